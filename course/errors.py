@@ -11,3 +11,15 @@ class CourseError(Exception):
     """
 
     exit_code = 1
+
+
+class DomainError(CourseError):
+    """A ROS domain id is out of range, or no free one is left on this machine."""
+
+
+class SessionError(CourseError):
+    """A session was asked for something that it cannot do (closed, wrong kind of node, ...)."""
+
+
+class WaitTimeout(CourseError):
+    """A wait reached its deadline; the message names what was waited for."""

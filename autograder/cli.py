@@ -1,0 +1,222 @@
+"""The ``autograder`` command."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from course.errors import CourseError
+from course.platform_check import require_supported_platform
+
+EXIT_DIFFERENT = 1
+"""The work was done, and something did not come out as it must (a corpus case, the demo)."""
+
+app = typer.Typer(
+    name="autograder",
+    help="Build, release and grade ROS 2 exercises by what the nodes do.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+out = Console()
+err = Console(stderr=True)
+
+Root = Annotated[
+    Path | None,
+    typer.Option("--root", help="The nbgrader course root (default: the course's own)."),
+]
+Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Submissions run at a time.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
+
+
+class Progress:
+    """One line a submission that is done: readable in a terminal and in a log file."""
+
+    def __init__(self, *, silent: bool) -> None:
+        """Say nothing if ``silent``."""
+        self._silent = silent
+        self._done = 0
+
+    def __call__(self, student: str, graded: Any | None) -> None:
+        """Report a submission that is done."""
+        if graded is None or self._silent:
+            return
+        self._done += 1
+        verdicts = [v for outcome in graded.outcomes.values() for v in outcome.verdicts.values()]
+        points, most = sum(v.score for v in verdicts), sum(v.max_score for v in verdicts)
+        seconds = sum(outcome.seconds for outcome in graded.outcomes.values())
+        problem = f"  {graded.problem}" if graded.problem else ""
+        out.print(
+            f"  {self._done:>3}  {student}: {points:g} of {most:g} automatic points, "
+            f"{seconds:.1f} s{problem}",
+            markup=False, highlight=False, soft_wrap=True,
+        )  # fmt: skip
+
+
+@app.command()
+def build(
+    root: Root = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Only say whether all is in step.")
+    ] = False,
+    with_solutions: Annotated[
+        bool, typer.Option("--with-solutions", help="Keep the chapters' solutions.")
+    ] = False,
+) -> None:
+    """Build the notebooks from their text sources."""
+    from autograder.build import build as build_notebooks
+
+    for path in build_notebooks(_root(root), check=check, with_solutions=with_solutions):
+        out.print(str(path), soft_wrap=True)
+
+
+@app.command()
+def release(assignment: str, root: Root = None) -> None:
+    """Make the student version of an assignment with nbgrader."""
+    from autograder.release import release as release_assignment
+
+    out.print(str(release_assignment(_root(root), assignment)), soft_wrap=True)
+
+
+@app.command()
+def grade(
+    assignment: str,
+    root: Root = None,
+    jobs: Jobs = 2,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Also run what did not change.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Grade what is in ``submitted/`` into the gradebook, with feedback and grades.csv."""
+    from autograder import engine
+    from autograder.gradebook import CourseGradebook, write_csv
+
+    where = _root(root)
+    done = engine.grade(
+        where, assignment, jobs=jobs, fresh=fresh, progress=Progress(silent=as_json)
+    )
+    grades = CourseGradebook(where).grades(assignment)
+    write_csv(grades, assignment, where / "grades.csv")
+    problems = {g.student: g.problem for g in done if g.problem}
+    if as_json:
+        _print_json({"grades": [vars(g) for g in grades], "problems": problems})
+        return
+    _grades_table(grades, problems)
+    out.print(f"Gradebook {where / 'gradebook.db'}, feedback in {where / 'feedback'}, "
+              f"{where / 'grades.csv'}", soft_wrap=True)  # fmt: skip
+
+
+@app.command()
+def corpus(
+    exam: Annotated[str, typer.Argument(help="Which exam's corpus; all if left out.")] = "",
+    repeat: Annotated[int, typer.Option("--repeat", min=1, help="Runs of each case.")] = 1,
+    jobs: Jobs = 2,
+    as_json: AsJson = False,
+) -> None:
+    """Grade the graders: run every case of known verdict, and compare."""
+    from autograder import corpus_command
+
+    trials = corpus_command.run(exam, repeat=repeat, jobs=jobs, say=_say(as_json))
+    different = [trial for trial in trials if trial.difference]
+    if as_json:
+        _print_json(corpus_command.as_data(trials))
+    else:
+        out.print(corpus_command.table(trials))
+        out.print(f"{len(trials)} runs, {len(different)} with another verdict than expected.")
+    if different:
+        raise typer.Exit(EXIT_DIFFERENT)
+
+
+@app.command()
+def report(assignment: str, root: Root = None, as_json: AsJson = False) -> None:
+    """Show the grades of an assignment, and what still needs a person."""
+    from autograder.gradebook import CourseGradebook
+
+    grades = CourseGradebook(_root(root)).grades(assignment)
+    if as_json:
+        _print_json({"grades": [vars(grade) for grade in grades]})
+    else:
+        _grades_table(grades, {})
+
+
+@app.command()
+def demo(
+    folder: Annotated[
+        Path, typer.Option("--dir", help="Where to work; an earlier demo there is replaced.")
+    ] = Path("ros2-course-demo"),
+    jobs: Jobs = 2,
+    as_json: AsJson = False,
+) -> None:
+    """Build, release, collect a bundled class, grade it on real DDS, and show the grades."""
+    from autograder import demo as demo_run
+
+    done = demo_run.run(folder, jobs=jobs, say=_say(as_json), progress=Progress(silent=as_json))
+    if as_json:
+        rows = [{**vars(row), "grade": vars(row.grade)} for row in done.rows]
+        _print_json({"root": str(done.root), "rows": rows, "as_expected": done.as_expected})
+    else:
+        _demo_table(done)
+    if not done.as_expected:
+        raise typer.Exit(EXIT_DIFFERENT)
+
+
+def _demo_table(done: Any) -> None:
+    table = Table("Student", "What is special", "Fails", "Points", "Verdict", padding=(0, 0))
+    for column in (0, 3):
+        table.columns[column].no_wrap = True
+    for row in done.rows:
+        score = f"{row.grade.score:g} of {row.grade.max_score:g}"
+        table.add_row(row.student, row.title, row.expected, score, row.difference or "as expected")
+    out.print(table)
+    out.print("Five of the points are for the written explanation, which a person grades.")
+    places = {
+        "gradebook": done.root / "gradebook.db",
+        "grades": done.csv,
+        "feedback": done.root / "feedback",
+        "formgrader": f"run `jupyter lab` in {done.root}",
+    }
+    for what, path in places.items():
+        out.print(f"{what:>11}: {path}", soft_wrap=True, highlight=False)
+
+
+def _grades_table(grades: list[Any], problems: dict[str, str]) -> None:
+    table = Table("Student", "Score", "Needs a person", "Remark")
+    for grade in grades:
+        score = f"{grade.score:g} of {grade.max_score:g}"
+        needs = "yes" if grade.needs_manual_grade else ""
+        table.add_row(grade.student, score, needs, problems.get(grade.student, ""))
+    out.print(table)
+
+
+def _say(silent: bool) -> Any:
+    return (lambda _line: None) if silent else (lambda line: out.print(line, soft_wrap=True))
+
+
+def _print_json(data: Any) -> None:
+    sys.stdout.write(json.dumps(data, default=str, ensure_ascii=False) + "\n")
+
+
+def _root(root: Path | None) -> Path:
+    from course.content import content_root
+
+    if root is None:
+        return content_root()
+    return root.resolve()
+
+
+def main() -> None:
+    """Run the command; a `CourseError` is printed as its sentence, with its exit code."""
+    try:
+        require_supported_platform()
+        app()
+    except CourseError as error:
+        err.print(f"autograder: {error}", markup=False, highlight=False, soft_wrap=True)
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        err.print("autograder: stopped; what was graded so far is kept.")
+        sys.exit(130)

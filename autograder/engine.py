@@ -1,0 +1,185 @@
+"""Grade a whole assignment: run submissions side by side, enter scores one by one.
+
+Running is parallel, because a subject mostly waits; the gradebook has one writer, this process.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+import nbformat
+from nbformat import NotebookNode
+
+from autograder import nbgrader_bridge as bridge
+from autograder import runner, submission
+from autograder.gradebook import CourseGradebook, GradebookError
+from autograder.runner import Outcome
+from autograder.store import OutcomeStore
+from autograder.submission import SubmissionError
+from course.errors import CourseError
+
+STAGED = f"{bridge.WORK_FOLDER}/staged"
+
+
+class AssignmentError(CourseError):
+    """An assignment that does not exist or is not ready; the message names what there is."""
+
+
+@dataclass(frozen=True)
+class Graded:
+    """One student's graded submission: outcomes by notebook, and what could not be done."""
+
+    student: str
+    outcomes: dict[str, Outcome]
+    problem: str = ""
+
+
+Progress = Callable[[str, Graded | None], None]
+"""Told (student, None) when a submission is taken up and (student, Graded) when it is done."""
+
+
+def grade(
+    root: Path,
+    assignment: str,
+    *,
+    jobs: int = 2,
+    fresh: bool = False,
+    feedback: bool = True,
+    progress: Progress = lambda _student, _graded: None,
+) -> list[Graded]:
+    """Grade every submission of an assignment into the gradebook of the course at ``root``.
+
+    Args:
+        root: the nbgrader course root.
+        assignment: its name.
+        jobs: how many submissions are run at a time.
+        fresh: run also what was run before and has not changed.
+        feedback: write HTML feedback, too.
+        progress: is told about each submission.
+
+    Raises:
+        AssignmentError: no such assignment, not released, or nothing submitted.
+        GradebookError: the gradebook itself cannot be used.
+    """
+    gradebook = CourseGradebook(root, submitted=STAGED)
+    names = _notebooks(gradebook, assignment)
+    students = _students(root, assignment)
+    class_ = _Class(gradebook, assignment, names, fresh)
+    graded = []
+    with ThreadPoolExecutor(max_workers=jobs) as pool:
+        futures = {pool.submit(class_.run, s, progress): s for s in students}
+        try:
+            for result in _results(futures):
+                graded.append(class_.enter(result, feedback))
+                progress(result.student, graded[-1])
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return sorted(graded, key=lambda item: item.student)
+
+
+def _results(futures: dict[Future[Graded], str]) -> Iterator[Graded]:
+    for future in as_completed(futures):
+        yield future.result()
+
+
+class _Class:
+    """The submissions of one assignment on their way into the gradebook."""
+
+    def __init__(
+        self, gradebook: CourseGradebook, assignment: str, notebooks: list[str], fresh: bool
+    ) -> None:
+        self._gradebook = gradebook
+        self._assignment = assignment
+        self._root = gradebook.root
+        self._store = OutcomeStore(self._root / bridge.WORK_FOLDER / "outcomes")
+        self._fresh = fresh
+        self._originals = {
+            name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
+        }
+
+    def run(self, student: str, progress: Progress) -> Graded:
+        """Stage and run one student's notebooks. Runs in a worker thread."""
+        progress(student, None)
+        staged = self._root / STAGED / student / self._assignment
+        shutil.rmtree(staged, ignore_errors=True)
+        staged.mkdir(parents=True)
+        submitted = self._root / "submitted" / student / self._assignment
+        if (submitted / "timestamp.txt").is_file():
+            shutil.copy(submitted / "timestamp.txt", staged)
+        outcomes, problems = {}, []
+        for name in self._originals:
+            notebook, outcome = self._one(submitted / f"{name}.ipynb")
+            nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
+            outcomes[name] = outcome
+            problems += outcome.notes if outcome.unreadable else []
+        return Graded(student, outcomes, " ".join(problems))
+
+    def _one(self, path: Path) -> tuple[NotebookNode, Outcome]:
+        source, released = self._originals[path.stem]
+        try:
+            notebook, notes = submission.restore(submission.read(path), source, released)
+        except SubmissionError as error:
+            blank = nbformat.from_dict(dict(released))  # type: ignore[no-untyped-call]
+            notebook, _ = submission.restore(blank, source, released)
+            return notebook, runner.refuse(submission.program(notebook), str(error))
+        notebook.metadata[bridge.NOTES_KEY] = notes
+        program = submission.program(notebook)
+        outcome = None if self._fresh else self._store.get(program)
+        if outcome is None:
+            outcome = runner.run(program)
+            self._store.put(program, outcome)
+        return notebook, outcome
+
+    def enter(self, graded: Graded, feedback: bool) -> Graded:
+        """Enter one student's outcomes into the gradebook. Runs in the one writer."""
+        for name, outcome in graded.outcomes.items():
+            bridge.prepared[self._assignment, graded.student, name] = outcome
+        try:
+            self._gradebook.autograde(self._assignment, graded.student)
+            if feedback:
+                self._gradebook.generate_feedback(self._assignment, graded.student)
+        except GradebookError as error:
+            return Graded(graded.student, graded.outcomes, str(error))
+        finally:
+            for name in graded.outcomes:
+                bridge.prepared.pop((self._assignment, graded.student, name), None)
+        return graded
+
+
+def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
+    """Return the notebooks of a released assignment, or say what is missing."""
+    known = gradebook.assignments()
+    if assignment not in known:
+        sources = sorted(
+            path.name for path in (gradebook.root / "source").glob("*") if path.is_dir()
+        )
+        if assignment in sources:
+            raise AssignmentError(
+                f"The assignment '{assignment}' has not been released: run "
+                f"`autograder release {assignment}` first."
+            )
+        raise AssignmentError(
+            f"There is no assignment '{assignment}' in {gradebook.root}: there are "
+            f"{', '.join(sources) or 'none yet'}."
+        )
+    folder = gradebook.root / "source" / assignment
+    return sorted(path.stem for path in folder.glob("*.ipynb"))
+
+
+def _students(root: Path, assignment: str) -> list[str]:
+    """Return the students who have a folder for the assignment."""
+    submitted = root / "submitted"
+    students = sorted(
+        path.parent.name for path in submitted.glob(f"*/{assignment}") if path.is_dir()
+    )
+    if not students:
+        raise AssignmentError(
+            f"Nobody has submitted '{assignment}' yet: nbgrader expects the files in "
+            f"{submitted}/<student>/{assignment}/."
+        )
+    return students

@@ -1,0 +1,182 @@
+"""Exams: checks that depend on each other, run in order by the examiner.
+
+A check is a function that gets the exam's rig and returns normally when the behaviour is right (a
+string it returns becomes a remark in the report) or raises `Failed`. The first line of its
+docstring is the title that a student reads; the rest says why it matters on a robot.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field, replace
+from typing import Generic, TypeVar
+
+from autograder import points as points_table
+from autograder.bench import Bench, SubjectGone
+from autograder.verdict import CheckResult, Status, Verdict
+from course.errors import CourseError
+
+RigT = TypeVar("RigT")
+
+
+class ExamError(CourseError):
+    """An exam that does not exist, or whose definition does not hold together."""
+
+
+class Failed(Exception):  # noqa: N818 - it is a finding, not a fault
+    """The behaviour was observed and was not what is needed.
+
+    ``expected`` and ``actual`` are one sentence each, in the terms of the exercise.
+    """
+
+    def __init__(self, *, expected: str, actual: str) -> None:
+        """Record what was needed and what was seen."""
+        super().__init__(f"expected: {expected} observed: {actual}")
+        self.expected = expected
+        self.actual = actual
+
+
+@dataclass(frozen=True)
+class Check(Generic[RigT]):
+    """One check: what it examines, what it needs, and how it helps."""
+
+    name: str
+    title: str
+    rationale: str
+    run: Callable[[RigT], str | None]
+    needs: tuple[str, ...]
+    hints: tuple[str, ...]
+    read: str
+
+
+@dataclass
+class Exam(Generic[RigT]):
+    """The checks of one exercise, and the rig they run on.
+
+    ``rig`` is a context manager around the bench: what it gives is what every check takes.
+    """
+
+    name: str
+    rig: Callable[[Bench], AbstractContextManager[RigT]]
+    checks: dict[str, Check[RigT]] = field(default_factory=dict)
+
+    def check(
+        self, *, needs: Sequence[str] = (), hints: Sequence[str] = (), read: str = ""
+    ) -> Callable[[Callable[[RigT], str | None]], Callable[[RigT], str | None]]:
+        """Register a check under its function's name.
+
+        Args:
+            needs: checks that must have passed before this one makes sense.
+            hints: from a nudge to nearly the answer; shown one by one.
+            read: where to read on (a section of the chapter, a page of the ROS 2 docs).
+        """
+        unknown = [name for name in needs if name not in self.checks]
+        if unknown:
+            raise ExamError(f"Exam '{self.name}' has no check {unknown[0]!r} to depend on.")
+
+        def register(run: Callable[[RigT], str | None]) -> Callable[[RigT], str | None]:
+            title, _, rationale = inspect.cleandoc(run.__doc__ or run.__name__).partition("\n")
+            self.checks[run.__name__] = Check(
+                run.__name__, title.strip(), " ".join(rationale.split()), run,
+                tuple(needs), tuple(hints), read,
+            )  # fmt: skip
+            return run
+
+        return register
+
+    def part(self, part: str) -> dict[str, float]:
+        """Return {check: points} of a part, in the order of ``points.toml``.
+
+        Raises:
+            ExamError: no such part, or the table of points and the checks disagree.
+        """
+        table = points_table.of_part(self.name, part)
+        if not table:
+            parts = [name for name in points_table.table().get(self.name, {}) if name != "manual"]
+            raise ExamError(
+                f"Exam '{self.name}' has no part '{part}': there are {', '.join(parts) or 'none'}."
+            )
+        for name in table:
+            if name not in self.checks:
+                raise ExamError(f"points.toml names a check '{name}' that '{self.name}' lacks.")
+        return table
+
+    def sit(self, part: str, bench: Bench, failed: dict[str, CheckResult] | None = None) -> Verdict:
+        """Run the checks of ``part``, and what they need, each once.
+
+        A check that is only needed by others earns nothing here: its points are in its own part.
+        ``failed`` has what failed in an earlier part and is not tried again; what fails now is
+        added to it.
+        """
+        table = self.part(part)
+        failed = {} if failed is None else failed
+        done = dict(failed)
+        with self.rig(bench) as rig:
+            results = [_worth(self._result(name, rig, done), table[name]) for name in table]
+        failed.update((name, result) for name, result in done.items() if result.status == "failed")
+        return Verdict(self.name, part, tuple(results))
+
+    def _result(self, name: str, rig: RigT, done: dict[str, CheckResult]) -> CheckResult:
+        if name not in done:
+            check = self.checks[name]
+            for need in check.needs:
+                self._result(need, rig, done)
+            missing = [done[need] for need in check.needs if not done[need].passed]
+            done[name] = _not_checked(check, missing[0]) if missing else _run(check, rig)
+        return done[name]
+
+
+def _worth(result: CheckResult, points: float) -> CheckResult:
+    return replace(result, points=points if result.passed else 0.0, max_points=points)
+
+
+def _result_of(check: Check[RigT], status: Status) -> CheckResult:
+    return CheckResult(
+        check.name, check.title, status, 0.0, 0.0,
+        rationale=check.rationale, hints=check.hints, read=check.read,
+    )  # fmt: skip
+
+
+def _not_checked(check: Check[RigT], missing: CheckResult) -> CheckResult:
+    return replace(_result_of(check, "not_checked"), actual=f"This needs “{missing.title}” first.")
+
+
+def _run(check: Check[RigT], rig: RigT) -> CheckResult:
+    try:
+        note = check.run(rig) or ""
+    except Failed as failed:
+        return replace(_result_of(check, "failed"), expected=failed.expected, actual=failed.actual)
+    except SubjectGone as gone:
+        return replace(
+            _result_of(check, "failed"), actual=str(gone),
+            expected="Your program keeps running and answering while it is examined.",
+        )  # fmt: skip
+    except Exception as error:  # noqa: BLE001 - whatever else goes wrong in here is our fault
+        return replace(
+            _result_of(check, "grader_error"),
+            actual=f"The grader itself failed ({type(error).__name__}: {error}, in "
+            f"{_innermost(error)}). This is not your fault: a person will look at it.",
+        )
+    return replace(_result_of(check, "passed"), note=note)
+
+
+def _innermost(error: BaseException) -> str:
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return f"{trace.tb_frame.f_code.co_name}, line {trace.tb_lineno}" if trace else "unknown"
+
+
+def unexamined(exam: Exam[RigT], part: str, reason: str, status: Status = "not_checked") -> Verdict:
+    """Return the verdict of a part that could not be sat.
+
+    ``status`` says whose fault it is: ``"not_checked"`` the subject's, ``"grader_error"`` ours.
+    """
+    table = exam.part(part)
+    results = (
+        replace(_result_of(exam.checks[name], status), actual=reason, max_points=table[name])
+        for name in table
+    )
+    return Verdict(exam.name, part, tuple(results))

@@ -1,0 +1,67 @@
+"""The examiner process: sits exams on a subject that it can only see over DDS.
+
+Started as ``python -m autograder.examiner --control FD --domain N``. It reads requests
+``{"exam": ..., "part": ..., "moved_on": ...}`` from standard input, one JSON object a line, and
+writes one verdict a line to standard output; ``moved_on`` says that the notebook ran cells since.
+File descriptor ``FD`` is the control channel to the subject's harness.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import socket
+import sys
+from collections.abc import Sequence
+from typing import TextIO
+
+from autograder import exams
+from autograder.bench import Bench, Subject
+from autograder.verdict import CheckResult
+from autograder.wire import Channel
+from course import Session
+
+Failures = dict[str, dict[str, CheckResult]]
+"""What failed in this sitting, by exam: not tried again while the notebook has not moved on."""
+
+
+def sit(exam: str, part: str, session: Session, subject: Subject, failures: Failures) -> str:
+    """Run one part of an exam, let the subject go on, and return the verdict as JSON."""
+    try:
+        bench = Bench(session, subject)
+        return exams.load(exam).sit(part, bench, failures.setdefault(exam, {})).to_json()
+    finally:
+        subject.release()
+
+
+def serve(requests: TextIO, verdicts: TextIO, session: Session, subject: Subject) -> None:
+    """Answer requests until standard input ends."""
+    failures: Failures = {}
+    for line in requests:
+        request = json.loads(line)
+        if request["moved_on"]:
+            failures.clear()
+        verdict = sit(request["exam"], request["part"], session, subject, failures)
+        verdicts.write(verdict + "\n")
+        verdicts.flush()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the process; returns its exit code."""
+    parser = argparse.ArgumentParser(prog="autograder.examiner")
+    parser.add_argument("--control", type=int, required=True, help="file descriptor of the channel")
+    parser.add_argument("--domain", type=int, required=True, help="the subject's domain id")
+    options = parser.parse_args(arguments)
+    # Verdicts go out over a private copy of standard output: whatever a library prints must not
+    # end up among them.
+    verdicts = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    subject = Subject(Channel(socket.socket(fileno=options.control)))
+    with Session(domain_id=options.domain) as session:
+        serve(sys.stdin, verdicts, session, subject)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

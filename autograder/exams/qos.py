@@ -1,0 +1,368 @@
+"""Exercise 1: QoS profiles for camera, LIDAR, IMU and emergency stop, judged by their effect.
+
+Every bound below is a sentence of the task, so any design that keeps to the task passes: the
+chapter's profiles, `qos_profile_sensor_data` for the sensors, deeper or shallower queues, one
+profile for both sides or two, a transient-local stop.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from autograder.bench import StudentError
+from autograder.exam import Exam, Failed
+from autograder.rigs.sensors import (
+    CAMERA,
+    CONSUMERS,
+    DRIVERS,
+    IMU,
+    LIDAR,
+    SENSORS,
+    STOP,
+    Heard,
+    Sensor,
+    SensorRig,
+    indices,
+    lossless,
+    mismatch,
+    sensor_rig,
+    undemanding,
+)
+
+EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
+
+CAMERA_NEWEST = 10  # frames: 1 s at 10 Hz
+LIDAR_FRESH = 5  # scans: 0.5 s at 10 Hz
+IMU_BURST, IMU_BOUND = 5, 50  # readings: 50 ms and 0.5 s at 100 Hz
+STALL = 60  # readings sent to each sensor while the consumer is busy
+EVENTS = 5
+
+READ_RELIABILITY = "Chapter 5, “QoS profiles: reliability”"
+READ_HISTORY = "Chapter 5, “QoS profiles: history”"
+READ_DURABILITY = "Chapter 5, “QoS profiles: durability”"
+
+
+@EXAM.check(
+    hints=(
+        "Run the cell with your classes again: does it end without an error?",
+        "Try it beside the check: `course.run(SensorDrivers)`, then `course.run(SensorConsumers)`.",
+        "Both classes must be there under these names, and every topic under its name and type.",
+    ),
+    read="Chapter 5, “Nodes: the processing units”",
+)
+def nodes_start(rig: SensorRig) -> None:
+    """Both nodes start, with every topic in place.
+
+    A robot whose driver does not come up has no eyes: everything else waits for this.
+    """
+    for name in (DRIVERS, CONSUMERS):
+        try:
+            rig.subject.start(name)
+        except StudentError as error:
+            where = f" It happened here:\n{error.trace}" if error.trace else ""
+            raise Failed(
+                expected=f"{name}() makes a node without an error.",
+                actual=f"It raised {error}.{where}",
+            ) from None
+    rig.wait(lambda: not any(line.startswith("There is no") for line in _faults(rig)))
+    if faults := _faults(rig):
+        raise Failed(expected="Every topic of the task has its endpoint.", actual=" ".join(faults))
+
+
+def _faults(rig: SensorRig) -> list[str]:
+    """Return what is missing, or has another type than the task says, a sentence each."""
+    found = []
+    for sensor in SENSORS:
+        ends = {
+            f"subscription to hardware/{sensor.name}": rig.requested(f"hardware/{sensor.name}"),
+            f"publisher on {sensor.topic}": rig.offered(sensor.topic),
+            f"subscription to {sensor.topic}": rig.requested(sensor.topic),
+            f"publisher on consumer/{sensor.name}": rig.offered(f"consumer/{sensor.name}"),
+        }
+        wanted = f"{sensor.type.__module__.split('.')[0]}/msg/{sensor.type.__name__}"
+        for what, endpoints in ends.items():
+            types = {endpoint.topic_type for endpoint in endpoints}
+            if not types:
+                found.append(f"There is no {what}.")
+            elif wanted not in types:
+                found.append(f"The {what} has type {', '.join(sorted(types))}, not {wanted}.")
+    return found
+
+
+@EXAM.check(
+    needs=("nodes_start",),
+    hints=(
+        "Compare what your publisher offers with what your subscription requests.",
+        "A subscription may ask for less than is offered, never for more.",
+        "BEST_EFFORT never satisfies a RELIABLE request, nor VOLATILE a TRANSIENT_LOCAL one.",
+    ),
+    read="ROS 2 documentation, “Quality of Service settings: QoS compatibilities”",
+)
+def readings_flow(rig: SensorRig) -> None:
+    """A reading of each sensor travels from the hardware to the consumer.
+
+    Two incompatible profiles never connect, and nothing fails aloud: the robot is simply blind.
+    """
+    silent = rig.probe(SENSORS, rig.node.consumed, give_up=lambda s: _mismatches(rig, s))
+    if silent:
+        raise Failed(
+            expected="Each of the four sensors' readings comes out at the consumer.",
+            actual=" ".join(_why_silent(rig, sensor) for sensor in silent),
+        )
+
+
+def _mismatches(rig: SensorRig, sensor: Sensor) -> list[str]:
+    pairs = [(o, r) for o in rig.offered(sensor.topic) for r in rig.requested(sensor.topic)]
+    reasons = [mismatch(offered, requested) for offered, requested in pairs]
+    return reasons if pairs and all(reasons) else []
+
+
+def _why_silent(rig: SensorRig, sensor: Sensor) -> str:
+    if reasons := _mismatches(rig, sensor):
+        return f"Nothing of {sensor.name} arrives, because DDS refuses the pair: {reasons[0]}"
+    if not rig.node.witnessed[sensor.name]:
+        return f"Nothing of {sensor.name} is published on {sensor.topic}."
+    raised = rig.subject.errors()
+    why = f" (a callback raised {raised[-1]})" if raised else ""
+    return f"{sensor.topic} carries readings, but none comes out on consumer/{sensor.name}{why}."
+
+
+@EXAM.check(
+    needs=("readings_flow",),
+    hints=(
+        "What should happen to a camera frame that was lost on the way?",
+        "A reliable link re-sends it, and holds back the newer frames until it is there.",
+        "Make either side of camera/image BEST_EFFORT.",
+    ),
+    read=READ_RELIABILITY,
+)
+def camera_best_effort(rig: SensorRig) -> str:
+    """A lost camera frame is gone; it never holds up newer ones.
+
+    RELIABLE repairs a loss by sending the old frame again, in order: on Wi-Fi the picture freezes
+    and then plays the past. A connection is reliable only if both sides ask for it.
+    """
+    offered, requested = rig.offered(CAMERA.topic), rig.requested(CAMERA.topic)
+    if _all_reliable(offered) and _all_reliable(requested):
+        raise Failed(
+            expected="The link from driver to consumer on camera/image is best effort.",
+            actual="The driver offers RELIABLE and the consumer requests it, so DDS re-sends.",
+        )
+    if _all_reliable(offered):
+        return "The driver offers RELIABLE, the consumer asks for less: the link is best effort."
+    return "The price: a subscriber that insists on RELIABLE now receives no picture."
+
+
+def _all_reliable(endpoints: list[TopicEndpointInfo]) -> bool:
+    return all(e.qos_profile.reliability == ReliabilityPolicy.RELIABLE for e in endpoints)
+
+
+def busy_consumer(rig: SensorRig) -> dict[str, list[int]]:
+    """Stall the consumer, feed every sensor, let it go on; return what it then passed on.
+
+    The barrier is a last emergency stop: it takes the same road into the subject as everything
+    before it, so once it is seen on the wire the stalled readers have received all they will.
+    """
+    rig.subject.pause(CONSUMERS)
+    for sensor in SENSORS:
+        if not rig.burst(sensor, "stall", STALL):
+            raise Failed(
+                expected=f"The driver publishes all {STALL} {sensor.name} readings that come in.",
+                actual=f"After {len(indices(rig.node.witnessed, sensor, 'stall'))} it fell silent.",
+            )
+    rig.burst(STOP, "barrier", 1)
+    rig.subject.resume(CONSUMERS)
+    for sensor in SENSORS:
+        rig.wait(lambda s=sensor: STALL - 1 in rig.consumed(s, "stall"))  # type: ignore[misc]
+    return {sensor.name: rig.consumed(sensor, "stall") for sensor in SENSORS}
+
+
+def _kept(rig: SensorRig, sensor: Sensor, least: int, most: int, expected: str) -> list[int]:
+    kept: list[int] = rig.once(busy_consumer)[sensor.name]
+    newest = list(range(STALL - len(kept), STALL))
+    if kept != newest:
+        actual = "the newest was missing" if STALL - 1 not in kept else f"it acted on {_few(kept)}"
+        raise Failed(expected=expected, actual=f"Of readings 0 to {STALL - 1}, {actual}.")
+    if not least <= len(kept) <= most:
+        actual = f"It then worked through the last {len(kept)} of {STALL} readings."
+        raise Failed(expected=expected, actual=actual)
+    return kept
+
+
+def _few(numbers: list[int]) -> str:
+    shown = ", ".join(str(n) for n in numbers[:6])
+    return f"readings {shown}{' …' if len(numbers) > 6 else ''}" if numbers else "nothing at all"
+
+
+@EXAM.check(
+    needs=("readings_flow",),
+    hints=(
+        "Where do frames wait while the consumer is busy, and how many of them?",
+        "The depth of the subscription's KEEP_LAST is the length of that queue.",
+        f"KEEP_LAST with a depth of 1 to {CAMERA_NEWEST} keeps the picture live.",
+    ),
+    read=READ_HISTORY,
+)
+def camera_newest(rig: SensorRig) -> None:
+    """After a pause the camera consumer goes on with the newest frames.
+
+    A deep queue makes a slow reader live in the past: it works through old pictures while the
+    robot drives on.
+    """
+    expected = f"After a pause at most the last {CAMERA_NEWEST} frames (1 s) are processed."
+    _kept(rig, CAMERA, 1, CAMERA_NEWEST, expected)
+
+
+@EXAM.check(
+    needs=("readings_flow",),
+    hints=(
+        "How old is the oldest scan in a queue of depth 10, at 10 Hz?",
+        "Obstacle avoidance needs the latest scan; a few more do no harm.",
+        f"KEEP_LAST with depth 1 gives the latest scan only; up to {LIDAR_FRESH} are accepted.",
+    ),
+    read=READ_HISTORY,
+)
+def lidar_fresh(rig: SensorRig) -> str:
+    """After a pause obstacle avoidance acts on fresh scans only.
+
+    An old scan shows obstacles where they were: at 1 m/s half a second is half a metre.
+    """
+    expected = f"After a pause no scan older than 0.5 s (the last {LIDAR_FRESH}) is acted on."
+    _kept(rig, LIDAR, 1, LIDAR_FRESH, expected)
+    return _practice(rig, LIDAR)
+
+
+def _practice(rig: SensorRig, sensor: Sensor) -> str:
+    if _all_reliable(rig.offered(sensor.topic)):
+        return (
+            "RELIABLE is the chapter's answer. Many drivers in the field publish best effort "
+            "(SensorDataQoS) instead; both are right here."
+        )
+    return (
+        "Best effort is what many drivers in the field do (SensorDataQoS); the chapter's answer is "
+        "RELIABLE. Both are right here, but a subscriber that insists on RELIABLE hears nothing."
+    )
+
+
+@EXAM.check(
+    needs=("readings_flow",),
+    hints=(
+        "Count how many readings come in while the consumer is busy for 50 ms, at 100 Hz.",
+        "A queue that is too short drops part of the burst; an endless one replays the past.",
+        f"KEEP_LAST with a depth of {IMU_BURST} to {IMU_BOUND} fits; the chapter takes 10.",
+    ),
+    read=READ_HISTORY,
+)
+def imu_burst(rig: SensorRig) -> str:
+    """A short burst of IMU readings is kept, a long past is not.
+
+    State estimation integrates: each reading that is missing is an angle that is wrong. But a
+    controller that works through seconds of old readings steers by the past.
+    """
+    expected = (
+        f"After a pause the last {IMU_BURST} readings (50 ms) at least are there, and at most "
+        f"{IMU_BOUND} (0.5 s)."
+    )
+    _kept(rig, IMU, IMU_BURST, IMU_BOUND, expected)
+    return _practice(rig, IMU)
+
+
+@EXAM.check(
+    needs=("readings_flow",),
+    hints=(
+        "Which consumers can connect to a BEST_EFFORT publisher, and which cannot?",
+        "What a publisher offers must be at least what the most demanding subscriber requests.",
+        "Offer RELIABLE on emergency/stop, and request it in your consumer too.",
+    ),
+    read=READ_RELIABILITY,
+)
+def stop_reaches_all(rig: SensorRig) -> None:
+    """An emergency stop reaches every consumer, whichever reliability it asks for.
+
+    A safety node asks for RELIABLE, a logger on Wi-Fi perhaps for BEST_EFFORT: neither may miss a
+    stop. Only a RELIABLE offer serves both.
+    """
+    reliable: Heard = defaultdict(list)
+    casual: Heard = defaultdict(list)
+    rig.node.listen(STOP, STOP.topic, lossless(), reliable)
+    rig.node.listen(STOP, STOP.topic, undemanding(), casual)
+    offers_all = _all_reliable(rig.offered(STOP.topic))
+    for heard, who in ((reliable, "RELIABLE"), (casual, "BEST_EFFORT")):
+        if rig.probe([STOP], heard, give_up=lambda _: not offers_all):
+            raise Failed(
+                expected="A consumer that asks for RELIABLE and one for BEST_EFFORT both hear it.",
+                actual=f"A consumer that asks for {who} heard nothing on emergency/stop.",
+            )
+    rig.burst(STOP, "event", EVENTS)
+    for heard in (reliable, casual):
+        rig.wait(lambda h=heard: len(indices(h, STOP, "event")) >= EVENTS)  # type: ignore[misc]
+        if (got := indices(heard, STOP, "event")) != list(range(EVENTS)):
+            raise Failed(
+                expected=f"{EVENTS} stops arrive as {EVENTS} stops, in order.",
+                actual=f"A consumer heard {_few(got)}.",
+            )
+    if not _all_reliable(rig.requested(STOP.topic)):
+        raise Failed(
+            expected="Your own consumer cannot lose a stop on a bad network either.",
+            actual="It requests BEST_EFFORT, so DDS does not repair a lost event for it.",
+        )
+
+
+@EXAM.check(
+    needs=("readings_flow",),
+    hints=(
+        "Which stop events are left if the consumer was busy while many came in?",
+        "KEEP_LAST(depth) throws the oldest away as soon as more than `depth` are waiting.",
+        "KEEP_ALL, or a depth of 100 as in the task, keeps every event.",
+    ),
+    read=READ_HISTORY,
+)
+def stop_complete(rig: SensorRig) -> str:
+    """Every stop event is kept, in order, even while the consumer is busy.
+
+    Pressed, released, pressed again: whoever sees only the last event does not know what happened.
+    """
+    kept: list[int] = rig.once(busy_consumer)[STOP.name]
+    if kept != list(range(STALL)):
+        missing = STALL - len(set(kept))
+        raise Failed(
+            expected=f"All {STALL} events of the pause are handled, in order.",
+            actual=f"{missing} of {STALL} were lost: the consumer handled {_few(kept)}.",
+        )
+    durable = any(
+        e.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        for e in rig.offered(STOP.topic)
+    )
+    return "TRANSIENT_LOCAL also tells a node that starts late: well thought." if durable else ""
+
+
+@EXAM.check(
+    needs=("readings_flow",),
+    hints=(
+        "What does a node that starts late receive from a TRANSIENT_LOCAL publisher?",
+        "A map or a parameter is still true a minute later. Is a camera frame?",
+        "VOLATILE for camera, LIDAR and IMU.",
+    ),
+    read=READ_DURABILITY,
+)
+def late_joiner(rig: SensorRig) -> None:
+    """A node that starts late does not act on old camera, LIDAR or IMU data.
+
+    A planner that restarts in mid-drive must not take a scan from before for the present.
+    """
+    for sensor in (CAMERA, LIDAR, IMU):
+        rig.burst(sensor, "before", EVENTS)
+        late: Heard = defaultdict(list)
+        refused: list[object] = []
+        profile = lossless(DurabilityPolicy.TRANSIENT_LOCAL)
+        rig.node.listen(sensor, sensor.topic, profile, late, refused.append)
+        # Either DDS refuses to hand out the past, or the writer replays it at once.
+        rig.wait(lambda heard=late, no=refused, s=sensor: no or heard[s.name])  # type: ignore[misc]
+        if old := indices(late, sensor, "before"):
+            raise Failed(
+                expected=f"A late reader of {sensor.topic} gets new readings only.",
+                actual=f"It was handed {len(old)} {sensor.name} readings from before it started.",
+            )

@@ -1,0 +1,152 @@
+"""The course's own nbgrader: its configuration, its gradebook, and the calls that we make."""
+
+from __future__ import annotations
+
+import csv
+import logging
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from nbgrader.api import Gradebook, MissingEntry
+from nbgrader.apps import NbGraderAPI
+from nbgrader.coursedir import CourseDirectory
+from traitlets.config import Config
+from traitlets.config.loader import PyFileConfigLoader
+
+from course.errors import CourseError
+
+
+class GradebookError(CourseError):
+    """nbgrader could not do what was asked; the message carries its own last words."""
+
+
+@dataclass(frozen=True)
+class Grade:
+    """One student's result: points earned and possible, and whether a person must still look.
+
+    ``cells`` is {notebook: {grade id: points, or None while a manual grade is missing}}.
+    """
+
+    student: str
+    score: float
+    max_score: float
+    needs_manual_grade: bool
+    cells: dict[str, dict[str, float | None]]
+
+
+class CourseGradebook:
+    """nbgrader on one course root (the folder with ``nbgrader_config.py``)."""
+
+    def __init__(self, root: Path, *, submitted: str = "submitted") -> None:
+        """Use the course at ``root``; read submissions from its folder ``submitted``."""
+        self.root = root.resolve()
+        config = _config(self.root)
+        config.CourseDirectory.root = str(self.root)
+        config.CourseDirectory.submitted_directory = submitted
+        self.config: Config = config
+        self.coursedir = CourseDirectory(config=config)
+        self._api = NbGraderAPI(coursedir=self.coursedir, config=config)
+        self._api.log_level = logging.ERROR
+
+    def generate_assignment(self, assignment: str) -> None:
+        """Make the student version of an assignment and enter it into the gradebook."""
+        self._call(self._api.generate_assignment, assignment, force=True, create=True)
+
+    def autograde(self, assignment: str, student: str) -> None:
+        """Enter one student's scores."""
+        self._call(self._api.autograde, assignment, student, force=True, create=True)
+
+    def generate_feedback(self, assignment: str, student: str) -> None:
+        """Write one student's feedback as HTML."""
+        self._call(self._api.generate_feedback, assignment, student, force=True)
+
+    def assignments(self) -> list[str]:
+        """Return the assignments that have been released into the gradebook."""
+        with self._open() as gradebook:
+            return sorted(assignment.name for assignment in gradebook.assignments)
+
+    def grades(self, assignment: str) -> list[Grade]:
+        """Return the grades of an assignment, one a student, sorted by student."""
+        with self._open() as gradebook:
+            submissions = gradebook.assignment_submissions(assignment)
+            return sorted((_grade(s) for s in submissions), key=lambda grade: grade.student)
+
+    def _call(self, method: Any, *arguments: Any, **options: Any) -> None:
+        with _quiet():
+            result = method(*arguments, **options)
+        if not result["success"]:
+            said = [line for line in str(result.get("log", "")).splitlines() if line.strip()]
+            last = result.get("error") or (said[-1] if said else "no reason given")
+            raise GradebookError(
+                f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: "
+                f"{str(last).strip().splitlines()[-1]}"
+            )
+
+    @contextmanager
+    def _open(self) -> Iterator[Gradebook]:
+        try:
+            with _quiet(), Gradebook(self.coursedir.db_url, self.coursedir.course_id) as gradebook:
+                yield gradebook
+        except MissingEntry as error:
+            raise GradebookError(
+                f"The gradebook in {self.root} has no such entry: {error}"
+            ) from None
+
+
+def _grade(submission: Any) -> Grade:
+    cells: dict[str, dict[str, float | None]] = {}
+    for notebook in submission.notebooks:
+        cells[notebook.name] = {
+            grade.name: None
+            if grade.needs_manual_grade and grade.manual_score is None
+            else float(grade.score)
+            for grade in notebook.grades
+        }
+    return Grade(
+        submission.student.id,
+        float(submission.score),
+        float(submission.max_score),
+        bool(submission.needs_manual_grade),
+        cells,
+    )
+
+
+def write_csv(grades: list[Grade], assignment: str, path: Path) -> None:
+    """Write one line a student; a cell that waits for a manual grade is empty."""
+    columns = sorted({(n, c) for g in grades for n, cells in g.cells.items() for c in cells})
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        head = ["assignment", "student_id", "score", "max_score", "needs_manual_grade"]
+        writer.writerow(head + [f"{notebook}:{cell}" for notebook, cell in columns])
+        for grade in grades:
+            points = [grade.cells.get(notebook, {}).get(cell) for notebook, cell in columns]
+            row = [
+                assignment,
+                grade.student,
+                grade.score,
+                grade.max_score,
+                grade.needs_manual_grade,
+            ]
+            writer.writerow([*row, *("" if p is None else p for p in points)])
+
+
+def _config(root: Path) -> Config:
+    if not (root / "nbgrader_config.py").is_file():
+        raise GradebookError(
+            f"There is no nbgrader_config.py in {root}: name the course root with --root, or start "
+            "in the folder that `autograder release` was run for."
+        )
+    loader = PyFileConfigLoader("nbgrader_config.py", path=str(root))
+    return Config(loader.load_config())
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep nbgrader's and SQLAlchemy's deprecation chatter off the screen."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield

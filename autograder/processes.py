@@ -1,0 +1,116 @@
+"""Starting the examiner and talking to it, for both doors: a student's kernel and the engine."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from types import TracebackType
+
+from autograder.verdict import MAX_BYTES, Verdict
+from course.errors import CourseError
+
+EXAM_TIMEOUT = 120.0
+"""Seconds one part of an exam may take in all: its own deadlines end it long before."""
+
+
+class ExaminerError(CourseError):
+    """The examiner process failed; it is never the student's fault."""
+
+
+class ExaminerProcess:
+    """A running examiner, bound to one subject by a control channel."""
+
+    def __init__(
+        self, control: socket.socket, domain_id: int, *, env: Mapping[str, str] | None = None
+    ) -> None:
+        """Start the process; ``control`` is its end of the channel and is closed here."""
+        command = [
+            sys.executable, "-m", "autograder.examiner",
+            "--control", str(control.fileno()), "--domain", str(domain_id),
+        ]  # fmt: skip
+        # What the examiner's libraries print on stderr must never reach a graded cell.
+        self._process = subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            pass_fds=[control.fileno()],
+            start_new_session=True,
+            env=dict(os.environ if env is None else env),
+        )
+        control.close()
+        self._buffer = b""
+
+    def request(self, exam: str, part: str, *, moved_on: bool = True) -> None:
+        """Ask for a part of an exam; its verdict comes with `verdict`.
+
+        ``moved_on`` is False if the notebook ran nothing since the last part: then what failed
+        there need not be tried again.
+        """
+        assert self._process.stdin is not None
+        line = json.dumps({"exam": exam, "part": part, "moved_on": moved_on}).encode() + b"\n"
+        try:
+            self._process.stdin.write(line)
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            raise ExaminerError(f"The examiner ended at once: {self._last_words()}") from None
+
+    def verdict(self, timeout: float = EXAM_TIMEOUT) -> Verdict:
+        """Return the verdict of the part that was asked for.
+
+        Raises:
+            ExaminerError: the examiner ended or took longer than ``timeout`` seconds.
+            VerdictError: what it wrote is no verdict.
+        """
+        assert self._process.stdout is not None
+        deadline = time.monotonic() + timeout
+        stream = self._process.stdout.fileno()
+        while b"\n" not in self._buffer:
+            ready, _, _ = select.select([stream], [], [], max(0.0, deadline - time.monotonic()))
+            if not ready:
+                raise ExaminerError(f"The examiner gave no verdict within {timeout:.0f} s.")
+            chunk = os.read(stream, 65536)
+            if not chunk or len(self._buffer) > MAX_BYTES:
+                raise ExaminerError(f"The examiner ended without a verdict: {self._last_words()}")
+            self._buffer += chunk
+        line, self._buffer = self._buffer.split(b"\n", 1)
+        return Verdict.from_json(line.decode())
+
+    def _last_words(self) -> str:
+        self._kill()
+        assert self._process.stderr is not None
+        lines = self._process.stderr.read(65536).decode(errors="replace").strip().splitlines()
+        return lines[-1] if lines else f"exit code {self._process.returncode}"
+
+    def _kill(self) -> None:
+        if self._process.poll() is None:
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+
+    def __enter__(self) -> ExaminerProcess:
+        """Return itself; leaving the block ends the process."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Let the process end by itself, or end it if it does not."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.close()
+            self._process.wait(timeout=5 if error is None else 0)
+        except (subprocess.TimeoutExpired, BrokenPipeError):
+            self._kill()
+        for stream in (self._process.stdout, self._process.stderr):
+            if stream is not None:
+                stream.close()

@@ -1,0 +1,1 @@
+"""What exams observe with: the examiner's own endpoints around the nodes under examination."""

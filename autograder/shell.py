@@ -1,0 +1,74 @@
+"""Runs a notebook's code cells in this process, as a kernel would, and collects their outputs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from IPython.core.interactiveshell import InteractiveShell
+from IPython.utils.capture import capture_output
+from traitlets.config import Config
+
+MAX_OUTPUT = 64 * 1024
+"""Characters kept of one stream of one cell; a flood is cut, and says so."""
+
+Output = dict[str, Any]
+
+
+class CellShell(InteractiveShell):  # type: ignore[misc] - traitlets metaclass
+    """An IPython shell that keeps a cell's error instead of printing it."""
+
+    last_error: Output | None = None
+
+    def _showtraceback(
+        self, etype: type[BaseException], evalue: BaseException, stb: list[str]
+    ) -> None:
+        self.last_error = {
+            "output_type": "error",
+            "ename": getattr(etype, "__name__", str(etype)),
+            "evalue": _cut(str(evalue)),
+            "traceback": [_cut(line) for line in stb],
+        }
+
+    def ask_exit(self) -> None:
+        """Ignore ``exit``: the rest of the notebook is still run."""
+
+
+def make_shell() -> CellShell:
+    """Return this process's shell: no history file, no prompt, no colours."""
+    config = Config()
+    config.HistoryManager.enabled = False
+    config.InteractiveShell.colors = "NoColor"
+    shell: CellShell = CellShell.instance(config=config)
+    return shell
+
+
+def run_cell(shell: CellShell, source: str) -> list[Output]:
+    """Run one cell and return its outputs in notebook format; an error is one of them."""
+    shell.last_error = None
+    with capture_output() as captured:
+        shell.run_cell(source, store_history=True)
+    outputs: list[Output] = []
+    for name in ("stdout", "stderr"):
+        if text := getattr(captured, name):
+            outputs.append(_stream(_cut(text), name))
+    room = MAX_OUTPUT
+    for shown in captured.outputs:
+        data = {mime: value for mime, value in shown.data.items() if isinstance(value, str)}
+        room -= sum(len(value) for value in data.values())
+        if room < 0:
+            outputs.append(_stream("[further outputs were cut off here]\n"))
+            break
+        outputs.append({"output_type": "display_data", "data": data, "metadata": {}})
+    if shell.last_error is not None:
+        outputs.append(shell.last_error)
+    return outputs
+
+
+def _stream(text: str, name: str = "stdout") -> Output:
+    return {"output_type": "stream", "name": name, "text": text}
+
+
+def _cut(text: str) -> str:
+    if len(text) <= MAX_OUTPUT:
+        return text
+    return f"{text[:MAX_OUTPUT]}\n[{len(text) - MAX_OUTPUT} more characters were cut off here]\n"

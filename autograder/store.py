@@ -1,0 +1,72 @@
+"""Outcomes kept on disk, so that what did not change is not run again."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Iterator
+from functools import cache
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from autograder.runner import Outcome
+from autograder.submission import Program, digest
+from course.errors import CourseError
+
+
+@cache
+def exam_salt() -> str:
+    """Return a digest of everything that decides a verdict beside the submission itself."""
+    state = hashlib.sha256()
+    for file in sorted(_sources(resources.files("autograder")), key=lambda f: f.name):
+        state.update(file.name.encode() + b"\0" + file.read_bytes())
+    return state.hexdigest()
+
+
+def _sources(folder: Traversable) -> Iterator[Traversable]:
+    for entry in folder.iterdir():
+        if entry.is_dir():
+            yield from _sources(entry)
+        elif entry.name.endswith((".py", ".toml")):
+            yield entry
+
+
+class OutcomeStore:
+    """A folder of outcomes, one file a program, named by the program's digest."""
+
+    def __init__(self, folder: Path) -> None:
+        """Keep outcomes in ``folder``, which is made when the first one is written."""
+        self._folder = folder
+
+    def get(self, program: Program) -> Outcome | None:
+        """Return the outcome of an equal program under equal exams, if there is a sound one."""
+        try:
+            return Outcome.from_json(self._path(program).read_text(encoding="utf-8"))
+        except (OSError, ValueError, KeyError, TypeError, CourseError):
+            return None
+
+    def put(self, program: Program, outcome: Outcome) -> None:
+        """Keep an outcome; one that a grader error spoilt is not kept.
+
+        Raises:
+            CourseError: the folder cannot be written (a full disk, say).
+        """
+        if outcome.needs_human:
+            return
+        path = self._path(program)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
+                file.write(outcome.to_json())
+            os.replace(file.name, path)  # noqa: PTH105 - atomic: a reader sees all of it or none
+        except OSError as error:
+            raise CourseError(
+                f"The outcome of a submission could not be written to {path.parent} "
+                f"({error.strerror}): make room there and run the same command again; what was "
+                "graded so far is kept."
+            ) from error
+
+    def _path(self, program: Program) -> Path:
+        return self._folder / f"{digest(program, exam_salt())}.json"

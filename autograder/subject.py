@@ -1,0 +1,54 @@
+"""The subject process: hosts one student's code while an examiner watches it from outside.
+
+Started as ``python -m autograder.subject --engine FD --control FD --domain N``. The engine sends
+the program over its channel, the examiner drives the harness over the control channel whenever
+the program comes to an exam. Nothing that this process says about itself earns a point.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import socket
+import sys
+from collections.abc import Sequence
+
+from autograder.harness import SUBJECT_ENV, Harness
+from autograder.shell import make_shell, run_cell
+from autograder.wire import Channel, ChannelClosed
+from course import Session
+
+
+def run(engine: Channel, control: Channel, domain_id: int) -> None:
+    """Run the engine's program cell by cell, and serve the examiner where it says so."""
+    shell = make_shell()
+    for number, cell in enumerate(engine.receive()["cells"]):
+        if cell["exam"]:
+            with Session(domain_id=domain_id) as session:
+                engine.send({"exam": number})
+                Harness(session, shell.user_ns).serve(control)
+        else:
+            engine.send({"ran": number, "outputs": run_cell(shell, cell["source"])})
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the process; returns its exit code."""
+    parser = argparse.ArgumentParser(prog="autograder.subject")
+    parser.add_argument("--engine", type=int, required=True, help="file descriptor of the engine")
+    parser.add_argument(
+        "--control", type=int, required=True, help="file descriptor of the examiner"
+    )
+    parser.add_argument("--domain", type=int, required=True, help="domain id the exam is sat on")
+    options = parser.parse_args(arguments)
+    os.environ[SUBJECT_ENV] = "1"
+    engine = Channel(socket.socket(fileno=options.engine))
+    control = Channel(socket.socket(fileno=options.control))
+    try:
+        run(engine, control, options.domain)
+    except ChannelClosed:
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,115 @@
+"""What an exam found: versioned JSON, one result a check.
+
+Four outcomes are kept apart, because they mean different things to a student and an instructor:
+a check *passed*, *failed* (the behaviour was seen and was wrong), was *not checked* (something it
+needs had failed), or ended in a *grader error* (our fault: never the student's).
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+from course.errors import CourseError
+
+VERSION = 1
+MAX_BYTES = 1024 * 1024
+
+Status = Literal["passed", "failed", "not_checked", "grader_error"]
+STATUSES: tuple[Status, ...] = ("passed", "failed", "not_checked", "grader_error")
+
+
+class VerdictError(CourseError):
+    """A verdict that cannot be read: damaged, too large, or of another version."""
+
+
+@dataclass(frozen=True)
+class CheckResult:
+    """The outcome of one check.
+
+    ``points`` is what was earned of ``max_points``. ``rationale`` says why the behaviour matters
+    on a robot, ``expected`` and ``actual`` what was needed and what was observed, ``hints`` lead to
+    the mend step by step, ``read`` names where to read more, ``note`` is a remark on a pass.
+    """
+
+    name: str
+    title: str
+    status: Status
+    points: float
+    max_points: float
+    rationale: str = ""
+    expected: str = ""
+    actual: str = ""
+    hints: tuple[str, ...] = ()
+    read: str = ""
+    note: str = ""
+
+    @property
+    def passed(self) -> bool:
+        """Whether the behaviour was seen and right."""
+        return self.status == "passed"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The results of one part of one exam on one subject."""
+
+    exam: str
+    part: str
+    checks: tuple[CheckResult, ...]
+    notes: tuple[str, ...] = ()
+    version: int = field(default=VERSION)
+
+    @property
+    def score(self) -> float:
+        """Points earned, rounded to the hundredth so that sums print as people write them."""
+        return round(sum(check.points for check in self.checks), 2)
+
+    @property
+    def max_score(self) -> float:
+        """Points there are to earn."""
+        return round(sum(check.max_points for check in self.checks), 2)
+
+    @property
+    def needs_human(self) -> bool:
+        """Whether a grader error left something that a person has to look at."""
+        return any(check.status == "grader_error" for check in self.checks)
+
+    def to_json(self) -> str:
+        """Return the verdict as one line of JSON."""
+        return json.dumps(asdict(self), ensure_ascii=False)
+
+    @classmethod
+    def from_json(cls, text: str) -> Verdict:
+        """Read a verdict.
+
+        Raises:
+            VerdictError: the text is no verdict of this version.
+        """
+        if len(text) > MAX_BYTES:
+            raise VerdictError(f"A verdict of {len(text)} bytes was refused: at most {MAX_BYTES}.")
+        try:
+            data = json.loads(text)
+            if data["version"] != VERSION:
+                raise VerdictError(
+                    f"A verdict of version {data['version']} cannot be read by this release, which "
+                    f"reads version {VERSION}: grade the submission again."
+                )
+            checks = tuple(_check(item) for item in data["checks"])
+            notes = tuple(str(note) for note in data["notes"])
+            return cls(str(data["exam"]), str(data["part"]), checks, notes)
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            raise VerdictError(
+                f"A verdict is damaged ({type(error).__name__}: {error}): grade it again."
+            ) from error
+
+
+def _check(item: dict[str, Any]) -> CheckResult:
+    if item["status"] not in STATUSES:
+        raise ValueError(f"unknown status {item['status']!r}")
+    points, max_points = float(item["points"]), float(item["max_points"])
+    if not 0 <= points <= max_points:
+        raise ValueError(f"{points} points of {max_points}")
+    return CheckResult(**{**item, "points": points, "max_points": max_points,
+                          "hints": tuple(item["hints"])})  # fmt: skip

@@ -1,0 +1,91 @@
+"""The control channel between examiner and subject: one JSON object a line, over a socket.
+
+What comes from a subject is data written by a stranger: it is bounded in size, parsed as JSON and
+nothing else, and every read has a deadline.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from typing import Any
+
+MAX_LINE = 2 * 1024 * 1024
+"""Largest message in bytes: the outputs of one cell are the largest, and are cut well below it."""
+
+
+class ChannelClosed(Exception):  # noqa: N818 - a state of the other side, not a fault of ours
+    """The other side closed the channel or its process ended."""
+
+
+class ChannelTimeout(Exception):  # noqa: N818
+    """The other side did not answer before the deadline."""
+
+
+class Channel:
+    """A line-based JSON channel over a connected stream socket."""
+
+    def __init__(self, sock: socket.socket) -> None:
+        """Take ownership of ``sock``."""
+        self._sock = sock
+        self._buffer = b""
+
+    def send(self, message: dict[str, Any]) -> None:
+        """Send one message.
+
+        Raises:
+            ChannelClosed: the other side is gone.
+            ValueError: the message is larger than ``MAX_LINE``.
+        """
+        line = json.dumps(message, ensure_ascii=False).encode(errors="replace") + b"\n"
+        if len(line) > MAX_LINE:
+            raise ValueError(f"control message of {len(line)} bytes is over {MAX_LINE}")
+        try:
+            self._sock.settimeout(None)
+            self._sock.sendall(line)
+        except OSError as error:
+            raise ChannelClosed(str(error)) from error
+
+    def receive(self, timeout: float | None = None) -> dict[str, Any]:
+        """Return the next message, waiting at most ``timeout`` seconds (None: for ever).
+
+        Raises:
+            ChannelClosed: end of stream, or something that is not a JSON object of bounded size.
+            ChannelTimeout: nothing came in time.
+        """
+        deadline = None if timeout is None else time.monotonic() + timeout
+        while b"\n" not in self._buffer:
+            if len(self._buffer) > MAX_LINE:
+                raise ChannelClosed(f"a message of more than {MAX_LINE} bytes was sent")
+            self._fill(deadline)
+        line, self._buffer = self._buffer.split(b"\n", 1)
+        try:
+            message = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            raise ChannelClosed("a message that is not JSON was sent") from error
+        if not isinstance(message, dict):
+            raise ChannelClosed("a message that is not a JSON object was sent")
+        return message
+
+    def _fill(self, deadline: float | None) -> None:
+        if deadline is not None:
+            left = deadline - time.monotonic()
+            if left <= 0:
+                raise ChannelTimeout
+            self._sock.settimeout(left)
+        else:
+            self._sock.settimeout(None)
+        try:
+            chunk = self._sock.recv(65536)
+        except TimeoutError as error:
+            raise ChannelTimeout from error
+        except OSError as error:
+            raise ChannelClosed(str(error)) from error
+        if not chunk:
+            raise ChannelClosed("end of stream")
+        self._buffer += chunk
+
+    def close(self) -> None:
+        """Close the socket; closing twice is fine."""
+        self._sock.close()

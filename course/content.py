@@ -1,0 +1,75 @@
+"""Where the course's own material lies: in a clone of the repository or in the installed package.
+
+In a clone (and in an editable installation) the folder ``notebooks`` is beside the packages. A
+wheel carries a copy of it as data of this package; see ``force-include`` in ``pyproject.toml``.
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from course.errors import CourseError
+
+_PACKAGE = Path(__file__).resolve().parent
+_CLONE, _DATA = _PACKAGE.parent, _PACKAGE / "data"
+
+CONFIG = "nbgrader_config.py"
+
+
+class ContentError(CourseError):
+    """Course material that is not where it should be, or cannot be copied."""
+
+
+def content_root() -> Path:
+    """Return the folder with the notebooks and ``nbgrader_config.py`` (an nbgrader course root).
+
+    Raises:
+        ContentError: the installation is incomplete.
+    """
+    return _first("notebooks", _CLONE / "notebooks", _DATA / "notebooks")
+
+
+def corpus_root() -> Path:
+    """Return the folder of submissions with known verdicts, one folder an exam.
+
+    Raises:
+        ContentError: the installation is incomplete.
+    """
+    return _first("submissions", _CLONE / "tests" / "submissions", _DATA / "submissions")
+
+
+def is_clone() -> bool:
+    """Whether the material is a clone's own, to be edited, and not the copy in a wheel."""
+    return content_root() != _DATA / "notebooks"
+
+
+def copy_authoring(root: Path, folder: Path) -> Path:
+    """Make ``folder`` an nbgrader course root with the text sources of ``root``; return it.
+
+    Raises:
+        ContentError: ``root`` is incomplete or ``folder`` cannot be written.
+    """
+    for name in ("authoring", CONFIG):
+        if not (root / name).exists():
+            raise ContentError(f"There is no {name} in {root}: it is not a course root.")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        shutil.copytree(root / "authoring", folder / "authoring", dirs_exist_ok=True)
+        shutil.copyfile(root / CONFIG, folder / CONFIG)
+    except OSError as error:
+        raise ContentError(
+            f"The course cannot be copied to {folder} ({error.strerror or error}): make room "
+            "there or choose another folder."
+        ) from error
+    return folder.resolve()
+
+
+def _first(what: str, *places: Path) -> Path:
+    for place in places:
+        if place.is_dir():
+            return place
+    raise ContentError(
+        f"The course's {what} are missing from this installation ({places[-1]}): install "
+        "ros2-course again."
+    )

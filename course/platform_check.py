@@ -1,0 +1,77 @@
+"""Whether ROS 2 can run here at all. Needs nothing but the standard library.
+
+The ROS 2 wheels exist for CPython on Linux x86-64 only, and elsewhere ``import rclpy`` fails with
+an error that helps nobody. So this runs before anything imports it.
+"""
+
+from __future__ import annotations
+
+import platform
+import sys
+
+from course.errors import CourseError
+
+OLDEST, NEWEST = (3, 11), (3, 14)
+"""First and last CPython that nbgrader, ipykernel and the ROS 2 wheels all support."""
+
+
+class UnsupportedPlatformError(CourseError):
+    """A Python or a platform that there are no ROS 2 wheels for."""
+
+    exit_code = 2
+
+
+def problem(
+    *,
+    system: str | None = None,
+    machine: str | None = None,
+    implementation: str | None = None,
+    version: tuple[int, int] | None = None,
+    libc: str | None = None,
+) -> str | None:
+    """Return one sentence that says why the course cannot run, or None if it can.
+
+    Args:
+        system: as `platform.system` gives it; this machine's if left out, like all that follow.
+        machine: as `platform.machine` gives it.
+        implementation: as `platform.python_implementation` gives it.
+        version: (major, minor) of Python.
+        libc: name of the C library, as `platform.libc_ver` gives it; empty if it is not glibc.
+    """
+    system = platform.system() if system is None else system
+    machine = platform.machine() if machine is None else machine
+    implementation = platform.python_implementation() if implementation is None else implementation
+    version = sys.version_info[:2] if version is None else version
+    libc = platform.libc_ver()[0] if libc is None else libc
+    if (system, machine.lower()) not in {("Linux", "x86_64"), ("Linux", "amd64")}:
+        return (
+            f"This course runs on Linux x86-64 only, not on {system or 'this system'} {machine}, "
+            "because the ROS 2 wheels exist for nothing else: use a Linux x86-64 machine, a "
+            f"virtual machine, {'WSL 2, ' if system == 'Windows' else ''}or a JupyterHub."
+        )
+    if not libc:
+        return (
+            "This Linux does not use glibc (Alpine, for example, uses musl), and the ROS 2 wheels "
+            "need it: use Debian, Ubuntu, Fedora or the like."
+        )
+    if implementation != "CPython" or not OLDEST <= version <= NEWEST:
+        return (
+            f"This course needs CPython {_text(OLDEST)} to {_text(NEWEST)}, not {implementation} "
+            f"{_text(version)}: run it with another Python, for example "
+            f"`uv run --python {_text((3, 12))} course lab`."
+        )
+    return None
+
+
+def require_supported_platform() -> None:
+    """Return if the course can run here.
+
+    Raises:
+        UnsupportedPlatformError: it cannot; the message says why, and what to do.
+    """
+    if (sentence := problem()) is not None:
+        raise UnsupportedPlatformError(sentence)
+
+
+def _text(version: tuple[int, int]) -> str:
+    return f"{version[0]}.{version[1]}"

@@ -1,0 +1,179 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-task", "locked": true, "schema_version": 3, "solution": false}
+# # Exercise 1: QoS profile design
+#
+# A delivery robot drives through a warehouse with a camera, a LIDAR, an IMU and an emergency stop
+# button. Their readings travel over four topics, and for each of them **you** decide what DDS
+# promises: reliability, durability, history and depth.
+#
+# | Sensor | Topic | Type | What the robot needs |
+# |---|---|---|---|
+# | camera | `camera/image` | `sensor_msgs/Image`, 10 Hz | A live picture over Wi-Fi. A lost frame is gone: nothing newer may wait for it. After a pause a consumer goes on with the newest frames, at most the last 10 (1 s). |
+# | LIDAR | `scan` | `sensor_msgs/LaserScan`, 10 Hz | Obstacle avoidance wants the latest scan. After a pause nothing older than 0.5 s (5 scans) is acted on. |
+# | IMU | `imu/data` | `sensor_msgs/Imu`, 100 Hz | State estimation may be busy for 50 ms (5 readings) and must still see each of them, but never more than the last 0.5 s (50 readings). |
+# | emergency stop | `emergency/stop` | `std_msgs/String`, on each press and release | Every event, in order, at every consumer, whichever reliability it asks for. Up to 100 events can queue up while a consumer is busy. |
+#
+# And one rule for camera, LIDAR and IMU together: a node that starts late must not act on old
+# readings. Whether the emergency stop remembers its last event for late joiners is up to you.
+#
+# Your work is examined by what your nodes **do**. Another process plays the hardware, keeps your
+# consumer busy, joins late, and listens on the wire. How you write it is your choice; every design
+# that does what the table says gets full marks.
+#
+# **20 points:** 10 for the visible checks, 5 for checks that run when your work is graded, 5 for
+# your explanation.
+
+# %% nbgrader={"grade": false, "grade_id": "qos-given", "locked": true, "schema_version": 3, "solution": false}
+# %load_ext course
+
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_profile_sensor_data,
+)
+from sensor_msgs.msg import Image, Imu, LaserScan
+from std_msgs.msg import String
+
+# Inside the robot readings travel over a cable that loses nothing. This profile is given.
+CABLE = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
+
+
+class Relay(Node):
+    """A node that passes messages on: what arrives on one topic leaves on another."""
+
+    def relay(self, msg_type, source, target, *, source_qos=CABLE, target_qos=CABLE):
+        """Subscribe to `source`, publish each message on `target`."""
+        publisher = self.create_publisher(msg_type, target, target_qos)
+        return self.create_subscription(msg_type, source, publisher.publish, source_qos)
+
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-your-work", "locked": true, "schema_version": 3, "solution": false}
+# ## Your design
+#
+# The cell below runs as it is, but its profiles are all the same: depth 10 and everything else by
+# default. Give each sensor what it needs. The drivers offer a profile, the consumers request one;
+# they may be equal or differ, as long as DDS connects them.
+#
+# Keep the two class names and the topic names. Everything else may change: you can drop `Relay`
+# and write both nodes from scratch.
+
+# %% nbgrader={"grade": false, "grade_id": "qos-solution", "locked": false, "schema_version": 3, "solution": true}
+camera_qos = QoSProfile(depth=10)
+lidar_qos = QoSProfile(depth=10)
+imu_qos = QoSProfile(depth=10)
+stop_qos = QoSProfile(depth=10)
+### BEGIN SOLUTION
+camera_qos = QoSProfile(
+    reliability=ReliabilityPolicy.BEST_EFFORT,
+    durability=DurabilityPolicy.VOLATILE,
+    history=HistoryPolicy.KEEP_LAST,
+    depth=5,
+)
+lidar_qos = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+    history=HistoryPolicy.KEEP_LAST,
+    depth=1,
+)
+imu_qos = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+    history=HistoryPolicy.KEEP_LAST,
+    depth=10,
+)
+stop_qos = QoSProfile(
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.VOLATILE,
+    history=HistoryPolicy.KEEP_ALL,
+)
+### END SOLUTION
+
+
+class SensorDrivers(Relay):
+    """Publishes what the hardware delivers."""
+
+    def __init__(self):
+        super().__init__('sensor_drivers')
+        self.relay(Image, 'hardware/camera', 'camera/image', target_qos=camera_qos)
+        self.relay(LaserScan, 'hardware/lidar', 'scan', target_qos=lidar_qos)
+        self.relay(Imu, 'hardware/imu', 'imu/data', target_qos=imu_qos)
+        self.relay(String, 'hardware/emergency_stop', 'emergency/stop', target_qos=stop_qos)
+
+
+class SensorConsumers(Relay):
+    """Hands each sensor's readings to the part of the robot that needs them."""
+
+    def __init__(self):
+        super().__init__('sensor_consumers')
+        self.relay(Image, 'camera/image', 'consumer/camera', source_qos=camera_qos)
+        self.relay(LaserScan, 'scan', 'consumer/lidar', source_qos=lidar_qos)
+        self.relay(Imu, 'imu/data', 'consumer/imu', source_qos=imu_qos)
+        self.relay(String, 'emergency/stop', 'consumer/emergency_stop', source_qos=stop_qos)
+
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-how-to-check", "locked": true, "schema_version": 3, "solution": false}
+# ## Check it yourself
+#
+# The next cell starts an examiner in a process of its own. It takes a few seconds. For each check
+# it says what was observed, what was needed, and why it matters on a robot. Ask for more help with
+# `check("qos", hint=2)` or `hint=3` in a cell of your own.
+
+# %% nbgrader={"grade": true, "grade_id": "qos-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
+from autograder import check
+
+check("qos")
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-about-hidden", "locked": true, "schema_version": 3, "solution": false}
+# The next cell is empty for you. When your work is graded, it examines the rest of the table: the
+# IMU's burst, the complete sequence of stop events, and the node that starts late.
+
+# %% nbgrader={"grade": true, "grade_id": "qos-hidden", "locked": true, "points": 0, "schema_version": 3, "solution": false}
+# Filled in when your work is graded.
+### BEGIN HIDDEN TESTS
+check("qos", part="hidden")
+### END HIDDEN TESTS
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-rubric", "locked": true, "schema_version": 3, "solution": false}
+# ## Explain your choices
+#
+# For each sensor say in one or two sentences which reliability, durability, and history with which
+# depth you chose, and what would happen on the robot with the opposite choice. An instructor reads
+# this; the five points are given as follows.
+#
+# | Points | For |
+# |---|---|
+# | 1 | Reliability: who re-sends, and why a late camera frame is worse than a lost one |
+# | 1 | Reliability of the emergency stop: what may never happen, and which policy prevents it |
+# | 1 | Durability: what a node that starts late gets, and why old sensor data is a danger |
+# | 1 | History and depth: what a busy consumer finds in its queue, for LIDAR against IMU |
+# | 1 | Compatibility: what happens if a consumer asks for more than the driver offers |
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "qos-explanation", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# **Camera:** best effort, volatile, keep last 5. A lost frame is replaced by the next one 100 ms
+# later; re-sending it would hold up newer frames and freeze the picture.
+#
+# **LIDAR:** reliable, volatile, keep last 1. Only the latest scan counts. Best effort, as many
+# drivers offer it, would do as well; then no consumer may request RELIABLE.
+#
+# **IMU:** reliable, volatile, keep last 10. Ten readings are 100 ms: enough for a busy estimator,
+# too little to steer by the past.
+#
+# **Emergency stop:** reliable, volatile, keep all. No event may get lost on the way or in a queue.
+# A RELIABLE offer also serves consumers that ask for BEST_EFFORT; the other way round DDS refuses
+# the connection and the stop would never arrive.
+# ### END SOLUTION

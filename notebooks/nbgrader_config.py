@@ -1,0 +1,57 @@
+"""nbgrader's configuration for this course: this folder is the course root."""
+
+from pathlib import Path
+
+from nbconvert.preprocessors import ClearMetadataPreprocessor
+from nbgrader.preprocessors import (
+    AssignLatePenalties,
+    CheckCellMetadata,
+    ClearOutput,
+    DeduplicateIds,
+    IgnorePattern,
+    LimitOutput,
+    OverwriteCells,
+    OverwriteKernelspec,
+    SaveAutoGrades,
+)
+
+from autograder.nbgrader_bridge import FlagForHumans, GradeByBehaviour, RestoreCells
+
+c = get_config()  # noqa: F821 - given by nbgrader
+root = Path(__file__).resolve().parent
+
+c.CourseDirectory.course_id = "ros2-course"
+c.CourseDirectory.root = str(root)
+c.NbGrader.logfile = str(root / ".nbgrader.log")
+
+# What stands in place of a solution. The code stub raises nothing: what is given around it runs,
+# so that a student can check early and see what is still missing.
+c.ClearSolutions.code_stub = {"python": "# Your work goes here."}
+c.ClearSolutions.text_stub = "*Your answer goes here.*"
+
+# A deleted test cell would otherwise say "needs manual grading" for ever.
+c.OverwriteCells.add_missing_cells = True
+
+# `nbgrader validate` runs the checks in a kernel: some need several seconds of simulated time.
+c.Execute.timeout = 300
+
+# Our own steps among nbgrader's: first mend what a student did to the instructor's cells, then
+# watch the nodes instead of trusting what the notebook prints, and flag what a person must see.
+c.Autograde.sanitize_preprocessors = [
+    RestoreCells,
+    ClearOutput,
+    DeduplicateIds,
+    OverwriteKernelspec,
+    OverwriteCells,
+    CheckCellMetadata,
+]
+c.Autograde.autograde_preprocessors = [
+    GradeByBehaviour,
+    IgnorePattern,
+    ClearMetadataPreprocessor,
+    LimitOutput,
+    SaveAutoGrades,
+    FlagForHumans,
+    AssignLatePenalties,
+    CheckCellMetadata,
+]

@@ -1,0 +1,68 @@
+"""A course root as an instructor has it: built, released, ready to collect submissions."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat import NotebookNode
+
+from autograder import corpus, submission
+from autograder.build import build
+from autograder.corpus import Case
+from autograder.release import release
+from course.content import content_root, copy_authoring
+
+SUBMISSIONS = Path(__file__).parents[1] / "submissions"
+ASSIGNMENT, NOTEBOOK = "ch05", "qos-design"
+
+
+@dataclass(frozen=True)
+class Course:
+    """A released course in a folder of its own."""
+
+    root: Path
+
+    @property
+    def source(self) -> NotebookNode:
+        return submission.read(self.root / "source" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+
+    @property
+    def released(self) -> NotebookNode:
+        return submission.read(self.root / "release" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+
+    def folder(self, student: str) -> Path:
+        folder = self.root / "submitted" / student / ASSIGNMENT
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
+
+    def submit(self, student: str, notebook: NotebookNode | str) -> Path:
+        path = self.folder(student) / f"{NOTEBOOK}.ipynb"
+        if isinstance(notebook, str):
+            path.write_text(notebook, encoding="utf-8")
+        else:
+            nbformat.write(notebook, path)
+        return path
+
+
+@pytest.fixture(scope="session")
+def released_course(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = copy_authoring(content_root(), tmp_path_factory.mktemp("course"))
+    build(root)
+    release(root, ASSIGNMENT)
+    return root
+
+
+@pytest.fixture
+def course(released_course: Path, tmp_path: Path) -> Course:
+    root = tmp_path / "course"
+    shutil.copytree(released_course, root)
+    return Course(root)
+
+
+@pytest.fixture(scope="session")
+def cases() -> dict[str, Case]:
+    return {case.name: case for case in corpus.load(SUBMISSIONS, "qos")}

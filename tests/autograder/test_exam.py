@@ -1,0 +1,130 @@
+"""The runner of exams: dependencies, four outcomes, and points from one table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from autograder import exams, points
+from autograder.bench import Bench, SubjectGone
+from autograder.exam import Exam, ExamError, Failed, unexamined
+
+
+@contextmanager
+def no_rig(_bench: Any) -> Iterator[list[str]]:
+    yield []
+
+
+@pytest.fixture
+def exam(monkeypatch: pytest.MonkeyPatch) -> Exam[list[str]]:
+    table = {
+        "toy": {"visible": {"first": 1.0, "second": 2.0, "third": 4.0}, "hidden": {"last": 8.0}}
+    }
+    monkeypatch.setattr(points, "table", lambda: table)
+    exam: Exam[list[str]] = Exam("toy", no_rig)
+
+    @exam.check()
+    def first(rig: list[str]) -> str:
+        """It starts.
+
+        Because it must.
+        """
+        rig.append("first")
+        return "nice"
+
+    @exam.check(needs=("first",))
+    def second(rig: list[str]) -> None:
+        """It runs."""
+        rig.append("second")
+        raise Failed(expected="left", actual="right")
+
+    @exam.check(needs=("second",))
+    def third(rig: list[str]) -> None:
+        """It flies."""
+        rig.append("third")
+
+    @exam.check(needs=("first",))
+    def last(rig: list[str]) -> None:
+        """It ends."""
+        raise ZeroDivisionError("of the grader's own")
+
+    return exam
+
+
+BENCH: Any = None
+
+
+def test_a_check_whose_need_failed_is_not_checked(exam: Exam[list[str]]) -> None:
+    verdict = exam.sit("visible", BENCH)
+    assert [check.status for check in verdict.checks] == ["passed", "failed", "not_checked"]
+    assert (verdict.score, verdict.max_score) == (1.0, 7.0)
+    first, second, third = verdict.checks
+    assert (first.title, first.rationale, first.note) == ("It starts.", "Because it must.", "nice")
+    assert (second.expected, second.actual) == ("left", "right")
+    assert "It runs." in third.actual
+
+
+def test_the_graders_own_fault_is_never_the_students(exam: Exam[list[str]]) -> None:
+    verdict = exam.sit("hidden", BENCH)
+    assert [check.status for check in verdict.checks] == ["grader_error"]
+    assert verdict.needs_human
+    assert "ZeroDivisionError" in verdict.checks[0].actual
+
+
+def test_a_subject_that_ends_fails_the_check(exam: Exam[list[str]]) -> None:
+    @exam.check()
+    def gone(rig: list[str]) -> None:
+        """It stays."""
+        raise SubjectGone("It left.")
+
+    points.table()["toy"]["late"] = {"gone": 1.0}
+    (check,) = exam.sit("late", BENCH).checks
+    assert (check.status, check.actual) == ("failed", "It left.")
+
+
+def test_each_check_runs_once_a_sitting(exam: Exam[list[str]]) -> None:
+    seen: list[str] = []
+
+    @contextmanager
+    def rig(_bench: Bench) -> Iterator[list[str]]:
+        yield seen
+
+    exam.rig = rig
+    exam.sit("visible", BENCH)
+    assert seen == ["first", "second"]
+
+
+def test_unexamined_parts_keep_their_points_out_of_reach(exam: Exam[list[str]]) -> None:
+    verdict = unexamined(exam, "visible", "the process ended")
+    assert (verdict.score, verdict.max_score) == (0.0, 7.0)
+    assert {check.actual for check in verdict.checks} == {"the process ended"}
+
+
+def test_an_unknown_part_names_those_there_are(exam: Exam[list[str]]) -> None:
+    with pytest.raises(ExamError, match=r"no part 'secret': there are visible, hidden"):
+        exam.part("secret")
+
+
+def test_an_unknown_need_is_refused(exam: Exam[list[str]]) -> None:
+    with pytest.raises(ExamError, match="no check 'nothing'"):
+        exam.check(needs=("nothing",))
+
+
+def test_an_unknown_exam_names_those_there_are() -> None:
+    with pytest.raises(ExamError, match=r"no exam 'qso': there are .*qos.* Did you mean 'qos'"):
+        exams.load("qso")
+
+
+@pytest.mark.parametrize("name", exams.names())
+def test_every_exam_and_the_table_of_points_agree(name: str) -> None:
+    exam = exams.load(name)
+    parts = [part for part in points.table()[name] if part != "manual"]
+    worth = [check for part in parts for check in exam.part(part)]
+    assert sorted(worth) == sorted(exam.checks), "each check has points in exactly one part"
+    for check in exam.checks.values():
+        assert check.rationale, f"{check.name} must say why it matters on a robot"
+        assert len(check.hints) == 3
+        assert check.read

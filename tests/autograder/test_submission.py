@@ -1,0 +1,171 @@
+"""Damaged submissions: mended where that is honest, refused in one sentence otherwise."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat import NotebookNode
+from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
+
+from autograder import submission
+from autograder.submission import SubmissionError
+
+
+def cell(grade_id: str, source: str, **flags: bool) -> NotebookNode:
+    data = {"grade": False, "locked": False, "solution": False, **flags}
+    data |= {"grade_id": grade_id, "schema_version": 3} | ({"points": 2} if data["grade"] else {})
+    return new_code_cell(source, id=grade_id, metadata={"nbgrader": data})
+
+
+def notebook(hidden: str = "") -> NotebookNode:
+    return new_notebook(
+        cells=[
+            new_markdown_cell("# Task", id="text"),
+            cell("given", "x = 1", locked=True),
+            cell("qos-solution", "y = 0", solution=True),
+            cell("qos-visible", f"check('qos'){hidden}", locked=True, grade=True),
+            cell("tail", "assert y", locked=True, grade=True),
+        ]
+    )
+
+
+SOURCE, RELEASED = notebook("  # secret"), notebook()
+
+
+def restored(submitted: NotebookNode) -> tuple[NotebookNode, list[str]]:
+    return submission.restore(submitted, SOURCE, RELEASED)
+
+
+def ids(nb: NotebookNode) -> list[str]:
+    return [submission.grade_id(c) for c in nb.cells]
+
+
+def test_an_honest_submission_needs_no_mending() -> None:
+    nb = notebook()
+    nb.cells[2].source = "y = 42"
+    mended, notes = restored(nb)
+    assert notes == []
+    assert mended.cells[2].source == "y = 42"
+    assert mended.cells[3].source.endswith("secret")
+
+
+def test_an_edited_locked_cell_gets_its_text_back() -> None:
+    nb = notebook()
+    nb.cells[3].source = "15.0"
+    mended, notes = restored(nb)
+    assert mended.cells[3].source == SOURCE.cells[3].source
+    assert "qos-visible" in notes[0]
+
+
+def test_metadata_are_the_instructors() -> None:
+    nb = notebook()
+    nb.cells[3].metadata["nbgrader"].update(points=99, locked=False, solution=True, grade=False)
+    mended, _ = restored(nb)
+    assert mended.cells[3].metadata["nbgrader"] == RELEASED.cells[3].metadata["nbgrader"]
+
+
+@pytest.mark.parametrize("gone", [(3,), (4,), (3, 4), (1, 2, 3, 4), (0, 1, 2, 3, 4)])
+def test_deleted_cells_come_back_in_their_place(gone: tuple[int, ...]) -> None:
+    nb = notebook()
+    nb.cells = [c for index, c in enumerate(nb.cells) if index not in gone]
+    mended, notes = restored(nb)
+    assert [i for i in ids(mended) if i] == ["given", "qos-solution", "qos-visible", "tail"]
+    assert len(notes) == len([index for index in gone if index])
+
+
+def test_of_duplicated_cells_the_one_worked_on_counts() -> None:
+    nb = notebook()
+    work = cell("qos-solution", "y = 42", solution=True)
+    nb.cells.append(work)
+    mended, notes = restored(nb)
+    (counting,) = [c for c in mended.cells if submission.grade_id(c) == "qos-solution"]
+    assert counting.source == "y = 42"
+    assert "2 times" in notes[0]
+
+
+def test_a_duplicated_test_cell_is_disarmed() -> None:
+    nb = notebook()
+    nb.cells.insert(4, cell("qos-visible", "7.0", locked=True, grade=True))
+    mended, _ = restored(nb)
+    assert ids(mended).count("qos-visible") == 1
+    assert [c.exam for c in submission.program(mended)].count("qos") == 1
+
+
+def test_a_cell_of_another_type_is_changed_back() -> None:
+    nb = notebook()
+    nb.cells[2] = new_markdown_cell("y = 42", metadata=nb.cells[2].metadata)
+    mended, notes = restored(nb)
+    assert (mended.cells[2].cell_type, mended.cells[2].source) == ("code", "y = 42")
+    assert "markdown" in notes[0]
+
+
+def test_foreign_grade_cells_are_disarmed() -> None:
+    nb = notebook()
+    nb.cells.append(cell("gift", "100.0", locked=True, grade=True))
+    mended, notes = restored(nb)
+    assert "gift" not in ids(mended)
+    assert "gift" in notes[0]
+
+
+@pytest.mark.parametrize("nonsense", [None, [], "x", {"grade_id": ["a"]}, {"grade_id": None}])
+def test_nonsense_in_metadata_is_ignored(nonsense: object) -> None:
+    nb = notebook()
+    nb.cells[0].metadata["nbgrader"] = nonsense
+    mended, _ = restored(nb)
+    assert ids(mended)[1:] == ["given", "qos-solution", "qos-visible", "tail"]
+
+
+def test_the_program_names_where_exams_are_sat() -> None:
+    program = submission.program(restored(notebook())[0])
+    assert [(c.source, c.exam, c.part) for c in program] == [
+        ("x = 1", "", ""), ("y = 0", "", ""), ("", "qos", "visible"), ("assert y", "", ""),
+    ]  # fmt: skip
+
+
+def test_equal_programs_have_equal_digests_and_exams_matter() -> None:
+    program = submission.program(notebook())
+    assert submission.digest(program, "a") == submission.digest(submission.program(notebook()), "a")
+    assert submission.digest(program, "a") != submission.digest(program, "b")
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("", "not valid JSON"),
+        ('{"cells": [', "not valid JSON"),
+        ("[]", "not a notebook"),
+        ('{"nbformat": 3, "worksheets": []}', "not a notebook"),
+        ('{"nbformat": 4, "nbformat_minor": 5, "metadata": {}, "cells": [{}]}', "format"),
+        ("[" * 100_000, "not valid JSON"),
+    ],
+)
+def test_what_is_no_notebook_is_one_sentence(tmp_path: Path, content: str, reason: str) -> None:
+    path = tmp_path / "qos-design.ipynb"
+    path.write_text(content)
+    with pytest.raises(SubmissionError, match=reason) as caught:
+        submission.read(path)
+    assert "qos-design.ipynb" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "qos-design.ipynb"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SubmissionError, match="not valid JSON"):
+        submission.read(path)
+
+
+def test_a_missing_notebook_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SubmissionError, match=r"no qos-design\.ipynb"):
+        submission.read(tmp_path / "qos-design.ipynb")
+
+
+def test_a_huge_notebook_is_refused_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(submission, "MAX_NOTEBOOK", 1000)
+    path = tmp_path / "qos-design.ipynb"
+    path.write_text(json.dumps(nbformat.from_dict(notebook())) + " " * 1000)
+    with pytest.raises(SubmissionError, match="clear its outputs"):
+        submission.read(path)

@@ -1,0 +1,81 @@
+"""Verdicts: what is written can be read, and what is damaged is refused in one sentence."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from autograder.report import Report
+from autograder.verdict import CheckResult, Verdict, VerdictError
+
+FAILED = CheckResult(
+    "fresh", "Scans are <fresh>", "failed", 0.0, 2.0, rationale="Half a metre.", expected="5.",
+    actual="<script>alert(1)</script>", hints=("one", "two", "three"), read="Chapter 5",
+)  # fmt: skip
+PASSED = CheckResult("start", "Nodes start", "passed", 1.0, 1.0, note="well done")
+VERDICT = Verdict("qos", "visible", (PASSED, FAILED), notes=("a cell was put back",))
+
+
+def test_a_verdict_survives_json() -> None:
+    assert Verdict.from_json(VERDICT.to_json()) == VERDICT
+
+
+def test_scores_add_up() -> None:
+    assert (VERDICT.score, VERDICT.max_score, VERDICT.needs_human) == (1.0, 3.0, False)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"version": 2},
+        {"checks": [{"status": "perfect"}]},
+        {"checks": None},
+        {"exam": None, "checks": [{}]},
+    ],
+)
+def test_a_forged_or_damaged_verdict_is_refused(change: dict[str, object]) -> None:
+    data = {**json.loads(VERDICT.to_json()), **change}
+    with pytest.raises(VerdictError):
+        Verdict.from_json(json.dumps(data))
+
+
+@pytest.mark.parametrize("points", [3.0, -1.0, float("nan")])
+def test_points_outside_their_range_are_refused(points: float) -> None:
+    data = json.loads(VERDICT.to_json())
+    data["checks"][1]["points"] = points
+    with pytest.raises(VerdictError, match="damaged"):
+        Verdict.from_json(json.dumps(data))
+
+
+@pytest.mark.parametrize("text", ["", "null", "{", "[]", "x" * 2_000_000])
+def test_what_is_no_verdict_is_refused(text: str) -> None:
+    with pytest.raises(VerdictError):
+        Verdict.from_json(text)
+
+
+def test_the_report_escapes_what_came_from_a_subject() -> None:
+    html = Report(VERDICT)._repr_html_()
+    assert "<script>" not in html
+    assert "&lt;script&gt;" in html
+
+
+def test_hints_are_given_one_by_one() -> None:
+    one, two, three = (repr(Report(VERDICT, hints=n)) for n in (1, 2, 3))
+    assert "hint 1: one" in one
+    assert "two" not in one
+    assert 'check("qos", hint=2)' in one
+    assert "hint 2: two" in two
+    assert "hint=4" not in three
+
+
+def test_the_report_says_what_was_seen_needed_and_why() -> None:
+    text = repr(Report(VERDICT))
+    for part in (
+        "1 of 3 points",
+        "a cell was put back",
+        "needed: 5.",
+        "Half a metre.",
+        "Chapter 5",
+    ):
+        assert part in text

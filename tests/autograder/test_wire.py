@@ -1,0 +1,61 @@
+"""The control channel: bounded, deadlined, JSON only."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from autograder.wire import MAX_LINE, Channel, ChannelClosed, ChannelTimeout
+
+
+@pytest.fixture
+def ends() -> Iterator[tuple[Channel, socket.socket]]:
+    ours, theirs = socket.socketpair()
+    channel = Channel(ours)
+    yield channel, theirs
+    channel.close()
+    theirs.close()
+
+
+def test_messages_arrive_whole_and_in_order(ends: tuple[Channel, socket.socket]) -> None:
+    channel, theirs = ends
+    theirs.sendall(b'{"op": "start"}\n{"op": ')
+    theirs.sendall('"späť"}\n'.encode())
+    assert channel.receive(5) == {"op": "start"}
+    assert channel.receive(5) == {"op": "späť"}
+
+
+def test_silence_ends_at_the_deadline(ends: tuple[Channel, socket.socket]) -> None:
+    channel, _ = ends
+    with pytest.raises(ChannelTimeout):
+        channel.receive(0.01)
+
+
+def test_a_closed_end_is_noticed(ends: tuple[Channel, socket.socket]) -> None:
+    channel, theirs = ends
+    theirs.close()
+    with pytest.raises(ChannelClosed):
+        channel.receive(5)
+    with pytest.raises(ChannelClosed):
+        channel.send({"op": "start"})
+
+
+@pytest.mark.parametrize("line", [b"not json\n", b"[1, 2]\n", b'"text"\n', b"[" * 100_000 + b"\n"])
+def test_what_is_no_json_object_closes_the_channel(
+    ends: tuple[Channel, socket.socket], line: bytes
+) -> None:
+    channel, theirs = ends
+    theirs.sendall(line)
+    with pytest.raises(ChannelClosed):
+        channel.receive(5)
+
+
+def test_an_endless_line_is_refused(ends: tuple[Channel, socket.socket]) -> None:
+    channel, theirs = ends
+    flood = threading.Thread(target=theirs.sendall, args=(b"x" * (MAX_LINE + 70_000),), daemon=True)
+    flood.start()
+    with pytest.raises(ChannelClosed, match="more than"):
+        channel.receive(30)

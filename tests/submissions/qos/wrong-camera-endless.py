@@ -1,0 +1,7 @@
+# title: A camera queue without an end
+# fails: camera_newest
+
+camera_qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
+lidar_qos = QoSProfile(depth=1)
+imu_qos = QoSProfile(depth=10)
+stop_qos = QoSProfile(history=HistoryPolicy.KEEP_ALL)

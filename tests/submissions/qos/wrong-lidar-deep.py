@@ -1,0 +1,7 @@
+# title: Obstacle avoidance that works through old scans
+# fails: lidar_fresh
+
+camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+lidar_qos = QoSProfile(depth=20)
+imu_qos = QoSProfile(depth=10)
+stop_qos = QoSProfile(history=HistoryPolicy.KEEP_ALL)
