@@ -74,7 +74,7 @@ def _show(report: Report) -> None:
     except ImportError:
         shell = None
     else:
-        shell = get_ipython()  # type: ignore[no-untyped-call]
+        shell = get_ipython()
     if shell is None:
         print(report)  # noqa: T201 - outside a notebook, the terminal is where a report goes
     else:

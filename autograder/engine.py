@@ -65,7 +65,7 @@ def grade(
         AssignmentError: no such assignment, not released, or nothing submitted.
         GradebookError: the gradebook itself cannot be used.
     """
-    gradebook = CourseGradebook(root, submitted=STAGED)
+    gradebook = CourseGradebook(root, staged=STAGED)
     names = _notebooks(gradebook, assignment)
     students = _students(root, assignment)
     class_ = _Class(gradebook, assignment, names, fresh)

@@ -17,6 +17,7 @@ from nbgrader.coursedir import CourseDirectory
 from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
+from autograder.nbgrader_bridge import RestoreCells
 from course.errors import CourseError
 
 
@@ -41,12 +42,19 @@ class Grade:
 class CourseGradebook:
     """nbgrader on one course root (the folder with ``nbgrader_config.py``)."""
 
-    def __init__(self, root: Path, *, submitted: str = "submitted") -> None:
-        """Use the course at ``root``; read submissions from its folder ``submitted``."""
+    def __init__(self, root: Path, *, staged: str = "") -> None:
+        """Use the course at ``root``.
+
+        ``staged`` names a folder of submissions whose cells have been restored already; nbgrader
+        then reads these in place of ``submitted``.
+        """
         self.root = root.resolve()
         config = _config(self.root)
         config.CourseDirectory.root = str(self.root)
-        config.CourseDirectory.submitted_directory = submitted
+        if staged:
+            config.CourseDirectory.submitted_directory = staged
+            steps = config.Autograde.sanitize_preprocessors
+            config.Autograde.sanitize_preprocessors = [s for s in steps if s is not RestoreCells]
         self.config: Config = config
         self.coursedir = CourseDirectory(config=config)
         self._api = NbGraderAPI(coursedir=self.coursedir, config=config)

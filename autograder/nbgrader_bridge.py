@@ -31,7 +31,7 @@ prepared: dict[Key, Any] = {}
 """Outcomes that the engine already has, by (assignment, student, notebook)."""
 
 
-class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc] - nbgrader ships no types
+class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ships no types
     """Put the instructor's cells right before anything else looks at a submission."""
 
     def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:

@@ -1,11 +1,17 @@
 """Runs a notebook's code cells in this process, as a kernel would, and collects their outputs."""
 
+# mypy: allow-untyped-calls
+# IPython leaves most of its functions untyped.
+
 from __future__ import annotations
 
 from typing import Any
 
+from IPython.core.displayhook import DisplayHook
+from IPython.core.displaypub import DisplayPublisher
 from IPython.core.interactiveshell import InteractiveShell
 from IPython.utils.capture import capture_output
+from traitlets import Type
 from traitlets.config import Config
 
 MAX_OUTPUT = 64 * 1024
@@ -14,10 +20,37 @@ MAX_OUTPUT = 64 * 1024
 Output = dict[str, Any]
 
 
-class CellShell(InteractiveShell):  # type: ignore[misc] - traitlets metaclass
-    """An IPython shell that keeps a cell's error instead of printing it."""
+class _Hook(DisplayHook):
+    """Keeps the value of a cell's last expression instead of printing it."""
 
-    last_error: Output | None = None
+    def write_output_prompt(self) -> None:
+        """Print no prompt."""
+
+    def write_format_data(self, format_dict: dict[str, Any], md_dict: Any = None) -> None:
+        _shell_of(self).shown.append(format_dict)
+
+
+class _Publisher(DisplayPublisher):
+    """Keeps what a cell displays."""
+
+    def publish(self, data: Any, *_: Any, **__: Any) -> None:
+        _shell_of(self).shown.append(data)
+
+    def clear_output(self, wait: bool = False) -> None:
+        """Keep it all: the record of a run is not an animation."""
+
+
+class CellShell(InteractiveShell):
+    """An IPython shell that keeps what a cell shows and raises instead of printing it."""
+
+    displayhook_class = Type(_Hook)
+    display_pub_class = Type(_Publisher)
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Start with nothing shown."""
+        self.shown: list[dict[str, Any]] = []
+        self.last_error: Output | None = None
+        super().__init__(**kwargs)
 
     def _showtraceback(
         self, etype: type[BaseException], evalue: BaseException, stb: list[str]
@@ -33,6 +66,11 @@ class CellShell(InteractiveShell):  # type: ignore[misc] - traitlets metaclass
         """Ignore ``exit``: the rest of the notebook is still run."""
 
 
+def _shell_of(part: Any) -> CellShell:
+    shell: CellShell = part.shell
+    return shell
+
+
 def make_shell() -> CellShell:
     """Return this process's shell: no history file, no prompt, no colours."""
     config = Config()
@@ -45,15 +83,16 @@ def make_shell() -> CellShell:
 def run_cell(shell: CellShell, source: str) -> list[Output]:
     """Run one cell and return its outputs in notebook format; an error is one of them."""
     shell.last_error = None
-    with capture_output() as captured:
+    shell.shown.clear()
+    with capture_output(display=False) as captured:
         shell.run_cell(source, store_history=True)
     outputs: list[Output] = []
     for name in ("stdout", "stderr"):
         if text := getattr(captured, name):
             outputs.append(_stream(_cut(text), name))
     room = MAX_OUTPUT
-    for shown in captured.outputs:
-        data = {mime: value for mime, value in shown.data.items() if isinstance(value, str)}
+    for shown in shell.shown:
+        data = {mime: value for mime, value in shown.items() if isinstance(value, str)}
         room -= sum(len(value) for value in data.values())
         if room < 0:
             outputs.append(_stream("[further outputs were cut off here]\n"))

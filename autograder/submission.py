@@ -62,7 +62,7 @@ def read(path: Path) -> NotebookNode:
                 f"{path.name} is not a notebook of format 4: open it in JupyterLab, save it, and "
                 "hand it in again."
             )
-        notebook = _sound(nbformat.v4.reads(text))
+        notebook = _sound(nbformat.v4.reads(text))  # type: ignore[no-untyped-call]
     except FileNotFoundError:
         raise SubmissionError(f"There is no {path.name} in the submission.") from None
     except (ValueError, RecursionError, UnicodeError) as error:
@@ -84,8 +84,9 @@ def _sound(notebook: NotebookNode) -> NotebookNode:
     with warnings.catch_warnings():
         # Missing or repeated ids are mended right here, so nobody needs to be warned.
         warnings.simplefilter("ignore")
-        _, sound = nbformat.validator.normalize(notebook)
-    nbformat.validate(sound)
+        _, normal = nbformat.validator.normalize(notebook)
+    nbformat.validate(normal)
+    sound: NotebookNode = normal
     return sound
 
 

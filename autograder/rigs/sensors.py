@@ -5,6 +5,9 @@ the sensor's topic, through the student's consumer node, and out on ``consumer/<
 ends belong to the examiner, and so does a witness that listens on the topic between them.
 """
 
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
 from __future__ import annotations
 
 import secrets
@@ -12,6 +15,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -88,7 +92,7 @@ Heard = dict[str, list[str]]
 """Tags in the order of their arrival, by sensor name."""
 
 
-class ExaminerNode(Node):  # type: ignore[misc] - rclpy ships no types
+class ExaminerNode(Node):
     """The examiner's endpoints: hardware outputs, a witness a topic, and the consumers' ends."""
 
     def __init__(self) -> None:
@@ -139,7 +143,9 @@ class SensorRig:
         """Bring up the examiner's endpoints on the subject's domain."""
         self.subject = bench.subject
         self._session = bench.session
-        self.node: ExaminerNode = bench.session.run(ExaminerNode)
+        node = bench.session.run(ExaminerNode)
+        assert isinstance(node, ExaminerNode)
+        self.node = node
         self._experiments: dict[str, Any] = {}
         self._probes = 0
 
@@ -175,7 +181,7 @@ class SensorRig:
         for _ in range(int(SETTLE / PROBE_PERIOD)):
             for sensor in silent:
                 self.node.send(sensor, phase)
-            self.wait(lambda still=silent: not _silent(still, heard, phase), PROBE_PERIOD)
+            self.wait(partial(_all_heard, silent, heard, phase), PROBE_PERIOD)
             silent = _silent(silent, heard, phase)
             if all(give_up is not None and give_up(sensor) for sensor in silent):
                 break
@@ -225,6 +231,10 @@ def mismatch(offered: TopicEndpointInfo, requested: TopicEndpointInfo) -> str:
 
 def _others(endpoints: list[TopicEndpointInfo]) -> list[TopicEndpointInfo]:
     return [endpoint for endpoint in endpoints if endpoint.node_name != EXAMINER_NODE]
+
+
+def _all_heard(sensors: Iterable[Sensor], heard: Heard, phase: str) -> bool:
+    return not _silent(sensors, heard, phase)
 
 
 def _silent(sensors: Iterable[Sensor], heard: Heard, phase: str) -> list[Sensor]:

@@ -1,0 +1,173 @@
+"""A folder of submissions goes in, nbgrader grades come out, by two doors, on real DDS."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat import NotebookNode
+from nbgrader.api import Gradebook
+
+from autograder import engine, runner, submission
+from autograder.corpus import Case
+from autograder.engine import AssignmentError
+from autograder.gradebook import CourseGradebook, Grade, GradebookError
+
+from .conftest import ASSIGNMENT, NOTEBOOK, Course
+
+Cases = dict[str, Case]
+
+
+def grade(course: Course, **options: bool) -> dict[str, Grade]:
+    engine.grade(course.root, ASSIGNMENT, **options)
+    return grades(course)
+
+
+def grades(course: Course) -> dict[str, Grade]:
+    return {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+
+
+def cells(grade: Grade) -> dict[str, float | None]:
+    return grade.cells[NOTEBOOK]
+
+
+def without(notebook: NotebookNode, grade_id: str) -> NotebookNode:
+    notebook.cells = [c for c in notebook.cells if submission.grade_id(c) != grade_id]
+    return notebook
+
+
+def nbgrader(course: Course, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "nbgrader", *arguments],
+        cwd=course.root, capture_output=True, text=True, timeout=170, check=False,
+        env={**os.environ, "PYTHONWARNINGS": "ignore"},
+    )  # fmt: skip
+
+
+def test_a_class_is_graded_whatever_state_its_files_are_in(course: Course, cases: Cases) -> None:
+    right = cases["right-chapter"].submission
+    course.submit("right", right(course.released))
+    course.submit("wrong", cases["wrong-imu-endless"].submission(course.released))
+    course.submit("cut-off", "{" + '"cells": [')
+    course.folder("empty")
+    course.submit("deleted", without(right(course.released), "qos-hidden"))
+    edited = right(course.released)
+    for cell in edited.cells:
+        if submission.grade_id(cell) == "qos-visible":
+            cell.source = "100.0"
+    course.submit("edited", edited)
+    twice = right(course.released)
+    (stub,) = (c for c in course.released.cells if submission.grade_id(c) == "qos-solution")
+    twice.cells.append(nbformat.from_dict({**stub, "id": "second"}))
+    course.submit("twice", twice)
+
+    graded = {g.student: g for g in engine.grade(course.root, ASSIGNMENT)}
+    found = grades(course)
+
+    full = {"qos-visible": 10.0, "qos-hidden": 5.0, "qos-explanation": None}
+    for student in ("right", "deleted", "edited", "twice"):
+        assert cells(found[student]) == full, student
+    assert cells(found["wrong"]) == {**full, "qos-hidden": 3.0}
+    for student, reason in {"cut-off": "not valid JSON", "empty": "There is no"}.items():
+        assert found[student].score == 0
+        assert found[student].needs_manual_grade, "a person decides about an unreadable file"
+        assert reason in graded[student].problem
+    assert not any(graded[student].problem for student in ("right", "wrong", "edited"))
+    feedback = (course.root / f"feedback/deleted/{ASSIGNMENT}/{NOTEBOOK}.html").read_text()
+    assert "had been deleted; it was put back" in feedback
+    assert "A short burst of IMU readings is kept" in feedback
+
+
+def test_manual_marks_survive_a_regrade(course: Course, cases: Cases) -> None:
+    course.submit("right", cases["right-chapter"].submission(course.released))
+    grade(course)
+    database = f"sqlite:///{course.root / 'gradebook.db'}"
+    with Gradebook(database) as book:
+        entry = book.find_grade("qos-explanation", NOTEBOOK, ASSIGNMENT, "right")
+        entry.manual_score = 4
+        entry.needs_manual_grade = False
+        book.db.commit()
+    again = grade(course)["right"]
+    assert (again.score, cells(again)["qos-explanation"]) == (19.0, 4.0)
+
+
+def test_what_did_not_change_is_not_run_again(
+    course: Course, cases: Cases, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    course.submit("right", cases["right-chapter"].submission(course.released))
+    runs: list[submission.Program] = []
+    really_run = runner.run
+
+    def spy(program: submission.Program) -> runner.Outcome:
+        runs.append(program)
+        return really_run(program)
+
+    monkeypatch.setattr(runner, "run", spy)
+    first = grade(course)
+    second = grade(course)
+    assert len(runs) == 1
+    assert first == second
+    grade(course, fresh=True)
+    assert len(runs) == 2
+    course.submit("right", cases["wrong-imu-single"].submission(course.released))
+    assert cells(grade(course)["right"])["qos-hidden"] == 3.0
+    assert len(runs) == 3
+
+
+def test_nbgraders_own_command_gives_the_same_grades(course: Course, cases: Cases) -> None:
+    course.submit("right", cases["right-two-sides"].submission(course.released))
+    wrong = without(cases["wrong-lidar-deep"].submission(course.released), "qos-visible")
+    course.submit("wrong", wrong)
+    result = nbgrader(course, "autograde", ASSIGNMENT)
+    assert result.returncode == 0, result.stderr
+    by_nbgrader = grades(course)
+    assert cells(by_nbgrader["right"])["qos-visible"] == 10.0
+    assert cells(by_nbgrader["wrong"])["qos-visible"] == 8.0
+    assert nbgrader(course, "generate_feedback", ASSIGNMENT).returncode == 0
+    feedback = (course.root / f"feedback/wrong/{ASSIGNMENT}/{NOTEBOOK}.html").read_text()
+    assert "After a pause obstacle avoidance acts on fresh scans only." in feedback
+    assert grade(course, fresh=True) == by_nbgrader
+
+
+def test_nbgrader_validate_passes_the_exemplar_and_fails_the_stub(course: Course) -> None:
+    exemplar = course.root / "source" / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
+    result = nbgrader(course, "validate", str(exemplar))
+    assert "Success! Your notebook passes all the tests." in result.stdout, result.stdout
+    stub = course.root / "release" / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
+    result = nbgrader(course, "validate", str(stub))
+    assert "VALIDATION FAILED" in result.stdout, result.stdout
+
+
+def test_the_release_gives_nothing_away(course: Course) -> None:
+    folder = course.root / "release" / ASSIGNMENT
+    assert [path.name for path in folder.rglob("*") if path.is_file()] == [f"{NOTEBOOK}.ipynb"]
+    text = (folder / f"{NOTEBOOK}.ipynb").read_text()
+    for secret in ("SOLUTION", "HIDDEN TESTS", 'part=\\"hidden\\"', "depth=5", "BEST_EFFORT,"):
+        assert secret not in text
+
+
+def test_an_unknown_assignment_names_those_there_are(course: Course) -> None:
+    with pytest.raises(AssignmentError, match=r"no assignment 'ch06'.*there are ch05"):
+        engine.grade(course.root, "ch06")
+
+
+def test_an_assignment_that_is_not_released_says_so(course: Course) -> None:
+    source = course.root / "source" / "ch06"
+    source.mkdir()
+    (source / "x.ipynb").write_text(nbformat.writes(course.source))
+    with pytest.raises(AssignmentError, match="run `autograder release ch06` first"):
+        engine.grade(course.root, "ch06")
+
+
+def test_an_empty_class_says_where_files_belong(course: Course) -> None:
+    with pytest.raises(AssignmentError, match=r"Nobody has submitted 'ch05' yet"):
+        engine.grade(course.root, ASSIGNMENT)
+
+
+def test_a_folder_that_is_no_course_says_so(tmp_path: Path) -> None:
+    with pytest.raises(GradebookError, match=r"no nbgrader_config\.py"):
+        engine.grade(tmp_path, ASSIGNMENT)

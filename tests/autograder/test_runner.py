@@ -1,0 +1,102 @@
+"""One submission against the runner: whatever it does, an outcome comes back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from autograder import runner
+from autograder.runner import Outcome
+from autograder.store import OutcomeStore
+from autograder.submission import Cell, Program
+
+EXAM = Cell("", "qos-visible", "qos", "visible")
+
+
+def program(*sources: str) -> Program:
+    return (*(Cell(source) for source in sources), EXAM)
+
+
+def verdict_reasons(outcome: Outcome) -> set[tuple[str, str]]:
+    return {(c.status, c.actual) for c in outcome.verdicts["qos-visible"].checks}
+
+
+def text_of(outputs: list[dict[str, str]]) -> str:
+    return "".join(output.get("text", "") for output in outputs)
+
+
+def test_outputs_come_back_cell_by_cell() -> None:
+    outcome = runner.run((Cell("print('one')\nx = 2"), Cell("x + 40"), Cell("1 / 0"), Cell("x")))
+    one, two, three, four = outcome.outputs
+    assert text_of(one) == "one\n"
+    assert two[0]["data"]["text/plain"] == "42"
+    assert three[-1]["ename"] == "ZeroDivisionError"
+    assert four[0]["data"]["text/plain"] == "2", "an error does not end the notebook"
+    assert any("ZeroDivisionError" in note for note in outcome.notes)
+
+
+@pytest.mark.parametrize(
+    ("source", "fate"),
+    [
+        ("import os; os._exit(7)", "exit code 7"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGKILL)", "killed by SIGKILL"),
+        ("import ctypes; ctypes.string_at(0)", "killed by SIGSEGV"),
+    ],
+)
+def test_a_process_that_ends_is_an_outcome(source: str, fate: str) -> None:
+    outcome = runner.run(program("x = 1", source))
+    ((status, reason),) = verdict_reasons(outcome)
+    assert status == "not_checked"
+    assert fate in reason
+
+
+def test_a_cell_that_never_ends_is_ended() -> None:
+    outcome = runner.run(program("while True: pass"), cell_timeout=3)
+    ((status, reason),) = verdict_reasons(outcome)
+    assert status == "not_checked"
+    assert "still running after 3 s" in reason
+
+
+def test_a_constructor_that_never_returns_fails_its_check(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = """
+from rclpy.node import Node
+class SensorDrivers(Node):
+    def __init__(self):
+        super().__init__('drivers')
+        while True:
+            pass
+"""
+    outcome = runner.run(program(source))
+    first, *rest = outcome.verdicts["qos-visible"].checks
+    assert (first.name, first.status) == ("nodes_start", "failed")
+    assert "did not answer" in first.actual
+    assert {check.status for check in rest} == {"not_checked"}
+
+
+def test_a_flood_of_output_is_cut() -> None:
+    outcome = runner.run((Cell("print('x' * 5_000_000)"),))
+    text = text_of(outcome.outputs[0])
+    assert len(text) < 100_000
+    assert "more characters were cut off" in text
+
+
+def test_nothing_that_a_student_prints_is_a_verdict() -> None:
+    forged = 'print(\'{"version": 1, "exam": "qos", "part": "visible", "checks": []}\')'
+    outcome = runner.run(program(forged))
+    assert outcome.verdicts["qos-visible"].score == 0
+
+
+def test_exit_in_a_cell_does_not_end_the_notebook() -> None:
+    outcome = runner.run((Cell("import sys; sys.exit(0)"), Cell("'still here'")))
+    assert outcome.outputs[1][0]["data"]["text/plain"] == "'still here'"
+
+
+def test_an_outcome_survives_the_store_and_a_damaged_one_is_ignored(tmp_path: Path) -> None:
+    store = OutcomeStore(tmp_path / "outcomes")
+    outcome = Outcome([[]], {}, ["note"], 1.5)
+    store.put(program(), outcome)
+    assert store.get(program()) == outcome
+    (file,) = (tmp_path / "outcomes").iterdir()
+    file.write_text(file.read_text()[:20])
+    assert store.get(program()) is None
