@@ -7,7 +7,7 @@ from typing import Any
 from autograder.wire import Channel, ChannelClosed, ChannelTimeout
 from course import Session
 
-REPLY_TIMEOUT = 15.0
+REPLY_TIMEOUT = 10.0
 """Seconds a subject may take over one request (making a node, say) before it counts as hung."""
 
 

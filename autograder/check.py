@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
+import signal
 import socket
 import threading
 from collections.abc import Mapping
@@ -16,6 +17,10 @@ from autograder.report import Report
 from autograder.verdict import Verdict
 from autograder.wire import Channel
 from course import Session
+from course.errors import CourseError
+
+STUCK = 3.0
+"""Seconds after a verdict in which the student's node must have been stopped."""
 
 
 def check(exam: str, part: str = "visible", *, hint: int = 1) -> float:
@@ -42,21 +47,72 @@ def check(exam: str, part: str = "visible", *, hint: int = 1) -> float:
 
 
 def examine(exam: str, part: str, namespace: Mapping[str, Any]) -> Verdict:
-    """Sit one part of an exam on the classes of ``namespace``, in a session made for it."""
+    """Sit one part of an exam on the classes of ``namespace``, in a session made for it.
+
+    Call it from the main thread: what hangs in the student's code is interrupted there.
+
+    Raises:
+        ExaminerError: the examiner failed.
+    """
     ours, theirs = socket.socketpair()
     channel = Channel(ours)
     with Session() as session, ExaminerProcess(theirs, session.domain_id) as examiner:
-        # A constructor that never returns must not hold the cell: the examiner gives up on it
-        # and the verdict still arrives here.
-        harness = Harness(session, namespace)
-        thread = threading.Thread(target=harness.serve, args=(channel,), daemon=True)
-        thread.start()
         examiner.request(exam, part)
+        sitting = _Sitting(examiner)
         try:
-            return examiner.verdict()
+            sitting.serve(Harness(session, namespace), channel)
         finally:
-            thread.join(timeout=5)
             channel.close()
+        return sitting.verdict()
+
+
+class _Sitting:
+    """Serves the examiner in the main thread while another thread waits for the verdict.
+
+    So a constructor that never returns can be interrupted when the examiner has given up on it,
+    what constructors print lands in the cell, and a learner's own interrupt works as always.
+    """
+
+    def __init__(self, examiner: ExaminerProcess) -> None:
+        self._examiner = examiner
+        self._verdict: Verdict | None = None
+        self._error: CourseError | None = None
+        self._served = threading.Event()
+        self._lock = threading.Lock()
+        self._waiter = threading.Thread(target=self._wait, daemon=True)
+
+    def serve(self, harness: Harness, channel: Channel) -> None:
+        self._waiter.start()
+        try:
+            harness.serve(channel)
+            with self._lock:
+                self._served.set()
+        except KeyboardInterrupt:
+            if self._verdict is None and self._error is None:
+                raise
+
+    def verdict(self) -> Verdict:
+        self._waiter.join()
+        if self._verdict is None:
+            assert self._error is not None
+            raise self._error
+        return self._verdict
+
+    def _wait(self) -> None:
+        try:
+            self._verdict = self._examiner.verdict()
+        except CourseError as error:
+            self._error = error
+        if not self._served.wait(STUCK):
+            with self._lock:
+                if not self._served.is_set():
+                    self._interrupt()
+
+    def _interrupt(self) -> None:
+        """Interrupt the main thread, which is still busy with the student's code."""
+        main = threading.main_thread().ident
+        assert main is not None
+        signal.pthread_kill(main, signal.SIGINT)
 
 
 def _caller_globals() -> Mapping[str, Any]:

@@ -102,13 +102,15 @@ def grade(
     )
     grades = CourseGradebook(where).grades(assignment)
     write_csv(grades, assignment, where / "grades.csv")
-    problems = {g.student: g.problem for g in done if g.problem}
+    problems = {graded.student: graded.problem for graded in done if graded.problem}
     if as_json:
-        _print_json({"grades": [vars(g) for g in grades], "problems": problems})
-        return
-    _grades_table(grades, problems)
-    out.print(f"Gradebook {where / 'gradebook.db'}, feedback in {where / 'feedback'}, "
-              f"{where / 'grades.csv'}", soft_wrap=True)  # fmt: skip
+        _print_json({"grades": [vars(grade) for grade in grades], "problems": problems})
+    else:
+        _grades_table(grades, problems)
+        places = (where / "gradebook.db", where / "feedback", where / "grades.csv")
+        out.print(f"Written: {', '.join(map(str, places))}", soft_wrap=True, highlight=False)
+    if any(not graded.entered for graded in done):
+        raise typer.Exit(EXIT_DIFFERENT)
 
 
 @app.command()
@@ -217,6 +219,14 @@ def main() -> None:
     except CourseError as error:
         err.print(f"autograder: {error}", markup=False, highlight=False, soft_wrap=True)
         sys.exit(error.exit_code)
+    except OSError as error:
+        where = f" ({error.filename})" if error.filename else ""
+        err.print(
+            f"autograder: {error.strerror or error}{where}: make room or choose another folder, "
+            "then run the same command again; what was graded so far is kept.",
+            markup=False, highlight=False, soft_wrap=True,
+        )  # fmt: skip
+        sys.exit(1)
     except KeyboardInterrupt:
         err.print("autograder: stopped; what was graded so far is kept.")
         sys.exit(130)

@@ -31,11 +31,15 @@ class AssignmentError(CourseError):
 
 @dataclass(frozen=True)
 class Graded:
-    """One student's graded submission: outcomes by notebook, and what could not be done."""
+    """One student's submission: outcomes by notebook, and what a person should know about it.
+
+    ``entered`` is False if the gradebook did not take the scores.
+    """
 
     student: str
     outcomes: dict[str, Outcome]
     problem: str = ""
+    entered: bool = True
 
 
 Progress = Callable[[str, Graded | None], None]
@@ -144,7 +148,7 @@ class _Class:
             if feedback:
                 self._gradebook.generate_feedback(self._assignment, graded.student)
         except GradebookError as error:
-            return Graded(graded.student, graded.outcomes, str(error))
+            return Graded(graded.student, graded.outcomes, str(error), entered=False)
         finally:
             for name in graded.outcomes:
                 bridge.prepared.pop((self._assignment, graded.student, name), None)

@@ -25,6 +25,10 @@ class GradebookError(CourseError):
     """nbgrader could not do what was asked; the message carries its own last words."""
 
 
+class DiskFullError(CourseError):
+    """There is no room for the gradebook or what nbgrader writes: the whole run has to stop."""
+
+
 @dataclass(frozen=True)
 class Grade:
     """One student's result: points earned and possible, and whether a person must still look.
@@ -87,11 +91,16 @@ class CourseGradebook:
         with _quiet():
             result = method(*arguments, **options)
         if not result["success"]:
-            said = [line for line in str(result.get("log", "")).splitlines() if line.strip()]
-            last = result.get("error") or (said[-1] if said else "no reason given")
+            said = f"{result.get('log', '')}\n{result.get('error') or ''}"
+            if any(full in said for full in ("disk is full", "No space left on device")):
+                raise DiskFullError(
+                    f"The disk of {self.root} is full: make room there and run the same command "
+                    "again; what was graded so far is kept."
+                )
+            lines = [line for line in said.splitlines() if line.strip()] or ["no reason given"]
             raise GradebookError(
                 f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: "
-                f"{str(last).strip().splitlines()[-1]}"
+                f"{lines[-1].strip()}"
             )
 
     @contextmanager

@@ -39,9 +39,24 @@ def corpus_root() -> Path:
     return _first("submissions", _CLONE / "tests" / "submissions", _DATA / "submissions")
 
 
-def is_clone() -> bool:
-    """Whether the material is a clone's own, to be edited, and not the copy in a wheel."""
-    return content_root() != _DATA / "notebooks"
+def working_root() -> Path:
+    """Return the nbgrader course root to work in, where files may be written.
+
+    The current folder or the nearest one above it that has an ``nbgrader_config.py``, or else the
+    clone's ``notebooks``.
+
+    Raises:
+        ContentError: there is neither.
+    """
+    here = Path.cwd()
+    for folder in (here, *here.parents):
+        if (folder / CONFIG).is_file():
+            return folder
+    if (_CLONE / "notebooks" / CONFIG).is_file():
+        return _CLONE / "notebooks"
+    raise ContentError(
+        f"There is no course root here: go to the folder with {CONFIG}, or name it with --root."
+    )
 
 
 def copy_authoring(root: Path, folder: Path) -> Path:

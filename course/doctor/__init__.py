@@ -1,0 +1,44 @@
+"""What ``course doctor`` does: look at a machine, and say in plain words what is wrong with it."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+
+from course.doctor import environment, machine, ros, software
+from course.doctor.finding import Finding, problem
+from course.errors import CourseError
+
+__all__ = ["Finding", "examine", "exit_code", "summary"]
+
+
+def examine() -> Iterator[Finding]:
+    """Yield what is found on this machine, each as soon as it is known. Takes about 3 s."""
+    parts = (
+        software.examine,
+        lambda: environment.examine(os.environ, sys.prefix),
+        machine.examine,
+        ros.examine,
+    )
+    for part in parts:
+        try:
+            yield from part()
+        except (CourseError, OSError) as error:
+            yield problem("doctor", f"A check could not be finished: {error}")
+
+
+def exit_code(findings: Sequence[Finding]) -> int:
+    """Return 1 if something must be mended before the course runs, else 0."""
+    return int(any(finding.status == "problem" for finding in findings))
+
+
+def summary(findings: Sequence[Finding]) -> str:
+    """Return the last line: how many problems and warnings there are."""
+    problems = sum(finding.status == "problem" for finding in findings)
+    warnings = sum(finding.status == "warning" for finding in findings)
+    if problems:
+        return f"{problems} to mend before the course can run here, and {warnings} to know about."
+    if warnings:
+        return f"The course runs here. {warnings} to know about."
+    return "All is well: the course runs here."

@@ -1,0 +1,50 @@
+"""One line of the doctor's report."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Literal
+
+Status = Literal["ok", "warning", "problem"]
+_WIDTH = len("warning")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was looked at, how it is, and how to mend it.
+
+    Attributes:
+        name: what was looked at, in a word or two.
+        status: "problem" if the course cannot run with it, "warning" if it works less well.
+        message: what was seen, in a sentence.
+        mend: what to do; empty if there is nothing to do.
+    """
+
+    name: str
+    status: Status
+    message: str
+    mend: str = ""
+
+    def text(self) -> str:
+        """Return the lines for a terminal."""
+        line = f"{self.status:<{_WIDTH}}  {self.name}: {self.message}"
+        return f"{line}\n{'':<{_WIDTH}}  -> {self.mend}" if self.mend else line
+
+    def as_data(self) -> dict[str, str]:
+        """Return the same for machines."""
+        return asdict(self)
+
+
+def ok(name: str, message: str) -> Finding:
+    """Return a finding that all is well."""
+    return Finding(name, "ok", message)
+
+
+def warning(name: str, message: str, mend: str = "") -> Finding:
+    """Return a finding that something works less well than it could."""
+    return Finding(name, "warning", message, mend)
+
+
+def problem(name: str, message: str, mend: str = "") -> Finding:
+    """Return a finding that keeps the course from running."""
+    return Finding(name, "problem", message, mend)

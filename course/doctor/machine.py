@@ -1,0 +1,131 @@
+"""The machine: space, shared memory, the log folder, the clock."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from course.doctor.finding import Finding, ok, problem, warning
+
+MIN_DISK, LOW_DISK = 50, 500  # MB: below, a build fails; below, a class's submissions may
+LOW_SHM = 32  # MB. A participant takes about 1 MB, and Docker gives 64 by default.
+SHM = Path("/dev/shm")
+
+
+def examine() -> Iterator[Finding]:
+    """Yield what there is to say about disk, shared memory, log folder and clock."""
+    yield disk(Path.cwd())
+    yield temporary_folder()
+    yield shared_memory(SHM)
+    yield stale_segments(SHM, Path("/proc/locks"))
+    yield log_folder(os.environ.get("ROS_LOG_DIR"), os.environ.get("ROS_HOME"))
+    yield clock(time.time(), Path(__file__).stat().st_mtime)
+
+
+def disk(folder: Path, free: int | None = None) -> Finding:
+    """Look at the space where notebooks are saved; ``free`` is in MB, measured if left out."""
+    free = shutil.disk_usage(folder).free >> 20 if free is None else free
+    text, mend = f"{free} MB are free in {folder}", "Make room there."
+    if free < MIN_DISK:
+        return problem("disk", f"{text}: notebooks and grades cannot be saved.", mend)
+    if free < LOW_DISK:
+        return warning("disk", f"{text}, which is little.", mend)
+    return ok("disk", text)
+
+
+def temporary_folder() -> Finding:
+    """Look whether temporary files can be written."""
+    try:
+        with tempfile.TemporaryFile() as file:
+            file.write(b"x" * 4096)
+            file.flush()
+            return ok("temporary files", f"{tempfile.gettempdir()} can be written")
+    except OSError as error:
+        return problem(
+            "temporary files",
+            f"They cannot be written ({error.strerror or error}).",
+            "Make room in /tmp, or set TMPDIR to a folder of your own.",
+        )
+
+
+def shared_memory(folder: Path, free: int | None = None) -> Finding:
+    """Look at DDS's fast path between processes; ``free`` is in MB, measured if left out."""
+    name = "shared memory"
+    if not (folder.is_dir() and os.access(folder, os.W_OK)):
+        return warning(
+            name,
+            f"{folder} cannot be written, so DDS uses slower UDP.",
+            "In a container: mount a tmpfs there.",
+        )
+    free = shutil.disk_usage(folder).free >> 20 if free is None else free
+    if free < LOW_SHM:
+        return warning(
+            name,
+            f"Only {free} MB are free in {folder}; with many nodes DDS falls back to slower UDP.",
+            "In a container: start it with --shm-size=256m.",
+        )
+    return ok(name, f"{free} MB are free in {folder}")
+
+
+def stale_segments(folder: Path, locks: Path) -> Finding:
+    """Count the segments of DDS participants that were killed.
+
+    A living participant holds a lock on its ``*_el`` file, which ``locks`` (``/proc/locks``)
+    lists by inode. Nothing is opened or locked here, so no running program is disturbed.
+    """
+    name = "left-over segments"
+    try:
+        held = {line.split()[5].rpartition(":")[2] for line in _lock_lines(locks)}
+        files = [path for path in folder.glob("fastrtps_*_el") if "port" not in path.name]
+        stale = [path for path in files if str(path.stat().st_ino) not in held]
+        size = sum(p.stat().st_size for s in stale for p in folder.glob(f"{s.name[:-3]}*")) >> 20
+    except OSError as error:  # a program may end and sweep its own while we look
+        return ok(name, f"They could not be counted just now ({error.strerror or error})")
+    if not stale:
+        return ok(name, "none")
+    return warning(
+        name,
+        f"{len(stale)} shared-memory locks or segments ({size} MB) were left in {folder} by ROS "
+        "programs that were killed.",
+        "When no ROS program runs: rm -f /dev/shm/fastrtps_* /dev/shm/sem.fastrtps_*",
+    )
+
+
+def _lock_lines(locks: Path) -> Iterator[str]:
+    for line in locks.read_text(encoding="ascii").splitlines():
+        if len(line.split()) >= 8 and "->" not in line:  # "->" marks one who waits for the lock
+            yield line
+
+
+def log_folder(chosen: str | None, ros_home: str | None) -> Finding:
+    """Look whether ROS can write its log files; rclpy does not start without."""
+    folder = Path(chosen or Path(ros_home or "~/.ros") / "log").expanduser()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=folder):
+            return ok("log folder", f"{folder} can be written")
+    except OSError as error:
+        return warning(
+            "log folder",
+            f"{folder} cannot be written ({error.strerror or error}), and plain rclpy does not "
+            "start then. Sessions of the course log to a temporary folder instead.",
+            "Set ROS_LOG_DIR to a folder of your own.",
+        )
+
+
+def clock(now: float, installed: float) -> Finding:
+    """Compare the clock (s since 1970) with when this file was installed."""
+    shown = datetime.datetime.fromtimestamp(now).astimezone().isoformat(" ", "seconds")
+    if now < installed - 60:
+        return warning(
+            "clock",
+            f"It says {shown}, which is before the course was installed: time stamps of messages "
+            "and submissions will be wrong.",
+            "Set the machine's clock.",
+        )
+    return ok("clock", shown)

@@ -1,0 +1,149 @@
+"""ROS 2 itself, tried for real: in processes of their own, so that a crash there is only seen."""
+
+from __future__ import annotations
+
+import json
+import socket
+import struct
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+
+from course.doctor.finding import Finding, ok, problem, warning
+from course.domains import MAX_DOMAIN, MIN_DOMAIN, domains_in_use, lease_domain
+from course.errors import DomainError
+
+DEADLINE = 40.0  # s for a probe, its imports included; it takes about 1 on an idle machine
+FEW_DOMAINS = 10
+_MULTICAST = ("239.255.0.1", 0)  # the group of DDSI-RTPS 9.6.1.4, on any free port
+
+
+def examine() -> Iterator[Finding]:
+    """Yield what there is to say about the wheels, DDS and the domains."""
+    yield domains(domains_in_use())
+    yield multicast()
+    imports = probe("imports")
+    if "error" in imports:
+        yield problem(
+            "ROS 2 wheels",
+            f"rclpy cannot be imported: {imports['error']}",
+            "Mend what stands above. If all is well there, install the course again.",
+        )
+        return
+    yield ok("ROS 2 wheels", f"rclpy and {imports['rmw']} load in {imports['seconds']:.1f} s")
+    yield in_one_process()
+    yield between_processes()
+
+
+def domains(in_use: set[int]) -> Finding:
+    """Look how many domains are left for sessions, given those with open ports."""
+    free = len(set(range(MIN_DOMAIN + 1, MAX_DOMAIN + 1)) - in_use)
+    mend = "Shut down notebooks and ROS programs that are no longer used."
+    if not free:
+        return problem("domains", "No ROS domain is free.", mend)
+    if free < FEW_DOMAINS:
+        return warning("domains", f"Only {free} ROS domains are free.", mend)
+    return ok("domains", f"{free} ROS domains are free")
+
+
+def multicast() -> Finding:
+    """Send one datagram to DDS's discovery group over the loopback, and receive it."""
+    message = b"course doctor"
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender,
+    ):
+        loopback = socket.inet_aton("127.0.0.1")
+        group = socket.inet_aton(_MULTICAST[0])
+        try:
+            receiver.bind(_MULTICAST)
+            membership = struct.pack("4s4s", group, loopback)
+            receiver.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+            receiver.settimeout(2.0)
+            sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, loopback)
+            sender.sendto(message, receiver.getsockname())
+            if receiver.recv(64) == message:
+                return ok("multicast", "DDS discovery datagrams arrive on the loopback")
+            reason = "another datagram arrived"
+        except OSError as error:
+            reason = error.strerror or str(error)
+    return warning(
+        "multicast",
+        f"DDS discovery datagrams do not arrive on the loopback ({reason}). Nodes of one session "
+        "still find each other; nodes of other programs may not.",
+        "Let UDP to 239.255.0.1 and 127.0.0.1 through the firewall; in a network namespace: "
+        "`ip link set lo up multicast on`.",
+    )
+
+
+def in_one_process() -> Finding:
+    """Send a message to another node and back, in one process."""
+    return _round_trip("round trip in one process", probe("both"))
+
+
+def between_processes() -> Finding:
+    """Send a message to a node of another process and back."""
+    name = "round trip between processes"
+    try:
+        lease = lease_domain()
+    except DomainError as error:
+        return problem(name, str(error))
+    with ExitStack() as stack:
+        stack.callback(lease.release)
+        echo = subprocess.Popen(
+            _command("echo", lease.domain_id),
+            stdin=subprocess.PIPE,  # closed, it tells the echo to end
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        stack.callback(_end, echo)
+        return _round_trip(name, probe("ping", lease.domain_id))
+
+
+def probe(*arguments: object) -> dict[str, object]:
+    """Run a probe to its end; return what it saw, or {"error": a sentence}."""
+    try:
+        done = subprocess.run(
+            _command(*arguments),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=DEADLINE,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return {"error": f"it gave no answer in {DEADLINE:.0f} s"}
+    try:
+        data = json.loads(done.stdout.splitlines()[-1])
+    except (ValueError, IndexError):
+        said = done.stderr.strip().splitlines()
+        return {
+            "error": f"it ended with code {done.returncode}" + (f", {said[-1]}" if said else "")
+        }
+    return data if isinstance(data, dict) else {"error": "it gave a strange answer"}
+
+
+def _round_trip(name: str, seen: dict[str, object]) -> Finding:
+    if "error" in seen:
+        return problem(
+            name,
+            f"No message came back: {seen['error']}",
+            "Mend what stands above. If all is well there, a firewall on 127.0.0.1 is likely.",
+        )
+    return ok(name, f"a message went there and back {seen['seconds']:.2f} s after the start")
+
+
+def _command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "course.doctor.probe", *(str(value) for value in arguments)]
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    assert process.stdin is not None
+    process.stdin.close()
+    try:
+        process.wait(10)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

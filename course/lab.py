@@ -1,0 +1,152 @@
+"""A student's working copy of the course: made, kept, and never overwritten."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+
+from course.content import content_root
+from course.errors import CourseError
+
+DEFAULT = Path("ros2-course")
+MANIFEST = ".ros2-course.json"
+"""File in a working copy that remembers what was handed out: {path: digests of its versions}."""
+
+
+class LabError(CourseError):
+    """A working copy that cannot be made or opened."""
+
+
+@dataclass(frozen=True)
+class Copied:
+    """What happened to a working copy; paths are relative to it.
+
+    Attributes:
+        folder: the working copy.
+        new: files that were not there.
+        beside: {the student's file: the course's newer version put beside it}.
+    """
+
+    folder: Path
+    new: list[Path] = field(default_factory=list)
+    beside: dict[Path, Path] = field(default_factory=dict)
+
+
+def make_copy(folder: Path, root: Path | None = None) -> Copied:
+    """Put the chapters and the released assignments into ``folder``.
+
+    A file that is there is never changed. Where the course has a version that was not handed out
+    yet, that one is put beside it as ``NAME.new.ipynb`` (``NAME.new-2.ipynb``, ...).
+
+    Args:
+        folder: the working copy; it is made if need be.
+        root: the nbgrader course root; the course's own if left out.
+
+    Raises:
+        LabError: ``folder`` cannot be used.
+        ContentError: the course's own files are damaged.
+    """
+    files = _course_files(root or content_root())
+    copied = Copied(folder)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handed_out = _read_manifest(folder)
+        for name, text in files.items():
+            _hand_out(copied, name, text.encode(), handed_out.setdefault(str(name), []))
+        _write_manifest(folder, handed_out)
+    except OSError as error:
+        raise LabError(
+            f"The working copy {folder} cannot be written ({error.strerror or error}): name a "
+            "folder of your own with room in it, for example `course lab ~/ros2-course`. No file "
+            "of yours was changed."
+        ) from error
+    return copied
+
+
+def open_lab(folder: Path, arguments: Sequence[str] = ()) -> NoReturn:
+    """Become JupyterLab in ``folder``; ``arguments`` are passed on to it.
+
+    Raises:
+        LabError: the folder cannot be entered, or JupyterLab cannot be started.
+    """
+    try:
+        os.chdir(folder)
+        # -m, and not the script: it starts the JupyterLab of this very Python.
+        os.execv(sys.executable, [sys.executable, "-m", "jupyterlab", *arguments])
+    except OSError as error:
+        raise LabError(
+            f"JupyterLab cannot be started in {folder} ({error.strerror or error}): choose "
+            "another folder, or run `course doctor`."
+        ) from error
+
+
+def _course_files(root: Path) -> dict[Path, str]:
+    """Return {path in a working copy: text}: chapters at its top, assignments in their folders."""
+    from course.student_version import student_versions
+
+    chapters = sorted((root / "chapters").glob("*.ipynb"))
+    files = {Path(path.name): path.read_text(encoding="utf-8") for path in chapters}
+    files |= student_versions(root)
+    if not files:
+        raise LabError(f"There are no notebooks in {root}: run `autograder build` first.")
+    return files
+
+
+def _hand_out(copied: Copied, name: Path, content: bytes, digests: list[str]) -> None:
+    digest = hashlib.sha256(content).hexdigest()
+    target = copied.folder / name
+    target.parent.mkdir(parents=True, exist_ok=True)
+    if not target.exists():
+        _create(target, content)
+        copied.new.append(name)
+    elif digest not in digests and target.read_bytes() != content:
+        beside = _free_name(target)
+        _create(beside, content)
+        copied.beside[name] = beside.relative_to(copied.folder)
+    if digest not in digests:
+        digests.append(digest)
+
+
+def _create(path: Path, content: bytes) -> None:
+    """Write a file that is not there; a full disk leaves none rather than half of one."""
+    file = path.open("xb")  # x: not even a file that appeared this very moment is overwritten
+    try:
+        with file:
+            file.write(content)
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise
+
+
+def _free_name(path: Path) -> Path:
+    number = 1
+    while True:
+        mark = "new" if number == 1 else f"new-{number}"
+        beside = path.with_name(f"{path.stem}.{mark}{path.suffix}")
+        if not beside.exists():
+            return beside
+        number += 1
+
+
+def _read_manifest(folder: Path) -> dict[str, list[str]]:
+    """Return what was handed out; a damaged record only costs a copy put beside."""
+    try:
+        data = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        return {str(name): [str(digest) for digest in digests] for name, digests in data.items()}
+    except (FileNotFoundError, ValueError, AttributeError, TypeError):
+        return {}
+
+
+def _write_manifest(folder: Path, handed_out: dict[str, list[str]]) -> None:
+    temporary = folder / f"{MANIFEST}.{os.getpid()}"
+    try:
+        temporary.write_text(json.dumps(handed_out, indent=1, sort_keys=True), encoding="utf-8")
+        temporary.replace(folder / MANIFEST)
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,30 @@
+"""Entry points of the two commands: look at the platform first, then import the rest.
+
+On a platform without ROS 2 wheels the import itself would fail, in a traceback.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+
+from course.platform_check import UnsupportedPlatformError, require_supported_platform
+
+
+def course() -> None:
+    """Run the ``course`` command."""
+    _run("course")
+
+
+def autograder() -> None:
+    """Run the ``autograder`` command."""
+    _run("autograder")
+
+
+def _run(name: str) -> None:
+    try:
+        require_supported_platform()
+    except UnsupportedPlatformError as error:
+        sys.stderr.write(f"{name}: {error}\n")
+        sys.exit(error.exit_code)
+    importlib.import_module(f"{name}.cli").main()
