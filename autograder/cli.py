@@ -12,7 +12,6 @@ from rich.console import Console
 from rich.table import Table
 
 from course.errors import CourseError
-from course.platform_check import require_supported_platform
 
 EXIT_DIFFERENT = 1
 """The work was done, and something did not come out as it must (a corpus case, the demo)."""
@@ -29,7 +28,7 @@ err = Console(stderr=True)
 
 Root = Annotated[
     Path | None,
-    typer.Option("--root", help="The nbgrader course root (default: the course's own)."),
+    typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
 ]
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Submissions run at a time.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
@@ -204,17 +203,14 @@ def _print_json(data: Any) -> None:
 
 
 def _root(root: Path | None) -> Path:
-    from course.content import content_root
+    from course.content import working_root
 
-    if root is None:
-        return content_root()
-    return root.resolve()
+    return working_root() if root is None else root.resolve()
 
 
 def main() -> None:
     """Run the command; a `CourseError` is printed as its sentence, with its exit code."""
     try:
-        require_supported_platform()
         app()
     except CourseError as error:
         err.print(f"autograder: {error}", markup=False, highlight=False, soft_wrap=True)

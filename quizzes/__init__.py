@@ -1,0 +1,1 @@
+"""The question bank and its marking. It imports nothing of the course or the autograder."""

@@ -1,0 +1,224 @@
+"""What people meet first: dependencies, commands, platforms, and the README's promises."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from course import content
+from course.errors import CourseError
+from course.platform_check import UnsupportedPlatformError, problem, require_supported_platform
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+CONSTRAINTS = (ROOT / ".ci" / "constraints.txt").read_text(encoding="utf-8").splitlines()
+HERE = {
+    "system": "Linux", "machine": "x86_64", "implementation": "CPython", "version": (3, 12),
+    "libc": "glibc",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def project() -> dict[str, Any]:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def requirements(project: dict[str, Any]) -> list[Requirement]:
+    texts = [*project["project"]["dependencies"], *project["dependency-groups"]["dev"]]
+    return [Requirement(text) for text in texts]
+
+
+def test_every_dependency_has_a_lower_and_an_upper_bound(project: dict[str, Any]) -> None:
+    for requirement in requirements(project):
+        operators = {specifier.operator for specifier in requirement.specifier}
+        assert {">=", "<"} <= operators, requirement
+
+
+def test_the_constraints_are_versions_and_nothing_else(project: dict[str, Any]) -> None:
+    assert sorted(set(CONSTRAINTS), key=lambda line: line.partition("==")[0]) == CONSTRAINTS
+    pinned = {}
+    for line in CONSTRAINTS:
+        found = re.fullmatch(r"([a-z0-9-]+)==([0-9][0-9a-z.]*)", line)
+        assert found, line
+        pinned[found[1]] = found[2]
+    for requirement in requirements(project):
+        version = pinned[canonicalize_name(requirement.name)]
+        assert requirement.specifier.contains(version), requirement
+
+
+def test_no_lock_file_and_no_address_of_an_index_is_kept() -> None:
+    assert "uv.lock" in (ROOT / ".gitignore").read_text(encoding="utf-8").splitlines()
+    for name in ("pyproject.toml", ".ci/constraints.txt", ".ci/run"):
+        assert "://" not in (ROOT / name).read_text(encoding="utf-8"), name
+
+
+def test_a_wheel_carries_what_the_commands_look_for(project: dict[str, Any]) -> None:
+    included = project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+    for path in included:
+        assert (ROOT / path).exists(), path
+    notebooks = {path.name for path in (ROOT / "notebooks").iterdir()}
+    made_by_nbgrader = {"release", "submitted", "autograded", "feedback", "gradebook.db"}
+    own = {n for n in notebooks - made_by_nbgrader if not n.startswith((".", "__"))} - {
+        "grades.csv"
+    }
+    assert {Path(path).name for path in included} == own | {"submissions"}
+    for target in included.values():
+        assert target.startswith("course/data/")
+
+
+def test_the_material_is_found_beside_the_packages_or_in_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert content.content_root() == ROOT / "notebooks"
+    assert content.corpus_root() == ROOT / "tests" / "submissions"
+    monkeypatch.setattr(content, "_CLONE", tmp_path / "site-packages")
+    monkeypatch.setattr(content, "_DATA", tmp_path / "data")
+    with pytest.raises(CourseError, match="missing from this installation"):
+        content.content_root()
+    (tmp_path / "data" / "notebooks").mkdir(parents=True)
+    assert content.content_root() == tmp_path / "data" / "notebooks"
+
+
+def test_the_course_root_to_work_in_is_never_the_installed_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert content.working_root() == ROOT / "notebooks"
+    inside = content.copy_authoring(content.content_root(), tmp_path / "mine") / "authoring"
+    monkeypatch.chdir(inside)
+    assert content.working_root() == tmp_path / "mine"
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(content, "_CLONE", tmp_path / "site-packages")
+    with pytest.raises(CourseError, match="--root"):
+        content.working_root()
+
+
+def test_copying_the_sources_says_what_is_wrong(tmp_path: Path) -> None:
+    with pytest.raises(CourseError, match="it is not a course root"):
+        content.copy_authoring(tmp_path, tmp_path / "new")
+    (tmp_path / "file").touch()
+    with pytest.raises(CourseError, match="cannot be copied to"):
+        content.copy_authoring(content.content_root(), tmp_path / "file")
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"system": "Darwin", "machine": "arm64"}, "not on Darwin arm64"),
+        ({"system": "Darwin"}, "not on Darwin x86_64"),
+        ({"system": "Windows", "machine": "AMD64"}, "WSL 2"),
+        ({"machine": "aarch64"}, "not on Linux aarch64"),
+        ({"libc": ""}, "glibc"),
+        ({"version": (3, 10)}, "not CPython 3.10"),
+        ({"version": (3, 15)}, "not CPython 3.15"),
+        ({"implementation": "PyPy"}, "not PyPy 3.12"),
+    ],
+)
+def test_a_platform_without_wheels_is_one_clear_sentence(change: dict[str, Any], says: str) -> None:
+    sentence = problem(**{**HERE, **change})
+    assert sentence is not None
+    assert says in sentence
+    assert "\n" not in sentence
+
+
+@pytest.mark.parametrize("version", [(3, 11), (3, 12), (3, 13), (3, 14)])
+def test_the_platforms_that_have_wheels_are_welcome(version: tuple[int, int]) -> None:
+    assert problem(**{**HERE, "version": version}) is None
+    require_supported_platform()
+
+
+def test_the_platform_check_and_the_metadata_agree(project: dict[str, Any]) -> None:
+    bounds = Requirement(f"python{project['project']['requires-python']}").specifier
+    for minor in range(9, 18):
+        welcome = problem(**{**HERE, "version": (3, minor)}) is None
+        assert bounds.contains(f"3.{minor}") == welcome, minor
+
+
+def run(code: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+@pytest.mark.parametrize("command", ["course", "autograder"])
+def test_a_command_on_a_foreign_platform_says_so_before_anything_is_imported(command: str) -> None:
+    code = "import platform; platform.system = lambda: 'Darwin'\n"
+    code += f"from course.launch import {command}; {command}()"
+    done = run(code)
+    assert done.returncode == UnsupportedPlatformError.exit_code == 2
+    assert done.stdout == ""
+    [line] = done.stderr.splitlines()
+    assert line.startswith(f"{command}: This course runs on Linux x86-64 only")
+
+
+def test_the_commands_start_at_the_launcher_which_needs_nothing(project: dict[str, Any]) -> None:
+    scripts = project["project"]["scripts"]
+    assert scripts == {n: f"course.launch:{n}" for n in ("course", "autograder")}
+    done = run(
+        "import sys; before = set(sys.modules); import course.launch\n"
+        "new = {name.partition('.')[0] for name in set(sys.modules) - before}\n"
+        "print(sorted(new - set(sys.stdlib_module_names) - {'course'}))"
+    )
+    assert (done.stdout, done.stderr) == ("[]\n", "")
+
+
+def test_the_installed_metadata_are_those_of_this_project(project: dict[str, Any]) -> None:
+    assert metadata.version("ros2-course") == project["project"]["version"]
+
+
+def commands(app: typer.Typer) -> set[str]:
+    return {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
+
+
+def test_every_command_in_the_readme_exists() -> None:
+    from autograder.cli import app as autograder
+    from course.cli import app as course
+
+    named = set(re.findall(r"uv run (course|autograder) ([a-z]+)", README))
+    there = {("course", name) for name in commands(course)}
+    there |= {("autograder", name) for name in commands(autograder)}
+    assert named <= there
+    assert {("course", "lab"), ("course", "doctor"), ("autograder", "demo")} <= named
+
+
+def test_every_path_in_the_readme_exists() -> None:
+    named = set(
+        re.findall(r"`((?:notebooks|autograder|course|quizzes|tests|\.ci)/[\w./-]*)`", README)
+    )
+    made_on_the_way = {"notebooks/release/ch05", "notebooks/grades.csv"}
+    patterns = {path.split("NAME")[0].split("ASSIGNMENT")[0] for path in named - made_on_the_way}
+    assert {path for path in patterns if not (ROOT / path).exists()} == set()
+
+
+def test_ci_ends_with_the_readmes_own_test_command() -> None:
+    script = ROOT / ".ci" / "run"
+    assert script.stat().st_mode & 0o111
+    subprocess.run(["bash", "-n", script], check=True, timeout=10)
+    last = script.read_text(encoding="utf-8").splitlines()[-1]
+    assert last == "uv run pytest"
+    assert f"pip install uv && {last}" in README
+    assert "pip install uv && uv run autograder demo" in README
+
+
+def test_nothing_in_the_packages_reaches_the_wrong_way() -> None:
+    """Imports run one way: autograder to course, quizzes to nothing of ours."""
+    allowed = {"course": {"course"}, "autograder": {"autograder", "course"}, "quizzes": {"quizzes"}}
+    ours = {*allowed, "notebooks", "tests"}
+    for package, may in allowed.items():
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+                names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+                wrong = {name.partition(".")[0] for name in names} & ours - may
+                assert not wrong, f"{path.relative_to(ROOT)} imports {wrong}"
