@@ -91,9 +91,9 @@ def _follow(
     cell_timeout: float,
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
+    moved_on, number = True, 0
     try:
         channel.send({"cells": [vars(cell) for cell in program]})
-        moved_on = True
         for number, cell in enumerate(program):
             message = channel.receive(cell_timeout)
             if cell.exam:
@@ -105,7 +105,13 @@ def _follow(
                 outcome.outputs[number] = _outputs(message, number)
                 _note_error(outcome, number)
     except ChannelTimeout:
-        _give_up(program, outcome, f"A cell was still running after {cell_timeout:.0f} s.")
+        _give_up(
+            program,
+            outcome,
+            f"Code cell {number + 1} was still running after {cell_timeout:.0f} s, so nothing after "
+            "it was examined: a cell that never ends (rclpy.spin, an endless loop) blocks a "
+            "notebook.",
+        )
     except ChannelClosed:
         _give_up(program, outcome, f"The notebook's process ended: {subject.fate()}.")
     except ExaminerError as error:

@@ -31,13 +31,13 @@ from autograder.rigs.sensors import (
     sensor_rig,
     undemanding,
 )
+from autograder.rigs.stalling import Stalled, busy_consumer, few, require_kept
 
 EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
 
 CAMERA_NEWEST = 10  # frames: 1 s at 10 Hz
 LIDAR_FRESH = 5  # scans: 0.5 s at 10 Hz
 IMU_BURST, IMU_BOUND = 5, 50  # readings: 50 ms and 0.5 s at 100 Hz
-STALL = 60  # readings sent to each sensor while the consumer is busy
 EVENTS = 5
 
 READ_RELIABILITY = "Chapter 5, “QoS profiles: reliability”"
@@ -106,6 +106,7 @@ def readings_flow(rig: SensorRig) -> None:
 
     Two incompatible profiles never connect, and nothing fails aloud: the robot is simply blind.
     """
+    rig.attend()
     silent = rig.probe(SENSORS, rig.node.consumed, give_up=lambda s: _mismatches(rig, s))
     if silent:
         raise Failed(
@@ -160,43 +161,6 @@ def _all_reliable(endpoints: list[TopicEndpointInfo]) -> bool:
     return all(e.qos_profile.reliability == ReliabilityPolicy.RELIABLE for e in endpoints)
 
 
-def busy_consumer(rig: SensorRig) -> dict[str, list[int]]:
-    """Stall the consumer, feed every sensor, let it go on; return what it then passed on.
-
-    The barrier is a last emergency stop: it takes the same road into the subject as everything
-    before it, so once it is seen on the wire the stalled readers have received all they will.
-    """
-    rig.subject.pause(CONSUMERS)
-    for sensor in SENSORS:
-        if not rig.burst(sensor, "stall", STALL):
-            raise Failed(
-                expected=f"The driver publishes all {STALL} {sensor.name} readings that come in.",
-                actual=f"After {len(indices(rig.node.witnessed, sensor, 'stall'))} it fell silent.",
-            )
-    rig.burst(STOP, "barrier", 1)
-    rig.subject.resume(CONSUMERS)
-    for sensor in SENSORS:
-        rig.wait(lambda s=sensor: STALL - 1 in rig.consumed(s, "stall"))  # type: ignore[misc]
-    return {sensor.name: rig.consumed(sensor, "stall") for sensor in SENSORS}
-
-
-def _kept(rig: SensorRig, sensor: Sensor, least: int, most: int, expected: str) -> list[int]:
-    kept: list[int] = rig.once(busy_consumer)[sensor.name]
-    newest = list(range(STALL - len(kept), STALL))
-    if kept != newest:
-        actual = "the newest was missing" if STALL - 1 not in kept else f"it acted on {_few(kept)}"
-        raise Failed(expected=expected, actual=f"Of readings 0 to {STALL - 1}, {actual}.")
-    if not least <= len(kept) <= most:
-        actual = f"It then worked through the last {len(kept)} of {STALL} readings."
-        raise Failed(expected=expected, actual=actual)
-    return kept
-
-
-def _few(numbers: list[int]) -> str:
-    shown = ", ".join(str(n) for n in numbers[:6])
-    return f"readings {shown}{' …' if len(numbers) > 6 else ''}" if numbers else "nothing at all"
-
-
 @EXAM.check(
     needs=("readings_flow",),
     hints=(
@@ -213,7 +177,7 @@ def camera_newest(rig: SensorRig) -> None:
     robot drives on.
     """
     expected = f"After a pause at most the last {CAMERA_NEWEST} frames (1 s) are processed."
-    _kept(rig, CAMERA, 1, CAMERA_NEWEST, expected)
+    require_kept(rig, CAMERA, 1, CAMERA_NEWEST, expected)
 
 
 @EXAM.check(
@@ -231,7 +195,7 @@ def lidar_fresh(rig: SensorRig) -> str:
     An old scan shows obstacles where they were: at 1 m/s half a second is half a metre.
     """
     expected = f"After a pause no scan older than 0.5 s (the last {LIDAR_FRESH}) is acted on."
-    _kept(rig, LIDAR, 1, LIDAR_FRESH, expected)
+    require_kept(rig, LIDAR, 1, LIDAR_FRESH, expected)
     return _practice(rig, LIDAR)
 
 
@@ -266,7 +230,7 @@ def imu_burst(rig: SensorRig) -> str:
         f"After a pause the last {IMU_BURST} readings (50 ms) at least are there, and at most "
         f"{IMU_BOUND} (0.5 s)."
     )
-    _kept(rig, IMU, IMU_BURST, IMU_BOUND, expected)
+    require_kept(rig, IMU, IMU_BURST, IMU_BOUND, expected)
     return _practice(rig, IMU)
 
 
@@ -302,7 +266,7 @@ def stop_reaches_all(rig: SensorRig) -> None:
         if (got := indices(heard, STOP, "event")) != list(range(EVENTS)):
             raise Failed(
                 expected=f"{EVENTS} stops arrive as {EVENTS} stops, in order.",
-                actual=f"A consumer heard {_few(got)}.",
+                actual=f"A consumer heard {few(got)}.",
             )
     if not _all_reliable(rig.requested(STOP.topic)):
         raise Failed(
@@ -325,12 +289,14 @@ def stop_complete(rig: SensorRig) -> str:
 
     Pressed, released, pressed again: whoever sees only the last event does not know what happened.
     """
-    kept: list[int] = rig.once(busy_consumer)[STOP.name]
-    if kept != list(range(STALL)):
-        missing = STALL - len(set(kept))
+    stalled: Stalled = rig.once(busy_consumer)
+    count, kept = stalled[STOP.name]
+    if kept != list(range(count)):
+        missing = count - len(set(kept))
+        what = f"{missing} of {count} were lost" if missing else "some came twice or out of order"
         raise Failed(
-            expected=f"All {STALL} events of the pause are handled, in order.",
-            actual=f"{missing} of {STALL} were lost: the consumer handled {_few(kept)}.",
+            expected=f"All {count} events of the pause are handled, once and in order.",
+            actual=f"{what}: the consumer handled {few(kept)}.",
         )
     durable = any(
         e.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL

@@ -28,6 +28,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
     qos_check_compatible,
 )
+from rclpy.time import Time
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from sensor_msgs.msg import Image, Imu, LaserScan
 from std_msgs.msg import String
@@ -36,28 +37,31 @@ from autograder.bench import Bench
 from course import WaitTimeout
 
 DRIVERS, CONSUMERS = "SensorDrivers", "SensorConsumers"
-EXAMINER_NODE = "examiner"
 
 SETTLE = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
+ENDLESS = 3600 * 10**9
+"""Nanoseconds: a lifespan of an hour or more changes nothing in an exam of seconds."""
 PROBE_PERIOD = 0.1
 """Seconds between two probes while endpoints find each other."""
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """One sensor of the exercise: its topic, its message type, and how a message is tagged."""
+    """One sensor of the exercise: its topic, message type and rate (Hz), and how it is tagged."""
 
     name: str
     topic: str
     type: Any
+    rate: float
 
-    def message(self, tag: str) -> Any:
-        """Return a reading that carries ``tag``."""
+    def message(self, tag: str, stamp: Time) -> Any:
+        """Return a reading that carries ``tag`` and was taken at ``stamp``."""
         if self.type is String:
             return String(data=tag)
         message = self.type()
         message.header.frame_id = tag
+        message.header.stamp = stamp.to_msg()
         return message
 
     def tag(self, message: Any) -> str:
@@ -66,10 +70,10 @@ class Sensor:
 
 
 SENSORS = (
-    Sensor("camera", "camera/image", Image),
-    Sensor("lidar", "scan", LaserScan),
-    Sensor("imu", "imu/data", Imu),
-    Sensor("emergency_stop", "emergency/stop", String),
+    Sensor("camera", "camera/image", Image, 10),
+    Sensor("lidar", "scan", LaserScan, 10),
+    Sensor("imu", "imu/data", Imu, 100),
+    Sensor("emergency_stop", "emergency/stop", String, 100),
 )
 CAMERA, LIDAR, IMU, STOP = SENSORS
 
@@ -96,16 +100,17 @@ class ExaminerNode(Node):
     """The examiner's endpoints: hardware outputs, a witness a topic, and the consumers' ends."""
 
     def __init__(self) -> None:
-        """Create every endpoint; readings are tagged with a nonce of this run."""
-        super().__init__(EXAMINER_NODE, start_parameter_services=False, enable_rosout=False)
+        """Create what does not depend on the student; a nonce of this run tags readings."""
         self.nonce = secrets.token_hex(4)
+        super().__init__(
+            f"examiner_{self.nonce}", start_parameter_services=False, enable_rosout=False
+        )
         self.hardware = {
             s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless()) for s in SENSORS
         }
         self.consumed: Heard = defaultdict(list)
         self.witnessed: Heard = defaultdict(list)
         for sensor in SENSORS:
-            self.listen(sensor, f"consumer/{sensor.name}", lossless(), self.consumed)
             self.listen(sensor, sensor.topic, undemanding(), self.witnessed)
 
     def listen(
@@ -130,10 +135,34 @@ class ExaminerNode(Node):
         return self.create_subscription(sensor.type, topic, note, qos, event_callbacks=events)
 
     def send(self, sensor: Sensor, phase: str, count: int = 1) -> None:
-        """Feed ``count`` readings, tagged ``phase/0`` onwards, into a sensor's hardware."""
+        """Feed ``count`` readings, tagged ``phase/0`` onwards, into a sensor's hardware.
+
+        They come at once, but are stamped as at the sensor's rate, the last one now: a consumer
+        may judge a reading by its age.
+        """
+        now = self.get_clock().now()
         for index in range(count):
-            message = sensor.message(f"{self.nonce}/{phase}/{index}")
-            self.hardware[sensor.name].publish(message)
+            age = int((count - 1 - index) / sensor.rate * 1e9)
+            stamp = Time(nanoseconds=now.nanoseconds - age, clock_type=now.clock_type)
+            self._publish(sensor, f"{phase}/{index}", stamp)
+
+    def stream(self, sensor: Sensor, phase: str, count: int) -> Callable[[], bool]:
+        """Feed ``count`` readings at the sensor's rate; return what tells whether all are out."""
+        sent: list[int] = []
+
+        def tick() -> None:
+            if len(sent) < count:
+                self._publish(sensor, f"{phase}/{len(sent)}", self.get_clock().now())
+                sent.append(1)
+            else:
+                timer.cancel()
+
+        timer = self.create_timer(1 / sensor.rate, tick)
+        return lambda: len(sent) == count
+
+    def _publish(self, sensor: Sensor, tag: str, stamp: Time) -> None:
+        message = sensor.message(f"{self.nonce}/{tag}", stamp)
+        self.hardware[sensor.name].publish(message)
 
 
 class SensorRig:
@@ -151,11 +180,24 @@ class SensorRig:
 
     def offered(self, topic: str) -> list[TopicEndpointInfo]:
         """Return the publishers on ``topic`` that are not the examiner's."""
-        return _others(self.node.get_publishers_info_by_topic(topic))
+        return self._others(self.node.get_publishers_info_by_topic(topic))
 
     def requested(self, topic: str) -> list[TopicEndpointInfo]:
         """Return the subscriptions on ``topic`` that are not the examiner's."""
-        return _others(self.node.get_subscriptions_info_by_topic(topic))
+        return self._others(self.node.get_subscriptions_info_by_topic(topic))
+
+    def _others(self, endpoints: list[TopicEndpointInfo]) -> list[TopicEndpointInfo]:
+        return [e for e in endpoints if e.node_name != self.node.get_name()]
+
+    def attend(self) -> None:
+        """Listen to the consumers' ends, with what they offer: lossless wherever it is possible."""
+        for sensor in SENSORS:
+            topic = f"consumer/{sensor.name}"
+            reliable = all(
+                e.qos_profile.reliability == ReliabilityPolicy.RELIABLE for e in self.offered(topic)
+            )
+            qos = lossless() if reliable else undemanding()
+            self.node.listen(sensor, topic, qos, self.node.consumed)
 
     def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
         """Wait until ``condition`` holds; return whether it did before the deadline."""
@@ -190,7 +232,16 @@ class SensorRig:
     def burst(self, sensor: Sensor, phase: str, count: int) -> bool:
         """Send ``count`` readings; return whether the last was seen on the sensor's topic."""
         self.node.send(sensor, phase, count)
+        return self.seen(sensor, phase, count)
+
+    def seen(self, sensor: Sensor, phase: str, count: int) -> bool:
+        """Wait for the last of ``count`` readings on the sensor's topic; False if it never came."""
         return self.wait(lambda: f"{phase}/{count - 1}" in self.node.witnessed[sensor.name])
+
+    def expires(self) -> bool:
+        """Whether readings of any sensor are dropped when they get old (a lifespan is offered)."""
+        ends = [end for sensor in SENSORS for end in self.offered(sensor.topic)]
+        return any(0 < end.qos_profile.lifespan.nanoseconds < ENDLESS for end in ends)
 
     def consumed(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings in the order the consumer passed them on."""
@@ -227,10 +278,6 @@ def mismatch(offered: TopicEndpointInfo, requested: TopicEndpointInfo) -> str:
     """
     compatibility, reason = qos_check_compatible(offered.qos_profile, requested.qos_profile)
     return str(reason) if compatibility == QoSCompatibility.ERROR else ""
-
-
-def _others(endpoints: list[TopicEndpointInfo]) -> list[TopicEndpointInfo]:
-    return [endpoint for endpoint in endpoints if endpoint.node_name != EXAMINER_NODE]
 
 
 def _all_heard(sensors: Iterable[Sensor], heard: Heard, phase: str) -> bool:

@@ -27,6 +27,9 @@
 # And one rule for camera, LIDAR and IMU together: a node that starts late must not act on old
 # readings. Whether the emergency stop remembers its last event for late joiners is up to you.
 #
+# The drivers publish each reading as soon as the hardware delivers it, the consumers hand on what
+# they act on.
+#
 # Your work is examined by what your nodes **do**. Another process plays the hardware, keeps your
 # consumer busy, joins late, and listens on the wire. How you write it is your choice; every design
 # that does what the table says gets full marks.

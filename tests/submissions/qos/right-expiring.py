@@ -1,0 +1,18 @@
+# title: Queues without an end whose readings expire instead
+# fails: nothing
+
+from rclpy.duration import Duration
+
+
+def fresh(seconds, reliability=ReliabilityPolicy.RELIABLE):
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_ALL,
+        reliability=reliability,
+        lifespan=Duration(seconds=seconds),
+    )
+
+
+camera_qos = fresh(0.8, ReliabilityPolicy.BEST_EFFORT)
+lidar_qos = fresh(0.4)
+imu_qos = fresh(0.4)
+stop_qos = QoSProfile(history=HistoryPolicy.KEEP_ALL)
