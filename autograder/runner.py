@@ -108,9 +108,9 @@ def _follow(
         _give_up(
             program,
             outcome,
-            f"Code cell {number + 1} was still running after {cell_timeout:.0f} s, so nothing after "
-            "it was examined: a cell that never ends (rclpy.spin, an endless loop) blocks a "
-            "notebook.",
+            f"Code cell {number + 1} was still running after {cell_timeout:.0f} s, so nothing "
+            "after it was examined: a cell that never ends (rclpy.spin, an endless loop) blocks "
+            "a notebook.",
         )
     except ChannelClosed:
         _give_up(program, outcome, f"The notebook's process ended: {subject.fate()}.")

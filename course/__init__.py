@@ -1,1 +1,100 @@
 """Learn the building blocks of ROS 2 in a notebook, on real nodes and real DDS."""
+
+from __future__ import annotations
+
+import importlib
+import os
+from typing import TYPE_CHECKING, Any
+
+from course import platform_check
+
+# Message modules read this when they load: a wrong field type then fails where it is assigned.
+os.environ.setdefault("ROS_PYTHON_CHECK_FIELDS", "1")
+
+if platform_check.problem() is None:
+    # From here on `from example_interfaces.srv import SetBool` finds, or builds, the package.
+    from course import interfaces
+
+    interfaces.install()
+
+if TYPE_CHECKING:
+    from course.ambient import call as call
+    from course.ambient import close as close
+    from course.ambient import logs as logs
+    from course.ambient import next_message as next_message
+    from course.ambient import pause as pause
+    from course.ambient import record as record
+    from course.ambient import resume as resume
+    from course.ambient import run as run
+    from course.ambient import send_goal as send_goal
+    from course.ambient import session as session
+    from course.ambient import spin as spin
+    from course.ambient import stop as stop
+    from course.ambient import until as until
+    from course.ambient import wait_for_service as wait_for_service
+    from course.errors import CourseError as CourseError
+    from course.errors import DomainError as DomainError
+    from course.errors import SessionError as SessionError
+    from course.errors import WaitTimeout as WaitTimeout
+    from course.notebook import load_ipython_extension as load_ipython_extension
+    from course.notebook import unload_ipython_extension as unload_ipython_extension
+    from course.runtime.actions import GoalRun as GoalRun
+    from course.runtime.actions import GoalState as GoalState
+    from course.runtime.callback_errors import CallbackError as CallbackError
+    from course.runtime.closing import CloseReport as CloseReport
+    from course.runtime.logs import LogTable as LogTable
+    from course.runtime.recorder import Recorder as Recorder
+    from course.runtime.recorder import Stamped as Stamped
+    from course.runtime.session import Session as Session
+    from course.runtime.simtime import SimulatedTime as SimulatedTime
+
+_HOMES = {
+    "call": "course.ambient",
+    "close": "course.ambient",
+    "logs": "course.ambient",
+    "next_message": "course.ambient",
+    "pause": "course.ambient",
+    "record": "course.ambient",
+    "resume": "course.ambient",
+    "run": "course.ambient",
+    "send_goal": "course.ambient",
+    "session": "course.ambient",
+    "spin": "course.ambient",
+    "stop": "course.ambient",
+    "until": "course.ambient",
+    "wait_for_service": "course.ambient",
+    "CourseError": "course.errors",
+    "DomainError": "course.errors",
+    "SessionError": "course.errors",
+    "WaitTimeout": "course.errors",
+    "load_ipython_extension": "course.notebook",
+    "unload_ipython_extension": "course.notebook",
+    "GoalRun": "course.runtime.actions",
+    "GoalState": "course.runtime.actions",
+    "CallbackError": "course.runtime.callback_errors",
+    "CloseReport": "course.runtime.closing",
+    "LogTable": "course.runtime.logs",
+    "Recorder": "course.runtime.recorder",
+    "Stamped": "course.runtime.recorder",
+    "Session": "course.runtime.session",
+    "SimulatedTime": "course.runtime.simtime",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used: rclpy takes a moment, and a supported platform.
+
+    Raises:
+        UnsupportedPlatformError: there are no ROS 2 wheels for this machine.
+    """
+    if name not in _HOMES:
+        raise AttributeError(f"module 'course' has no attribute {name!r}")
+    if _HOMES[name] != "course.errors":
+        platform_check.require_supported_platform()
+    value = getattr(importlib.import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

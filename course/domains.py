@@ -23,7 +23,7 @@ _PORT_BASE, _PORTS_PER_DOMAIN = 7400, 250  # DDSI-RTPS 2.2, section 9.6.1.1: PB 
 _leases: weakref.WeakSet[DomainLease] = weakref.WeakSet()
 
 
-def check_domain_id(domain_id: int) -> int:
+def check_domain_id(domain_id: object) -> int:
     """Return `domain_id` if it is safe to use.
 
     Raises:
@@ -45,6 +45,7 @@ class DomainLease:
     """One domain id that no other session on this machine can lease; released by `release()`."""
 
     def __init__(self, domain_id: int, sock: socket.socket) -> None:
+        """Hold `domain_id` for as long as `sock` is open."""
         self.domain_id = domain_id
         self._socket = sock
         _leases.add(self)

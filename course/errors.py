@@ -12,6 +12,10 @@ class CourseError(Exception):
 
     exit_code = 1
 
+    def _render_traceback_(self) -> list[str]:
+        """Return what IPython shows: the sentence alone. The cell still fails."""
+        return [f"{type(self).__name__}: {self}"]
+
 
 class DomainError(CourseError):
     """A ROS domain id is out of range, or no free one is left on this machine."""
@@ -21,5 +25,5 @@ class SessionError(CourseError):
     """A session was asked for something that it cannot do (closed, wrong kind of node, ...)."""
 
 
-class WaitTimeout(CourseError):
+class WaitTimeout(CourseError):  # noqa: N818 - a wait that ended, named as ROS users say it
     """A wait reached its deadline; the message names what was waited for."""
