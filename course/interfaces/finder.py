@@ -1,0 +1,88 @@
+"""The import hook: ``from example_interfaces.srv import SetBool`` builds it on first use.
+
+The finder is the last on ``sys.meta_path``: a real ROS installation, or any installed package of
+that name, is found before it is asked.
+"""
+
+from __future__ import annotations
+
+import importlib.abc
+import importlib.machinery
+import importlib.util
+import sys
+from collections.abc import Sequence
+from types import ModuleType
+
+from course.interfaces import bundled, cache, packages, standins
+from course.interfaces.build import Unit
+from course.interfaces.errors import BuildError
+
+
+class Finder(importlib.abc.MetaPathFinder):
+    """Finds the bundled packages, and the modules made for learners' own ones."""
+
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> importlib.machinery.ModuleSpec | None:
+        """Return a spec at once; nothing is built before the module is executed."""
+        if fullname in bundled.PACKAGES:
+            return packages.package_spec(fullname, BundledLoader())
+        if packages.is_ours(fullname):  # importlib.reload asks again
+            return packages.package_spec(fullname)
+        return None
+
+
+class BundledLoader(packages.MadeHere):
+    """Loads a bundled package: from the cache, by building it, or as stand-ins."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Fill the modules of the package, unless a reload asks for it again."""
+        package = module.__name__
+        unit = bundled.unit(package)
+        if package in standins.reasons or unit.types[0] in packages.loaded:
+            return
+        try:
+            obtain(unit)
+        except BuildError as error:
+            standins.load(package, str(error))
+
+
+def obtain(unit: Unit) -> None:
+    """Build ``unit`` if it is not in the cache, and load it.
+
+    Raises ``BuildError``.
+    """
+    try:
+        packages.load(unit, cache.ensure(unit))
+    except BuildError:
+        raise
+    except ImportError:
+        # It is whole but does not fit: libraries were moved, or replaced by others.
+        folder = cache.ensure(unit, rebuild=True)
+        try:
+            packages.load(unit, folder)
+        except ImportError as error:
+            raise BuildError(
+                f"{unit.label} was built and cannot be loaded: {error}. "
+                "Reinstalling the ROS packages of this environment may help."
+            ) from error
+
+
+def install() -> None:
+    """Put the finder last on ``sys.meta_path``, once."""
+    if not any(isinstance(finder, Finder) for finder in sys.meta_path):
+        sys.meta_path.append(Finder())
+
+
+def installed_elsewhere(package: str) -> bool:
+    """Say whether Python finds ``package`` without us."""
+    if package in sys.modules:
+        return not packages.is_ours(package)
+    if package in sys.stdlib_module_names:
+        return True
+    try:
+        spec = importlib.util.find_spec(package)
+    except (ImportError, ValueError):
+        return True
+    # A namespace package is any folder of that name beside the notebook: it offers nothing.
+    return spec is not None and spec.has_location
