@@ -1,0 +1,1443 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Chapter 5: Nodes, Topics, Services - The Building Blocks of ROS 2
+#
+# This chapter is alive. Every node in it is a real `rclpy` node, talking over real DDS, inside the
+# notebook you are reading. Run the cells from top to bottom with **Shift+Enter**; running a cell
+# again is always safe, because a node that is already there is replaced, never doubled.
+#
+# Run the next cell first. It loads the course and opens a *session*: a private corner of the ROS
+# network in which your nodes run in the background while you read on.
+
+# %% tags=["notebook-only"]
+# %load_ext course
+import course
+
+session = course.session(threads=4)
+print(f"Your nodes live on ROS domain {session.domain_id}, and nobody else's do.")
+
+# %% [markdown]
+# ## Introduction
+#
+# Chapter 4 showed ROS 2 from above: the nervous system of a Physical AI system. Now we look through
+# the microscope. A nervous system is made of a few kinds of cell, neurons, synapses and pathways,
+# and its rich behaviour comes from how these simple parts are joined. ROS 2 is the same. It has
+# four building blocks:
+#
+# - **nodes** do the work, each one a small unit with one function;
+# - **topics** let nodes share information continuously;
+# - **services** answer a request with a response, synchronously;
+# - **actions** run a long operation and report on it while it runs.
+#
+# You will meet each of them first as an idea, then as an everyday picture, and then as code that
+# you can stop, change and run again. By the end all of them run together, as they would in a robot.
+
+# %% [markdown]
+# ## Learning objectives
+#
+# When you have worked through this chapter you can
+#
+# - **explain** how a ROS 2 node is built, how it lives and ends, and what part it plays in a
+#   Physical AI system;
+# - **describe** publish-subscribe, and say which QoS profile a given topic needs;
+# - **implement** nodes that communicate through topics, services and actions;
+# - **analyse** what each communication pattern costs and what it gives in a robotic system;
+# - **evaluate** which pattern fits a particular robotic task and its requirements.
+
+# %% [markdown]
+# ## Hook
+#
+# Follow one camera image through a robot.
+#
+# The camera driver, a node, publishes the image on a topic. Perception, another node, receives it,
+# finds the objects in the picture, and publishes the detections on a second topic. It neither knows
+# nor cares who reads them: today navigation and manipulation do, tomorrow a logger may.
+#
+# Navigation now wants to know where the robot is. That is a question with one answer, so it calls a
+# service of the localization system. Then the robot has to drive somewhere. That takes a while, so
+# a goal is sent to the navigation system's action, and feedback about the progress flows back until
+# the robot arrives.
+#
+# Three patterns, one image, and no node that does everything. Like the specialised cells of a body,
+# each part is simple; the skill is in joining them. A robot that is joined well is robust and can
+# be maintained. That skill is what this chapter is about.
+
+# %% [markdown]
+# ## Before you learn this
+#
+# Five sentences to carry with you:
+#
+# - A **node** is the basic processing unit of ROS 2; it performs one specific function.
+# - A **topic** shares data continuously, by publish-subscribe.
+# - A **service** is request-response, for synchronous operations.
+# - An **action** is for long-running operations: it has goals that are managed, and feedback.
+# - A **QoS profile** controls reliability, durability and other traits of the communication.
+
+# %% [markdown]
+# ## Common misunderstanding
+#
+# > **Myth:** topics are the most common pattern, so all ROS 2 communication should use topics.
+# >
+# > **Reality:** topics, services and actions each suit different cases. What decides is timing (how
+# > soon, how often, how long), the direction in which data flows, and the kind of interaction you
+# > need: a broadcast, a question, or a task.
+
+# %% [markdown]
+# ## Concept
+#
+# The four building blocks are specialised, like the cell types of a body. Each was designed for one
+# kind of interaction. We take them in turn.
+
+# %% [markdown]
+# ### Nodes: the processing units
+#
+# A node is to ROS 2 what a neuron is to a nervous system. It does one job, and it reaches other
+# nodes through the ROS 2 middleware. Three traits matter.
+#
+# **Single responsibility.** A node has one clear purpose, as a specialised cell has. The camera
+# driver handles camera data and nothing else; the localization node estimates the position and
+# nothing else.
+#
+# **Lifecycle management.** A node lives through three phases:
+#
+# | Phase | What the node does |
+# | --- | --- |
+# | initialization | creates its publishers, subscribers, services and actions |
+# | running | processes data and communicates with other nodes |
+# | cleanup | releases its resources properly |
+#
+# **Resource management.** A node owns its timers, callbacks and communication endpoints. It must
+# set them up and take them down with care; what is forgotten is a memory leak at best, and an
+# unstable system at worst.
+#
+# > **Note** "Lifecycle" has a second, narrower meaning in ROS 2: a *managed* node (`LifecycleNode`)
+# > has named states such as *inactive* and *active*, and is moved between them from outside. The
+# > nodes in this chapter are ordinary nodes; the three phases above hold for both kinds. Source:
+# > ROS 2 design, "Managed nodes".
+
+# %% [markdown]
+# ### Topics: continuous data sharing (publish-subscribe)
+#
+# A topic is for a stream of data that several nodes need. Think of a sensory neuron: it fires, and
+# several centres in the brain receive the signal.
+#
+# **Publishers and subscribers.** Publishers send to a topic, subscribers receive from it. Several
+# publishers on one topic are allowed, but uncommon; several subscribers are the normal case.
+#
+# **Asynchronous communication.** A publisher does not wait for anybody's response, and a subscriber
+# need not know who published. Neither depends on the other being there. This is called *loose
+# coupling*, and it is why you can add a logger to a robot without touching the robot.
+#
+# **Message types.** Each topic has exactly one message type, which fixes the structure of its data.
+# That makes the exchange type-safe and predictable.
+#
+# **Quality of Service (QoS).** Not every topic needs the same treatment, so each end of a topic has
+# a QoS profile: reliability, durability, history and more. A sensor stream may use best-effort
+# delivery; safety-critical data should use reliable delivery. More below, with experiments.
+
+# %% [markdown]
+# ### Services: synchronous request-response
+#
+# A service is for an operation that needs an answer now. You ask a particular question and wait for
+# the reply, as over a direct neural pathway.
+#
+# **Client-server model.** A client sends a request to the server; the server processes it and
+# returns a response. Until that response is there the client does not go on: the call blocks.
+#
+# **Synchronous processing.** Use this when an operation must be known to be complete before the
+# next one starts.
+#
+# **Error handling.** The response can say that an operation failed, with an error code and a
+# message, so the client is never left guessing.
+#
+# > **Note** Waiting is the *client's* choice, not a property of the service. `call()` blocks the
+# > thread it runs in; `call_async()` returns a future at once and a callback gets the response. A
+# > blocking call *inside a callback* is a trap: on a single-threaded executor, or within one
+# > mutually exclusive callback group, the response can never be processed and the node deadlocks.
+# > You will see it happen further down. Sources: ROS 2 documentation, "Synchronous vs. asynchronous
+# > service clients" and "Using Callback Groups"; rclpy, `Client.call`.
+#
+# > **Note** The error code is one you design: it is a field of the response, such as `success` and
+# > `message` in `SetBool`. If a server's callback raises an exception, `rclpy` sends no response at
+# > all, so a client still needs a timeout. Source: ROS 2 documentation, "Interfaces"; observed with
+# > rclpy 7.1.
+
+# %% [markdown]
+# ### Actions: long-running operations with feedback
+#
+# An action is for something that takes time and has to be watched. The biological picture is a
+# complex motor pattern: walking to a place means monitoring and adjusting at every step.
+#
+# **Goal, feedback, result.** The client sends a goal. The server sends feedback again and again
+# while it works. When it is done it returns a result.
+#
+# **Non-blocking.** Unlike the client of a service, the client of an action does not stop and wait.
+# It carries on with its own work while the feedback comes in.
+#
+# **Cancellation.** A client can ask for a goal to be canceled, and so stop an operation that is no
+# longer wanted.
+#
+# **Goal status.** Every goal has a status, so that the client knows whether it is pending,
+# executing, succeeded or failed.
+#
+# > **Note** The exact names of the states are ACCEPTED (1, the "pending" above), EXECUTING (2),
+# > CANCELING (3), SUCCEEDED (4), CANCELED (5) and ABORTED (6, the "failed" above). A goal that the
+# > server *rejects* never gets a status at all. Source: `action_msgs/msg/GoalStatus`.
+#
+# > **Note** Cancellation is a request, which the server may decline, and in `rclpy` an action
+# > server **declines every one of them** unless you give it a `cancel_callback`. Our ActionNode
+# > below has one. Source: rclpy, `ActionServer` (`default_cancel_callback`).
+
+# %% [markdown]
+# ### When to use what
+#
+# Choosing the pattern is the most important design decision you make about an interface.
+#
+# | Use a **topic** when | Use a **service** when | Use an **action** when |
+# | --- | --- | --- |
+# | many readers want the same data, such as sensor streams or state information | a synchronous request-response is needed | the operation takes a long time |
+# | data is produced and consumed continuously | the operation is fairly quick, under a few seconds | continuous feedback is needed while it runs |
+# | asynchronous communication is acceptable | error handling matters | it may have to be canceled |
+# | the nodes should stay loosely coupled | exactly two parties talk, one to one | it has a clear start and a clear end |
+
+# %% [markdown]
+# ### Quality of Service (QoS) profiles
+#
+# A QoS profile says how a topic behaves. Three policies matter most.
+#
+# **Reliability.** Must messages be delivered (`RELIABLE`), or is some loss acceptable
+# (`BEST_EFFORT`)? Safety-critical data should use `RELIABLE`; for sensor data `BEST_EFFORT` is
+# often the better choice.
+#
+# **Durability.** Does a late joiner get messages that were published before it came
+# (`TRANSIENT_LOCAL`), or only new ones (`VOLATILE`)? Settings, parameter information for instance,
+# are a case for `TRANSIENT_LOCAL`: whoever starts late still learns the current values.
+#
+# **History.** How much is stored until it is delivered: everything (`KEEP_ALL`), or the latest few
+# messages (`KEEP_LAST` with a *depth*)? For a fast sensor, `KEEP_LAST` and a small depth keep the
+# memory bounded.
+#
+# > **Note** `RELIABLE` means that a lost message is sent again *while the publisher still has it in
+# > its history*. It is not "every message, always": a reader that is slower than the publisher
+# > still loses what its queue cannot hold. Source: DDS 1.4, sections 2.2.3.14 RELIABILITY and
+# > 2.2.3.18 HISTORY.
+#
+# > **Note** The *parameters* of ROS 2 nodes do not travel on a transient-local topic: they are read
+# > and written through services. Transient-local topics are used for things like a map or a robot's
+# > description, which are published once and needed by whoever comes later. Source: ROS 2
+# > documentation, "Parameters" and "Quality of Service settings".
+#
+# Three experiments follow. Each opens a session of its own and closes it again.
+
+# %% [markdown]
+# #### Experiment 1: the late joiner
+#
+# A publisher posts five notices *before* anybody subscribes. Then two readers join. Look at which
+# notices each of them has: the only difference between the two readers is their durability.
+
+# %% tags=["notebook-only"]
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+
+
+def texts(recorder):
+    """The text of each message that a recorder has kept."""
+    return [stamped.message.data for stamped in recorder.messages]
+
+
+board_qos = QoSProfile(
+    depth=3,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+with course.Session() as bench:
+    board = bench.run(Node, "notice_board")
+    notices = board.create_publisher(String, "notices", board_qos)
+    for number in range(1, 6):
+        notices.publish(String(data=f"notice {number}"))
+
+    remembers = bench.record(
+        "notices", String, qos=QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    )
+    forgets = bench.record(
+        "notices", String, qos=QoSProfile(depth=10, durability=DurabilityPolicy.VOLATILE)
+    )
+    bench.until(
+        lambda: notices.get_subscription_count() == 2 and remembers.count >= 3,
+        timeout=30.0,
+        what="both readers to be matched, and the old notices to be replayed",
+    )
+    notices.publish(String(data="notice 6"))
+    bench.until(
+        lambda: "notice 6" in texts(remembers) and "notice 6" in texts(forgets),
+        timeout=30.0,
+        what="the new notice to reach both readers",
+    )
+
+    print("TRANSIENT_LOCAL reader:", texts(remembers))
+    print("VOLATILE reader:       ", texts(forgets))
+    assert texts(remembers) == ["notice 3", "notice 4", "notice 5", "notice 6"]
+    assert texts(forgets) == ["notice 6"]
+
+# %% [markdown]
+# The transient-local reader got notices 3, 4 and 5, which were published before it existed, and the
+# volatile reader did not. Notices 1 and 2 are gone for everybody: the publisher's depth is 3, so it
+# kept three. A replay is never longer than the smaller of the two depths, and *both* sides have to
+# be `TRANSIENT_LOCAL`.
+
+# %% [markdown]
+# #### Experiment 2: two ends that do not fit
+#
+# A publisher **offers** a QoS, a subscriber **requests** one. If the offer is weaker than the
+# request, DDS does not connect the two. There is no exception and no crash; nothing arrives. Here a
+# camera offers `BEST_EFFORT`; one display asks for `RELIABLE`, the other for `BEST_EFFORT`.
+
+# %% tags=["notebook-only"]
+from rclpy.qos import qos_check_compatible
+
+best_effort = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+reliable = QoSProfile(depth=10, reliability=ReliabilityPolicy.RELIABLE)
+demanding, modest = [], []
+
+with course.Session() as bench:
+    camera = bench.run(Node, "camera")
+    display = bench.run(Node, "display")
+    images = camera.create_publisher(String, "images", best_effort)
+    display.create_subscription(String, "images", demanding.append, reliable)
+    display.create_subscription(String, "images", modest.append, best_effort)
+    bench.until(
+        lambda: display.count_subscribers("images") == 2 and images.get_subscription_count() == 1,
+        timeout=30.0,
+        what="both subscriptions on the graph, and one of them matched",
+    )
+    for number in range(5):
+        images.publish(String(data=f"image {number}"))
+    bench.until(
+        lambda: len(modest) == 5, timeout=30.0, what="five images at the BEST_EFFORT subscriber"
+    )
+
+    print("On the graph: subscriptions ", display.count_subscribers("images"))
+    print("Matched by the publisher:   ", images.get_subscription_count())
+    print("RELIABLE subscriber got:    ", len(demanding), "images")
+    print("BEST_EFFORT subscriber got: ", len(modest), "images")
+    _, reason = qos_check_compatible(best_effort, reliable)
+    print("rclpy says:                 ", reason)
+    warnings = bench.until(
+        lambda: [row for row in bench.logs(level="WARN") if "incompatible QoS" in row.message],
+        timeout=30.0,
+        what="the warning about the incompatible pair in the log",
+    )
+    for row in warnings:
+        print(f"{row.node} logged: {row.message}")
+    assert demanding == []
+    assert len(modest) == 5
+
+# %% [markdown]
+# Remember this picture: *two* subscriptions are on the graph, *one* is matched, and the only trace
+# is a warning in the log. When "my subscriber gets nothing" on a robot, compare the two QoS
+# profiles first. These pairs do not connect:
+#
+# | Offered | Requested |
+# | --- | --- |
+# | `BEST_EFFORT` | `RELIABLE` |
+# | `VOLATILE` | `TRANSIENT_LOCAL` |
+#
+# The other way round is fine: an offer may be *better* than the request. History and depth never
+# keep two ends apart. (Deadline and liveliness can; they are beyond this chapter.) Source: ROS 2
+# documentation, "Quality of Service settings", QoS compatibilities.
+
+# %% [markdown]
+# #### Experiment 3: the slow reader
+#
+# A planner is busy while a laser publishes 30 scans, all of them `RELIABLE`. Then the planner gets
+# round to reading. It has three subscriptions which differ in their history only. Look at which
+# scans are left in each queue.
+
+# %% tags=["notebook-only"]
+from rclpy.duration import Duration
+
+histories = {
+    "KEEP_LAST, depth 1": QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=1),
+    "KEEP_LAST, depth 10": QoSProfile(history=HistoryPolicy.KEEP_LAST, depth=10),
+    "KEEP_ALL": QoSProfile(history=HistoryPolicy.KEEP_ALL),
+}
+kept = {name: [] for name in histories}
+
+with course.Session() as bench:
+    laser = bench.run(Node, "laser")
+    planner = bench.run(Node, "planner")
+    scans = laser.create_publisher(String, "scan", QoSProfile(history=HistoryPolicy.KEEP_ALL))
+    for name, qos in histories.items():
+        planner.create_subscription(String, "scan", kept[name].append, qos)
+    bench.until(
+        lambda: scans.get_subscription_count() == 3,
+        timeout=30.0,
+        what="three matched subscriptions",
+    )
+
+    bench.pause(planner)
+    for number in range(1, 31):
+        scans.publish(String(data=str(number)))
+    assert scans.wait_for_all_acked(Duration(seconds=10))
+    bench.resume(planner)
+    bench.until(
+        lambda: len(kept["KEEP_ALL"]) == 30, timeout=30.0, what="the planner to empty its queues"
+    )
+
+    for name, messages in kept.items():
+        print(f"{name:<20} {len(messages):>2} of 30:", ", ".join(m.data for m in messages))
+    assert [m.data for m in kept["KEEP_LAST, depth 1"]] == ["30"]
+    assert [m.data for m in kept["KEEP_LAST, depth 10"]] == [str(n) for n in range(21, 31)]
+
+# %% [markdown]
+# Reliable delivery put every scan at the planner's door; the *history* decided how many were still
+# there when it opened. Depth 1 is the newest scan and nothing else, which is often just what a
+# controller wants, but do not call it "no data loss".
+#
+# > **Note** With `KEEP_ALL` the depth is ignored. "All" is still not endless: the queue grows up to
+# > the middleware's resource limits (5000 samples by default in Fast DDS, which this course uses);
+# > beyond them we saw messages disappear without a word. Sources: DDS 1.4, sections 2.2.3.18
+# > HISTORY and 2.2.3.19 RESOURCE_LIMITS; Fast DDS, `ResourceLimitsQosPolicy`.
+
+# %% [markdown]
+# ## Real-world examples and analogies
+#
+# **A hospital.** Patient monitors broadcast vital signs all day, to whoever needs to see them:
+# topics. A doctor asks for one particular lab result and gets it: a service. Surgery is long and
+# complex, and the surgical team gets updates from start to finish: an action.
+#
+# **A smart home.** Sensors publish temperature and humidity all the time: topics. You ask for the
+# light to be turned on: a service. Security monitoring goes on for hours and keeps you up to date
+# on its status: an action.
+#
+# In both, each pattern has its purpose, and is built for one type of information flow.
+
+# %% [markdown]
+# ## Diagram
+#
+# One robot, three patterns. The camera's images go to two subscribers over a topic. The path comes
+# from a service: one request, one response. Driving is an action: a goal goes in, feedback comes
+# out all the while, and a result at the end. Every arrow has a QoS profile that controls how it
+# behaves.
+#
+# ```mermaid
+# flowchart LR
+#     subgraph topics["Topic: publish-subscribe"]
+#         camera(["Camera Driver"]) -- "images" --> processing(["Image Processing"])
+#         camera -- "images" --> detection(["Object Detection"])
+#     end
+#     subgraph services["Service: request-response"]
+#         navclient(["Navigation Client"]) -- "request: path to B?" --> planner(["Path Planner"])
+#         planner -. "response: the path" .-> navclient
+#     end
+#     subgraph actions["Action: goal, feedback, result"]
+#         motion(["Motion Client"]) -- "goal: drive to B" --> server(["Navigation Server"])
+#         server -. "feedback: how far" .-> motion
+#         server -. "result: arrived" .-> motion
+#     end
+#     qos["QoS profiles: reliability, durability, history"] --- topics
+#     qos --- services
+#     qos --- actions
+# ```
+
+# %% [markdown]
+# ## Code
+#
+# Now the real thing: five nodes, structured as in a real robot, with no robot needed. They use ROS
+# 2, `rclpy` and Python's standard library, plus `course` to run them in the background.
+#
+# **You practise** creating nodes with different communication patterns; writing publishers,
+# subscribers, services and actions; managing a node's resources; and seeing what a QoS profile
+# does.
+#
+# **You need** Chapter 1 (the fundamentals of Physical AI), Chapter 2 (basic Python), Chapter 3 (the
+# three-tier architecture) and Chapter 4 (the architecture of ROS 2).
+#
+# **You will see** several nodes using different patterns, each with a QoS chosen for its purpose,
+# and how they take up and give back what they use.
+#
+# The names in the cells below, of classes, nodes, topics, services and the action, are the
+# chapter's own. You will meet them again in the exercises.
+
+# %%
+"""Nodes, topics, services and actions: the five nodes of chapter 5, and a main that runs them."""
+
+# First, as it provides example_interfaces where no ROS 2 is installed.
+import course  # isort: skip
+
+import threading
+
+from example_interfaces.action import Fibonacci
+from example_interfaces.srv import SetBool
+from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+
+# %% [markdown]
+# > **Note** The first import of `example_interfaces` may take a few seconds: the course builds the
+# > package from its interface definitions with your compiler, once, and keeps it. After that it is
+# > instant.
+#
+# ### SensorNode: topics with different QoS
+#
+# One node, three streams, three different needs:
+#
+# | Topic | Rate | Reliability | Durability | History | Because |
+# | --- | --- | --- | --- | --- | --- |
+# | `camera/data` | 10 Hz | `BEST_EFFORT` | `VOLATILE` | `KEEP_LAST`, depth 5 | fast sensor data (camera, IMU): the next frame is coming anyway |
+# | `emergency/stop` | 1 Hz | `RELIABLE` | `VOLATILE` | `KEEP_ALL` | safety: no event may be dropped |
+# | `environment/data` | 0.5 Hz | `RELIABLE` | `VOLATILE` | `KEEP_LAST`, depth 10 | slow data: every value is worth having |
+#
+# Each stream has a timer. Time is read from the node's own clock, not from `time.time()`, so that
+# the node also works on simulated time; you will use that in a moment.
+
+
+# %%
+class SensorNode(Node):
+    """Publish three simulated sensors, each with the QoS that suits it."""
+
+    def __init__(self):
+        super().__init__("sensor_node")
+
+        # Fast sensor data: losing a frame is better than waiting for it.
+        qos_sensor = QoSProfile(
+            depth=5,
+            reliability=ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.VOLATILE,
+            history=HistoryPolicy.KEEP_LAST,
+        )
+        self.camera_publisher = self.create_publisher(String, "camera/data", qos_sensor)
+
+        # Safety: every event must arrive.
+        qos_critical = QoSProfile(
+            depth=10,  # KEEP_ALL ignores it
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.VOLATILE,
+            history=HistoryPolicy.KEEP_ALL,
+        )
+        self.emergency_publisher = self.create_publisher(String, "emergency/stop", qos_critical)
+
+        # Slow data: reliable, with a short memory.
+        qos_env = QoSProfile(
+            depth=10,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.VOLATILE,
+            history=HistoryPolicy.KEEP_LAST,
+        )
+        self.environment_publisher = self.create_publisher(String, "environment/data", qos_env)
+
+        self.camera_timer = self.create_timer(0.1, self.publish_camera_data)  # 10 Hz
+        self.emergency_timer = self.create_timer(1.0, self.publish_emergency_data)  # 1 Hz
+        self.environment_timer = self.create_timer(2.0, self.publish_environment_data)  # 0.5 Hz
+        self.get_logger().info("Sensors ready: camera 10 Hz, emergency 1 Hz, environment 0.5 Hz")
+
+    def seconds(self):
+        """The time on this node's clock, in s."""
+        return self.get_clock().now().nanoseconds / 1e9
+
+    def publish_camera_data(self):
+        """Publish one frame; frames are numbered in tenths of a second."""
+        frame = String(data=f"Camera frame {round(self.seconds() * 10)} - RGB-D data")
+        self.camera_publisher.publish(frame)
+        self.get_logger().debug(f"Camera: {frame.data}")
+
+    def publish_emergency_data(self):
+        """Publish the state of the emergency stop."""
+        status = String(data=f"Emergency status: OK - {self.seconds():.3f}")
+        self.emergency_publisher.publish(status)
+        self.get_logger().info(f"Emergency: {status.data}")
+
+    def publish_environment_data(self):
+        """Publish temperature and humidity."""
+        reading = String(data=f"Environment: Temperature 22°C, Humidity 45% - {self.seconds():.3f}")
+        self.environment_publisher.publish(reading)
+        self.get_logger().info(f"Environment: {reading.data}")
+
+
+# %% [markdown]
+# Start it. It runs in the background from here on; the notebook stays yours. Look at the QoS that
+# the node *offers on the graph*, and at one live message of each topic.
+
+# %% tags=["notebook-only"]
+sensor_topics = ("camera/data", "emergency/stop", "environment/data")
+sensor_node = session.run(SensorNode)
+
+offered = {}
+for topic in sensor_topics:
+    endpoint = sensor_node.get_publishers_info_by_topic(topic)[0]
+    qos = endpoint.qos_profile
+    offered[topic] = (qos.reliability.name, qos.durability.name)
+    message = session.next_message(String, topic, timeout=30.0)
+    print(f"{topic:<17} {qos.reliability.name:<12} {qos.durability.name:<9} {message.data}")
+
+assert offered == {
+    "camera/data": ("BEST_EFFORT", "VOLATILE"),
+    "emergency/stop": ("RELIABLE", "VOLATILE"),
+    "environment/data": ("RELIABLE", "VOLATILE"),
+}
+
+# %% [markdown]
+# History and depth are missing from that table on purpose: DDS does not announce them. They show in
+# behaviour only, as in experiment 3.
+#
+# And the rates? On a wall clock we would have to wait, and a busy laptop would blur the figures. So
+# we use **simulated time**: a session that publishes `/clock` itself. Twenty seconds pass in about
+# one, and every timer fires exactly as often as it should.
+
+# %% tags=["notebook-only"]
+with course.Session(sim_time=True) as lab:
+    lab.run(SensorNode)
+    tapes = {topic: lab.record(topic, String) for topic in sensor_topics}
+    lab.until(
+        lambda: all(lab.nodes["/sensor_node"].count_subscribers(topic) for topic in sensor_topics),
+        timeout=30.0,
+        what="the recorders to be on the graph",
+    )
+    lab.sim.advance(20.0)
+    expected = {"camera/data": 200, "emergency/stop": 20, "environment/data": 10}
+    lab.until(
+        lambda: all(tapes[topic].count >= number for topic, number in expected.items()),
+        timeout=30.0,
+        what="every message of 20 simulated seconds",
+    )
+    arrived = {topic: tape.count for topic, tape in tapes.items()}
+
+for topic, count in arrived.items():
+    print(f"{topic:<17} {count:>3} messages in 20 s = {count / 20:g} Hz")
+assert arrived == expected
+
+# %% [markdown]
+# ### ProcessingNode: subscribers that match
+#
+# The next node subscribes to all three streams. What it requests must be no more than what the
+# sensors offer:
+#
+# | Topic | SensorNode offers | ProcessingNode requests |
+# | --- | --- | --- |
+# | `camera/data` | `BEST_EFFORT` | `BEST_EFFORT`, depth 5 |
+# | `emergency/stop` | `RELIABLE`, `KEEP_ALL` | `RELIABLE`, depth 10 |
+# | `environment/data` | `RELIABLE` | `BEST_EFFORT`, depth 5 |
+#
+# Look at the last row: the subscriber asks for *less* than is offered. That connects, and the
+# connection is then best-effort. In the middle row the histories differ, which never matters for
+# connecting, but it means that this *reader* keeps ten events, whatever the publisher keeps.
+#
+# Every camera frame leads to one message on `processed/data`. Emergency data is handled at once; a
+# real system might trigger its safety response there. The `10` given to the last publisher is the
+# short form of a QoS: `RELIABLE`, `VOLATILE`, `KEEP_LAST` with depth 10.
+
+
+# %%
+class ProcessingNode(Node):
+    """Subscribe to the sensors with QoS that fits what they offer, and publish what was found."""
+
+    def __init__(self):
+        super().__init__("processing_node")
+
+        qos_sensor = QoSProfile(
+            depth=5,
+            reliability=ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.VOLATILE,
+        )
+        qos_critical = QoSProfile(
+            depth=10,
+            reliability=ReliabilityPolicy.RELIABLE,
+            durability=DurabilityPolicy.VOLATILE,
+        )
+        self.camera_subscriber = self.create_subscription(
+            String, "camera/data", self.camera_callback, qos_sensor
+        )
+        self.emergency_subscriber = self.create_subscription(
+            String, "emergency/stop", self.emergency_callback, qos_critical
+        )
+        self.environment_subscriber = self.create_subscription(
+            String, "environment/data", self.environment_callback, qos_sensor
+        )
+        self.processed_publisher = self.create_publisher(String, "processed/data", 10)
+        self.get_logger().info("Processing ready: three subscribers, one publisher")
+
+    def camera_callback(self, msg):
+        """Simulate image processing: one result for each frame."""
+        processed = String(data=f"Processed: {msg.data} - Objects detected")
+        self.processed_publisher.publish(processed)
+        self.get_logger().debug(f"Processed camera: {processed.data}")
+
+    def emergency_callback(self, msg):
+        """Handle safety data at once."""
+        self.get_logger().warning(f"CRITICAL: {msg.data}")
+
+    def environment_callback(self, msg):
+        """Take note of the environment."""
+        self.get_logger().info(f"Environmental: {msg.data}")
+
+
+# %% [markdown]
+# Start it beside the sensors, and let five simulated seconds pass. Fifty frames go in; look for
+# fifty results coming out, each with the frame that caused it. Below it is the node's log. Nothing
+# is printed by the nodes themselves: their log messages are kept, at every level, and you read them
+# when you like.
+
+# %% tags=["notebook-only"]
+with course.Session(sim_time=True) as lab:
+    lab.run(SensorNode)
+    processing = lab.run(ProcessingNode)
+    results = lab.record("processed/data", String)
+    lab.until(
+        lambda: (
+            all(processing.count_publishers(topic) for topic in sensor_topics)
+            and processing.count_subscribers("processed/data")
+        ),
+        timeout=30.0,
+        what="both nodes and the recorder to be connected",
+    )
+    lab.sim.advance(5.0)
+    lab.until(lambda: results.count >= 50, timeout=30.0, what="fifty processed frames")
+    processed = texts(results)
+    log = lab.logs("processing_node", level="INFO")
+
+print(*processed[:2], "...", processed[-1], "", sep="\n")
+print(log)
+assert len(processed) == 50
+assert all(
+    text.startswith("Processed: Camera frame") and text.endswith("- RGB-D data - Objects detected")
+    for text in processed
+)
+assert any(row.message.startswith("CRITICAL: Emergency status: OK") for row in log)
+assert any("Temperature 22°C, Humidity 45%" in row.message for row in log)
+
+# %% [markdown]
+# The same pair now runs in your session too, at its natural pace. The cell takes one result as it
+# comes and shows what the graph says about the connections.
+
+# %% tags=["notebook-only"]
+processing_node = session.run(ProcessingNode)
+print(session.next_message(String, "processed/data", timeout=30.0).data)
+
+requested = {}
+for topic in sensor_topics:
+    endpoints = processing_node.get_subscriptions_info_by_topic(topic)
+    ours = next(e for e in endpoints if e.node_name == "processing_node")
+    requested[topic] = ours.qos_profile.reliability.name
+    print(f"{topic:<17} offered {offered[topic][0]:<12} requested {requested[topic]}")
+processed_qos = processing_node.get_publishers_info_by_topic("processed/data")[0].qos_profile
+assert requested == {
+    "camera/data": "BEST_EFFORT",
+    "emergency/stop": "RELIABLE",
+    "environment/data": "BEST_EFFORT",
+}
+assert processed_qos.reliability is ReliabilityPolicy.RELIABLE
+assert processed_qos.durability is DurabilityPolicy.VOLATILE
+
+# %% [markdown]
+# ### ServiceNode: answers on request
+#
+# Two services, both of type `SetBool`: a boolean goes in as `data`; `success` and `message` come
+# out.
+#
+# - `get_robot_state` answers that the robot is operational, and repeats the mode it was asked with;
+# - `set_robot_mode` sets the mode: `True` is ACTIVE, `False` is STANDBY.
+
+
+# %%
+class ServiceNode(Node):
+    """Serve two quick operations."""
+
+    def __init__(self):
+        super().__init__("service_node")
+        self.get_robot_state_service = self.create_service(
+            SetBool, "get_robot_state", self.get_robot_state_callback
+        )
+        self.set_parameter_service = self.create_service(
+            SetBool, "set_robot_mode", self.set_robot_mode_callback
+        )
+        self.get_logger().info("Services ready: get_robot_state, set_robot_mode")
+
+    def get_robot_state_callback(self, request, response):
+        """Report on the (simulated) state of the robot."""
+        response.success = True
+        response.message = f"Robot is operational - Mode: {request.data}"
+        self.get_logger().info(f"Robot state requested: {response.message}")
+        return response
+
+    def set_robot_mode_callback(self, request, response):
+        """Switch between ACTIVE and STANDBY."""
+        mode = "ACTIVE" if request.data else "STANDBY"
+        response.success = True
+        response.message = f"Robot mode set to: {mode}"
+        self.get_logger().info(f"Robot mode changed: {mode}")
+        return response
+
+
+# %% [markdown]
+# Three calls, three responses. `session.call` waits for the service to be there, sends the request,
+# and gives up after a deadline instead of waiting for ever.
+
+# %% tags=["notebook-only"]
+session.run(ServiceNode)
+
+state = session.call(SetBool, "get_robot_state", SetBool.Request(data=True), timeout=30.0)
+active = session.call(SetBool, "set_robot_mode", SetBool.Request(data=True), timeout=30.0)
+standby = session.call(SetBool, "set_robot_mode", SetBool.Request(data=False), timeout=30.0)
+for response in (state, active, standby):
+    print(f"success={response.success}  message={response.message!r}")
+
+assert state.success
+assert state.message == "Robot is operational - Mode: True"
+assert active.message == "Robot mode set to: ACTIVE"
+assert standby.message == "Robot mode set to: STANDBY"
+
+# %% [markdown]
+# #### The trap: a blocking call inside a callback
+#
+# This is the deadlock of the note above, on purpose, with a timeout so that we get out again. The
+# node makes the same blocking call from a timer twice. First its client shares the timer's callback
+# group: while the timer's callback waits, nothing else of that group may run, the response
+# included. Then the client has a group of its own.
+
+# %% tags=["notebook-only"]
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+
+
+class AskingNode(Node):
+    """Make a blocking call from inside a timer's callback: do not copy this."""
+
+    def __init__(self, name, own_group, patience):
+        super().__init__(name)
+        group = MutuallyExclusiveCallbackGroup() if own_group else None
+        self.client = self.create_client(SetBool, "get_robot_state", callback_group=group)
+        self.patience = patience
+        self.answers = []
+        self.timer = self.create_timer(0.05, self.ask)
+
+    def ask(self):
+        """Block this callback until the response comes, or patience ends."""
+        if not self.answers and self.client.service_is_ready():
+            request = SetBool.Request(data=True)
+            self.answers.append(self.client.call(request, timeout_sec=self.patience))
+
+
+with course.Session(threads=4) as bench:
+    bench.run(ServiceNode)
+    stuck = bench.run(AskingNode, "stuck", own_group=False, patience=1.0)
+    free = bench.run(AskingNode, "free", own_group=True, patience=30.0)
+    bench.until(lambda: stuck.answers and free.answers, timeout=60.0, what="both nodes to ask")
+    print("client in the timer's group:", stuck.answers[0])
+    print("client in its own group:    ", free.answers[0])
+    assert stuck.answers == [None]
+    assert free.answers[0].message == "Robot is operational - Mode: True"
+
+# %% [markdown]
+# `None` is the deadlock: the service answered at once, and the answer lay unread until the timeout.
+# Four threads did not help. The usual mend is simpler than callback groups: use `call_async()`, as
+# ClientNode does below.
+
+# %% [markdown]
+# ### ActionNode: a long operation, with feedback
+#
+# The action `fibonacci_sequence` computes a Fibonacci sequence one number at a time, half a second
+# each, as a stand-in for a drive across a room. After each step it publishes the sequence so far as
+# feedback.
+#
+# Three details to notice:
+#
+# - `cancel_callback` accepts cancellation, and the loop looks after every pause whether it was
+#   asked for;
+# - the pause is `Event.wait`, which lasts half a second *unless the node is being stopped*. A
+#   `time.sleep` would make the cleanup wait for it;
+# - `destroy_node` is the cleanup phase: it ends a goal that is still running before it takes the
+#   action server down.
+#
+# > **Note** While it executes a goal this callback occupies one thread of the executor, as the
+# > `time.sleep` of the printed chapter does. On a `MultiThreadedExecutor` other callbacks, the one
+# > for cancel requests among them, go on. On a `SingleThreadedExecutor` everything waits until the
+# > goal has ended, so a cancellation comes too late. That is why your session has four threads.
+# > Source: ROS 2 documentation, "Executors"; observed with rclpy 7.1.
+#
+# > **Note** A goal of order 5 yields **six** numbers, `[0, 1, 1, 2, 3, 5]`: order *n* ends with the
+# > *n*-th Fibonacci number, and the sequence starts with number zero. (A comment in the printed
+# > chapter promises the first 5 numbers; that is one short.) Order 0 yields `[0]`, order 1 yields
+# > `[0, 1]`. Try it below.
+
+
+# %%
+class ActionNode(Node):
+    """Run a long operation that reports on its progress and can be canceled."""
+
+    STEP_SECONDS = 0.5  # the simulated effort of each step
+    MAX_ORDER = 46  # the last Fibonacci number that fits the action's int32
+
+    def __init__(self):
+        super().__init__("action_node")
+        self._stopping = threading.Event()
+        self._action_server = ActionServer(
+            self,
+            Fibonacci,
+            "fibonacci_sequence",
+            execute_callback=self.execute_fibonacci_callback,
+            goal_callback=self.goal_callback,
+            cancel_callback=self.cancel_callback,
+        )
+        self.get_logger().info("Action ready: fibonacci_sequence")
+
+    def goal_callback(self, goal):
+        """Accept the orders that can be computed."""
+        acceptable = 0 <= goal.order <= self.MAX_ORDER
+        return GoalResponse.ACCEPT if acceptable else GoalResponse.REJECT
+
+    def cancel_callback(self, goal_handle):
+        """Accept every request to cancel; without this callback all are declined."""
+        return CancelResponse.ACCEPT
+
+    def execute_fibonacci_callback(self, goal_handle):
+        """Compute the sequence step by step, with feedback after each."""
+        order = goal_handle.request.order
+        self.get_logger().info(f"Executing Fibonacci sequence - order: {order}")
+        sequence = [0, 1][: order + 1]  # order 0 is done with [0], order 1 with [0, 1]
+
+        for step in range(1, order):
+            sequence.append(sequence[-1] + sequence[-2])
+            goal_handle.publish_feedback(Fibonacci.Feedback(sequence=sequence))
+            self.get_logger().info(f"Fibonacci progress: {step}/{order}")
+            if self._stopping.wait(self.STEP_SECONDS):
+                goal_handle.abort()
+                return Fibonacci.Result(sequence=sequence)
+            if goal_handle.is_cancel_requested:
+                goal_handle.canceled()
+                self.get_logger().info("Fibonacci action canceled")
+                return Fibonacci.Result(sequence=sequence)
+
+        goal_handle.succeed()
+        self.get_logger().info(f"Fibonacci completed: {sequence}")
+        return Fibonacci.Result(sequence=sequence)
+
+    def destroy_node(self):
+        """Clean up: end a running goal, then the action server, then the node."""
+        self._stopping.set()
+        if self._action_server in self.waitables:  # destroy_node() would leave it on the graph
+            self._action_server.destroy()
+        super().destroy_node()
+
+
+# %% [markdown]
+# Send a goal of order 5 and follow it to its end. Look at the feedback growing by one number each
+# time.
+
+# %% tags=["notebook-only"]
+from action_msgs.msg import GoalStatus
+
+session.run(ActionNode)
+
+goal = session.send_goal(Fibonacci, "fibonacci_sequence", Fibonacci.Goal(order=5), timeout=30.0)
+goal.wait(timeout=60.0)
+for feedback in goal.feedback:
+    print("feedback:", list(feedback.sequence))
+print("result:  ", list(goal.result.sequence), "- status", goal.status)
+
+assert goal.accepted
+assert goal.status == GoalStatus.STATUS_SUCCEEDED
+assert list(goal.result.sequence) == [0, 1, 1, 2, 3, 5]
+assert [len(feedback.sequence) for feedback in goal.feedback] == [3, 4, 5, 6]
+
+# %% [markdown]
+# Now a long goal, canceled after its second feedback. Its result is what had been computed so far.
+# And two small ones: a goal of order 0, and one that makes no sense and is rejected.
+
+# %% tags=["notebook-only"]
+long_goal = session.send_goal(
+    Fibonacci, "fibonacci_sequence", Fibonacci.Goal(order=40), timeout=30.0
+)
+session.until(lambda: len(long_goal.feedback) >= 2, timeout=60.0, what="two feedback messages")
+assert long_goal.cancel(timeout=30.0)
+long_goal.wait(timeout=60.0)
+print("canceled:", list(long_goal.result.sequence), "- status", long_goal.status)
+
+zero = session.send_goal(Fibonacci, "fibonacci_sequence", Fibonacci.Goal(order=0), timeout=30.0)
+zero.wait(timeout=60.0)
+print("order 0: ", list(zero.result.sequence), "- status", zero.status)
+
+absurd = session.send_goal(Fibonacci, "fibonacci_sequence", Fibonacci.Goal(order=-1), timeout=30.0)
+print("order -1: accepted is", absurd.accepted)
+
+assert long_goal.status == GoalStatus.STATUS_CANCELED
+assert 4 <= len(long_goal.result.sequence) < 41
+assert list(zero.result.sequence) == [0]
+assert zero.status == GoalStatus.STATUS_SUCCEEDED
+assert not absurd.accepted
+
+# %% [markdown]
+# ### ClientNode: the one who asks
+#
+# Every 5 seconds this node requests the robot's state and sends a Fibonacci goal of order 5. It
+# never blocks: each step is a callback that hands over to the next one.
+#
+# > **Note** The printed chapter waits without end for the service in the constructor, and for the
+# > action server inside the timer's callback. The first can hang the start of a robot; the second
+# > holds a thread of the executor, for good if no server ever comes. Here the node asks whether the
+# > servers are there, says so in its log if they are not, and tries again 5 seconds later. Source:
+# > ROS 2 documentation, "Using Callback Groups" and "Synchronous vs. asynchronous service clients".
+
+
+# %%
+class ClientNode(Node):
+    """Use the service and the action every 5 seconds, without ever blocking."""
+
+    def __init__(self):
+        super().__init__("client_node")
+        self.robot_state_client = self.create_client(SetBool, "get_robot_state")
+        self.action_client = ActionClient(self, Fibonacci, "fibonacci_sequence")
+        self.client_timer = self.create_timer(5.0, self.make_requests)
+        self.get_logger().info("Client ready: one request and one goal every 5 s")
+
+    def make_requests(self):
+        """Ask the service and the action, as far as they are there."""
+        self.request_robot_state()
+        self.send_action_goal()
+
+    def request_robot_state(self):
+        """Send a request; the response comes to service_response_callback."""
+        if not self.robot_state_client.service_is_ready():
+            self.get_logger().info("Waiting for robot state service...")
+            return
+        self.get_logger().info("Making service request...")
+        future = self.robot_state_client.call_async(SetBool.Request(data=True))
+        future.add_done_callback(self.service_response_callback)
+
+    def service_response_callback(self, future):
+        """Take the response, or the reason why there is none."""
+        if future.exception() is not None:
+            self.get_logger().error(f"Service call failed: {future.exception()}")
+            return
+        self.get_logger().info(f"Service response: {future.result().message}")
+
+    def send_action_goal(self):
+        """Send a goal; what follows comes to the three callbacks below."""
+        if not self.action_client.server_is_ready():
+            self.get_logger().info("Waiting for action server...")
+            return
+        self.get_logger().info("Sending action goal...")
+        future = self.action_client.send_goal_async(
+            Fibonacci.Goal(order=5), feedback_callback=self.action_feedback_callback
+        )
+        future.add_done_callback(self.action_response_callback)
+
+    def action_feedback_callback(self, feedback_msg):
+        """Follow the progress."""
+        self.get_logger().info(f"Action feedback: {list(feedback_msg.feedback.sequence)}")
+
+    def action_response_callback(self, future):
+        """Learn whether the goal was accepted, and if so ask for its result."""
+        goal_handle = future.result()
+        if not goal_handle.accepted:
+            self.get_logger().info("Action goal rejected")
+            return
+        self.get_logger().info("Action goal accepted, getting result...")
+        goal_handle.get_result_async().add_done_callback(self.action_result_callback)
+
+    def action_result_callback(self, future):
+        """Take the result."""
+        self.get_logger().info(f"Action result: {list(future.result().result.sequence)}")
+
+    def destroy_node(self):
+        """Clean up: the action client, then the node."""
+        if self.action_client in self.waitables:
+            self.action_client.destroy()
+        super().destroy_node()
+
+
+# %% [markdown]
+# Two simulated runs. In the first the client is alone: look at how it stays calm. In the second the
+# servers are there, five simulated seconds pass, and the log tells the whole conversation. The
+# order of "service response", "goal accepted" and the first feedback may differ from run to run;
+# that is what *asynchronous* means.
+
+
+# %% tags=["notebook-only"]
+def said(log):
+    """What a node logged, as plain strings."""
+    return [row.message for row in log]
+
+
+def heard_all(wanted, messages):
+    """The messages, once they hold each beginning as often as is wanted; until then None."""
+    counts = {start: sum(text.startswith(start) for text in messages) for start in wanted}
+    return messages if counts == wanted else None
+
+
+with course.Session(sim_time=True, threads=4) as lab:
+    client = lab.run(ClientNode)
+    lab.sim.advance(5.0)
+    alone = lab.until(
+        lambda: heard_all({"Waiting": 2}, said(lab.logs(client))),
+        timeout=30.0,
+        what="the client to notice that it is alone",
+    )
+    print("alone:", *alone, sep="\n  ")
+
+with course.Session(sim_time=True, threads=4) as lab:
+    lab.run(ServiceNode)
+    lab.run(ActionNode)
+    client = lab.run(ClientNode)
+    lab.until(
+        lambda: (
+            client.robot_state_client.service_is_ready() and client.action_client.server_is_ready()
+        ),
+        timeout=30.0,
+        what="the client to see both servers",
+    )
+    lab.sim.advance(5.0)
+    wanted = {"Service response": 1, "Action feedback": 4, "Action result": 1}
+    talk = lab.until(
+        lambda: heard_all(wanted, said(lab.logs(client))),
+        timeout=60.0,
+        what="the response, four feedback messages and the result in the client's log",
+    )
+    print("together:", *talk, sep="\n  ")
+
+assert "Waiting for robot state service..." in alone
+assert "Waiting for action server..." in alone
+assert "Service response: Robot is operational - Mode: True" in talk
+assert "Action feedback: [0, 1, 1, 2, 3, 5]" in talk
+assert "Action result: [0, 1, 1, 2, 3, 5]" in talk
+
+# %% [markdown]
+# ### main: all five at once
+#
+# `main` runs the whole system on a multi-threaded executor with five threads, which is what
+# `course.Session(threads=5)` is, until you press Ctrl-C. Leaving the `with` block is the cleanup
+# phase of the whole program: the executor stops, its threads are joined, the nodes are destroyed,
+# the context is shut down, in that order.
+#
+# > **Note** The printed chapter catches `KeyboardInterrupt` and then calls `rclpy.shutdown()`. By
+# > then rclpy's own signal handler has already shut the context down, so that call raises an error;
+# > and the nodes are never destroyed. Without `course`, end a program like this:
+# >
+# > ```python
+# > rclpy.init()
+# > executor = MultiThreadedExecutor(num_threads=5)
+# > nodes = [SensorNode(), ProcessingNode(), ServiceNode(), ActionNode(), ClientNode()]
+# > for node in nodes:
+# >     executor.add_node(node)
+# > try:
+# >     executor.spin()
+# > except (KeyboardInterrupt, ExternalShutdownException):
+# >     pass
+# > finally:
+# >     for node in nodes:
+# >         node.destroy_node()
+# >     executor.shutdown()
+# >     rclpy.try_shutdown()
+# > ```
+# >
+# > (A goal that runs at that moment may still print a line on its way out; `course` waits for it.)
+# > Sources: rclpy, `rclpy.try_shutdown` and `rclpy.executors.ExternalShutdownException`.
+
+
+# %%
+NODE_CLASSES = (SensorNode, ProcessingNode, ServiceNode, ActionNode, ClientNode)
+
+
+def main():
+    """Run the five nodes until Ctrl-C, then clean up."""
+    with course.Session(threads=5) as system:
+        for node_class in NODE_CLASSES:
+            system.run(node_class)
+        print(f"ROS 2 building blocks operational on domain {system.domain_id}", flush=True)
+        print("All patterns active: topics, services, actions. Ctrl-C ends it.", flush=True)
+        system.spin()
+        print("Shutting down the ROS 2 building blocks. The last they logged:")
+        print(system.logs(last=15))
+
+
+# %% [markdown]
+# In a notebook `main()` would hold the cell until you interrupt the kernel, so here is the same
+# system step by step. First everything your own session runs is stopped, then the five nodes start
+# together. A second session joins the same domain and looks on **from outside**, as another
+# computer on the robot would: it must see all five.
+
+# %% tags=["notebook-only"]
+session.stop()
+system = course.Session(threads=5)
+for node_class in NODE_CLASSES:
+    system.run(node_class)
+
+outside = course.Session(domain_id=system.domain_id)
+observer = outside.run(Node, "observer")
+five = {"sensor_node", "processing_node", "service_node", "action_node", "client_node"}
+outside.until(
+    lambda: five <= set(observer.get_node_names()),
+    timeout=60.0,
+    what="the five nodes to be seen from outside",
+)
+print("Seen from outside:", ", ".join(sorted(five)))
+
+frame = outside.next_message(String, "processed/data", timeout=60.0)
+print("Heard from outside:", frame.data)
+assert frame.data.endswith("Objects detected")
+
+# %% [markdown]
+# Topics run. Now use the other two patterns *while* they do: a request is served, a goal runs to
+# its end with feedback, and another one is canceled.
+
+# %% tags=["notebook-only"]
+answer = outside.call(SetBool, "get_robot_state", SetBool.Request(data=True), timeout=60.0)
+print("service:  ", answer.message)
+
+goal = outside.send_goal(Fibonacci, "fibonacci_sequence", Fibonacci.Goal(order=5), timeout=60.0)
+doomed = outside.send_goal(Fibonacci, "fibonacci_sequence", Fibonacci.Goal(order=40), timeout=60.0)
+outside.until(lambda: len(doomed.feedback) >= 1, timeout=60.0, what="feedback of the long goal")
+assert doomed.cancel(timeout=60.0)
+doomed.wait(timeout=60.0)
+goal.wait(timeout=60.0)
+print("action:   ", list(goal.result.sequence), "after", len(goal.feedback), "feedback messages")
+print("canceled: ", list(doomed.result.sequence), "- status", doomed.status)
+
+assert answer.message == "Robot is operational - Mode: True"
+assert list(goal.result.sequence) == [0, 1, 1, 2, 3, 5]
+assert goal.status == GoalStatus.STATUS_SUCCEEDED
+assert len(goal.feedback) == 4
+assert doomed.status == GoalStatus.STATUS_CANCELED
+
+# %% [markdown]
+# ClientNode does the same by itself, 5 seconds after the start and every 5 seconds from then on.
+# Wait for its first round, and read the log of all five nodes: this is what a working robot sounds
+# like.
+
+# %% tags=["notebook-only"]
+first_round = {
+    "Service response: Robot is operational - Mode: True",
+    "Action result: [0, 1, 1, 2, 3, 5]",
+}
+system.until(
+    lambda: first_round <= set(said(system.logs("client_node"))),
+    timeout=60.0,
+    what="the response and the result of ClientNode's first round",
+)
+print(system.logs(last=25))
+assert system.errors == []
+
+# %% [markdown]
+# And the end. `close()` says what it could not stop; look for an empty list. Then the observer
+# outside has the last word: on the graph nothing of the five is left.
+
+# %% tags=["notebook-only"]
+report = system.close()
+outside.until(
+    lambda: not five & set(observer.get_node_names()),
+    timeout=60.0,
+    what="the five nodes to disappear from the graph",
+)
+print("Leaked:", report.leaked)
+print("Left on the graph:", [name for name in observer.get_node_names() if name in five])
+assert not report.leaked
+outside_report = outside.close()
+assert not outside_report.leaked
+
+# %% [markdown]
+# #### As a program, outside Jupyter
+#
+# The five nodes and `main` are a complete program; the cells that experiment are tagged
+# `notebook-only`. In a terminal, beside this notebook:
+#
+# ```
+# jupyter nbconvert --to python --output building_blocks ch05-building-blocks.ipynb \
+#     --TagRemovePreprocessor.enabled=True \
+#     --TagRemovePreprocessor.remove_cell_tags=notebook-only
+# python building_blocks.py
+# ```
+#
+# Let it run for ten seconds, then press Ctrl-C. In Jupyter the next cell does nothing, which is as
+# it should be.
+
+# %%
+if __name__ == "__main__" and "get_ipython" not in globals():
+    main()
+
+# %% [markdown]
+# ## Exercises
+#
+# **1. QoS profile design** (graded). Your mobile robot has a camera, a LIDAR, an IMU and an
+# emergency stop button. Design the QoS profile of each of the four, and explain why you chose its
+# reliability, its durability and its history. You do this in the notebook
+# **`ch05/qos-design.ipynb`**, in the assignment folder beside the chapters: your publishers are
+# tried out on real DDS, with a late joiner, a slow reader, and consumers of both kinds; your
+# explanation is read by a person.
+#
+# Write your answers to the next four in a cell of your own below each question, or on paper.
+#
+# **2. Node architecture design.** A robot has to drive through waypoints and avoid obstacles on its
+# way. Which nodes will you give it? Which communication patterns does each of them use? How do they
+# work together? A sketch with one box per node and one arrow per topic, service or action is a good
+# answer.
+#
+# **3. Communication pattern selection.** Topic, service or action? Choose one for each line, and
+# give your reason in a sentence:
+#
+# - a display asks where the robot is right now
+# - the camera publishes its images
+# - an operator sends the robot a navigation goal, a particular place
+# - a tool updates some of the robot's parameters
+# - the battery broadcasts its level
+#
+# **4. Resource management.** How does a ROS 2 node manage its resources properly? Say what has to
+# be done during initialization, while it runs, and during cleanup. ActionNode above is a good
+# example to start from.
+#
+# **5. Error handling.** Your robot is safety-critical. How do its services and its actions deal
+# with errors? Describe the strategies you would implement, and what the robot does while it waits
+# for an answer that does not come.
+
+# %% [markdown] tags=["solutions"]
+# ## Exercise solutions
+#
+# Other answers can be just as good; what counts is the reason.
+#
+# **1. QoS profile design**
+#
+# | Sensor | Reliability | Durability | History | Reason |
+# | --- | --- | --- | --- | --- |
+# | Camera | `BEST_EFFORT` | `VOLATILE` | `KEEP_LAST`, depth 5 | real-time performance matters more than a lost frame |
+# | LIDAR | `RELIABLE` | `VOLATILE` | `KEEP_LAST`, depth 1 | navigation must not miss its data, and only the latest scan is of use |
+# | IMU | `RELIABLE` | `VOLATILE` | `KEEP_LAST`, depth 10 | control depends on it; processing gets a small buffer |
+# | Emergency stop | `RELIABLE` | `VOLATILE` | `KEEP_ALL` | it must be delivered, and every event is preserved |
+#
+# > **Note** For the LIDAR, reliable with depth 1 gives the *latest value*, not *every value*: a
+# > slow reader loses the scans in between, as in experiment 3. Drivers in the field often publish
+# > best-effort, the profile called sensor data, and then a subscriber which requests `RELIABLE`
+# > gets nothing. Source: ROS 2 documentation, "Quality of Service settings".
+#
+# **2. Node architecture design**
+#
+# | Node | Takes in | Gives out |
+# | --- | --- | --- |
+# | Navigation | goals, as an action server; sensor data, by topic | feedback and result |
+# | Obstacle detection | LIDAR and camera, by topic | obstacles, by topic |
+# | Path planner | map and goal, by topic; requests, as a service | the planned path, as the response |
+# | Controller | navigation commands, by topic | commands to the motors, by topic |
+# | Sensor drivers | the hardware | sensor data, by topic |
+# | State estimation | the sensors, by topic | the robot's pose, by topic |
+#
+# **3. Communication pattern selection**
+#
+# - Current position: **service**. A synchronous request-response is needed.
+# - Camera images: **topic**. A continuous stream with several subscribers.
+# - Navigation goal: **action**. It runs for long, and gives feedback.
+# - Updating parameters: **service**. It has to be confirmed, synchronously.
+# - Battery level: **topic**. Continuous monitoring by several subscribers.
+#
+# > **Note** Make the battery's topic transient-local with depth 1, and a display that starts late
+# > shows the level at once. For parameters you need not write the service: every node offers it
+# > through the parameter API. Sources: ROS 2 documentation, "Quality of Service settings" and
+# > "Parameters".
+#
+# **4. Resource management**
+#
+# - *Initialization*: set up the internal state and every endpoint: publishers, subscribers,
+#   services, actions.
+# - *Runtime*: process callbacks, manage timers, keep the data flowing.
+# - *Cleanup*: take publishers and subscribers down properly, release what else is held, and handle
+#   a shutdown gracefully.
+#
+# **5. Error handling**
+#
+# - *Services*: return error codes and messages; have timeouts; have a way to retry.
+# - *Actions*: handle cancellation; report errors in the feedback; have timeouts.
+# - *In general*: use `try` and `except`; log errors where they help; have a fallback behaviour.
+#
+# > **Note** Retry only what may safely happen twice. A request whose response was lost may have
+# > been carried out all the same.
+
+# %% [markdown]
+# ## Summary
+#
+# 1. **Nodes**, the basic units of processing, perform one function each and manage their lifecycle
+#    and their resources with care.
+# 2. **Topics** share data continuously by publish-subscribe; their Quality of Service is yours to
+#    set.
+# 3. **Services** are synchronous request-response, for operations that need an answer at once.
+# 4. **Actions** are goal, feedback and result, for long operations that must be watched.
+# 5. **QoS profiles** set how communication behaves: reliability, durability, history.
+# 6. **Choosing a pattern** is a matter of timing, data flow and interaction. Each has its place.
+#
+# Simple parts, joined by well-defined interactions, make complex robots. Used properly and with
+# fitting QoS they make applications that are robust, efficient and easy to maintain, from a single
+# robot to a team of them.
+
+# %% [markdown]
+# ## Part 2 Quiz
+#
+# Five questions to check what stayed. To pass you need **4 of 5**: the mark is 70 %, and 70 % of 5
+# is 3.5. For now, choose an answer to each and say *why the other three are wrong*; that is the
+# better half of the exercise.
+#
+# **Question 1. What are QoS (Quality of Service) profiles in ROS 2 mainly for?**
+#
+# - A. To encrypt the messages between nodes and to check who may read them
+# - B. To decide on which thread of the executor a callback runs
+# - C. To set how messages are delivered and kept, for example reliability and history
+# - D. To define the names and types of the fields which a message has
+#
+# **Question 2. A camera publishes images. Which communication pattern fits best?**
+#
+# - A. A topic
+# - B. A service that returns the latest image
+# - C. An action with the image as its result
+# - D. A parameter that is updated for every frame
+#
+# **Question 3. A publisher and its subscriber are both `RELIABLE`. What does that guarantee in ROS
+# 2?**
+#
+# - A. A message arrives within a fixed time, or the publisher is told that it did not
+# - B. A subscriber which joins late receives the messages that were published earlier
+# - C. The subscriber's callback has ended before the publisher's next message is sent
+# - D. A message that is lost on the way is sent again, as long as the publisher keeps it
+#
+# **Question 4. Navigation takes a minute and should report how far it has come. Which pattern is
+# best?**
+#
+# - A. A service whose client has a timeout of more than a minute
+# - B. An action
+# - C. Two topics, one for each direction
+# - D. A service which is called again and again to ask for the progress
+#
+# **Question 5. Services and actions: what is the main difference in ROS 2?**
+#
+# - A. Services work within one computer only, while actions also work over a network
+# - B. Services send data in both directions, while actions only send data to the server
+# - C. Services answer once and quickly, while actions run long, with feedback and cancellation
+# - D. Services can be written in Python or C++, while actions can be written in C++ only
+
+# %% [markdown]
+# ## Preview: the next chapter
+#
+# **Chapter 6: Python rclpy.** We look closely at the Python client library for ROS 2. You will
+# write more sophisticated nodes, use advanced features such as parameters and timers, and connect
+# to real hardware. It takes you from understanding the building blocks to building production-ready
+# robotic applications with them.
+
+# %% [markdown]
+# ---
+# *Last of all, a health check: it looks for callbacks that raised an error, closes your session, and
+# looks for threads that still run. To go on experimenting afterwards, run the first cell again.*
+
+# %% tags=["notebook-only"]
+errors = list(session.errors)
+session_report = session.close()
+left = [thread.name for thread in threading.enumerate() if thread.name.startswith("ROS domain")]
+print("Callback errors:", errors or "none")
+print("Threads left over:", session_report.leaked + left or "none")
+assert errors == []
+assert not session_report.leaked
+assert not left
