@@ -1,0 +1,96 @@
+"""What `%load_ext course` adds to a notebook: `%%interface`, and news of nodes after each cell."""
+
+from __future__ import annotations
+
+import html
+import weakref
+from typing import Any
+
+from course.interfaces import magic
+from course.runtime import closing
+from course.runtime.callback_errors import CallbackError
+from course.runtime.session import Session
+
+_INIT_TWICE = "Context.init() must only be called once"
+
+
+def load_ipython_extension(shell: Any) -> None:
+    """Set up a notebook's shell; IPython calls this for `%load_ext course`. Idempotent."""
+    magic.register(shell)
+    unload_ipython_extension(shell)
+    shell.events.register("post_run_cell", _report)
+
+
+def unload_ipython_extension(shell: Any) -> None:
+    """Stop reporting; IPython calls this for `%unload_ext course`."""
+    if _report in shell.events.callbacks["post_run_cell"]:
+        shell.events.unregister("post_run_cell", _report)
+
+
+class News:
+    """Something that the learner should know, shown under the cell that has just run."""
+
+    def __init__(self, sentence: str, detail: str = "") -> None:
+        """Show `sentence`, with `detail` (a traceback) to unfold."""
+        self.sentence = sentence
+        self.detail = detail
+
+    def __repr__(self) -> str:
+        """Return it as text."""
+        return "\n".join(part for part in (self.sentence, self.detail) if part)
+
+    def _repr_html_(self) -> str:
+        sentence = html.escape(self.sentence)
+        if self.detail:
+            detail = html.escape(self.detail)
+            sentence = f"<details><summary>{sentence}</summary><pre>{detail}</pre></details>"
+        style = "border-left:4px solid #c60;padding:.3em .8em"
+        return f'<div style="{style}">{sentence}</div>'
+
+
+class _Reported:
+    """How much of each session's news the learner has seen."""
+
+    def __init__(self) -> None:
+        self._errors: weakref.WeakKeyDictionary[Any, dict[int, int]] = weakref.WeakKeyDictionary()
+        self._notices: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
+
+    def news(self, session: Session) -> list[News]:
+        seen = self._errors.setdefault(session, {})
+        news = []
+        for index, error in enumerate(session.errors):
+            if error.count > seen.get(index, 0):
+                news.append(_about(error, again=index in seen))
+                seen[index] = error.count
+        told = self._notices.get(session, 0)
+        news += [News(notice) for notice in session.notices[told:]]
+        self._notices[session] = len(session.notices)
+        return news
+
+
+_reported = _Reported()
+
+
+def _about(error: CallbackError, *, again: bool) -> News:
+    if again:
+        return News(f"Again: {error}.")
+    return News(f"{error}. The node goes on spinning.", error.traceback)
+
+
+def _report(result: Any) -> None:
+    from IPython.display import display
+
+    error = getattr(result, "error_in_exec", None)
+    if isinstance(error, RuntimeError) and _INIT_TWICE in str(error):
+        display(  # type: ignore[no-untyped-call]
+            News(
+                "The course's session has initialised rclpy for this notebook already: leave "
+                "rclpy.init() out, or call course.close() before it."
+            )
+        )
+    for session in closing.known():
+        if isinstance(session, Session):
+            if not session.closed:
+                session.take_back_stolen_nodes()
+            for item in _reported.news(session):
+                display(item)  # type: ignore[no-untyped-call]

@@ -1,0 +1,1 @@
+"""What runs nodes: sessions, their executors, waiting, recording, simulated time and logs."""

@@ -1,0 +1,192 @@
+"""What a session can wait for and ask: conditions, messages, services, actions, recordings."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
+
+from rclpy.context import Context
+from rclpy.qos import QoSProfile
+
+from course.errors import SessionError, WaitTimeout
+from course.runtime.actions import GoalRun, Goals
+from course.runtime.callback_errors import CallbackError
+from course.runtime.crew import Crew
+from course.runtime.jobs import current_job
+from course.runtime.probe import Probe
+from course.runtime.recorder import Recorder
+from course.runtime.waiting import Deadline, Pulse, poll
+
+T = TypeVar("T")
+
+
+class Asking:
+    """The half of a Session that waits and asks; it needs no node of the learner's."""
+
+    def __init__(self, context: Context, crew: Crew, pulse: Pulse) -> None:
+        """Ask in `context`, with executors of `crew`, woken by `pulse`."""
+        self.context = context
+        self._crew = crew
+        self._pulse = pulse
+        self._asking_lock = threading.Lock()
+        self._probe_made: Probe | None = None
+        self._goals_made: Goals | None = None
+
+    @property
+    def closed(self) -> bool:
+        """True once nothing can be asked any more."""
+        return not self.context.ok()
+
+    @property
+    def errors(self) -> list[CallbackError]:
+        """What callbacks raised."""
+        return []
+
+    def take_back_stolen_nodes(self) -> None:
+        """See to it that nodes spin before they are waited for."""
+
+    def until(
+        self, condition: Callable[[], T], timeout: float = 5.0, what: str = "the condition"
+    ) -> T:
+        """Return the first true value of `condition`.
+
+        It is asked after each callback of this session, and every 20 ms.
+
+        Args:
+            condition: a function without arguments.
+            timeout: seconds to wait at most.
+            what: what is waited for, to be named in the error.
+
+        Raises:
+            WaitTimeout: it was not true in time.
+        """
+        with self._explaining():
+            value = poll(condition, timeout, self._pulse)
+            if value is None:
+                raise WaitTimeout(f"Waited {timeout:g} s in vain for {what}.")
+            return value
+
+    def next_message(
+        self,
+        msg_type: Any,
+        topic: str,
+        *,
+        qos: QoSProfile | int | None = None,
+        timeout: float = 5.0,
+    ) -> Any:
+        """Return the next message on `topic`, or the one that a late joiner is given.
+
+        Args:
+            msg_type: the message class.
+            topic: its name.
+            qos: the QoS to request; None requests the strongest that every publisher offers.
+            timeout: seconds to wait at most.
+
+        Raises:
+            WaitTimeout: none came in time; it says why, as far as the ROS graph knows.
+        """
+        with self._explaining():
+            return self._probe.next_message(msg_type, topic, qos, timeout)
+
+    def wait_for_service(self, srv_type: Any, name: str, timeout: float = 5.0) -> None:
+        """Return when a server of `name` is ready.
+
+        Raises:
+            WaitTimeout: none was in time; it says why.
+        """
+        with self._explaining(), self._probe.client(srv_type, name, Deadline(timeout)):
+            pass
+
+    def call(self, srv_type: Any, name: str, request: Any, timeout: float = 5.0) -> Any:
+        """Call a service and return its response.
+
+        Raises:
+            WaitTimeout: no server, or no answer, within `timeout` seconds; it says which.
+        """
+        with self._explaining():
+            return self._probe.call(srv_type, name, request, timeout)
+
+    def send_goal(
+        self,
+        action_type: Any,
+        name: str,
+        goal: Any,
+        *,
+        timeout: float = 10.0,
+        on_feedback: Callable[[Any], None] | None = None,
+    ) -> GoalRun:
+        """Send a goal; return when the server has accepted or rejected it.
+
+        Args:
+            action_type: the action class.
+            name: the action's name.
+            goal: the goal message.
+            timeout: seconds for server and answer together.
+            on_feedback: called with each feedback message, in a background thread.
+
+        Raises:
+            WaitTimeout: no server, or no answer, in time.
+        """
+        with self._explaining():
+            probe = self._probe
+            self._goals_made = self._goals_made or Goals(probe)
+            return self._goals_made.send(action_type, name, goal, timeout, on_feedback)
+
+    def record(
+        self,
+        topic: str,
+        msg_type: Any | None = None,
+        *,
+        qos: QoSProfile | int | None = None,
+        limit: int = 1000,
+    ) -> Recorder:
+        """Record a topic from now on.
+
+        Args:
+            topic: its name.
+            msg_type: the message class; None takes the topic's type from the graph.
+            qos: the QoS to request; None requests the strongest that every publisher offers now.
+            limit: how many messages to keep.
+
+        Raises:
+            WaitTimeout: `msg_type` is None, and the topic does not appear.
+        """
+        with self._explaining():
+            return Recorder(self._probe, topic, msg_type, qos, limit, self._now_ns)
+
+    # Inside.
+
+    @property
+    def _probe(self) -> Probe:
+        if self.closed:
+            raise SessionError("This session is closed: open a new one with course.Session().")
+        with self._asking_lock:
+            if self._probe_made is None:
+                self._probe_made = Probe(self.context, self._crew, self._pulse)
+            return self._probe_made
+
+    def _now_ns(self) -> int | None:
+        """Return simulated time (ns), or None where time is not simulated."""
+        return None
+
+    @contextlib.contextmanager
+    def _explaining(self) -> Iterator[None]:
+        """Add to a WaitTimeout what this session knows about its reasons."""
+        self.take_back_stolen_nodes()
+        known = sum(error.count for error in self.errors)
+        try:
+            yield
+        except WaitTimeout as error:
+            hints = [str(error)]
+            if self.closed:
+                hints.append("The session is closed.")
+            if sum(e.count for e in self.errors) > known:
+                latest = max(self.errors, key=lambda e: e.stamp)
+                hints.append(f"Meanwhile {latest}.")
+            if (job := current_job()) is not None and job.home.threads == 1:
+                hints.append("A wait inside a callback holds up all others: run with threads=2.")
+            raise WaitTimeout(" ".join(hints)) from None

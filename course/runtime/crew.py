@@ -1,0 +1,69 @@
+"""The executors of one session: one for each number of threads asked for, made when needed."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import threading
+import time
+
+from rclpy.context import Context
+from rclpy.node import Node
+
+from course.runtime.executor import BackgroundExecutor
+from course.runtime.jobs import Report
+from course.runtime.names import node_name
+
+
+class Crew:
+    """Makes, finds and stops a session's executors."""
+
+    def __init__(self, context: Context, label: str, report: Report) -> None:
+        """Prepare for executors on `context`; their threads are named after `label`."""
+        self._context = context
+        self._label = label
+        self._report = report
+        self._executors: dict[tuple[int, str], BackgroundExecutor] = {}
+        self._lock = threading.Lock()
+
+    def executor(self, threads: int, purpose: str = "") -> BackgroundExecutor:
+        """Return the spinning executor of `threads` threads for `purpose`; make it at first use."""
+        with self._lock:
+            executor = self._executors.get((threads, purpose))
+            if executor is None:
+                name = f"{self._label} {purpose}".rstrip()
+                executor = BackgroundExecutor(self._context, threads, self._report, name, self)
+                self._executors[threads, purpose] = executor
+                executor.start()
+            return executor
+
+    def all(self) -> list[BackgroundExecutor]:
+        """Return the executors made so far."""
+        with self._lock:
+            return list(self._executors.values())
+
+    def nodes(self) -> list[Node]:
+        """Return the nodes of all executors."""
+        return [node for executor in self.all() for node in executor.get_nodes()]
+
+    def owns(self, thread: threading.Thread) -> bool:
+        """Return whether `thread` belongs to one of the executors."""
+        return any(executor.owns(thread) for executor in self.all())
+
+    def stop(self, deadline: float) -> list[str]:
+        """Stop them all; return what still runs at `deadline`: the thread, and whose callback."""
+        return [
+            f"{thread.name}{_busy_with(executor, thread)}"
+            for executor in self.all()
+            for thread in executor.stop(deadline)
+        ]
+
+    def shutdown(self, deadline: float) -> None:
+        """Free what the stopped executors hold of rclpy."""
+        for executor in self.all():
+            executor.shutdown(timeout_sec=max(0.0, deadline - time.monotonic()))
+
+
+def _busy_with(executor: BackgroundExecutor, thread: threading.Thread) -> str:
+    names = [node_name(j.node) for j in executor.running.copy() if j.thread_id == thread.ident]
+    return f" (a callback of {names[0]})" if names else ""

@@ -1,0 +1,148 @@
+"""A job is one run of one callback: whose it is, and what became of it."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import functools
+import inspect
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from rclpy.node import Node
+from rclpy.task import Task
+
+from course.runtime.log_store import note
+from course.runtime.names import node_name
+
+Report = Callable[["Job", BaseException | None], None]
+"""Called when a job has ended, with what its callback raised, or None."""
+
+
+class Home(Protocol):
+    """What a job knows of the executor that runs it."""
+
+    threads: int
+    session_key: object
+
+
+class _Current(threading.local):
+    job: Job | None = None
+
+
+_current = _Current()
+
+
+def current_job() -> Job | None:
+    """Return the job that runs in this thread, or None outside callbacks."""
+    return _current.job
+
+
+class Job:
+    """One run of an rclpy Task, which it stands in for on an executor.
+
+    An exception ends here: it is handed to `report`, and the executor goes on.
+    """
+
+    __slots__ = (
+        "callback",
+        "entity",
+        "home",
+        "node",
+        "report",
+        "since",
+        "task",
+        "thread_id",
+        "unfinished",
+    )
+
+    def __init__(
+        self, task: Task, entity: object, node: Node | None, home: Home, report: Report
+    ) -> None:
+        """Take over `task`, made for `entity` of `node`, on an executor of `home`."""
+        self.task = task
+        self.entity = entity
+        self.node = node
+        self.home = home
+        self.callback: Callable[..., Any] | None = getattr(entity, "callback", None)
+        self.report = report
+        self.since = time.monotonic()
+        self.thread_id = 0
+        self.unfinished: dict[str, str] = {}  # printed without a line end so far, by level
+
+    def __call__(self) -> None:
+        """Run the callback to its end, or a coroutine to its next await."""
+        outer, _current.job = _current.job, self
+        failure: BaseException | None = None
+        try:
+            self.task()
+            if self.task.done():
+                failure = self.task.exception()
+        except BaseException as error:  # noqa: BLE001 - sys.exit() in a callback must not end spinning
+            failure = error
+            self.task.cancel()
+        finally:
+            _current.job = outer
+            self.report(self, failure)
+
+    def say(self, level: str, text: str) -> None:
+        """Log a line that the callback printed."""
+        note(level, node_name(self.node), text, self.home.session_key)
+
+
+def attributed(callback: Any, node: Node | None, shown: Any) -> Any:
+    """Return `callback`, made to sign the job that runs it with `node` and the callable `shown`.
+
+    rclpy makes tasks for what has no entity of its own (the execution of a goal, the done callback
+    of a future): without a signature nobody could tell whose they are.
+    """
+
+    def sign() -> None:
+        if (job := _current.job) is not None:
+            job.node, job.callback = node, shown
+
+    if inspect.iscoroutinefunction(callback):
+
+        async def run_async(*args: Any, **kwargs: Any) -> Any:
+            sign()
+            return await callback(*args, **kwargs)
+
+        return run_async
+
+    def run(*args: Any, **kwargs: Any) -> Any:
+        sign()
+        return callback(*args, **kwargs)
+
+    return run
+
+
+def watched(callback: Callable[..., Any]) -> Callable[..., Any]:
+    """Return `callback`, made to report what it raises before its caller can swallow it."""
+
+    def failed(error: BaseException) -> None:
+        if (job := _current.job) is not None:
+            job.report(job, error)
+
+    if inspect.iscoroutinefunction(callback):
+
+        @functools.wraps(callback)
+        async def run_async(*args: Any) -> Any:
+            try:
+                return await callback(*args)
+            except Exception as error:
+                failed(error)
+                raise
+
+        return run_async
+
+    @functools.wraps(callback)
+    def run(*args: Any) -> Any:
+        try:
+            return callback(*args)
+        except Exception as error:
+            failed(error)
+            raise
+
+    return run

@@ -1,0 +1,33 @@
+"""Names as the ROS graph spells them."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+from typing import Any
+
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+
+from course.runtime.log_store import node_of
+
+
+def node_name(node: Node | None) -> str:
+    """Return the fully qualified name of `node`, also after it has been destroyed."""
+    if node is None:
+        return ""
+    try:
+        return str(node.get_fully_qualified_name())
+    except InvalidHandle:
+        return node_of(str(node.get_logger().name))
+
+
+def type_name(ros_type: Any) -> str:
+    """Return a message, service or action type's name as on the graph: ``std_msgs/msg/String``."""
+    package, kind = ros_type.__module__.split(".")[:2]
+    return f"{package}/{kind}/{ros_type.__name__}"
+
+
+def is_name(full_name: str, name: str) -> bool:
+    """Return whether `name` stands for the node `full_name`: in full, or its last parts."""
+    return full_name == name or (not name.startswith("/") and full_name.endswith("/" + name))

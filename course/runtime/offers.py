@@ -1,0 +1,130 @@
+"""What the ROS graph offers on a topic: a QoS that fits it, its type, and why nothing arrives."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import difflib
+import importlib
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import (
+    DurabilityPolicy,
+    QoSCompatibility,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
+
+from course.errors import SessionError, WaitTimeout
+from course.runtime.names import type_name
+
+
+def full_topic(node: Node, topic: str) -> str:
+    """Return `topic` as the graph spells it, seen from `node`.
+
+    Raises:
+        SessionError: it is not a topic name.
+    """
+    try:
+        return str(node.resolve_topic_name(topic))
+    except RuntimeError as error:  # rclpy's RCLError: the reason, and a place in its C source
+        reason = str(error).removeprefix("failed to resolve name: ").partition(", at ")[0]
+        raise SessionError(f"{topic!r} is not a topic name: {reason}.") from None
+
+
+def fitting_qos(node: Node, topic: str, depth: int) -> QoSProfile:
+    """Return the strongest QoS that every publisher on `topic` can serve.
+
+    RELIABLE and TRANSIENT_LOCAL are requested only if every publisher offers them: a stronger
+    request than the offer is not matched at all (DDS 1.4, section 2.2.3: requested/offered).
+    """
+    offers = [info.qos_profile for info in node.get_publishers_info_by_topic(topic)]
+    reliable = offers and all(o.reliability == ReliabilityPolicy.RELIABLE for o in offers)
+    durable = offers and all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offers)
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if durable else DurabilityPolicy.VOLATILE,
+    )
+
+
+def type_on(node: Node, topic: str) -> Any | None:
+    """Return the message class of `topic`, or None while nobody publishes or subscribes to it.
+
+    Raises:
+        SessionError: its type is not installed here.
+    """
+    for name, types in node.get_topic_names_and_types():
+        if name == topic:
+            return _load(types[0], topic)
+    return None
+
+
+def require_type(name: str, ros_type: Any, on_graph: list[tuple[str, list[str]]]) -> None:
+    """Check that the topic or service `name`, if it is on the graph, has the type `ros_type`.
+
+    Within one process, DDS refuses an endpoint of another type, and complains on the console;
+    between two, it would wait for ever. So this is asked before an endpoint is made.
+
+    Raises:
+        WaitTimeout: it has another type: waiting is pointless.
+    """
+    types = dict(on_graph).get(name)
+    wanted = type_name(ros_type)
+    if types and wanted not in types:
+        raise WaitTimeout(f"{name} is of type {', '.join(sorted(types))}, not {wanted}.")
+
+
+def why_no_message(node: Node, topic: str, msg_type: Any, qos: QoSProfile) -> str:
+    """Return one sentence that says why a subscription got nothing."""
+    publishers = node.get_publishers_info_by_topic(topic)
+    if not publishers:
+        return f"Nobody publishes on {topic}{_alike(topic, _published(node))}."
+    require_type(topic, msg_type, [(topic, [info.topic_type for info in publishers])])
+    for info in publishers:
+        verdict, reason = qos_check_compatible(info.qos_profile, qos)
+        # Two default profiles give WARNING: what is left unsaid may or may not fit.
+        if verdict == QoSCompatibility.ERROR:
+            reasons = ", ".join(part.strip() for part in _reasons(reason))
+            return f"The QoS that {info.node_name} offers on {topic} does not fit: {reasons}."
+    count = len(publishers)
+    return (
+        f"{count} publisher{'s' if count > 1 else ''} on {topic} with a QoS that fits, "
+        "but nothing was published while we listened."
+    )
+
+
+def why_no_service(node: Node, name: str, srv_type: Any) -> str:
+    """Return one sentence that says why the service `name` is not there."""
+    services = dict(node.get_service_names_and_types())
+    require_type(name, srv_type, list(services.items()))
+    others = [service for service in services if node.count_services(service)]
+    return f"Nobody offers {name}{_alike(name, others)}."
+
+
+def _published(node: Node) -> list[str]:
+    topics = [name for name, _ in node.get_topic_names_and_types()]
+    return [name for name in topics if node.count_publishers(name)]
+
+
+def _alike(name: str, names: list[str]) -> str:
+    close = difflib.get_close_matches(name, names, n=1)
+    return f" (is it {close[0]}?)" if close else ""
+
+
+def _reasons(reason: str) -> list[str]:
+    parts = (part.strip() for part in reason.split(";"))
+    return [p.removeprefix("ERROR:") for p in parts if p.startswith("ERROR:")] or [reason]
+
+
+def _load(name: str, topic: str) -> Any:
+    package, kind, cls = name.split("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.{kind}"), cls)
+    except (ImportError, AttributeError):
+        raise SessionError(
+            f"{topic} carries {name}, which is not installed here: install its package, or define "
+            f"it with `%%interface {name}`."
+        ) from None

@@ -1,0 +1,146 @@
+"""A hidden node that listens and asks on behalf of a session, in a thread of its own."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from rclpy.client import Client
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+
+from course.errors import WaitTimeout
+from course.runtime.crew import Crew
+from course.runtime.offers import (
+    fitting_qos,
+    full_topic,
+    require_type,
+    why_no_message,
+    why_no_service,
+)
+from course.runtime.waiting import Deadline, Pulse, poll
+
+_LISTEN_DEPTH = 1000
+
+
+class Probe:
+    """Subscribes, calls services and sends goals without disturbing the session's own nodes.
+
+    It has its own single-threaded executor: a callback that blocks cannot keep it from listening.
+    The leading underscore of its name makes the ROS tools hide it.
+    """
+
+    def __init__(self, context: Context, crew: Crew, pulse: Pulse) -> None:
+        """Make the hidden node in `context`."""
+        self.pulse = pulse
+        self.node = Node(
+            f"_course_{os.getpid()}_{id(self):x}",
+            context=context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+        self.executor = crew.executor(1, "probe")
+        self.executor.add_node(self.node)
+
+    def subscribe(
+        self, msg_type: Any, topic: str, callback: Callable[..., None], qos: QoSProfile | int
+    ) -> Subscription:
+        """Subscribe; the caller drops it with `drop`.
+
+        Raises:
+            WaitTimeout: the topic has another type.
+        """
+        require_type(topic, msg_type, self.node.get_topic_names_and_types())
+        return self.node.create_subscription(msg_type, topic, callback, qos)
+
+    def drop(self, entity: Subscription | Client) -> None:
+        """Destroy a subscription or client of the hidden node. Idempotent."""
+        with self.executor.held():
+            if isinstance(entity, Subscription):
+                self.node.destroy_subscription(entity)
+            else:
+                self.node.destroy_client(entity)
+
+    def next_message(
+        self, msg_type: Any, topic: str, qos: QoSProfile | int | None, timeout: float
+    ) -> Any:
+        """Return the next message; see `Session.next_message`."""
+        topic = full_topic(self.node, topic)
+        inbox: list[Any] = []
+        deadline = Deadline(timeout)
+        profile = _profile(qos) or fitting_qos(self.node, topic, _LISTEN_DEPTH)
+        with self._listening(msg_type, topic, inbox, profile):
+            # Listen at once, whatever is offered: the publisher may appear and publish meanwhile.
+            poll(lambda: inbox or self.node.count_publishers(topic), deadline.left, self.pulse)
+            better = profile if qos is not None else fitting_qos(self.node, topic, _LISTEN_DEPTH)
+            with contextlib.ExitStack() as stack:
+                if not inbox and better != profile:
+                    stack.enter_context(self._listening(msg_type, topic, inbox, better))
+                if poll(lambda: inbox, deadline.left, self.pulse):
+                    return inbox[0]
+        reason = why_no_message(self.node, topic, msg_type, better)
+        raise WaitTimeout(f"No message on {topic} in {timeout:g} s. {reason}")
+
+    @contextlib.contextmanager
+    def client(self, srv_type: Any, name: str, deadline: Deadline) -> Iterator[Client]:
+        """Give a client whose server is there.
+
+        Raises:
+            WaitTimeout: no server by the deadline.
+        """
+        name = str(self.node.resolve_service_name(name))
+        require_type(name, srv_type, self.node.get_service_names_and_types())
+        client = self.node.create_client(srv_type, name)
+        try:
+            if not poll(client.service_is_ready, deadline.left, self.pulse):
+                reason = why_no_service(self.node, name, srv_type)
+                raise WaitTimeout(
+                    f"The service {name} was not ready in {deadline.total:g} s. {reason}"
+                )
+            yield client
+        finally:
+            self.drop(client)
+
+    def call(self, srv_type: Any, name: str, request: Any, timeout: float) -> Any:
+        """Return a service's response; see `Session.call`."""
+        deadline = Deadline(timeout)
+        with self.client(srv_type, name, deadline) as client:
+            future = client.call_async(request)
+            return self.outcome(
+                future, deadline, f"The service {client.service_name} did not answer"
+            )
+
+    def outcome(self, future: Future, deadline: Deadline, complaint: str) -> Any:
+        """Return the result of `future`.
+
+        Raises:
+            WaitTimeout: none by the deadline; its message begins with `complaint`.
+        """
+        if not poll(future.done, deadline.left, self.pulse):
+            if not self.node.context.ok():
+                raise ExternalShutdownException
+            raise WaitTimeout(f"{complaint} in {deadline.total:g} s.")
+        return future.result()
+
+    @contextlib.contextmanager
+    def _listening(
+        self, msg_type: Any, topic: str, inbox: list[Any], qos: QoSProfile
+    ) -> Iterator[None]:
+        subscription = self.subscribe(msg_type, topic, inbox.append, qos)
+        try:
+            yield
+        finally:
+            self.drop(subscription)
+
+
+def _profile(qos: QoSProfile | int | None) -> QoSProfile | None:
+    return QoSProfile(depth=qos) if isinstance(qos, int) else qos

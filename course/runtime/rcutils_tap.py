@@ -1,0 +1,116 @@
+"""Hear everything that is logged through rcutils: what rclpy's loggers and rcl itself say.
+
+rclpy offers no hook, rcutils does: one output handler for the process, set through its C API. Ours
+keeps each line and hands it on to the handler that was there, so that /rosout works as ever.
+"""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import ctypes
+import threading
+
+from rclpy.impl.logging_severity import LoggingSeverity
+from rclpy.logging import get_logger_level
+from rclpy.node import Node
+
+from course.runtime.jobs import current_job
+from course.runtime.log_store import store
+
+# void handler(location, int severity, const char *name, int64 stamp_ns, const char *format,
+#              va_list *arguments): rcutils/logging.h, rcutils_logging_output_handler_t.
+_Handler = ctypes.CFUNCTYPE(
+    None,
+    ctypes.c_void_p,
+    ctypes.c_int,
+    ctypes.c_char_p,
+    ctypes.c_int64,
+    ctypes.c_char_p,
+    ctypes.c_void_p,
+)
+_VA_LIST_BYTES = 24  # System V ABI for x86-64, section 3.5.7
+_TEXT_BYTES = 4096
+
+_rcutils = ctypes.CDLL("librcutils.so")
+_rcutils.rcutils_logging_get_output_handler.restype = ctypes.c_void_p
+_rcutils.rcutils_logging_set_output_handler.argtypes = [ctypes.c_void_p]
+_vsnprintf = ctypes.CDLL(None).vsnprintf
+_vsnprintf.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_void_p]
+
+_lock = threading.Lock()
+_next: ctypes._CFunctionType | None = None
+_next_address: int | None = None
+_lowered: set[str] = set()
+
+
+def install(*, hand_on: bool) -> None:
+    """Hear what is logged from now on. Idempotent, and to be repeated after each Context.init().
+
+    Args:
+        hand_on: whether the handler that is there now is to hear it as well.
+    """
+    global _next, _next_address
+    with _lock:
+        address = _rcutils.rcutils_logging_get_output_handler()
+        if address == _ours:
+            return
+        _next_address = address
+        _next = _Handler(address) if hand_on and address else None
+        _rcutils.rcutils_logging_set_output_handler(_ours)
+
+
+def uninstall() -> None:
+    """Put the handler back that was there before, if ours is still in place. Idempotent.
+
+    Needed before the interpreter ends: threads of DDS may log later than that.
+    """
+    with _lock:
+        if _rcutils.rcutils_logging_get_output_handler() == _ours:
+            _rcutils.rcutils_logging_set_output_handler(_next_address)
+
+
+def keep_every_level(node: Node) -> None:
+    """Let `node`'s logger emit DEBUG, so that any level can be read back, unless it chose a level.
+
+    What is below INFO is kept, but not handed on: /rosout carries what it carries in plain ROS 2.
+    """
+    logger = node.get_logger()
+    if get_logger_level(logger.name) == LoggingSeverity.UNSET:
+        logger.set_level(LoggingSeverity.DEBUG)
+        _lowered.add(logger.name)
+
+
+def _text(text_format: bytes, arguments: int) -> str:
+    # The next handler needs the arguments too, and reading them uses them up: read a copy.
+    copy = ctypes.create_string_buffer(ctypes.string_at(arguments, _VA_LIST_BYTES))
+    buffer = ctypes.create_string_buffer(_TEXT_BYTES)
+    length = _vsnprintf(buffer, _TEXT_BYTES, text_format, ctypes.addressof(copy))
+    if length >= _TEXT_BYTES:
+        ctypes.memmove(copy, arguments, _VA_LIST_BYTES)
+        buffer = ctypes.create_string_buffer(length + 1)
+        _vsnprintf(buffer, length + 1, text_format, ctypes.addressof(copy))
+    return buffer.value.decode("utf-8", "replace")
+
+
+def _hear(
+    location: int, severity: int, name: bytes, stamp: int, text_format: bytes, arguments: int
+) -> None:
+    logger = (name or b"").decode("utf-8", "replace")
+    job = current_job()
+    home = None if job is None else job.home.session_key
+    store.add(stamp / 1e9, severity, logger, _text(text_format, arguments), home)
+    if _next is not None and (severity >= LoggingSeverity.INFO or not _is_lowered(logger)):
+        _next(location, severity, name, stamp, text_format, arguments)
+
+
+def _is_lowered(logger: str) -> bool:
+    while logger:
+        if logger in _lowered:
+            return True
+        logger = logger.rpartition(".")[0]
+    return False
+
+
+_hear_in_c = _Handler(_hear)  # kept here: C only has its address
+_ours = ctypes.cast(_hear_in_c, ctypes.c_void_p).value

@@ -1,0 +1,232 @@
+"""The nodes of one session: making, replacing, stopping, pausing and finding them."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import functools
+import threading
+import weakref
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.node import Node
+
+from course.errors import SessionError
+from course.runtime.context import as_default_context
+from course.runtime.crew import Crew
+from course.runtime.executor import BackgroundExecutor
+from course.runtime.jobs import current_job
+from course.runtime.names import is_name, node_name
+from course.runtime.teardown import destroy_half_made, destroy_node, is_alive
+from course.runtime.waiting import Pulse, poll
+
+_CALLBACK_GRACE = 2.0  # s that stop() and pause() give a callback that is running
+
+Factory = Callable[..., Node]
+
+
+@dataclass
+class Resident:
+    """A node that a session runs."""
+
+    node: Node
+    name: str
+    key: Hashable
+    factory: object
+    executor: BackgroundExecutor
+    paused: bool = False
+
+
+class Residents:
+    """Keeps the nodes of one session."""
+
+    def __init__(self, context: Context, crew: Crew, pulse: Pulse) -> None:
+        """Keep nodes of `context`, spun by `crew`."""
+        self.stopped: weakref.WeakSet[Node] = weakref.WeakSet()
+        self.on_made: list[Callable[[Node], None]] = []
+        self._context = context
+        self._crew = crew
+        self._pulse = pulse
+        self._residents: dict[Node, Resident] = {}
+        self._made_by: dict[str, object] = {}  # every name that ever ran
+        self._lock = threading.RLock()
+
+    def all(self) -> list[Resident]:
+        """Return the nodes that are kept now; those that somebody destroyed are let go of."""
+        with self._lock:
+            residents = list(self._residents.values())
+        for resident in residents:
+            if not is_alive(resident.node):
+                self.stop(resident.node)  # its action servers are still there
+        return [resident for resident in residents if resident.node not in self.stopped]
+
+    def run(
+        self, factory: Factory | Node, args: tuple[Any, ...], kwargs: dict[str, Any], threads: int
+    ) -> Node:
+        """Make a node and spin it; see `Session.run`."""
+        key = _key(factory, args, kwargs)
+        for resident in self.all():
+            if key is not None and resident.key == key:
+                self.stop(resident.node)
+        node = factory if isinstance(factory, Node) else self._make(factory, args, kwargs)
+        if node.context is not self._context:
+            raise SessionError(
+                f"{node_name(node)} was made in another rclpy context: "
+                "pass its class to run(), and let the session make the node."
+            )
+        name = node_name(node)
+        for resident in self.all():
+            if resident.name == name and resident.node is not node:
+                self.stop(resident.node)
+        for callback in self.on_made:
+            callback(node)
+        executor = self._crew.executor(threads)
+        with self._lock:
+            self._residents[node] = Resident(node, name, key, factory, executor)
+            self._made_by[name] = factory
+            executor.add_node(node)  # under the lock: a node without executor looks stolen
+        return node
+
+    def stop(self, node: Node) -> None:
+        """Stop spinning `node`, let its running callback end, and destroy it. Idempotent."""
+        with self._lock:
+            resident = self._residents.pop(node, None)
+        if resident is None:
+            return
+        self.stopped.add(node)
+        self._take_out(resident)
+        destroy_node(node)
+
+    def pause(self, resident: Resident) -> None:
+        """Stop executing callbacks; DDS goes on receiving into the node's queues."""
+        resident.paused = True
+        self._take_out(resident)
+
+    def resume(self, resident: Resident) -> None:
+        """Execute callbacks again, beginning with what the queues hold."""
+        resident.paused = False
+        resident.executor.add_node(resident.node)
+
+    def forget_all(self) -> None:
+        """Destroy every node; no executor may be spinning."""
+        nodes = {*(resident.node for resident in self.all()), *self._crew.nodes()}
+        with self._lock:
+            self._residents.clear()
+        for node in nodes:
+            self.stopped.add(node)
+            destroy_node(node)
+
+    def find(self, what: tuple[Any, ...]) -> list[Resident]:
+        """Return what nodes, names or factories stand for; without any, everything.
+
+        Raises:
+            SessionError: a name that was never run.
+        """
+        residents = self.all()
+        if not what:
+            return residents
+        found = []
+        for item in what:
+            matches = [resident for resident in residents if _matches(resident, item)]
+            if not matches and isinstance(item, str):
+                self._require_seen(item, residents)
+            found += matches
+        return found
+
+    def names(self, what: Any) -> list[str]:
+        """Return the names of nodes that run or ran and that `what` stands for.
+
+        Raises:
+            SessionError: a name that was never run.
+        """
+        if isinstance(what, Node):
+            return [node_name(what)]
+        if isinstance(what, str):
+            with self._lock:
+                names = [known for known in self._made_by if is_name(known, what)]
+            return names or [resident.name for resident in self.find((what,))]
+        return [name for name, factory in self._made_by.items() if _same(factory, what)]
+
+    def stolen(self) -> list[Resident]:
+        """Return nodes that some other executor took over and then let go of.
+
+        `rclpy.spin_once(node)` does that: the node leaves its executor and does not come back. A
+        node that another executor still holds was moved there on purpose.
+        """
+        return [
+            resident
+            for resident in self.all()
+            if not resident.paused
+            and (holder := resident.node.executor) is not resident.executor
+            and (holder is None or resident.node not in holder.get_nodes())
+        ]
+
+    def take_back_stolen(self) -> list[str]:
+        """Spin nodes again that were `stolen`; return their names."""
+        stolen = self.stolen()
+        for resident in stolen:
+            resident.executor.add_node(resident.node)
+        return [resident.name for resident in stolen]
+
+    # Inside.
+
+    def _make(self, factory: Factory, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Node:
+        try:
+            with as_default_context(self._context):
+                node = factory(*args, **kwargs)
+        except BaseException as error:
+            destroy_half_made(error.__traceback__)
+            raise
+        if not isinstance(node, Node):
+            name = getattr(factory, "__qualname__", repr(factory))
+            raise SessionError(
+                "run() needs a Node class, or a function that returns a node; "
+                f"{name} returned {type(node).__name__}."
+            )
+        return node
+
+    def _take_out(self, resident: Resident) -> None:
+        node, executor = resident.node, resident.executor
+        with executor.held():
+            executor.remove_node(node)
+        if (job := current_job()) is None or job.node is not node:
+            poll(lambda: not executor.is_running(node), _CALLBACK_GRACE, self._pulse)
+
+    def _require_seen(self, name: str, residents: list[Resident]) -> None:
+        with self._lock:
+            seen = any(is_name(known, name) for known in self._made_by)
+        if not seen:
+            running = ", ".join(sorted(resident.name for resident in residents)) or "none"
+            raise SessionError(f"No node {name!r} ran in this session; running now: {running}.")
+
+
+def _matches(resident: Resident, what: Any) -> bool:
+    if isinstance(what, str):
+        return is_name(resident.name, what)
+    if isinstance(what, Node):
+        return resident.node is what
+    return _same(resident.factory, what)
+
+
+def _same(factory: object, other: object) -> bool:
+    # A class defined again in a cell is another object of the same name.
+    path = _path(other)
+    return factory is other or (path is not None and path == _path(factory))
+
+
+def _path(factory: object) -> tuple[str, str] | None:
+    factory = getattr(factory, "func", factory)
+    module, name = getattr(factory, "__module__", None), getattr(factory, "__qualname__", None)
+    # Every lambda has the same name: it says nothing about the node that it makes.
+    return (module, name) if module and name and "<lambda>" not in name else None
+
+
+def _key(factory: object, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Hashable:
+    if isinstance(factory, functools.partial):
+        args, kwargs = (*factory.args, *args), {**factory.keywords, **kwargs}
+    if isinstance(factory, Node) or (path := _path(factory)) is None:
+        return None
+    return (path, repr(args), repr(sorted(kwargs.items())))

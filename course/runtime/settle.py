@@ -1,0 +1,49 @@
+"""Let executors come to rest: run what is ready, and all that follows from it, then return."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Iterator, Sequence
+
+from course.runtime.executor import BackgroundExecutor
+
+_PATIENCE = 0.05  # s after which a running callback counts as blocked: on simulated time, say
+_NAP = 0.0005  # s between looks at callbacks that run in other threads
+
+
+@contextlib.contextmanager
+def all_held(executors: Sequence[BackgroundExecutor]) -> Iterator[None]:
+    """Hold every executor; see `BackgroundExecutor.held`."""
+    with contextlib.ExitStack() as stack:
+        for executor in executors:
+            stack.enter_context(executor.held())
+        yield
+
+
+def settle(executors: Sequence[BackgroundExecutor], timeout: float = 5.0) -> bool:
+    """Return True once nothing is ready anywhere and no callback runs, False after `timeout` s.
+
+    Called from a callback of one of the executors it cannot work, and returns False.
+    """
+    if any(executor.owns(threading.current_thread()) for executor in executors):
+        return False
+    with all_held(executors):
+        return come_to_rest(executors, timeout)
+
+
+def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> bool:
+    """Do the work of `settle` on executors that are held already."""
+    deadline = time.monotonic() + timeout
+    while True:
+        moment = time.monotonic() - _PATIENCE
+        running = [executor for executor in executors if executor.busy_since(moment)]
+        if running:
+            running[0].wait_for_a_job(_NAP)
+        else:
+            progress = [executor.run_ready() for executor in executors]
+            if not any(progress) and not any(e.busy_since(moment) for e in executors):
+                return True
+        if time.monotonic() >= deadline:
+            return False

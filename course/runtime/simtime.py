@@ -1,0 +1,148 @@
+"""Simulated time: move the clock of a session's nodes, step by step, and let each step take effect.
+
+Nodes with `use_sim_time` follow /clock (ROS 2 design, "Clock and Time"). A step publishes the new
+time, and ends when every node has it and everything that it set off has run: how often a timer
+fires then depends on nothing but the clock, whatever the machine's load.
+"""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import threading
+import time
+
+from rclpy.clock import ROSClock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
+
+from course.errors import SessionError, WaitTimeout
+from course.runtime.crew import Crew
+from course.runtime.jobs import current_job
+from course.runtime.names import node_name
+from course.runtime.probe import Probe
+from course.runtime.residents import Residents
+from course.runtime.settle import all_held, come_to_rest
+
+_NS = 1_000_000_000
+_LONGEST_STRIDE = 1000  # steps
+_STEP_TIMEOUT = 10.0  # s of wall time that a callback may hold up one step
+
+
+class SimulatedTime:
+    """The clock of a session with `sim_time=True`; it starts at 0 and moves on demand only."""
+
+    def __init__(self, probe: Probe, crew: Crew, residents: Residents) -> None:
+        """Move the clock of `residents`, spun by `crew`; `probe` publishes /clock."""
+        self._crew = crew
+        self._residents = residents
+        self._now_ns = 0
+        self._moving = threading.Lock()
+        # The QoS that ROS 2 gives /clock: the latest time is all that counts.
+        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self._publisher = probe.node.create_publisher(Clock, "/clock", qos)
+
+    @property
+    def now(self) -> float:
+        """Simulated time in seconds."""
+        return self._now_ns / _NS
+
+    @property
+    def now_ns(self) -> int:
+        """Simulated time in nanoseconds."""
+        return self._now_ns
+
+    def advance(self, seconds: float, step: float = 0.01) -> None:
+        """Move the clock on by `seconds`, in steps of `step` seconds.
+
+        After each step, callbacks run until nothing is left to do. A callback that blocks (for
+        more than 50 ms) is left behind in its thread, if the session has more than one.
+
+        Raises:
+            SessionError: called from a callback, or with a step or time that is not positive.
+            WaitTimeout: a callback kept its node from following for 10 s of wall time.
+        """
+        if seconds < 0 or step <= 0:
+            raise SessionError(
+                f"Simulated time moves forward, in positive steps: not by {seconds:g} s in steps "
+                f"of {step:g} s."
+            )
+        if current_job() is not None:
+            raise SessionError("A callback cannot move the time that it runs in.")
+        with self._moving, all_held(self._crew.all()):
+            step_ns, target = round(step * _NS), self._now_ns + round(seconds * _NS)
+            while self._now_ns < target:
+                self._move_to(min(self._now_ns + self._stride(step_ns), target))
+
+    def welcome(self, node: Node) -> None:
+        """Let a node that has just been made start from the present time.
+
+        Its clock and timers began at 0: the first /clock would make each timer fire at once.
+        """
+        if self._now_ns and (clock := _simulated_clock(node)) is not None:
+            moment = Time(nanoseconds=self._now_ns, clock_type=ClockType.ROS_TIME)
+            clock.set_ros_time_override(moment)
+            for timer in node.timers:
+                if not timer.is_canceled():
+                    timer.reset()
+
+    def _stride(self, step_ns: int) -> int:
+        """Return how far to move: one step, or several at once if no timer is due in between.
+
+        Nothing could tell the difference, unless others follow /clock or a callback waits for it.
+        """
+        followers = self._followers()
+        if self._publisher.get_subscription_count() != len(followers):
+            return step_ns
+        if any(executor.running for executor in self._crew.all()):
+            return step_ns
+        waits = [
+            wait
+            for node in followers
+            for timer in node.timers
+            if timer.clock is node.get_clock()
+            and (wait := timer.time_until_next_call()) is not None
+        ]
+        steps = -(-min(waits) // step_ns) if waits else _LONGEST_STRIDE
+        return step_ns * min(max(1, steps), _LONGEST_STRIDE)
+
+    def _move_to(self, moment_ns: int) -> None:
+        self._now_ns = moment_ns
+        seconds, nanoseconds = divmod(moment_ns, _NS)
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = seconds, nanoseconds
+        deadline = time.monotonic() + _STEP_TIMEOUT
+        executors = self._crew.all()
+        while True:
+            self._publisher.publish(message)
+            settled = come_to_rest(executors, deadline - time.monotonic())
+            late = [node for node in self._followers() if _clock_ns(node) < moment_ns]
+            if settled and not late:
+                return
+            if time.monotonic() >= deadline:
+                names = ", ".join(node_name(node) for node in late) or "the session"
+                raise WaitTimeout(
+                    f"{names} did not follow simulated time to {self.now:g} s: "
+                    f"a callback has been running for {_STEP_TIMEOUT:g} s."
+                )
+            if late:  # blocked, or the message is on its way
+                executors[0].wait_for_a_job(0.001)
+
+    def _followers(self) -> list[Node]:
+        return [
+            resident.node
+            for resident in self._residents.all()
+            if not resident.paused and _simulated_clock(resident.node) is not None
+        ]
+
+
+def _simulated_clock(node: Node) -> ROSClock | None:
+    clock = node.get_clock()
+    return clock if isinstance(clock, ROSClock) and clock.ros_time_is_active else None
+
+
+def _clock_ns(node: Node) -> int:
+    return int(node.get_clock().now().nanoseconds)

@@ -1,0 +1,49 @@
+"""Take nodes down completely: the node, and what rclpy's destroy_node() leaves behind."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import contextlib
+from types import TracebackType
+
+from rclpy.action.client import ActionClient
+from rclpy.action.server import ActionServer
+from rclpy.exceptions import InvalidHandle
+from rclpy.node import Node
+
+
+def destroy_node(node: Node) -> None:
+    """Destroy `node` with its action servers and clients. Idempotent.
+
+    No executor may be waiting on the node. rclpy's own destroy_node() leaves action entities
+    alive, and with them the node's endpoints on the ROS graph.
+    """
+    for waitable in list(node.waitables):
+        if isinstance(waitable, ActionServer | ActionClient):
+            with contextlib.suppress(InvalidHandle, ValueError):  # destroyed already
+                waitable.destroy()
+    with contextlib.suppress(InvalidHandle):
+        node.destroy_node()
+
+
+def destroy_half_made(tb: TracebackType | None) -> None:
+    """Destroy nodes whose constructor raised: they would stay on the graph as ghosts.
+
+    The only references to such a node are in the frames of the traceback, which a notebook keeps.
+    """
+    while tb is not None:
+        for value in list(tb.tb_frame.f_locals.values()):
+            # A node with an executor is one that runs: it only happens to be mentioned here.
+            if isinstance(value, Node) and is_alive(value) and value.executor is None:
+                destroy_node(value)
+        tb = tb.tb_next
+
+
+def is_alive(node: Node) -> bool:
+    """Return whether `node` has been made and not been destroyed."""
+    try:
+        with node.handle:
+            return True
+    except (InvalidHandle, AttributeError, TypeError):  # super().__init__() not reached
+        return False
