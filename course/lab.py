@@ -23,6 +23,10 @@ class LabError(CourseError):
     """A working copy that cannot be made or opened."""
 
 
+_SETTINGS = Path(__file__).resolve().parent / "jupyter"
+"""A Jupyter configuration folder: no questions about news, no look for updates on the internet."""
+
+
 @dataclass(frozen=True)
 class Copied:
     """What happened to a working copy; paths are relative to it.
@@ -77,6 +81,9 @@ def open_lab(folder: Path, arguments: Sequence[str] = ()) -> NoReturn:
     """
     try:
         os.chdir(folder)
+        inherited = os.environ.get("JUPYTER_CONFIG_PATH")
+        places = [str(_SETTINGS), *([inherited] if inherited else [])]
+        os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(places)
         # -m, and not the script: it starts the JupyterLab of this very Python.
         os.execv(sys.executable, [sys.executable, "-m", "jupyterlab", *arguments])
     except OSError as error:
