@@ -12,42 +12,26 @@ from typing import Any, TypeVar
 from rclpy.context import Context
 from rclpy.qos import QoSProfile
 
-from course.errors import SessionError, WaitTimeout
+from course.errors import WaitTimeout
 from course.runtime.actions import GoalRun, Goals
-from course.runtime.callback_errors import CallbackError
-from course.runtime.crew import Crew
+from course.runtime.hosting import Hosting
 from course.runtime.jobs import current_job
 from course.runtime.probe import Probe
 from course.runtime.recorder import Recorder
-from course.runtime.waiting import Deadline, Pulse, poll
+from course.runtime.waiting import Deadline, poll
 
 T = TypeVar("T")
 
 
-class Asking:
-    """The half of a Session that waits and asks; it needs no node of the learner's."""
+class Asking(Hosting):
+    """The part of a Session that waits and asks."""
 
-    def __init__(self, context: Context, crew: Crew, pulse: Pulse) -> None:
-        """Ask in `context`, with executors of `crew`, woken by `pulse`."""
-        self.context = context
-        self._crew = crew
-        self._pulse = pulse
+    def __init__(self, context: Context, threads: int) -> None:
+        """Ask in `context`; see `Hosting`."""
+        super().__init__(context, threads)
         self._asking_lock = threading.Lock()
         self._probe_made: Probe | None = None
         self._goals_made: Goals | None = None
-
-    @property
-    def closed(self) -> bool:
-        """True once nothing can be asked any more."""
-        return not self.context.ok()
-
-    @property
-    def errors(self) -> list[CallbackError]:
-        """What callbacks raised."""
-        return []
-
-    def take_back_stolen_nodes(self) -> None:
-        """See to it that nodes spin before they are waited for."""
 
     def until(
         self, condition: Callable[[], T], timeout: float = 5.0, what: str = "the condition"
@@ -162,8 +146,7 @@ class Asking:
 
     @property
     def _probe(self) -> Probe:
-        if self.closed:
-            raise SessionError("This session is closed: open a new one with course.Session().")
+        self._require_open()
         with self._asking_lock:
             if self._probe_made is None:
                 self._probe_made = Probe(self.context, self._crew, self._pulse)

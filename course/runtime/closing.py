@@ -25,7 +25,8 @@ class CloseReport:
     """What closing a session left behind.
 
     Attributes:
-        leaked: names of threads whose callback did not end in time, with the callback's node.
+        leaked: names of threads whose callback did not end in time, with the callback's node, and
+            nodes whose own cleanup raised.
         duration: seconds that closing took.
     """
 

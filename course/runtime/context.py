@@ -47,6 +47,8 @@ def open_context(
         raise SessionError(f"Unknown discovery range {discovery!r}: choose one of {names}.")
     ensure_log_dir()
     arguments = ["--ros-args", "--disable-stdout-logs", "--disable-external-lib-logs"]
+    # rclpy 7.1 leaves this service of a destroyed node on the graph, until the context ends.
+    arguments += ["-p", "start_type_description_service:=false"]
     if sim_time:
         # The one way to reach a class that calls super().__init__("name") and nothing else.
         arguments += ["-p", "use_sim_time:=true"]

@@ -13,16 +13,18 @@ from rclpy.node import Node
 from course.runtime.executor import BackgroundExecutor
 from course.runtime.jobs import Report
 from course.runtime.names import node_name
+from course.runtime.waiting import Pulse
 
 
 class Crew:
     """Makes, finds and stops a session's executors."""
 
-    def __init__(self, context: Context, label: str, report: Report) -> None:
+    def __init__(self, context: Context, label: str, report: Report, pulse: Pulse) -> None:
         """Prepare for executors on `context`; their threads are named after `label`."""
         self._context = context
         self._label = label
         self._report = report
+        self._pulse = pulse
         self._executors: dict[tuple[int, str], BackgroundExecutor] = {}
         self._lock = threading.Lock()
 
@@ -32,7 +34,14 @@ class Crew:
             executor = self._executors.get((threads, purpose))
             if executor is None:
                 name = f"{self._label} {purpose}".rstrip()
-                executor = BackgroundExecutor(self._context, threads, self._report, name, self)
+                executor = BackgroundExecutor(
+                    self._context,
+                    threads,
+                    name,
+                    report=self._report,
+                    pulse=self._pulse,
+                    session_key=self,
+                )
                 self._executors[threads, purpose] = executor
                 executor.start()
             return executor
@@ -52,10 +61,12 @@ class Crew:
 
     def stop(self, deadline: float) -> list[str]:
         """Stop them all; return what still runs at `deadline`: the thread, and whose callback."""
+        for executor in self.all():
+            executor.request_stop()
         return [
             f"{thread.name}{_busy_with(executor, thread)}"
             for executor in self.all()
-            for thread in executor.stop(deadline)
+            for thread in executor.join(deadline)
         ]
 
     def shutdown(self, deadline: float) -> None:

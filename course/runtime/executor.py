@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import contextlib
-import queue
 import threading
 import time
 import weakref
@@ -26,9 +25,12 @@ from rclpy.task import Future, Task
 from rclpy.waitable import Waitable
 
 from course.runtime import streams
+from course.runtime.gate import Gate
 from course.runtime.jobs import Job, Report, attributed, current_job, watched
+from course.runtime.waiting import Pulse
+from course.runtime.workers import Workers, sleeps
 
-_GATE_TIMEOUT = 5.0  # s; waking an executor takes microseconds, so this bounds what cannot happen
+_WAY_OUT = 5.0  # s; a woken thread needs microseconds to end, unless the machine is very busy
 
 
 class BackgroundExecutor(Executor):
@@ -42,49 +44,59 @@ class BackgroundExecutor(Executor):
     """
 
     def __init__(
-        self, context: Context, threads: int, report: Report, name: str, session_key: object
+        self,
+        context: Context,
+        threads: int,
+        name: str,
+        *,
+        report: Report,
+        pulse: Pulse,
+        session_key: object,
     ) -> None:
-        """Make an executor; `start` makes it spin. `report` hears of each job that ended."""
+        """Make an executor; `start` makes it spin.
+
+        `report` hears of each callback that raised, `pulse` of each that ended.
+        """
         super().__init__(context=context)
         self.threads = threads
         self.session_key = session_key
         self.running: set[Job] = set()
-        self._in_hand: dict[Task, Job] = {}
-        self._crowded = False  # True while the spinning thread waits for a worker
         self._scheduled: weakref.WeakSet[Task] = weakref.WeakSet()
-        self._report = report
-        self._gate = threading.Condition()
-        self._holds = 0
-        self._waiting = False  # True while rclpy looks at, or waits on, the nodes' entities
-        self._stale = False  # True if nodes may have changed under a suspended wait
-        self._stopping = False
-        self._interrupted = self._new_condition()
+        self.report = report
+        self._pulse = pulse
+        self._gate = Gate(self.wake)
+        self._interrupted = self._gate.new_interrupt()
         self._round = _fresh_false()
-        self._jobs: queue.SimpleQueue[Job | None] | None = None
+        self._workers = Workers(threads, self._run, name) if threads > 1 else None
         self._threads = [threading.Thread(target=self._loop, name=f"{name} spin", daemon=True)]
-        if threads > 1:
-            self._jobs = queue.SimpleQueue()
-            self._threads += [
-                threading.Thread(target=self._work, name=f"{name} worker {n + 1}", daemon=True)
-                for n in range(threads)
-            ]
+        if self._workers is not None:
+            self._threads += self._workers.threads
 
     def start(self) -> None:
         """Start spinning in the background."""
         for thread in self._threads:
             thread.start()
 
-    def stop(self, deadline: float) -> list[threading.Thread]:
-        """Stop spinning; return the threads that still run a callback at `deadline` (monotonic)."""
-        self._stopping = True
-        with self._gate:
-            self._gate.notify_all()
-        self.wake()
-        if self._jobs is not None:
-            for _ in range(self.threads):
-                self._jobs.put(None)
+    def request_stop(self) -> None:
+        """Let every thread end after the callback that it runs; do not wait for it."""
+        self._gate.stop()
+        if self._workers is not None:
+            self._workers.stop()
+
+    def join(self, deadline: float) -> list[threading.Thread]:
+        """Wait for the threads to end; return those that run a callback past `deadline`.
+
+        Args:
+            deadline: as of time.monotonic(), s. A thread outside callbacks is on its way out, and
+                is waited for in any case: one that is still inside rclpy when the interpreter ends
+                would abort the process.
+        """
         for thread in self._threads:
             thread.join(max(0.0, deadline - time.monotonic()))
+        busy = {job.thread_id for job in self.running.copy()}
+        for thread in self._threads:
+            if thread.ident not in busy:
+                thread.join(_WAY_OUT)
         self._drop_what_never_began()
         return [thread for thread in self._threads if thread.is_alive()]
 
@@ -98,47 +110,46 @@ class BackgroundExecutor(Executor):
 
         Callbacks that already run are not waited for. May be called from a callback.
         """
-        with self._gate:
-            self._holds += 1
-            self._stale = True
-        self.wake()
-        try:
-            with self._gate:
-                self._gate.wait_for(lambda: not self._waiting, _GATE_TIMEOUT)
+        with self._gate.held():
             yield
-        finally:
-            with self._gate:
-                self._holds -= 1
-                self._gate.notify_all()
 
     def run_ready(self) -> bool:
         """Run one round of what is ready, and return whether there was anything.
 
         To be called while `held`. Without workers the callbacks run in the calling thread.
         """
-        if self._jobs is None and self.running:
-            return False  # one thread, and a callback that blocks: the others wait for it
+        if self._workers is None and self.running:
+            return False  # the one thread has a callback to run, and the others wait for it
         busy = False
         while True:
-            if self._stale:  # a callback removed a node under this round
-                self._round, self._stale = _fresh_false(), False
+            if self._gate.stale:  # a callback removed a node under this round
+                self._round, self._gate.stale = _fresh_false(), False
             try:
                 ready: Any = super().wait_for_ready_callbacks(0.0, None, self._round)
             except (TimeoutException, ShutdownException):
                 return busy
-            if ready[0] in self._in_hand:
+            if self._workers is not None and self._workers.job_of(ready[0]) is not None:
                 return busy  # no worker is free: nothing else can begin either
             busy = True
             self._execute(self._job(*ready))
 
     def busy_since(self, moment: float) -> bool:
-        """Return whether callbacks run that were taken up after `moment` (monotonic, s)."""
-        return any(job.since > moment for job in self.running.copy())
+        """Return whether callbacks run that are neither done nor blocked.
+
+        Args:
+            moment: a callback taken up before it (monotonic, s) that sleeps counts as blocked. With
+                one thread there is nobody to go on without it, so there it does not.
+        """
+        if self._workers is None:
+            return bool(self.running)
+        return any(
+            job.since > moment or (job.thread_id and not sleeps(job.thread_id))
+            for job in self.running.copy()
+        )
 
     def wait_for_a_job(self, timeout: float) -> None:
         """Return when a running callback has ended, or after `timeout` s; while `held`."""
-        with self._gate:
-            self._gate.wait(timeout)
+        self._gate.wait(timeout)
 
     def is_running(self, node: Node) -> bool:
         """Return whether a callback of `node` runs, or is about to, in another thread than this."""
@@ -148,29 +159,14 @@ class BackgroundExecutor(Executor):
     # What rclpy's own executors override.
 
     def wait_for_ready_callbacks(self, *args: Any, **kwargs: Any) -> tuple[Any, Any, Any]:
-        """Return the next job, its entity and its node; the arguments are rclpy's."""
-        self._waiting = True  # before looking at _holds: held() does it the other way round
-        try:
-            if self._holds or self._stale or self._stopping:
-                self._let_others_in()
-            timeout = args[0] if args else kwargs.get("timeout_sec")
-            # Equal arguments resume rclpy's suspended wait; a new condition starts a fresh one.
-            while True:
-                ready: Any = super().wait_for_ready_callbacks(timeout, None, self._interrupted)
-                # rclpy offers a task again and again until a worker has begun it.
-                if (job := self._in_hand.get(ready[0])) is None:
-                    return self._job(*ready), *ready[1:]
-                self._wait_for_start(job)
-        finally:
-            self._waiting = False
-            if self._holds:
-                with self._gate:
-                    self._gate.notify_all()
+        """Return the next job, its entity and its node; only the timeout matters."""
+        job = self._next_job(args[0] if args else kwargs.get("timeout_sec"))
+        return job, job.entity, job.node
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Wait for one callback and run it, or hand it to a worker."""
         try:
-            job, _, _ = self.wait_for_ready_callbacks(timeout_sec)
+            job = self._next_job(timeout_sec)
         except (ShutdownException, TimeoutException, ConditionReachedException):
             return
         self._execute(job)
@@ -198,34 +194,33 @@ class BackgroundExecutor(Executor):
 
     # Inside.
 
-    def _new_condition(self) -> Callable[[], bool]:
-        return lambda: bool(self._holds or self._stopping)
+    def _next_job(self, timeout: Any) -> Job:
+        try:
+            if self._gate.enter():
+                # Equal arguments resume rclpy's suspended wait; a new condition starts afresh.
+                self._interrupted = self._gate.new_interrupt()
+            while True:
+                ready: Any = super().wait_for_ready_callbacks(timeout, None, self._interrupted)
+                if self._workers is None or (job := self._workers.job_of(ready[0])) is None:
+                    return self._job(*ready)
+                # rclpy offers a task again and again until a worker has begun it.
+                self._gate.watch(lambda begun=job: begun.thread_id)  # type: ignore[misc]
+        finally:
+            self._gate.leave()
 
     def _job(self, task: Any, entity: Any, node: Any) -> Job:
-        job = Job(task, entity, node, self, self._finished)
+        job = Job(task, entity, node, self)
         self.running.add(job)
         return job
 
     def _execute(self, job: Job) -> None:
-        if self._jobs is None:
+        if self._workers is None:
             self._run(job)
         else:
-            self._in_hand[job.task] = job
-            self._jobs.put(job)
-
-    def _let_others_in(self) -> None:
-        with self._gate:
-            self._waiting = False
-            self._gate.notify_all()
-            self._gate.wait_for(lambda: not self._holds or self._stopping)
-            if self._stopping:
-                raise ShutdownException
-            self._interrupted = self._new_condition()
-            self._stale = False
-            self._waiting = True
+            self._workers.put(job)
 
     def _loop(self) -> None:
-        while not self._stopping:
+        while not self._gate.stopping:
             try:
                 self.spin_once()
             except ExternalShutdownException:
@@ -233,52 +228,29 @@ class BackgroundExecutor(Executor):
             except InvalidHandle:
                 self._drop_destroyed_nodes()
 
-    def _work(self) -> None:
-        assert self._jobs is not None
-        while (job := self._jobs.get()) is not None:
-            if self._stopping:
-                self._jobs.put(job)  # `stop` drops it
-                return
-            self._run(job)
-
     def _run(self, job: Job) -> None:
         job.thread_id = threading.get_ident()
-        if self._crowded:
-            with self._gate:
-                self._gate.notify_all()
+        self._gate.notify_watchers()
         streams.install()
-        job()
-        self._in_hand.pop(job.task, None)
-        if job.unfinished:
+        failure = job()
+        if job.unfinished is not None:
             streams.finish_lines(job)
-
-    def _wait_for_start(self, job: Job) -> None:
-        """Return when a worker has begun `job`; there is nothing better to do until then."""
-        with self._gate:
-            self._crowded = True
-            self._gate.wait_for(
-                lambda: job.thread_id or self._holds or self._stopping, _GATE_TIMEOUT
-            )
-            self._crowded = False
+        if failure is not None:
+            self.report(job, failure)
+        self.running.discard(job)
+        self._pulse.beat()
+        self._gate.notify_watchers()
 
     def _drop_what_never_began(self) -> None:
         # A coroutine that never began would complain on stderr.
         tasks = list(self._scheduled)
-        if self._jobs is not None:
-            with contextlib.suppress(queue.Empty):
-                while True:
-                    if (job := self._jobs.get_nowait()) is not None:
-                        self.running.discard(job)
-                        tasks.append(job.task)
+        if self._workers is not None:
+            never_begun = self._workers.never_begun()
+            self.running.difference_update(never_begun)
+            tasks += [job.task for job in never_begun]
         for task in tasks:
-            task.cancel()
-
-    def _finished(self, job: Job, failure: BaseException | None) -> None:
-        self.running.discard(job)
-        self._report(job, failure)
-        if self._holds:
-            with self._gate:
-                self._gate.notify_all()
+            if not task.executing():
+                task.cancel()
 
     def _drop_destroyed_nodes(self) -> None:
         """Take out nodes destroyed behind our back: they make every wait fail."""

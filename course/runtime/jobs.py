@@ -17,8 +17,8 @@ from rclpy.task import Task
 from course.runtime.log_store import note
 from course.runtime.names import node_name
 
-Report = Callable[["Job", BaseException | None], None]
-"""Called when a job has ended, with what its callback raised, or None."""
+Report = Callable[["Job", BaseException], None]
+"""Called when a callback has raised."""
 
 
 class Home(Protocol):
@@ -26,6 +26,7 @@ class Home(Protocol):
 
     threads: int
     session_key: object
+    report: Report
 
 
 class _Current(threading.local):
@@ -43,49 +44,44 @@ def current_job() -> Job | None:
 class Job:
     """One run of an rclpy Task, which it stands in for on an executor.
 
-    An exception ends here: it is handed to `report`, and the executor goes on.
+    One is made for every message that arrives, so it is kept small.
     """
 
-    __slots__ = (
-        "callback",
-        "entity",
-        "home",
-        "node",
-        "report",
-        "since",
-        "task",
-        "thread_id",
-        "unfinished",
-    )
+    __slots__ = ("entity", "home", "node", "shown", "since", "task", "thread_id", "unfinished")
 
-    def __init__(
-        self, task: Task, entity: object, node: Node | None, home: Home, report: Report
-    ) -> None:
-        """Take over `task`, made for `entity` of `node`, on an executor of `home`."""
+    def __init__(self, task: Task, entity: object, node: Node | None, home: Home) -> None:
+        """Take over `task`, made for `entity` of `node`, on the executor `home`."""
         self.task = task
         self.entity = entity
         self.node = node
         self.home = home
-        self.callback: Callable[..., Any] | None = getattr(entity, "callback", None)
-        self.report = report
+        self.shown: Callable[..., Any] | None = None
         self.since = time.monotonic()
         self.thread_id = 0
-        self.unfinished: dict[str, str] = {}  # printed without a line end so far, by level
+        self.unfinished: dict[str, str] | None = None  # printed without a line end, by level
 
-    def __call__(self) -> None:
-        """Run the callback to its end, or a coroutine to its next await."""
+    @property
+    def callback(self) -> Callable[..., Any] | None:
+        """What to name when this job fails, if rclpy knows it."""
+        return self.shown or getattr(self.entity, "callback", None)
+
+    def __call__(self) -> BaseException | None:
+        """Run the callback to its end, or a coroutine to its next await.
+
+        Returns:
+            What it raised, or None. No exception leaves a job: the executor goes on.
+        """
         outer, _current.job = _current.job, self
-        failure: BaseException | None = None
+        task = self.task
         try:
-            self.task()
-            if self.task.done():
-                failure = self.task.exception()
+            task()
+            failure: BaseException | None = task.exception() if task.done() else None
+            return failure
         except BaseException as error:  # noqa: BLE001 - sys.exit() in a callback must not end spinning
-            failure = error
-            self.task.cancel()
+            task.cancel()
+            return error
         finally:
             _current.job = outer
-            self.report(self, failure)
 
     def say(self, level: str, text: str) -> None:
         """Log a line that the callback printed."""
@@ -101,7 +97,7 @@ def attributed(callback: Any, node: Node | None, shown: Any) -> Any:
 
     def sign() -> None:
         if (job := _current.job) is not None:
-            job.node, job.callback = node, shown
+            job.node, job.shown = node, shown
 
     if inspect.iscoroutinefunction(callback):
 
@@ -123,7 +119,7 @@ def watched(callback: Callable[..., Any]) -> Callable[..., Any]:
 
     def failed(error: BaseException) -> None:
         if (job := _current.job) is not None:
-            job.report(job, error)
+            job.home.report(job, error)
 
     if inspect.iscoroutinefunction(callback):
 

@@ -110,14 +110,20 @@ class Residents:
         resident.paused = False
         resident.executor.add_node(resident.node)
 
-    def forget_all(self) -> None:
-        """Destroy every node; no executor may be spinning."""
+    def forget_all(self) -> list[str]:
+        """Destroy every node; no executor may be spinning. Return which cleanups raised what."""
+        problems = []
         nodes = {*(resident.node for resident in self.all()), *self._crew.nodes()}
         with self._lock:
             self._residents.clear()
         for node in nodes:
             self.stopped.add(node)
-            destroy_node(node)
+            name = node_name(node)
+            try:
+                destroy_node(node)
+            except Exception as error:  # noqa: BLE001 - a mistake in one node's cleanup, not ours
+                problems.append(f"the cleanup of {name} raised {type(error).__name__}: {error}")
+        return problems
 
     def find(self, what: tuple[Any, ...]) -> list[Resident]:
         """Return what nodes, names or factories stand for; without any, everything.

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from course.runtime.executor import BackgroundExecutor
 
-_PATIENCE = 0.05  # s after which a running callback counts as blocked: on simulated time, say
+_PATIENCE = 0.2  # s after which a callback that sleeps counts as blocked: on simulated time, say
 _NAP = 0.0005  # s between looks at callbacks that run in other threads
 
 

@@ -59,7 +59,7 @@ class SimulatedTime:
         """Move the clock on by `seconds`, in steps of `step` seconds.
 
         After each step, callbacks run until nothing is left to do. A callback that blocks (for
-        more than 50 ms) is left behind in its thread, if the session has more than one.
+        more than 0.2 s) is left behind in its thread, if the session has more than one.
 
         Raises:
             SessionError: called from a callback, or with a step or time that is not positive.

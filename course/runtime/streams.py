@@ -24,10 +24,10 @@ class JobAwareStream:
         job = current_job()
         if job is None:
             return self._stream.write(text)
-        *lines, rest = (job.unfinished.get(self._level, "") + text).split("\n")
+        unfinished = job.unfinished = job.unfinished or {}
+        *lines, unfinished[self._level] = (unfinished.get(self._level, "") + text).split("\n")
         for line in lines:
             job.say(self._level, line)
-        job.unfinished[self._level] = rest
         return len(text)
 
     def writelines(self, lines: Any) -> None:
@@ -71,6 +71,6 @@ def uninstall() -> None:
 
 def finish_lines(job: Job) -> None:
     """Log what a callback printed without a line end."""
-    for level, rest in job.unfinished.items():
+    for level, rest in (job.unfinished or {}).items():
         if rest:
             job.say(level, rest)

@@ -19,12 +19,19 @@ def destroy_node(node: Node) -> None:
     No executor may be waiting on the node. rclpy's own destroy_node() leaves action entities
     alive, and with them the node's endpoints on the ROS graph.
     """
-    for waitable in list(node.waitables):
-        if isinstance(waitable, ActionServer | ActionClient):
-            with contextlib.suppress(InvalidHandle, ValueError):  # destroyed already
-                waitable.destroy()
-    with contextlib.suppress(InvalidHandle):
-        node.destroy_node()
+    # The node's own method first: a class that overrides it destroys its action server itself,
+    # and rclpy does not take that twice.
+    try:
+        with contextlib.suppress(InvalidHandle):
+            node.destroy_node()
+    finally:
+        for waitable in list(node.waitables):
+            if isinstance(waitable, ActionServer | ActionClient):
+                with contextlib.suppress(InvalidHandle, ValueError):  # destroyed already
+                    waitable.destroy()
+        # An override that raised, or did not call the base method, must leave no ghost.
+        with contextlib.suppress(InvalidHandle):
+            Node.destroy_node(node)
 
 
 def destroy_half_made(tb: TracebackType | None) -> None:
@@ -36,7 +43,9 @@ def destroy_half_made(tb: TracebackType | None) -> None:
         for value in list(tb.tb_frame.f_locals.values()):
             # A node with an executor is one that runs: it only happens to be mentioned here.
             if isinstance(value, Node) and is_alive(value) and value.executor is None:
-                destroy_node(value)
+                # What the constructor raised is what the learner has to see, not what came of it.
+                with contextlib.suppress(Exception):
+                    destroy_node(value)
         tb = tb.tb_next
 
 

@@ -77,19 +77,22 @@ def test_a_lease_dies_with_its_process_however_it_ends(start_script, monkeypatch
 def test_a_forked_child_does_not_keep_a_lease_alive(monkeypatch):
     lease = lease_domain()
     go_on, let_go = os.pipe()
+    begun, say_begun = os.pipe()
     child = os.fork()
     if child == 0:
         os.close(let_go)
+        os.write(say_begun, b"!")
         os.read(go_on, 1)  # returns when the parent has closed its end
         os._exit(0)
     try:
+        os.read(begun, 1)
         lease.release()
         monkeypatch.setattr(domains, "MIN_DOMAIN", lease.domain_id - 1)
         monkeypatch.setattr(domains, "MAX_DOMAIN", lease.domain_id)
         lease_domain().release()
     finally:
-        os.close(let_go)
-        os.close(go_on)
+        for pipe_end in (let_go, go_on, begun, say_begun):
+            os.close(pipe_end)
         os.waitpid(child, 0)
 
 

@@ -1,0 +1,76 @@
+"""A pool of daemon threads that run jobs.
+
+Not concurrent.futures: its threads are joined at interpreter exit, and a callback that never
+returns would keep the process from ending.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from rclpy.task import Task
+
+from course.runtime.jobs import Job
+
+
+class Workers:
+    """Runs jobs in `count` threads, first come, first served."""
+
+    def __init__(self, count: int, run: Callable[[Job], None], name: str) -> None:
+        """Make the pool; its threads, `threads`, are for the caller to start and to join."""
+        self._run = run
+        self._queue: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
+        self._in_hand: dict[Task, Job] = {}
+        self._stopping = False
+        self.threads = [
+            threading.Thread(target=self._work, name=f"{name} worker {number}", daemon=True)
+            for number in range(1, count + 1)
+        ]
+
+    def put(self, job: Job) -> None:
+        """Hand `job` to the next worker that is free."""
+        self._in_hand[job.task] = job
+        self._queue.put(job)
+
+    def job_of(self, task: Task) -> Job | None:
+        """Return the job that was put for `task` and has not ended, if there is one."""
+        return self._in_hand.get(task)
+
+    def stop(self) -> None:
+        """Let every worker end after the job that it runs."""
+        self._stopping = True
+        for _ in self.threads:
+            self._queue.put(None)
+
+    def never_begun(self) -> list[Job]:
+        """Return the jobs that no worker has begun, once the workers have stopped."""
+        jobs = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                if (job := self._queue.get_nowait()) is not None:
+                    jobs.append(job)
+        return jobs
+
+    def _work(self) -> None:
+        while (job := self._queue.get()) is not None:
+            if self._stopping:
+                self._queue.put(job)  # for `never_begun`
+                return
+            self._run(job)
+            self._in_hand.pop(job.task, None)
+
+
+def sleeps(thread_id: int) -> bool:
+    """Return whether the kernel has this thread sleeping, rather than running or waiting to run."""
+    thread = next((t for t in threading.enumerate() if t.ident == thread_id), None)
+    if thread is None:
+        return False
+    try:
+        status = Path(f"/proc/self/task/{thread.native_id}/stat").read_text(encoding="ascii")
+    except OSError:  # it has just ended
+        return False
+    return status.rpartition(")")[2].split()[0] == "S"

@@ -1,0 +1,144 @@
+"""Logs: everything is kept, nothing reaches the console, and it reads as a table."""
+
+# ruff: noqa: T201 - what callbacks print is what is tested here
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from std_msgs.msg import String
+
+import course
+from course.errors import SessionError
+from course.runtime.logs import LogRow, LogTable
+
+
+class Chatty(Node):
+    """Says something at every level, in every way, once."""
+
+    def __init__(self, name="chatty"):
+        super().__init__(name)
+        self.get_logger().info("born: 100 % <b>ü</b> %s")
+        self.done = False
+        self.timer = self.create_timer(0.01, self.talk)
+
+    def talk(self):
+        self.timer.cancel()
+        logger = self.get_logger()
+        logger.debug("a detail")
+        logger.get_child("lens").warning("dirty")
+        logger.error("x" * 10_000)
+        print("printed", 1)
+        print("half a line", end="")
+        print("to stderr", file=sys.stderr)
+        self.done = True
+
+
+@pytest.fixture
+def chatty(any_session):
+    node = any_session.run(Chatty)
+    any_session.until(lambda: any_session.logs(node, level="WARN").messages[-1:] == ["to stderr"])
+    return node
+
+
+def levels(table):
+    return [row.level for row in table]
+
+
+def test_every_level_is_kept_and_nothing_reaches_the_console(any_session, chatty, capfd):
+    any_session.until(lambda: "half a line" in any_session.logs().messages)
+    rows = any_session.logs(level="DEBUG")
+    assert sorted(levels(rows)) == sorted(
+        ["INFO", "DEBUG", "WARN", "ERROR", "PRINT", "PRINT", "STDERR"]
+    )
+    assert {row.node for row in rows} == {"/chatty"}
+    assert capfd.readouterr() == ("", "")
+
+
+def test_texts_are_kept_whole(any_session, chatty):
+    messages = any_session.logs().messages
+    assert "born: 100 % <b>ü</b> %s" in messages
+    assert "x" * 10_000 in messages
+
+
+def test_levels_select_from_there_upwards(any_session, chatty):
+    assert "DEBUG" not in levels(any_session.logs())
+    assert set(levels(any_session.logs(level="warning"))) == {"WARN", "STDERR", "ERROR"}
+    assert levels(any_session.logs(level="ERROR")) == ["ERROR"]
+    with pytest.raises(SessionError, match="choose DEBUG, INFO, WARN, ERROR or FATAL"):
+        any_session.logs(level="LOUD")
+
+
+def test_nodes_are_found_by_object_name_and_class_after_they_have_gone_too(any_session, chatty):
+    any_session.run(Node, "silent")
+    any_session.stop(chatty)
+    for what in (chatty, "chatty", "/chatty", Chatty):
+        assert "printed 1" in any_session.logs(what).messages
+    assert len(any_session.logs("silent")) == 0
+    with pytest.raises(SessionError, match="'chatter'"):
+        any_session.logs("chatter")
+
+
+def test_last_counts_back_from_the_latest(any_session, chatty):
+    table = any_session.logs(last=2)
+    assert len(table) == 2
+    assert "earlier rows" in repr(table)
+    assert len(any_session.logs(last=None)) > 2
+
+
+def test_what_the_main_thread_prints_passes_through(any_session, chatty, capsys):
+    print("from the cell")
+    assert "from the cell" in capsys.readouterr().out
+
+
+def test_two_sessions_with_nodes_of_one_name_keep_their_prints_apart():
+    with course.Session() as one, course.Session() as other:
+        first = one.run(Chatty)
+        one.until(lambda: first.done)
+        assert "printed 1" not in other.logs().messages
+        second = other.run(Chatty)
+        other.until(lambda: second.done)
+        one.until(lambda: "printed 1" in one.logs().messages)
+        assert one.logs(last=None).messages.count("printed 1") == 1
+
+
+def test_rosout_carries_what_it_carries_in_plain_ros(any_session):
+    from rcl_interfaces.msg import Log
+
+    node = any_session.run(Node, "robot")
+    recorder = any_session.record("/rosout", Log)
+    node.get_logger().debug("below the default level")
+    node.get_logger().info("hello")
+    recorder.wait(1)
+    assert "hello" in [stamped.message.msg for stamped in recorder.messages]
+    assert "below the default level" not in [s.message.msg for s in recorder.messages]
+
+
+def test_the_warning_about_an_incompatible_qos_is_there(any_session):
+    robot, display = any_session.run(Node, "robot"), any_session.run(Node, "display")
+    best_effort = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    robot.create_publisher(String, "images", best_effort)
+    display.create_subscription(String, "images", lambda message: None, 10)
+    any_session.until(
+        lambda: any("incompatible QoS" in m for m in any_session.logs("display").messages)
+    )
+
+
+def test_a_table_in_a_notebook_is_escaped():
+    table = LogTable([LogRow(0.0, "INFO", "/<node>", "<script>alert(1)</script>\nsecond")])
+    page = table._repr_html_()
+    assert "<script>" not in page
+    assert "&lt;script&gt;" in page
+    assert "/&lt;node&gt;" in page
+    assert LogTable([])._repr_html_() == "<i>nothing logged</i>"
+    assert repr(LogTable([])) == "(nothing logged)"
+
+
+def test_a_table_is_a_sequence_of_rows():
+    rows = [LogRow(float(n), "INFO", "/a", str(n)) for n in range(3)]
+    table = LogTable(rows)
+    assert (list(table), table[0], table[1:], len(table)) == (rows, rows[0], rows[1:], 3)
+    assert len(repr(table).splitlines()) == 3

@@ -1,0 +1,152 @@
+"""Simulated time: exact, whatever the machine's load."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+from rclpy.node import Node
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
+
+import course
+from course.errors import SessionError, WaitTimeout
+
+
+class Sensors(Node):
+    """Three timers, as a textbook has them."""
+
+    def __init__(self):
+        super().__init__("sensors")
+        self.fired = {10.0: [], 1.0: [], 0.5: []}
+        self.publisher = self.create_publisher(String, "readings", 10)
+        for rate, times in self.fired.items():
+            self.create_timer(1.0 / rate, lambda times=times: self.fire(times))
+
+    def fire(self, times):
+        times.append(self.get_clock().now().nanoseconds)
+        self.publisher.publish(String())
+
+
+@pytest.fixture(params=[1, 4], ids=["one thread", "four threads"])
+def lab(request):
+    with course.Session(sim_time=True, threads=request.param) as session:
+        yield session
+
+
+def test_timers_fire_exactly_as_often_as_their_rates_say(lab):
+    sensors = lab.run(Sensors)
+    lab.sim.advance(20.0)
+    assert {rate: len(times) for rate, times in sensors.fired.items()} == {
+        10.0: 200,
+        1.0: 20,
+        0.5: 10,
+    }
+    assert sensors.fired[0.5] == [2_000_000_000 * n for n in range(1, 11)]
+    assert lab.sim.now == 20.0
+
+
+def test_what_timers_set_off_has_happened_when_advance_returns(lab):
+    lab.run(Sensors)
+    listener = lab.run(Node, "listener")
+    heard = []
+    echo = listener.create_publisher(String, "echo", 10)
+    listener.create_subscription(
+        String, "readings", lambda message: (heard.append(message), echo.publish(message)), 10
+    )
+    recorder = lab.record("echo", String)
+    for second in range(1, 6):
+        lab.sim.advance(1.0)
+        assert len(heard) == recorder.count == 11 * second + second // 2
+
+
+def test_a_recorder_stamps_in_simulated_time(lab):
+    lab.run(Sensors)
+    recorder = lab.record("readings", String)
+    lab.sim.advance(1.0)
+    first_ten = [stamped.stamp_ns for stamped in recorder.messages][:10]
+    assert first_ten == [100_000_000 * n for n in range(1, 11)]
+    recorder.clear()
+    lab.sim.advance(0.95)
+    assert recorder.rate() == pytest.approx(10.0)
+
+
+def test_a_node_that_comes_later_starts_at_the_present_time(lab):
+    lab.sim.advance(5.03)
+    sensors = lab.run(Sensors)
+    lab.sim.advance(2.0)
+    assert [len(times) for times in sensors.fired.values()] == [20, 2, 1]
+    assert sensors.fired[1.0] == [6_030_000_000, 7_030_000_000]
+
+
+def test_small_steps_are_seen_by_whoever_follows_the_clock(lab):
+    recorder = lab.record("/clock", Clock)
+    lab.sim.advance(0.25, step=0.05)
+    stamps = [s.message.clock.nanosec for s in recorder.messages]
+    assert stamps == [50_000_000 * n for n in range(1, 6)]
+
+
+def test_without_timers_time_moves_all_the_same(lab):
+    node = lab.run(Node, "idle")
+    lab.sim.advance(1000.0)
+    assert node.get_clock().now().nanoseconds == 1000 * 10**9
+
+
+def test_a_callback_that_blocks_does_not_stop_time_if_there_are_more_threads():
+    release = threading.Event()
+    with course.Session(sim_time=True, threads=3) as lab:
+        sensors = lab.run(Sensors)
+        blocker = lab.run(Node, "blocker")
+        begun = threading.Event()
+        blocker.create_timer(0.5, lambda: (begun.set(), release.wait(60.0)))
+        # Its own clock subscription waits for the callback: let time pass it by.
+        lab.sim.advance(0.45)
+        lab.pause(blocker)
+        lab.resume(blocker)
+        thread = threading.Thread(target=lab.sim.advance, args=(1.0,))
+        thread.start()
+        lab.until(begun.is_set)
+        release.set()
+        thread.join()
+        assert len(sensors.fired[10.0]) == 14
+
+
+def test_a_paused_node_is_not_waited_for(lab):
+    sensors = lab.run(Sensors)
+    lab.pause(sensors)
+    lab.sim.advance(1.0)
+    assert sensors.fired[10.0] == []
+
+
+def test_a_callback_cannot_move_time(lab):
+    node = lab.run(Node, "eager")
+    node.create_timer(0.1, lambda: lab.sim.advance(1.0))
+    lab.sim.advance(0.1)
+    (error,) = lab.errors
+    assert isinstance(error.exception, SessionError)
+
+
+@pytest.mark.parametrize(("seconds", "step"), [(-1.0, 0.01), (1.0, 0.0), (1.0, -0.1)])
+def test_time_moves_forward_only(lab, seconds, step):
+    with pytest.raises(SessionError, match="moves forward"):
+        lab.sim.advance(seconds, step=step)
+
+
+def test_without_simulated_time_there_is_no_sim(session):
+    with pytest.raises(SessionError, match="sim_time=True"):
+        session.sim.advance(1.0)
+
+
+def test_a_node_that_cannot_follow_is_named(monkeypatch):
+    from course.runtime import simtime
+
+    monkeypatch.setattr(simtime, "_STEP_TIMEOUT", 0.3)
+    release = threading.Event()
+    with course.Session(sim_time=True) as lab:
+        stuck = lab.run(Node, "stuck")
+        begun = threading.Event()
+        stuck.create_guard_condition(lambda: (begun.set(), release.wait(60.0))).trigger()
+        lab.until(begun.is_set)
+        with pytest.raises(WaitTimeout, match=r"/stuck did not follow simulated time to 0\.01 s"):
+            lab.sim.advance(1.0)
+        release.set()
