@@ -87,7 +87,12 @@ class Subject:
 class Bench:
     """The examiner's session on the subject's domain, and the subject."""
 
-    def __init__(self, session: Session, subject: Subject) -> None:
-        """Put both within a check's reach."""
+    def __init__(self, session: Session, subject: Subject, memory: dict[str, Any]) -> None:
+        """Put both within a check's reach.
+
+        ``memory`` outlives this bench: what an experiment found in an earlier part of the exam,
+        as long as the notebook has not moved on since.
+        """
         self.session = session
         self.subject = subject
+        self.memory = memory

@@ -101,7 +101,11 @@ def grade(
     )
     grades = CourseGradebook(where).grades(assignment)
     write_csv(grades, assignment, where / "grades.csv")
-    problems = {graded.student: graded.problem for graded in done if graded.problem}
+    problems = {
+        graded.student: graded.problem if graded.entered else f"NOT ENTERED: {graded.problem}"
+        for graded in done
+        if graded.problem
+    }
     if as_json:
         _print_json({"grades": [vars(grade) for grade in grades], "problems": problems})
     else:
@@ -191,6 +195,8 @@ def _grades_table(grades: list[Any], problems: dict[str, str]) -> None:
         score = f"{grade.score:g} of {grade.max_score:g}"
         needs = "yes" if grade.needs_manual_grade else ""
         table.add_row(grade.student, score, needs, problems.get(grade.student, ""))
+    for student in sorted(problems.keys() - {grade.student for grade in grades}):
+        table.add_row(student, "none", "yes", problems[student])
     out.print(table)
 
 

@@ -5,6 +5,7 @@ Running is parallel, because a subject mostly waits; the gradebook has one write
 
 from __future__ import annotations
 
+import copy
 import shutil
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
@@ -13,6 +14,7 @@ from pathlib import Path
 
 import nbformat
 from nbformat import NotebookNode
+from nbgrader.utils import parse_utc
 
 from autograder import nbgrader_bridge as bridge
 from autograder import runner, submission
@@ -20,8 +22,10 @@ from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.runner import Outcome
 from autograder.store import OutcomeStore
 from autograder.submission import SubmissionError
+from autograder.verdict import Status
 from course.errors import CourseError
 
+GLOB = "*?[]"
 STAGED = f"{bridge.WORK_FOLDER}/staged"
 
 
@@ -73,7 +77,8 @@ def grade(
     names = _notebooks(gradebook, assignment)
     students = _students(root, assignment)
     class_ = _Class(gradebook, assignment, names, fresh)
-    graded = []
+    graded = [_unusable(student) for student in students if set(student) & set(GLOB)]
+    students = [student for student in students if not set(student) & set(GLOB)]
     with ThreadPoolExecutor(max_workers=jobs) as pool:
         futures = {pool.submit(class_.run, s, progress): s for s in students}
         try:
@@ -113,9 +118,7 @@ class _Class:
         shutil.rmtree(staged, ignore_errors=True)
         staged.mkdir(parents=True)
         submitted = self._root / "submitted" / student / self._assignment
-        if (submitted / "timestamp.txt").is_file():
-            shutil.copy(submitted / "timestamp.txt", staged)
-        outcomes, problems = {}, []
+        outcomes, problems = {}, _stage_timestamp(submitted, staged)
         for name in self._originals:
             notebook, outcome = self._one(submitted / f"{name}.ipynb")
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
@@ -127,17 +130,28 @@ class _Class:
         source, released = self._originals[path.stem]
         try:
             notebook, notes = submission.restore(submission.read(path), source, released)
+            program = submission.program(notebook)
+            files = submission.extras(path.parent)
         except SubmissionError as error:
-            blank = nbformat.from_dict(dict(released))  # type: ignore[no-untyped-call]
-            notebook, _ = submission.restore(blank, source, released)
-            return notebook, runner.refuse(submission.program(notebook), str(error))
+            return self._refused(path.stem, str(error), "not_checked")
+        except Exception as error:  # noqa: BLE001 - one student's data must not end the class
+            return self._refused(path.stem, f"{type(error).__name__}: {error}", "grader_error")
         notebook.metadata[bridge.NOTES_KEY] = notes
-        program = submission.program(notebook)
-        outcome = None if self._fresh else self._store.get(program)
+        outcome = None if self._fresh else self._store.get(program, files)
         if outcome is None:
-            outcome = runner.run(program)
-            self._store.put(program, outcome)
+            try:
+                outcome = runner.run(program, files)
+            except Exception as error:  # noqa: BLE001 - the same: a person looks at this one
+                return self._refused(path.stem, f"{type(error).__name__}: {error}", "grader_error")
+            self._store.put(program, files, outcome)
         return notebook, outcome
+
+    def _refused(self, name: str, reason: str, status: Status) -> tuple[NotebookNode, Outcome]:
+        """Return the released notebook in place of one that cannot be run, and why."""
+        source, released = self._originals[name]
+        blank: NotebookNode = copy.deepcopy(released)
+        notebook, _ = submission.restore(blank, source, released)
+        return notebook, runner.refuse(submission.program(notebook), reason, status)
 
     def enter(self, graded: Graded, feedback: bool) -> Graded:
         """Enter one student's outcomes into the gradebook. Runs in the one writer."""
@@ -153,6 +167,28 @@ class _Class:
             for name in graded.outcomes:
                 bridge.prepared.pop((self._assignment, graded.student, name), None)
         return graded
+
+
+def _unusable(student: str) -> Graded:
+    problem = (
+        f"nbgrader takes one of the characters {' '.join(GLOB)} in the folder name '{student}' for "
+        "a pattern: rename the folder."
+    )
+    return Graded(student, {}, problem, entered=False)
+
+
+def _stage_timestamp(submitted: Path, staged: Path) -> list[str]:
+    """Copy the time of submission if nbgrader can read it; return what is wrong with it."""
+    file = submitted / "timestamp.txt"
+    if not file.is_file():
+        return []
+    try:
+        text = file.read_text(encoding="utf-8").strip()
+        parse_utc(text)
+    except (ValueError, OverflowError, UnicodeError, OSError):
+        return ["timestamp.txt holds no date, so the time of submission is unknown."]
+    (staged / "timestamp.txt").write_text(text, encoding="utf-8")
+    return []
 
 
 def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:

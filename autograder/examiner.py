@@ -14,7 +14,8 @@ import os
 import socket
 import sys
 from collections.abc import Sequence
-from typing import TextIO
+from dataclasses import dataclass, field
+from typing import Any, TextIO
 
 from autograder import exams
 from autograder.bench import Bench, Subject
@@ -22,27 +23,36 @@ from autograder.verdict import CheckResult
 from autograder.wire import Channel
 from course import Session
 
-Failures = dict[str, dict[str, CheckResult]]
-"""What failed in this sitting, by exam: not tried again while the notebook has not moved on."""
+
+@dataclass
+class Sitting:
+    """What earlier parts of an exam found, good as long as the notebook has not moved on."""
+
+    failed: dict[str, CheckResult] = field(default_factory=dict)
+    memory: dict[str, Any] = field(default_factory=dict)
 
 
-def sit(exam: str, part: str, session: Session, subject: Subject, failures: Failures) -> str:
+Sittings = dict[str, Sitting]
+
+
+def sit(exam: str, part: str, session: Session, subject: Subject, sittings: Sittings) -> str:
     """Run one part of an exam, let the subject go on, and return the verdict as JSON."""
+    sitting = sittings.setdefault(exam, Sitting())
     try:
-        bench = Bench(session, subject)
-        return exams.load(exam).sit(part, bench, failures.setdefault(exam, {})).to_json()
+        bench = Bench(session, subject, sitting.memory)
+        return exams.load(exam).sit(part, bench, sitting.failed).to_json()
     finally:
         subject.release()
 
 
 def serve(requests: TextIO, verdicts: TextIO, session: Session, subject: Subject) -> None:
     """Answer requests until standard input ends."""
-    failures: Failures = {}
+    sittings: Sittings = {}
     for line in requests:
         request = json.loads(line)
         if request["moved_on"]:
-            failures.clear()
-        verdict = sit(request["exam"], request["part"], session, subject, failures)
+            sittings.clear()
+        verdict = sit(request["exam"], request["part"], session, subject, sittings)
         verdicts.write(verdict + "\n")
         verdicts.flush()
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import logging
+import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -97,10 +98,8 @@ class CourseGradebook:
                     f"The disk of {self.root} is full: make room there and run the same command "
                     "again; what was graded so far is kept."
                 )
-            lines = [line for line in said.splitlines() if line.strip()] or ["no reason given"]
             raise GradebookError(
-                f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: "
-                f"{lines[-1].strip()}"
+                f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: {_why(said)}"
             )
 
     @contextmanager
@@ -112,6 +111,13 @@ class CourseGradebook:
             raise GradebookError(
                 f"The gradebook in {self.root} has no such entry: {error}"
             ) from None
+
+
+def _why(said: str) -> str:
+    """Return the line of nbgrader's log that names the cause: of a traceback, the last line."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    causes = [line for line in lines if re.match(r"[\w.]+(Error|Exception|Entry)\b", line)]
+    return (causes or lines or ["no reason given"])[-1]
 
 
 def _grade(submission: Any) -> Grade:

@@ -58,7 +58,8 @@ class Harness:
             factory = self._namespace[name]
         except KeyError:
             raise LookupError(f"there is no class named {name} in the notebook") from None
-        node = self._session.run(factory)
+        # Two classes may share a node name, or come out of one function: both have to run.
+        node = self._session.run_beside(factory)
         self._nodes[name] = node
         return {"node": node.get_fully_qualified_name()}
 

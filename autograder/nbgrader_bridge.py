@@ -50,7 +50,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         from autograder import runner
 
         notes = list(nb.metadata.pop(NOTES_KEY, []))
-        outcome = prepared.get(_names(resources)) or self._run(submission.program(nb))
+        outcome = prepared.get(_names(resources)) or self._run(nb, resources)
         outcome = runner.with_notes(outcome, notes)
         code_cells = [cell for cell in nb.cells if cell.cell_type == "code"]
         for cell, outputs in zip(code_cells, outcome.outputs, strict=True):
@@ -63,15 +63,19 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
             resources["ros2_course_flags"] = list(outcome.verdicts)
         return nb, resources
 
-    def _run(self, program: submission.Program) -> Any:
+    def _run(self, nb: NotebookNode, resources: Resources) -> Any:
         from autograder import runner
         from autograder.store import OutcomeStore
 
-        store = OutcomeStore(Path(_coursedir(self).root) / WORK_FOLDER / "outcomes")
-        outcome = store.get(program)
+        coursedir = _coursedir(self)
+        assignment, student, _ = _names(resources)
+        folder = coursedir.format_path(coursedir.submitted_directory, student, assignment)
+        program, files = submission.program(nb), submission.extras(Path(folder))
+        store = OutcomeStore(Path(coursedir.root) / WORK_FOLDER / "outcomes")
+        outcome = store.get(program, files)
         if outcome is None:
-            outcome = runner.run(program)
-            store.put(program, outcome)
+            outcome = runner.run(program, files)
+            store.put(program, files, outcome)
         return outcome
 
 

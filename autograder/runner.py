@@ -10,6 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,6 +26,9 @@ from course.domains import lease_domain
 
 CELL_TIMEOUT = 30.0
 """Seconds one cell of a submission may run, as in nbgrader."""
+
+
+NO_FILES: Mapping[str, bytes] = {}
 
 
 @dataclass
@@ -62,8 +66,13 @@ class Outcome:
         return cls(data["outputs"], verdicts, data["notes"], data["seconds"], data["unreadable"])
 
 
-def run(program: Program, *, cell_timeout: float = CELL_TIMEOUT) -> Outcome:
-    """Run a program in a subject of its own and have its exams sat; never raises for its sake."""
+def run(
+    program: Program, files: Mapping[str, bytes] = NO_FILES, *, cell_timeout: float = CELL_TIMEOUT
+) -> Outcome:
+    """Run a program in a subject of its own and have its exams sat; never raises for its sake.
+
+    ``files`` are put into the folder that it runs in, by relative path.
+    """
     started = time.monotonic()
     outcome = Outcome(outputs=[[] for _ in program])
     with ExitStack() as stack:
@@ -73,7 +82,7 @@ def run(program: Program, *, cell_timeout: float = CELL_TIMEOUT) -> Outcome:
         control, subject_control = socket.socketpair()
         examiner = stack.enter_context(ExaminerProcess(control, lease.domain_id))
         subject = stack.enter_context(
-            _SubjectProcess(subject_engine, subject_control, lease.domain_id)
+            _SubjectProcess(subject_engine, subject_control, lease.domain_id, files)
         )
         channel = Channel(engine)
         stack.callback(channel.close)
@@ -142,10 +151,10 @@ def _give_up(
             outcome.verdicts[cell.grade_id] = unexamined(exam, cell.part, reason, status)
 
 
-def refuse(program: Program, reason: str) -> Outcome:
+def refuse(program: Program, reason: str, status: Status = "not_checked") -> Outcome:
     """Return the outcome of a program that is not run at all, for ``reason``."""
     outcome = Outcome(outputs=[[] for _ in program], unreadable=True)
-    _give_up(program, outcome, reason)
+    _give_up(program, outcome, reason, status)
     return outcome
 
 
@@ -159,9 +168,22 @@ def with_notes(outcome: Outcome, notes: list[str]) -> Outcome:
 class _SubjectProcess:
     """A running subject: started in a session of its own, and ended with all it started."""
 
-    def __init__(self, engine: socket.socket, control: socket.socket, domain_id: int) -> None:
-        self._home = tempfile.TemporaryDirectory(prefix="ros2-course-subject-")
+    def __init__(
+        self,
+        engine: socket.socket,
+        control: socket.socket,
+        domain_id: int,
+        files: Mapping[str, bytes],
+    ) -> None:
+        # What a subject leaves there that cannot be removed is no reason to stop.
+        self._home = tempfile.TemporaryDirectory(
+            prefix="ros2-course-subject-", ignore_cleanup_errors=True
+        )
         home = self._home.name
+        for name, content in files.items():
+            path = Path(home) / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
         cache = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
         env = {
             **os.environ, "HOME": home, "XDG_CACHE_HOME": cache, "IPYTHONDIR": f"{home}/.ipython",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib import resources
 from importlib.resources.abc import Traversable
@@ -40,14 +40,14 @@ class OutcomeStore:
         """Keep outcomes in ``folder``, which is made when the first one is written."""
         self._folder = folder
 
-    def get(self, program: Program) -> Outcome | None:
+    def get(self, program: Program, files: Mapping[str, bytes]) -> Outcome | None:
         """Return the outcome of an equal program under equal exams, if there is a sound one."""
         try:
-            return Outcome.from_json(self._path(program).read_text(encoding="utf-8"))
+            return Outcome.from_json(self._path(program, files).read_text(encoding="utf-8"))
         except (OSError, ValueError, KeyError, TypeError, CourseError):
             return None
 
-    def put(self, program: Program, outcome: Outcome) -> None:
+    def put(self, program: Program, files: Mapping[str, bytes], outcome: Outcome) -> None:
         """Keep an outcome; one that a grader error spoilt is not kept.
 
         Raises:
@@ -55,7 +55,7 @@ class OutcomeStore:
         """
         if outcome.needs_human:
             return
-        path = self._path(program)
+        path = self._path(program, files)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
@@ -68,5 +68,5 @@ class OutcomeStore:
                 "graded so far is kept."
             ) from error
 
-    def _path(self, program: Program) -> Path:
-        return self._folder / f"{digest(program, exam_salt())}.json"
+    def _path(self, program: Program, files: Mapping[str, bytes]) -> Path:
+        return self._folder / f"{digest(program, files, exam_salt())}.json"

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import stat
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,10 @@ from course.errors import CourseError
 
 MAX_NOTEBOOK = 20 * 1024 * 1024
 """Largest notebook file in bytes that is read; a course notebook with its outputs has 0.1 MB."""
+
+
+MAX_EXTRAS = 10 * 1024 * 1024
+"""Bytes of other files that are given to a submission's code."""
 
 
 class SubmissionError(CourseError):
@@ -46,37 +52,78 @@ def read(path: Path) -> NotebookNode:
     """Return the notebook at ``path``.
 
     Raises:
-        SubmissionError: missing, too large, not JSON, or not a notebook of format 4.
+        SubmissionError: missing, no plain file, too large, not JSON, or not a notebook of format 4.
     """
+    text = _text(path)
     try:
-        size = path.stat().st_size
-        if size > MAX_NOTEBOOK:
-            raise SubmissionError(
-                f"{path.name} has {size / 2**20:.0f} MB, more than the {MAX_NOTEBOOK // 2**20} MB "
-                "that are read: clear its outputs and hand it in again."
-            )
-        text = path.read_text(encoding="utf-8")
         data = json.loads(text)
-        if not isinstance(data, dict) or data.get("nbformat") != 4 or "cells" not in data:
-            raise SubmissionError(
-                f"{path.name} is not a notebook of format 4: open it in JupyterLab, save it, and "
-                "hand it in again."
-            )
-        notebook = _sound(nbformat.v4.reads(text))  # type: ignore[no-untyped-call]
-    except FileNotFoundError:
-        raise SubmissionError(f"There is no {path.name} in the submission.") from None
-    except (ValueError, RecursionError, UnicodeError) as error:
+        versions = (data["nbformat"], data["nbformat_minor"])
+        if versions[0] != 4 or not all(type(version) is int for version in versions):
+            raise KeyError("nbformat")
+    except (KeyError, TypeError):
+        raise SubmissionError(
+            f"{path.name} is not a notebook of format 4: open it in JupyterLab, save it, and hand "
+            "it in again."
+        ) from None
+    except (ValueError, RecursionError) as error:
         raise SubmissionError(
             f"{path.name} is not valid JSON ({str(error)[:120]}): the file was cut off or damaged; "
             "hand in the original again."
         ) from None
-    except (nbformat.ValidationError, KeyError, TypeError, AttributeError) as error:
+    try:
+        # Half of a surrogate pair is legal in JSON, but no text that anything could write again.
+        clean = json.dumps(data, ensure_ascii=False).encode("utf-8", "replace").decode()
+        return _sound(nbformat.v4.reads(clean))  # type: ignore[no-untyped-call]
+    except Exception as error:  # noqa: BLE001 - a stranger's data: nbformat fails in many ways
         reason = (str(error) or type(error).__name__).splitlines()[0][:160]
         raise SubmissionError(
             f"{path.name} does not follow the notebook format ({reason}): open it in JupyterLab, "
             "save it, and hand it in again."
         ) from None
-    return notebook
+
+
+def _text(path: Path) -> str:
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise SubmissionError(f"{path.name} is not a file: hand in the notebook itself.")
+        if status.st_size > MAX_NOTEBOOK:
+            raise SubmissionError(
+                f"{path.name} has {status.st_size / 2**20:.0f} MB, more than the "
+                f"{MAX_NOTEBOOK // 2**20} MB that are read: clear its outputs and hand it in again."
+            )
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise SubmissionError(f"There is no {path.name} in the submission.") from None
+    except UnicodeError as error:
+        raise SubmissionError(
+            f"{path.name} is not valid JSON ({str(error)[:120]}): the file was cut off or damaged; "
+            "hand in the original again."
+        ) from None
+    except OSError as error:
+        raise SubmissionError(
+            f"{path.name} cannot be read ({error.strerror}): hand in the notebook itself."
+        ) from None
+
+
+def extras(folder: Path) -> dict[str, bytes]:
+    """Return {relative path: content} of a submission's other files, a helper module perhaps.
+
+    Links, hidden files, notebooks and what is over `MAX_EXTRAS` bytes in all are left out.
+    """
+    found: dict[str, bytes] = {}
+    room = MAX_EXTRAS
+    for path in sorted(folder.rglob("*")):
+        name = path.relative_to(folder)
+        hidden = any(part.startswith((".", "__")) for part in name.parts)
+        linked = any(parent.is_symlink() for parent in (path, *path.parents) if parent != folder)
+        if hidden or linked or path.suffix == ".ipynb" or name == Path("timestamp.txt"):
+            continue
+        status = path.lstat()
+        if stat.S_ISREG(status.st_mode) and status.st_size <= room:
+            found[str(name)] = path.read_bytes()
+            room -= status.st_size
+    return found
 
 
 def _sound(notebook: NotebookNode) -> NotebookNode:
@@ -128,6 +175,9 @@ def restore(
         elif name:
             cell = _mend(cell, reference[name], originals.get(name, reference[name]), notes)
         kept.append(cell)
+    order = [name for cell in kept if (name := grade_id(cell))]
+    if order != [name for name in reference if name in order]:
+        notes.append("The cells of the assignment had been moved; they were run as they stood.")
     _put_back(kept, reference, originals, notes)
     mended = nbformat.from_dict({**submitted, "cells": kept})  # type: ignore[no-untyped-call]
     mended.metadata["kernelspec"] = dict(source.metadata.get("kernelspec", {}))
@@ -212,10 +262,11 @@ def program(notebook: NotebookNode) -> Program:
     return tuple(cells)
 
 
-def digest(program_: Program, salt: str) -> str:
+def digest(program_: Program, files: Mapping[str, bytes], salt: str) -> str:
     """Return a key for the results of a program: equal programs behave alike.
 
-    ``salt`` is what else the results depend on: the exams themselves.
+    ``files`` are the other files it finds, ``salt`` is what else the results depend on: the exams.
     """
-    content = json.dumps([salt, [vars(cell) for cell in program_]], sort_keys=True)
+    beside = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
+    content = json.dumps([salt, beside, [vars(cell) for cell in program_]], sort_keys=True)
     return hashlib.sha256(content.encode()).hexdigest()

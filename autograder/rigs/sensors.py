@@ -10,13 +10,14 @@ ends belong to the examiner, and so does a witness that listens on the topic bet
 
 from __future__ import annotations
 
+import re
 import secrets
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
@@ -41,9 +42,27 @@ DRIVERS, CONSUMERS = "SensorDrivers", "SensorConsumers"
 SETTLE = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
 ENDLESS = 3600 * 10**9
-"""Nanoseconds: a lifespan of an hour or more changes nothing in an exam of seconds."""
+"""Nanoseconds: a lifespan of an hour or more is as good as none."""
 PROBE_PERIOD = 0.1
 """Seconds between two probes while endpoints find each other."""
+
+
+class Tag(NamedTuple):
+    """What tells readings apart: a nonce of this run, a phase of the exam, a running number."""
+
+    nonce: int
+    phase: int
+    number: int
+
+    def __str__(self) -> str:
+        """Return the tag as text."""
+        return f"{self.nonce}/{self.phase}/{self.number}"
+
+    @classmethod
+    def read(cls, text: str) -> Tag | None:
+        """Return the tag that ``text`` is, or None."""
+        found = re.fullmatch(r"(\d{1,9})/(\d{1,9})/(\d{1,9})", text)
+        return cls(*map(int, found.groups())) if found else None
 
 
 @dataclass(frozen=True)
@@ -55,25 +74,45 @@ class Sensor:
     type: Any
     rate: float
 
-    def message(self, tag: str, stamp: Time) -> Any:
+    def message(self, tag: Tag, stamp: Time) -> Any:
         """Return a reading that carries ``tag`` and was taken at ``stamp``."""
         if self.type is String:
-            return String(data=tag)
+            return String(data=str(tag))
         message = self.type()
-        message.header.frame_id = tag
+        message.header.frame_id = str(tag)
         message.header.stamp = stamp.to_msg()
+        # A driver may well set the frame id, so the tag is in the reading itself, too.
+        numbers = [float(number) for number in tag]
+        if self.type is Image:
+            message.data = str(tag).encode()
+            message.height, message.width, message.step = 1, len(message.data), len(message.data)
+            message.encoding = "mono8"
+        elif self.type is LaserScan:
+            message.ranges = numbers
+        else:
+            message.orientation.x, message.orientation.y, message.orientation.z = numbers
         return message
 
-    def tag(self, message: Any) -> str:
-        """Return the tag of a reading."""
-        return str(message.data if self.type is String else message.header.frame_id)
+    def tag(self, message: Any) -> Tag | None:
+        """Return the tag of a reading, or None if it is not the examiner's."""
+        if self.type is String:
+            return Tag.read(message.data)
+        if (tag := Tag.read(message.header.frame_id)) is not None:
+            return tag
+        if self.type is Image:
+            return Tag.read(bytes(message.data).decode(errors="replace"))
+        if self.type is LaserScan:
+            numbers = list(message.ranges)[:3]
+        else:
+            numbers = [message.orientation.x, message.orientation.y, message.orientation.z]
+        return Tag.read("/".join(f"{number:.0f}" for number in numbers))
 
 
 SENSORS = (
     Sensor("camera", "camera/image", Image, 10),
     Sensor("lidar", "scan", LaserScan, 10),
     Sensor("imu", "imu/data", Imu, 100),
-    Sensor("emergency_stop", "emergency/stop", String, 100),
+    Sensor("emergency_stop", "emergency/stop", String, 80),
 )
 CAMERA, LIDAR, IMU, STOP = SENSORS
 
@@ -92,7 +131,7 @@ def undemanding() -> QoSProfile:
     return QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-Heard = dict[str, list[str]]
+Heard = dict[str, list[Tag]]
 """Tags in the order of their arrival, by sensor name."""
 
 
@@ -101,10 +140,11 @@ class ExaminerNode(Node):
 
     def __init__(self) -> None:
         """Create what does not depend on the student; a nonce of this run tags readings."""
-        self.nonce = secrets.token_hex(4)
+        self.nonce = secrets.randbelow(2**24)  # that a float32 still holds exactly
         super().__init__(
             f"examiner_{self.nonce}", start_parameter_services=False, enable_rosout=False
         )
+        self._phases: dict[str, int] = {}
         self.hardware = {
             s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless()) for s in SENSORS
         }
@@ -124,8 +164,8 @@ class ExaminerNode(Node):
         """Subscribe to ``topic`` and note the tags of this run's readings in ``heard``."""
 
         def note(message: Any) -> None:
-            nonce, _, tag = sensor.tag(message).partition("/")
-            if nonce == self.nonce:
+            tag = sensor.tag(message)
+            if tag is not None and tag.nonce == self.nonce:
                 heard[sensor.name].append(tag)
 
         # Without a handler of ours rclpy would log an incompatible profile as a warning.
@@ -134,35 +174,40 @@ class ExaminerNode(Node):
         )
         return self.create_subscription(sensor.type, topic, note, qos, event_callbacks=events)
 
+    def phase(self, name: str) -> int:
+        """Return the number of a phase of the exam."""
+        return self._phases.setdefault(name, len(self._phases) + 1)
+
     def send(self, sensor: Sensor, phase: str, count: int = 1) -> None:
-        """Feed ``count`` readings, tagged ``phase/0`` onwards, into a sensor's hardware.
-
-        They come at once, but are stamped as at the sensor's rate, the last one now: a consumer
-        may judge a reading by its age.
-        """
-        now = self.get_clock().now()
+        """Feed ``count`` readings at once, numbered from 0, into a sensor's hardware."""
         for index in range(count):
-            age = int((count - 1 - index) / sensor.rate * 1e9)
-            stamp = Time(nanoseconds=now.nanoseconds - age, clock_type=now.clock_type)
-            self._publish(sensor, f"{phase}/{index}", stamp)
+            self.publish(sensor, phase, index)
 
-    def stream(self, sensor: Sensor, phase: str, count: int) -> Callable[[], bool]:
-        """Feed ``count`` readings at the sensor's rate; return what tells whether all are out."""
-        sent: list[int] = []
+    def publish(self, sensor: Sensor, phase: str, index: int) -> None:
+        """Feed one reading, taken now, into a sensor's hardware."""
+        tag = Tag(self.nonce, self.phase(phase), index)
+        self.hardware[sensor.name].publish(sensor.message(tag, self.get_clock().now()))
 
-        def tick() -> None:
-            if len(sent) < count:
-                self._publish(sensor, f"{phase}/{len(sent)}", self.get_clock().now())
-                sent.append(1)
-            else:
-                timer.cancel()
 
-        timer = self.create_timer(1 / sensor.rate, tick)
-        return lambda: len(sent) == count
+class Stream:
+    """Readings that come in at the sensor's rate until it is stopped or ``limit`` are out."""
 
-    def _publish(self, sensor: Sensor, tag: str, stamp: Time) -> None:
-        message = sensor.message(f"{self.nonce}/{tag}", stamp)
-        self.hardware[sensor.name].publish(message)
+    def __init__(self, node: ExaminerNode, sensor: Sensor, phase: str, limit: int = 2**31) -> None:
+        """Begin at once."""
+        self.sensor = sensor
+        self.sent = 0
+        self._node, self._phase, self._limit = node, phase, limit
+        self._timer = node.create_timer(1 / sensor.rate, self._tick)
+
+    def _tick(self) -> None:
+        if self.sent < self._limit:
+            self._node.publish(self.sensor, self._phase, self.sent)
+            self.sent += 1
+
+    def stop(self) -> None:
+        """Send no more."""
+        self._limit = 0
+        self._timer.cancel()
 
 
 class SensorRig:
@@ -175,7 +220,7 @@ class SensorRig:
         node = bench.session.run(ExaminerNode)
         assert isinstance(node, ExaminerNode)
         self.node = node
-        self._experiments: dict[str, Any] = {}
+        self._experiments = bench.memory
         self._probes = 0
 
     def offered(self, topic: str) -> list[TopicEndpointInfo]:
@@ -223,32 +268,43 @@ class SensorRig:
         for _ in range(int(SETTLE / PROBE_PERIOD)):
             for sensor in silent:
                 self.node.send(sensor, phase)
-            self.wait(partial(_all_heard, silent, heard, phase), PROBE_PERIOD)
-            silent = _silent(silent, heard, phase)
+            self.wait(partial(self._all_heard, silent, heard, phase), PROBE_PERIOD)
+            silent = self._silent(silent, heard, phase)
             if all(give_up is not None and give_up(sensor) for sensor in silent):
                 break
         return silent
 
+    def _all_heard(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> bool:
+        return not self._silent(sensors, heard, phase)
+
+    def _silent(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> list[Sensor]:
+        return [sensor for sensor in sensors if not self.indices(heard, sensor, phase)]
+
     def burst(self, sensor: Sensor, phase: str, count: int) -> bool:
         """Send ``count`` readings; return whether the last was seen on the sensor's topic."""
         self.node.send(sensor, phase, count)
-        return self.seen(sensor, phase, count)
+        return self.wait(lambda: count - 1 in self.witnessed(sensor, phase))
 
-    def seen(self, sensor: Sensor, phase: str, count: int) -> bool:
-        """Wait for the last of ``count`` readings on the sensor's topic; False if it never came."""
-        return self.wait(lambda: f"{phase}/{count - 1}" in self.node.witnessed[sensor.name])
-
-    def expires(self) -> bool:
-        """Whether readings of any sensor are dropped when they get old (a lifespan is offered)."""
-        ends = [end for sensor in SENSORS for end in self.offered(sensor.topic)]
-        return any(0 < end.qos_profile.lifespan.nanoseconds < ENDLESS for end in ends)
+    def witnessed(self, sensor: Sensor, phase: str) -> list[int]:
+        """Return the indices of a phase's readings as they went over the sensor's topic."""
+        return self.indices(self.node.witnessed, sensor, phase)
 
     def consumed(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings in the order the consumer passed them on."""
-        return indices(self.node.consumed, sensor, phase)
+        return self.indices(self.node.consumed, sensor, phase)
+
+    def indices(self, heard: Heard, sensor: Sensor, phase: str) -> list[int]:
+        """Return the indices of a phase's readings in order of arrival."""
+        number = self.node.phase(phase)
+        return [tag.number for tag in list(heard[sensor.name]) if tag.phase == number]
+
+    def expires(self, sensor: Sensor) -> bool:
+        """Whether readings of a sensor are dropped when they get old (a lifespan is offered)."""
+        lifespans = [end.qos_profile.lifespan.nanoseconds for end in self.offered(sensor.topic)]
+        return any(0 < lifespan < ENDLESS for lifespan in lifespans)
 
     def once(self, experiment: Callable[[SensorRig], Any]) -> Any:
-        """Run an experiment that several checks read, once."""
+        """Run an experiment that several checks read, once a sitting."""
         name = experiment.__name__
         if name not in self._experiments:
             self._experiments[name] = experiment(self)
@@ -265,12 +321,6 @@ def sensor_rig(bench: Bench) -> Iterator[SensorRig]:
         bench.session.stop(rig.node)
 
 
-def indices(heard: Heard, sensor: Sensor, phase: str) -> list[int]:
-    """Return the indices of a phase's readings in order of arrival."""
-    tags = (tag.rpartition("/") for tag in list(heard[sensor.name]))
-    return [int(index) for name, _, index in tags if name == phase and index.isdigit()]
-
-
 def mismatch(offered: TopicEndpointInfo, requested: TopicEndpointInfo) -> str:
     """Return why DDS refuses to connect two endpoints, or an empty string.
 
@@ -278,11 +328,3 @@ def mismatch(offered: TopicEndpointInfo, requested: TopicEndpointInfo) -> str:
     """
     compatibility, reason = qos_check_compatible(offered.qos_profile, requested.qos_profile)
     return str(reason) if compatibility == QoSCompatibility.ERROR else ""
-
-
-def _all_heard(sensors: Iterable[Sensor], heard: Heard, phase: str) -> bool:
-    return not _silent(sensors, heard, phase)
-
-
-def _silent(sensors: Iterable[Sensor], heard: Heard, phase: str) -> list[Sensor]:
-    return [s for s in sensors if not any(t.startswith(f"{phase}/") for t in list(heard[s.name]))]

@@ -4,17 +4,23 @@
 
 from __future__ import annotations
 
+import uuid
+import weakref
 from collections.abc import Callable
 from enum import IntEnum
 from typing import Any
 
 from rclpy.action.client import ActionClient, ClientGoalHandle
+from rclpy.qos import QoSProfile
+from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
 from course.errors import WaitTimeout
-from course.runtime.offers import why_no_service
+from course.runtime.offers import full_topic, why_no_service
 from course.runtime.probe import Probe
 from course.runtime.settle import settle
 from course.runtime.waiting import Deadline, poll
+
+_FEEDBACK_DEPTH = 1000
 
 
 class GoalState(IntEnum):
@@ -96,8 +102,7 @@ class GoalRun:
         """
         if self._handle is None or not self.accepted:
             return False
-        # rclpy registers the request after it has sent it: no answer may come in between.
-        with self._probe.executor.held():
+        with self._probe.executor.held():  # as in Goals.send
             future = self._handle.cancel_goal_async()
         response = self._probe.outcome(
             future, Deadline(timeout), f"{self.name} did not answer the request to cancel"
@@ -112,9 +117,9 @@ class GoalRun:
 
     def take_feedback(self, message: Any) -> None:
         """Keep a feedback message and hand it on."""
-        self.feedback.append(message.feedback)
+        self.feedback.append(message)
         if self._on_feedback is not None:
-            self._on_feedback(message.feedback)
+            self._on_feedback(message)
 
     def follow(self, handle: ClientGoalHandle) -> None:
         """Take the server's answer, and ask for the result of an accepted goal."""
@@ -124,13 +129,42 @@ class GoalRun:
                 self._future = handle.get_result_async()
 
 
+class _Action:
+    """The client side of one action, shared by all goals sent to it."""
+
+    def __init__(self, probe: Probe, action_type: Any, name: str) -> None:
+        self._runs: weakref.WeakValueDictionary[bytes, GoalRun] = weakref.WeakValueDictionary()
+        self.client = ActionClient(probe.node, action_type, name)
+        # A subscription of our own: rclpy's client drops the feedback that it has not got round to
+        # when the result comes.
+        self._feedback = probe.subscribe(
+            action_type.Impl.FeedbackMessage,
+            full_topic(probe.node, f"{name}/_action/feedback"),
+            self._hand_on,
+            QoSProfile(depth=_FEEDBACK_DEPTH),
+        )
+
+    def is_ready(self) -> bool:
+        return bool(self.client.server_is_ready() and self._feedback.get_publisher_count())
+
+    def send(self, goal: Any, run: GoalRun) -> Any:
+        goal_id = UUID(uuid=list(uuid.uuid4().bytes))
+        self._runs[bytes(goal_id.uuid)] = run
+        return self.client.send_goal_async(goal, goal_uuid=goal_id)
+
+    def _hand_on(self, message: Any) -> None:
+        run = self._runs.get(bytes(message.goal_id.uuid))
+        if run is not None:
+            run.take_feedback(message.feedback)
+
+
 class Goals:
-    """Sends goals through a probe; keeps one action client for each action."""
+    """Sends goals through a probe; keeps one client for each action."""
 
     def __init__(self, probe: Probe) -> None:
         """Send through `probe`."""
         self._probe = probe
-        self._clients: dict[tuple[Any, str], ActionClient] = {}
+        self._actions: dict[tuple[Any, str], _Action] = {}
 
     def send(
         self,
@@ -145,19 +179,18 @@ class Goals:
         Raises:
             WaitTimeout: no server, or no answer, within `timeout` seconds.
         """
-        deadline = Deadline(timeout)
-        client = self._clients.get((action_type, name))
-        if client is None:
-            client = ActionClient(self._probe.node, action_type, name)
-            self._clients[action_type, name] = client
-        if not poll(client.server_is_ready, deadline.left, self._probe.pulse):
-            service = str(self._probe.node.resolve_service_name(f"{name}/_action/send_goal"))
-            reason = why_no_service(
-                self._probe.node, service, action_type.Impl.SendGoalService
-            ).replace("/_action/send_goal", "")
+        probe, deadline = self._probe, Deadline(timeout)
+        action = self._actions.get((action_type, name))
+        if action is None:
+            action = self._actions[action_type, name] = _Action(probe, action_type, name)
+        if not poll(action.is_ready, deadline.left, probe.pulse):
+            service = str(probe.node.resolve_service_name(f"{name}/_action/send_goal"))
+            reason = why_no_service(probe.node, service, action_type.Impl.SendGoalService)
+            reason = reason.replace("/_action/send_goal", "")
             raise WaitTimeout(f"The action {name} was not ready in {timeout:g} s. {reason}")
-        run = GoalRun(self._probe, name, on_feedback)
-        with self._probe.executor.held():
-            future = client.send_goal_async(goal, feedback_callback=run.take_feedback)
-        run.follow(self._probe.outcome(future, deadline, f"{name} did not answer to the goal"))
+        run = GoalRun(probe, name, on_feedback)
+        # rclpy registers the request after it has sent it: no answer may come in between.
+        with probe.executor.held():
+            future = action.send(goal, run)
+        run.follow(probe.outcome(future, deadline, f"{name} did not answer to the goal"))
         return run

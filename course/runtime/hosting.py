@@ -72,6 +72,18 @@ class Hosting:
         self._require_open()
         return self._residents.run(factory, args, kwargs, threads or self.threads)
 
+    def run_beside(self, factory: Factory) -> Node:
+        """Make a node and spin it beside all others, even one of the same name or class.
+
+        ROS 2 allows two nodes of one name. In a notebook that is nearly always a cell that was run
+        twice, which is why `run` replaces; whoever hosts somebody else's classes wants this.
+
+        Raises:
+            SessionError: the session is closed, or the factory made no node for it.
+        """
+        self._require_open()
+        return self._residents.run(factory, (), {}, self.threads, replace=False)
+
     def stop(self, *what: Any) -> None:
         """Stop nodes and take them off the graph; without arguments, every node. Idempotent.
 

@@ -64,10 +64,16 @@ class Residents:
         return [resident for resident in residents if resident.node not in self.stopped]
 
     def run(
-        self, factory: Factory | Node, args: tuple[Any, ...], kwargs: dict[str, Any], threads: int
+        self,
+        factory: Factory | Node,
+        args: tuple[Any, ...],
+        kwargs: dict[str, Any],
+        threads: int,
+        *,
+        replace: bool = True,
     ) -> Node:
-        """Make a node and spin it; see `Session.run`."""
-        key = _key(factory, args, kwargs)
+        """Make a node and spin it; see `Session.run` and, for ``replace=False``, `run_beside`."""
+        key = _key(factory, args, kwargs) if replace else None
         for resident in self.all():
             if key is not None and resident.key == key:
                 self.stop(resident.node)
@@ -79,7 +85,7 @@ class Residents:
             )
         name = node_name(node)
         for resident in self.all():
-            if resident.name == name and resident.node is not node:
+            if replace and resident.name == name and resident.node is not node:
                 self.stop(resident.node)
         for callback in self.on_made:
             callback(node)

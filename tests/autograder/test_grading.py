@@ -102,9 +102,9 @@ def test_what_did_not_change_is_not_run_again(
     runs: list[submission.Program] = []
     really_run = runner.run
 
-    def spy(program: submission.Program) -> runner.Outcome:
+    def spy(program: submission.Program, files: dict[str, bytes]) -> runner.Outcome:
         runs.append(program)
-        return really_run(program)
+        return really_run(program, files)
 
     monkeypatch.setattr(runner, "run", spy)
     first = grade(course)

@@ -95,8 +95,8 @@ def test_exit_in_a_cell_does_not_end_the_notebook() -> None:
 def test_an_outcome_survives_the_store_and_a_damaged_one_is_ignored(tmp_path: Path) -> None:
     store = OutcomeStore(tmp_path / "outcomes")
     outcome = Outcome([[]], {}, ["note"], 1.5)
-    store.put(program(), outcome)
-    assert store.get(program()) == outcome
+    store.put(program(), {}, outcome)
+    assert store.get(program(), {}) == outcome
     (file,) = (tmp_path / "outcomes").iterdir()
     file.write_text(file.read_text()[:20])
-    assert store.get(program()) is None
+    assert store.get(program(), {}) is None

@@ -127,8 +127,11 @@ def test_the_program_names_where_exams_are_sat() -> None:
 
 def test_equal_programs_have_equal_digests_and_exams_matter() -> None:
     program = submission.program(notebook())
-    assert submission.digest(program, "a") == submission.digest(submission.program(notebook()), "a")
-    assert submission.digest(program, "a") != submission.digest(program, "b")
+    assert submission.digest(program, {}, "a") == submission.digest(
+        submission.program(notebook()), {}, "a"
+    )
+    assert submission.digest(program, {}, "a") != submission.digest(program, {}, "b")
+    assert submission.digest(program, {}, "a") != submission.digest(program, {"x": b""}, "a")
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ class SensorConsumers(Relay):
         self.relay(String, 'emergency/stop', 'consumer/emergency_stop', source_qos=CABLE)
 
     def not_older(self, msg_type, source, target, seconds):
-        publisher = self.create_publisher(msg_type, target, deep)
+        publisher = self.create_publisher(msg_type, target, CABLE)
 
         def handle(msg):
             age = self.get_clock().now() - Time.from_msg(msg.header.stamp)

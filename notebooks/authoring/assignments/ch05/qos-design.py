@@ -24,11 +24,12 @@
 # | IMU | `imu/data` | `sensor_msgs/Imu`, 100 Hz | State estimation may be busy for 50 ms (5 readings) and must still see each of them, but never more than the last 0.5 s (50 readings). |
 # | emergency stop | `emergency/stop` | `std_msgs/String`, on each press and release | Every event, in order, at every consumer, whichever reliability it asks for. Up to 100 events can queue up while a consumer is busy. |
 #
-# And one rule for camera, LIDAR and IMU together: a node that starts late must not act on old
+# And one rule for camera, LIDAR and IMU together: a node that starts late must not be handed old
 # readings. Whether the emergency stop remembers its last event for late joiners is up to you.
 #
-# The drivers publish each reading as soon as the hardware delivers it, the consumers hand on what
-# they act on.
+# The drivers publish each reading as soon as the hardware delivers it, with its content unchanged;
+# the consumers hand on what they act on. Leave the threads to ROS 2: the examiner keeps your
+# consumer busy by holding back its callbacks.
 #
 # Your work is examined by what your nodes **do**. Another process plays the hardware, keeps your
 # consumer busy, joins late, and listens on the wire. How you write it is your choice; every design

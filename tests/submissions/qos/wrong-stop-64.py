@@ -1,0 +1,7 @@
+# title: A stop queue that is deep, but not deep enough
+# fails: stop_complete
+
+camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+lidar_qos = QoSProfile(depth=1)
+imu_qos = QoSProfile(depth=10)
+stop_qos = QoSProfile(depth=64)

@@ -1,0 +1,9 @@
+# title: Stop events that are forgotten after five seconds
+# fails: stop_complete
+
+from rclpy.duration import Duration
+
+camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+lidar_qos = QoSProfile(depth=1)
+imu_qos = QoSProfile(depth=10)
+stop_qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, lifespan=Duration(seconds=5))
