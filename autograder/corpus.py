@@ -44,7 +44,7 @@ class Case:
 
     def solution(self, stub: str) -> str:
         """Return the solution cell: the stub with its mark replaced, or a cell of its own."""
-        if "class SensorDrivers" in self.body and "class SensorConsumers" in self.body:
+        if "SensorDrivers" in self.body and "SensorConsumers" in self.body:
             return self.body
         return stub.replace(STUB_MARK, self.body)
 

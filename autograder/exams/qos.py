@@ -30,7 +30,7 @@ from autograder.rigs.sensors import (
     sensor_rig,
     undemanding,
 )
-from autograder.rigs.stalling import Backlog, busy_consumer, few, require_kept
+from autograder.rigs.stalling import backlog, few, require_kept
 
 EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
 
@@ -288,8 +288,8 @@ def stop_complete(rig: SensorRig) -> str:
 
     Pressed, released, pressed again: whoever sees only the last event does not know what happened.
     """
-    backlogs: dict[str, Backlog] = rig.once(busy_consumer)
-    count, kept = backlogs[STOP.name].count, backlogs[STOP.name].kept
+    found = backlog(rig, STOP)
+    count, kept = found.count, found.kept
     if kept != list(range(count)):
         missing = count - len(set(kept))
         what = f"{missing} of {count} were lost" if missing else "some came twice or out of order"

@@ -27,13 +27,14 @@ THINNED = 0.8  # a driver that publishes less than this share of the readings dr
 
 @dataclass(frozen=True)
 class Backlog:
-    """One sensor's readings: how many came in during the pause, and which were passed on.
+    """One sensor's readings: how many came in during the pause, and what became of them.
 
-    ``kept`` has the indices in the order in which the consumer passed them on; those from ``count``
-    on came in after the pause.
+    ``published`` is how many of these the driver put on the topic. ``kept`` has the numbers in the
+    order in which the consumer passed them on; those from ``count`` on came in after the pause.
     """
 
     count: int
+    published: int
     kept: list[int]
 
 
@@ -45,13 +46,16 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     # Camera and LIDAR go on, as on a robot. The IMU stops here: its last readings are counted.
     streams[IMU.name].stop()
     counts = {name: stream.sent for name, stream in streams.items()}
-    _require_published(rig, counts)
+    published = {s.name: _published(rig, s, counts[s.name]) for s in SENSORS}
     rig.subject.resume(CONSUMERS)
     for sensor in SENSORS:
         _drain(rig, sensor, counts[sensor.name])
     for stream in streams.values():
         stream.stop()
-    return {s.name: Backlog(counts[s.name], rig.consumed(s, "stall")) for s in SENSORS}
+    return {
+        s.name: Backlog(counts[s.name], published[s.name], rig.consumed(s, "stall"))
+        for s in SENSORS
+    }
 
 
 def _least(sensor: Sensor) -> int:
@@ -62,22 +66,14 @@ def _limit(sensor: Sensor) -> int:
     return EVENTS if sensor is STOP else 2**31
 
 
-def _require_published(rig: SensorRig, counts: dict[str, int]) -> None:
-    """Fail if the driver keeps readings back.
+def _published(rig: SensorRig, sensor: Sensor, count: int) -> int:
+    """Return how many of the first ``count`` readings went over the sensor's topic.
 
-    Also the barrier: each sensor's last reading was seen on the wire, so the stalled reader has
-    been sent all before it, too.
+    Also the barrier: the last of them (or a later one, where a driver drops some) was seen on the
+    wire, so the stalled reader has been sent all before it, too.
     """
-    for sensor in SENSORS:
-        last = counts[sensor.name] - 1
-        # A later one does as well: the last one itself may be among those that a driver drops.
-        rig.wait(lambda s=sensor, n=last: max(rig.witnessed(s, "stall"), default=-1) >= n)  # type: ignore[misc]
-        seen = len({number for number in rig.witnessed(sensor, "stall") if number <= last})
-        if seen < (EVENTS if sensor is STOP else last * THINNED):
-            raise Failed(
-                expected=f"The driver publishes each {sensor.name} reading as it comes in.",
-                actual=f"Of {last + 1} that came in, {seen} went over {sensor.topic}.",
-            )
+    rig.wait(lambda: max(rig.witnessed(sensor, "stall"), default=-1) >= count - 1)
+    return len({number for number in rig.witnessed(sensor, "stall") if number < count})
 
 
 def _drain(rig: SensorRig, sensor: Sensor, count: int) -> None:
@@ -89,15 +85,27 @@ def _drain(rig: SensorRig, sensor: Sensor, count: int) -> None:
             return
 
 
+def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
+    """Return what became of one sensor's readings; fail if the driver keeps readings back."""
+    backlogs: dict[str, Backlog] = rig.once(busy_consumer)
+    found = backlogs[sensor.name]
+    if found.published < (found.count if sensor is STOP else (found.count - 1) * THINNED):
+        raise Failed(
+            expected=f"The driver publishes each {sensor.name} reading as it comes in.",
+            actual=f"Of {found.count} that came in, {found.published} went over {sensor.topic}.",
+        )
+    return found
+
+
 def require_kept(rig: SensorRig, sensor: Sensor, least: int, most: int, expected: str) -> None:
     """Fail unless the consumer then acts on the newest readings: ``least`` to ``most`` of them."""
-    backlogs: dict[str, Backlog] = rig.once(busy_consumer)
-    count, kept = backlogs[sensor.name].count, backlogs[sensor.name].kept
+    found = backlog(rig, sensor)
+    count, kept = found.count, found.kept
     if max(kept, default=-1) < count - 1:
         actual = f"Of {count} readings in a pause the newest never came out: it got {few(kept)}."
     elif min(kept) < count - most:
         actual = f"It then worked through the last {count - min(kept)} of {count} readings."
-    elif missing := [index for index in range(count - least, count) if index not in kept]:
+    elif missing := [number for number in range(count - least, count) if number not in kept]:
         actual = f"Of the last {least} of {count} readings {len(missing)} were lost."
     elif kept != sorted(kept):
         actual = f"It passed them on out of order: {few(kept)}."

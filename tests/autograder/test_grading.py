@@ -82,6 +82,36 @@ def test_a_class_is_graded_whatever_state_its_files_are_in(course: Course, cases
     assert "A short burst of IMU readings is kept" in feedback
 
 
+def test_what_one_student_hands_in_never_stops_the_others(course: Course, cases: Cases) -> None:
+    right = nbformat.writes(cases["right-chapter"].submission(course.released))
+    course.submit("a-surrogate", right.replace("My idea", "My \\ud83d idea"))
+    course.submit("b-version", right.replace('"nbformat": 4', '"nbformat": 4.0'))
+    (course.folder("c-folder") / f"{NOTEBOOK}.ipynb").mkdir()
+    os.mkfifo(course.folder("d-fifo") / f"{NOTEBOOK}.ipynb")
+    course.submit("e-time", right)
+    (course.folder("e-time") / "timestamp.txt").write_text("19.11.2026 um 14 Uhr")
+    course.submit("f[1]", right)
+    helper = right.replace(
+        "camera_qos = QoSProfile(depth=10)", "from my_profiles import camera_qos"
+    )
+    course.submit("g-helper", helper)
+    (course.folder("g-helper") / "my_profiles.py").write_text("camera_qos = 10\n")
+    course.submit("h last Müller", right)
+
+    graded = {g.student: g for g in engine.grade(course.root, ASSIGNMENT)}
+    found = grades(course)
+
+    for student in ("a-surrogate", "e-time", "g-helper", "h last Müller"):
+        assert found[student].score == 15, graded[student]
+    for student in ("b-version", "c-folder", "d-fifo"):
+        assert found[student].score == 0
+        assert found[student].needs_manual_grade
+        assert graded[student].problem
+    assert "no date" in graded["e-time"].problem
+    assert not graded["f[1]"].entered
+    assert "rename the folder" in graded["f[1]"].problem
+
+
 def test_manual_marks_survive_a_regrade(course: Course, cases: Cases) -> None:
     course.submit("right", cases["right-chapter"].submission(course.released))
     grade(course)

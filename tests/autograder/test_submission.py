@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import nbformat
@@ -140,6 +141,8 @@ def test_equal_programs_have_equal_digests_and_exams_matter() -> None:
         ("", "not valid JSON"),
         ('{"cells": [', "not valid JSON"),
         ("[]", "not a notebook"),
+        ('{"nbformat": 4.0, "nbformat_minor": 5, "metadata": {}, "cells": []}', "not a notebook"),
+        ('{"nbformat": 4, "nbformat_minor": 4.5, "metadata": {}, "cells": []}', "not a notebook"),
         ('{"nbformat": 3, "worksheets": []}', "not a notebook"),
         ('{"nbformat": 4, "nbformat_minor": 5, "metadata": {}, "cells": [{}]}', "format"),
         ("[" * 100_000, "not valid JSON"),
@@ -172,3 +175,46 @@ def test_a_huge_notebook_is_refused_unread(tmp_path: Path, monkeypatch: pytest.M
     path.write_text(json.dumps(nbformat.from_dict(notebook())) + " " * 1000)
     with pytest.raises(SubmissionError, match="clear its outputs"):
         submission.read(path)
+
+
+def test_half_a_surrogate_pair_is_replaced(tmp_path: Path) -> None:
+    nb = notebook()
+    path = tmp_path / "qos-design.ipynb"
+    path.write_text(json.dumps(nbformat.from_dict(nb)).replace("y = 0", "y = '\\ud83d'"))
+    read = submission.read(path)
+    assert read.cells[2].source == "y = '?'"
+    nbformat.write(read, tmp_path / "again.ipynb")
+
+
+def test_a_byte_order_mark_is_no_damage(tmp_path: Path) -> None:
+    path = tmp_path / "qos-design.ipynb"
+    path.write_text(json.dumps(nbformat.from_dict(notebook())), encoding="utf-8-sig")
+    assert len(submission.read(path).cells) == 5
+
+
+def test_what_is_no_plain_file_is_refused_at_once(tmp_path: Path) -> None:
+    folder, fifo, loop = (tmp_path / name for name in ("a.ipynb", "b.ipynb", "c.ipynb"))
+    folder.mkdir()
+    os.mkfifo(fifo)
+    loop.symlink_to(loop)
+    for path in (folder, fifo, loop):
+        with pytest.raises(SubmissionError, match="hand in the notebook itself"):
+            submission.read(path)
+
+
+def test_other_files_of_a_submission_are_found_and_links_are_not(tmp_path: Path) -> None:
+    (tmp_path / "profiles.py").write_text("depth = 5")
+    (tmp_path / "pack").mkdir()
+    (tmp_path / "pack" / "more.py").write_text("x = 1")
+    (tmp_path / "timestamp.txt").write_text("2026-01-01")
+    (tmp_path / ".hidden").write_text("x")
+    (tmp_path / "link.py").symlink_to("/etc/hostname")
+    (tmp_path / "away").symlink_to("/etc")
+    assert submission.extras(tmp_path) == {"pack/more.py": b"x = 1", "profiles.py": b"depth = 5"}
+
+
+def test_cells_that_were_moved_are_noted() -> None:
+    nb = notebook()
+    nb.cells[2], nb.cells[3] = nb.cells[3], nb.cells[2]
+    _, notes = restored(nb)
+    assert notes == ["The cells of the assignment had been moved; they were run as they stood."]

@@ -27,5 +27,5 @@ def make_node_class(drives):
     return Generated
 
 
-SensorDrivers = make_node_class(True)  # class SensorDrivers
-SensorConsumers = make_node_class(False)  # class SensorConsumers
+SensorDrivers = make_node_class(True)
+SensorConsumers = make_node_class(False)
