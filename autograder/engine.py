@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import copy
 import shutil
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from autograder import nbgrader_bridge as bridge
 from autograder import runner, submission
 from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.runner import Outcome
-from autograder.store import OutcomeStore
+from autograder.store import OutcomeStore, StoreError
 from autograder.submission import SubmissionError
 from autograder.verdict import Status
 from course.errors import CourseError
@@ -80,20 +80,15 @@ def grade(
     graded = [_unusable(student) for student in students if set(student) & set(GLOB)]
     students = [student for student in students if not set(student) & set(GLOB)]
     with ThreadPoolExecutor(max_workers=jobs) as pool:
-        futures = {pool.submit(class_.run, s, progress): s for s in students}
+        futures = [pool.submit(class_.run, student, progress) for student in students]
         try:
-            for result in _results(futures):
-                graded.append(class_.enter(result, feedback))
-                progress(result.student, graded[-1])
+            for future in as_completed(futures):
+                graded.append(class_.enter(future.result(), feedback))
+                progress(graded[-1].student, graded[-1])
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
     return sorted(graded, key=lambda item: item.student)
-
-
-def _results(futures: dict[Future[Graded], str]) -> Iterator[Graded]:
-    for future in as_completed(futures):
-        yield future.result()
 
 
 class _Class:
@@ -137,14 +132,12 @@ class _Class:
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
             return self._refused(path.stem, f"{type(error).__name__}: {error}", "grader_error")
         notebook.metadata[bridge.NOTES_KEY] = notes
-        outcome = None if self._fresh else self._store.get(program, files)
-        if outcome is None:
-            try:
-                outcome = runner.run(program, files)
-            except Exception as error:  # noqa: BLE001 - the same: a person looks at this one
-                return self._refused(path.stem, f"{type(error).__name__}: {error}", "grader_error")
-            self._store.put(program, files, outcome)
-        return notebook, outcome
+        try:
+            return notebook, self._store.outcome(program, files, fresh=self._fresh)
+        except StoreError:
+            raise
+        except Exception as error:  # noqa: BLE001 - the same: a person looks at this one
+            return self._refused(path.stem, f"{type(error).__name__}: {error}", "grader_error")
 
     def _refused(self, name: str, reason: str, status: Status) -> tuple[NotebookNode, Outcome]:
         """Return the released notebook in place of one that cannot be run, and why."""

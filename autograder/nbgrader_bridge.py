@@ -1,7 +1,7 @@
 """What nbgrader runs in place of its own execution step: preprocessors for ``nbgrader autograde``.
 
 `GradeByBehaviour` stands where nbgrader would execute the notebook in a kernel. It writes the
-outputs of the sandboxed run into the cells and each exam's points into its grade cell, so that
+outputs of the subject's run into the cells and each exam's points into its grade cell, so that
 nbgrader's own steps save, flag and report the scores as everyone knows them.
 """
 
@@ -57,14 +57,13 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
             verdict = outcome.verdicts.get(submission.grade_id(cell))
             cell.outputs = _graded(verdict) if verdict else [new_output(**o) for o in outputs]  # type: ignore[no-untyped-call]
         resources["ros2_course_flags"] = [
-            name for name, verdict in outcome.verdicts.items() if verdict.needs_human
+            name
+            for name, verdict in outcome.verdicts.items()
+            if outcome.unreadable or verdict.needs_human
         ]
-        if outcome.unreadable:
-            resources["ros2_course_flags"] = list(outcome.verdicts)
         return nb, resources
 
     def _run(self, nb: NotebookNode, resources: Resources) -> Any:
-        from autograder import runner
         from autograder.store import OutcomeStore
 
         coursedir = _coursedir(self)
@@ -72,11 +71,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         folder = coursedir.format_path(coursedir.submitted_directory, student, assignment)
         program, files = submission.program(nb), submission.extras(Path(folder))
         store = OutcomeStore(Path(coursedir.root) / WORK_FOLDER / "outcomes")
-        outcome = store.get(program, files)
-        if outcome is None:
-            outcome = runner.run(program, files)
-            store.put(program, files, outcome)
-        return outcome
+        return store.outcome(program, files)
 
 
 class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]

@@ -11,9 +11,14 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from autograder import runner
 from autograder.runner import Outcome
 from autograder.submission import Program, digest
 from course.errors import CourseError
+
+
+class StoreError(CourseError):
+    """An outcome could not be kept (a full disk, say): the whole run has to stop."""
 
 
 @cache
@@ -40,6 +45,21 @@ class OutcomeStore:
         """Keep outcomes in ``folder``, which is made when the first one is written."""
         self._folder = folder
 
+    def outcome(
+        self, program: Program, files: Mapping[str, bytes], *, fresh: bool = False
+    ) -> Outcome:
+        """Return a program's outcome: the one that is kept, or else (or if ``fresh``) a new one.
+
+        Raises:
+            StoreError: the new one could not be kept.
+        """
+        kept = None if fresh else self.get(program, files)
+        if kept is not None:
+            return kept
+        outcome = runner.run(program, files)
+        self.put(program, files, outcome)
+        return outcome
+
     def get(self, program: Program, files: Mapping[str, bytes]) -> Outcome | None:
         """Return the outcome of an equal program under equal exams, if there is a sound one."""
         try:
@@ -51,7 +71,7 @@ class OutcomeStore:
         """Keep an outcome; one that a grader error spoilt is not kept.
 
         Raises:
-            CourseError: the folder cannot be written (a full disk, say).
+            StoreError: the folder cannot be written (a full disk, say).
         """
         if outcome.needs_human:
             return
@@ -62,7 +82,7 @@ class OutcomeStore:
                 file.write(outcome.to_json())
             os.replace(file.name, path)  # noqa: PTH105 - atomic: a reader sees all of it or none
         except OSError as error:
-            raise CourseError(
+            raise StoreError(
                 f"The outcome of a submission could not be written to {path.parent} "
                 f"({error.strerror}): make room there and run the same command again; what was "
                 "graded so far is kept."
