@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from autograder.wire import Channel, ChannelClosed, ChannelTimeout
@@ -25,51 +26,112 @@ class StudentError(Exception):
 
 
 class Subject:
-    """The examiner's end of the control channel. It asks; it does not believe."""
+    """The examiner's end of the control channel. It asks; it does not believe.
 
-    def __init__(self, channel: Channel) -> None:
-        """Talk to the harness over ``channel``."""
+    ``name`` is always a name of the notebook's: of a class, or of anything that makes a node.
+    """
+
+    def __init__(self, channel: Channel, pid: int = 0) -> None:
+        """Talk to the harness over ``channel``; ``pid`` is the subject's process as seen here."""
         self._channel = channel
         self._gone: str | None = None
+        self.pid = pid
 
-    def start(self, class_name: str) -> str:
-        """Make a node of a class of the notebook and spin it; return its name.
+    def open(self, *, threads: int = 1, sim_time: bool = False) -> None:
+        """Begin a new session on the subject's side; nodes of an earlier one are stopped.
+
+        Without it, the first `start` begins one with a single thread and wall-clock time.
+
+        Args:
+            threads: how many threads run the nodes' callbacks.
+            sim_time: the nodes follow simulated time, which only `advance` moves.
+        """
+        self._ask("open", "a session", threads=threads, sim_time=sim_time)
+
+    def start(self, name: str) -> str:
+        """Make a node of a class of the notebook and spin it; return its fully qualified name.
 
         Raises:
             StudentError: the class is missing or its constructor raised.
             SubjectGone: the process ended or hangs.
         """
-        return str(self._ask("start", class_name)["node"])
+        return str(self._ask("start", name)["node"])
 
-    def stop(self, class_name: str) -> None:
-        """Destroy the node made of a class."""
-        self._ask("stop", class_name)
+    def start_all(self, name: str) -> dict[str, str]:
+        """Make every node that an object of the notebook declares; return {label: node name}.
 
-    def pause(self, class_name: str) -> None:
+        The object has ``node_factories()``, which gives {label: factory}. Each node is afterwards
+        known as ``"<name>.<label>"`` to the other requests.
+
+        Raises:
+            StudentError: the object is missing or declares nothing, or a node could not be made.
+        """
+        return {str(k): str(v) for k, v in self._ask("start_all", name)["nodes"].items()}
+
+    def stop(self, name: str) -> None:
+        """Destroy the node made of a class, as a session does: its ``destroy_node`` is called."""
+        self._ask("stop", name)
+
+    def pause(self, name: str) -> None:
         """Stop executing the node's callbacks while its endpoints go on receiving."""
-        self._ask("pause", class_name)
+        self._ask("pause", name)
 
-    def resume(self, class_name: str) -> None:
+    def resume(self, name: str) -> None:
         """Execute the node's callbacks again, beginning with what queued up."""
-        self._ask("resume", class_name)
+        self._ask("resume", name)
+
+    def advance(self, seconds: float, step: float = 0.01) -> None:
+        """Move simulated time on (see `course.Session.sim`); needs `open` with ``sim_time``."""
+        self._ask("advance", f"{seconds:g} s of simulated time", seconds=seconds, step=step)
+
+    def call(self, name: str, method: str, *args: Any, timeout: float = REPLY_TIMEOUT) -> Any:
+        """Call a method of the node made of a class, in the main thread, while the node spins.
+
+        Args:
+            name: the class.
+            method: its method; ``args`` are passed on and must be JSON.
+            timeout: seconds until it counts as hung.
+
+        Returns:
+            What the method returned, if that is JSON; else its ``repr``. It is no evidence.
+
+        Raises:
+            StudentError: there is no such method, or it raised.
+            SubjectGone: the process ended or the method hangs.
+        """
+        reply = self._ask(
+            "call", f"{name}.{method}()", timeout, node=name, method=method, args=args
+        )
+        return reply.get("value")
+
+    def value(self, name: str) -> Any:
+        """Return a variable of the notebook as JSON data: numbers, strings, lists and dicts.
+
+        Raises:
+            StudentError: there is no such variable, or it is made of something else.
+        """
+        return self._ask("value", name)["value"]
 
     def errors(self) -> list[str]:
         """Return what the student's callbacks raised: for an explanation, never as evidence."""
-        return [str(line) for line in self._ask("errors", "").get("errors", [])]
+        return [str(line) for line in self._ask("errors", "its errors").get("errors", [])]
 
-    def _ask(self, operation: str, class_name: str) -> dict[str, Any]:
+    def _ask(
+        self, operation: str, what: str, timeout: float = REPLY_TIMEOUT, **more: Any
+    ) -> dict[str, Any]:
         if self._gone:
             raise SubjectGone(self._gone)
+        doing = f"{operation.replace('_', ' ')} {what}"
         try:
-            self._channel.send({"op": operation, "class": class_name})
-            reply = self._channel.receive(REPLY_TIMEOUT)
+            self._channel.send({"op": operation, "name": what, **more})
+            reply = self._channel.receive(timeout)
         except ChannelClosed:
-            self._gone = f"Your program ended while it was asked to {operation} {class_name}."
+            self._gone = f"Your program ended while it was asked to {doing}."
             raise SubjectGone(self._gone) from None
         except ChannelTimeout:
             self._gone = (
-                f"Your program did not answer within {REPLY_TIMEOUT:.0f} s when it was asked to "
-                f"{operation} {class_name}: does a constructor or a callback wait for ever?"
+                f"Your program did not answer within {timeout:.0f} s when it was asked to "
+                f"{doing}: does a constructor or a callback wait for ever?"
             )
             raise SubjectGone(self._gone) from None
         if not reply.get("ok"):
@@ -87,12 +149,20 @@ class Subject:
 class Bench:
     """The examiner's session on the subject's domain, and the subject."""
 
-    def __init__(self, session: Session, subject: Subject, memory: dict[str, Any]) -> None:
+    def __init__(
+        self,
+        session: Session,
+        subject: Subject,
+        memory: dict[str, Any],
+        key: Mapping[str, Any] | None = None,
+    ) -> None:
         """Put both within a check's reach.
 
         ``memory`` outlives this bench: what an experiment found in an earlier part of the exam,
-        as long as the notebook has not moved on since.
+        as long as the notebook has not moved on since. ``key`` is the answer key that the part's
+        hidden cell carries, if it has one: the subject never sees it.
         """
         self.session = session
         self.subject = subject
         self.memory = memory
+        self.key: Mapping[str, Any] = key or {}

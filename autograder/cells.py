@@ -71,6 +71,17 @@ def regions(source: str) -> Iterator[tuple[str, str]]:
             yield inside, line
 
 
+def without_hidden(source: str) -> str:
+    """Return a cell's text as a release has it: without the lines of its hidden tests."""
+    kept = [line for marker, line in regions(source) if marker != "HIDDEN TESTS"]
+    return "\n".join(kept).strip("\n")
+
+
+def without_markers(source: str) -> str:
+    """Return a cell's whole text, solution included, without the lines that carry markers."""
+    return "\n".join(line for _, line in regions(source))
+
+
 def has_marker(source: str) -> bool:
     """Whether a line of a cell begins or ends a region that a release must not hold."""
     return _MARKER.search(source) is not None

@@ -17,13 +17,16 @@ from autograder.report import Report
 from autograder.verdict import Verdict
 from autograder.wire import Channel
 from course import Session
+from course.domains import lease_domain
 from course.errors import CourseError
 
 STUCK = 3.0
 """Seconds after a verdict in which the student's node must have been stopped."""
 
 
-def check(exam: str, part: str = "visible", *, hint: int = 1) -> float:
+def check(
+    exam: str, part: str = "visible", *, hint: int = 1, key: Mapping[str, Any] | None = None
+) -> float:
     """Examine this notebook's nodes by what they do, show a report, and return the points.
 
     An examiner process joins a DDS domain of its own with this kernel, asks for nodes of the
@@ -33,6 +36,7 @@ def check(exam: str, part: str = "visible", *, hint: int = 1) -> float:
         exam: the name of the exam, such as ``"qos"``.
         part: which of its parts; ``"visible"`` is the one for students.
         hint: how many of a failed check's hints to show, from a nudge to nearly the answer.
+        key: the answer key of a part that has one; it stands in a hidden cell of the source.
 
     Raises:
         ExamError: no such exam or part; the message names the ones there are.
@@ -41,13 +45,15 @@ def check(exam: str, part: str = "visible", *, hint: int = 1) -> float:
     exams.load(exam).part(part)
     if SUBJECT_ENV in os.environ:
         return 0.0  # the real examiner is at work outside this process
-    verdict = examine(exam, part, namespace)
+    verdict = examine(exam, part, namespace, key)
     _show(Report(verdict, hints=hint))
     return float(verdict.score)
 
 
-def examine(exam: str, part: str, namespace: Mapping[str, Any]) -> Verdict:
-    """Sit one part of an exam on the classes of ``namespace``, in a session made for it.
+def examine(
+    exam: str, part: str, namespace: Mapping[str, Any], key: Mapping[str, Any] | None = None
+) -> Verdict:
+    """Sit one part of an exam on the classes of ``namespace``, in sessions made for it.
 
     Call it from the main thread: what hangs in the student's code is interrupted there.
 
@@ -56,14 +62,22 @@ def examine(exam: str, part: str, namespace: Mapping[str, Any]) -> Verdict:
     """
     ours, theirs = socket.socketpair()
     channel = Channel(ours)
-    with Session() as session, ExaminerProcess(theirs, session.domain_id) as examiner:
-        examiner.request(exam, part)
-        sitting = _Sitting(examiner)
-        try:
-            sitting.serve(Harness(session, namespace), channel)
-        finally:
-            channel.close()
-        return sitting.verdict()
+    lease = lease_domain()
+
+    def open_session(threads: int, sim_time: bool) -> Session:
+        return Session(domain_id=lease.domain_id, threads=threads, sim_time=sim_time)
+
+    try:
+        with ExaminerProcess(theirs, lease.domain_id) as examiner:
+            examiner.request(exam, part, pid=os.getpid(), key=key)
+            sitting = _Sitting(examiner)
+            try:
+                sitting.serve(Harness(open_session, namespace), channel)
+            finally:
+                channel.close()
+            return sitting.verdict()
+    finally:
+        lease.release()
 
 
 class _Sitting:

@@ -118,22 +118,40 @@ def grade(
 
 @app.command()
 def corpus(
-    exam: Annotated[str, typer.Argument(help="Which exam's corpus; all if left out.")] = "",
+    exercise: Annotated[
+        str, typer.Option("--exercise", help="Which exam's corpus; all if left out.")
+    ] = "",
+    case: Annotated[list[str] | None, typer.Option("--case", help="Only this case.")] = None,
     repeat: Annotated[int, typer.Option("--repeat", min=1, help="Runs of each case.")] = 1,
+    load: Annotated[int, typer.Option("--load", min=0, help="Busy loops beside it.")] = 0,
     jobs: Jobs = 2,
     as_json: AsJson = False,
+    as_table: Annotated[
+        bool, typer.Option("--table", help="Run nothing; print which mutant each check catches.")
+    ] = False,
 ) -> None:
     """Grade the graders: run every case of known verdict, and compare."""
-    from autograder import corpus_command
+    from autograder.corpus import command, tables
 
-    trials = corpus_command.run(exam, repeat=repeat, jobs=jobs, say=_say(as_json))
+    if as_table:
+        sys.stdout.write(tables.matrix(command.cases(exercise)))
+        return
+    trials = command.run(
+        exercise, only=case or (), repeat=repeat, jobs=jobs, load=load, say=_say(as_json)
+    )
     different = [trial for trial in trials if trial.difference]
+    flips = tables.all_flips(trials)
     if as_json:
-        _print_json(corpus_command.as_data(trials))
+        _print_json(tables.as_data(trials))
     else:
-        out.print(corpus_command.table(trials))
-        out.print(f"{len(trials)} runs, {len(different)} with another verdict than expected.")
-    if different:
+        out.print(tables.table(trials))
+        out.print(
+            f"{len(trials)} runs: {len(different)} with another verdict than expected, "
+            f"{len(flips)} checks that changed between repeats."
+        )
+        for line in (*flips, *(f"{t.case.name}: {t.difference}" for t in different)):
+            out.print(f"  {line}", soft_wrap=True, highlight=False, markup=False)
+    if different or flips:
         raise typer.Exit(EXIT_DIFFERENT)
 
 

@@ -91,10 +91,13 @@ def run(
 
 def collect(root: Path, cases: list[corpus.Case]) -> list[str]:
     """Write one submission a case into the course's ``submitted`` folder; return the students."""
-    released = submission.read(root / "release" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+    source, released = (
+        submission.read(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+        for step in ("source", "release")
+    )
     for case in cases:
         folder = _submitted(root, case.name)
-        nbformat.write(case.submission(released), folder / f"{NOTEBOOK}.ipynb")  # type: ignore[no-untyped-call]
+        nbformat.write(case.submission(source, released), folder / f"{NOTEBOOK}.ipynb")  # type: ignore[no-untyped-call]
     whole = (root / "release" / ASSIGNMENT / f"{NOTEBOOK}.ipynb").read_text(encoding="utf-8")
     damaged = _submitted(root, DAMAGED) / f"{NOTEBOOK}.ipynb"
     damaged.write_text(whole[: len(whole) // 2], encoding="utf-8")
@@ -139,6 +142,6 @@ def _rows(
                 Row(grade.student, "A file that was cut off", grade, "unreadable", difference)
             )
             continue
-        fails = "everything" if case.fails is None else ", ".join(sorted(case.fails)) or "nothing"
-        rows.append(Row(grade.student, case.title, grade, fails, case.verdict_of(outcome)))
+        difference = case.verdict_of(outcome)
+        rows.append(Row(grade.student, case.title, grade, case.fails_in_words, difference))
     return rows

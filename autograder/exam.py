@@ -94,9 +94,10 @@ class Exam(Generic[RigT]):
         """
         table = points_table.of_part(self.name, part)
         if not table:
-            parts = [name for name in points_table.table().get(self.name, {}) if name != "manual"]
+            entry = points_table.table().get(self.name)
+            parts = ", ".join(entry.parts) if entry else ""
             raise ExamError(
-                f"Exam '{self.name}' has no part '{part}': there are {', '.join(parts) or 'none'}."
+                f"Exam '{self.name}' has no part '{part}': there are {parts or 'none'}."
             )
         for name in table:
             if name not in self.checks:

@@ -1,8 +1,10 @@
 """The examiner process: sits exams on a subject that it can only see over DDS.
 
 Started as ``python -m autograder.examiner --control FD --domain N``. It reads requests
-``{"exam": ..., "part": ..., "moved_on": ...}`` from standard input, one JSON object a line, and
-writes one verdict a line to standard output; ``moved_on`` says that the notebook ran cells since.
+``{"exam": ..., "part": ..., "moved_on": ..., "key": ..., "pid": ...}`` from standard input, one
+JSON object a line, and writes one verdict a line to standard output. ``moved_on`` says that the
+notebook ran cells since, ``key`` is the answer key of the part's hidden cell, ``pid`` the subject's
+process.
 File descriptor ``FD`` is the control channel to the subject's harness.
 """
 
@@ -35,12 +37,14 @@ class Sitting:
 Sittings = dict[str, Sitting]
 
 
-def sit(exam: str, part: str, session: Session, subject: Subject, sittings: Sittings) -> str:
+def sit(request: dict[str, Any], session: Session, subject: Subject, sittings: Sittings) -> str:
     """Run one part of an exam, let the subject go on, and return the verdict as JSON."""
-    sitting = sittings.setdefault(exam, Sitting())
+    sitting = sittings.setdefault(request["exam"], Sitting())
+    subject.pid = int(request["pid"])
     try:
-        bench = Bench(session, subject, sitting.memory)
-        return exams.load(exam).sit(part, bench, sitting.failed).to_json()
+        bench = Bench(session, subject, sitting.memory, request["key"])
+        exam = exams.load(request["exam"])
+        return exam.sit(request["part"], bench, sitting.failed).to_json()
     finally:
         subject.release()
 
@@ -52,7 +56,7 @@ def serve(requests: TextIO, verdicts: TextIO, session: Session, subject: Subject
         request = json.loads(line)
         if request["moved_on"]:
             sittings.clear()
-        verdict = sit(request["exam"], request["part"], session, subject, sittings)
+        verdict = sit(request, session, subject, sittings)
         verdicts.write(verdict + "\n")
         verdicts.flush()
 

@@ -1,30 +1,37 @@
 """The subject's side of an exam: makes nodes of the student's classes when the examiner asks.
 
 The harness lives in the student's process, so nothing it says is evidence: it only carries out
-requests (start, stop, pause, resume), and the examiner believes what it observes on DDS.
+requests, and the examiner believes what it observes on DDS.
 """
 
 from __future__ import annotations
 
+import json
 import traceback
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from autograder.wire import Channel, ChannelClosed
 from course import Session
 
 TRACE_LINES = 6
+MAX_VALUE = 64 * 1024
+"""Characters of JSON that a value or a returned object may have."""
 
 SUBJECT_ENV = "AUTOGRADER_SUBJECT"
 """Set in a subject: `autograder.check` in a student's own cell then has nothing to do."""
 
+OpenSession = Callable[[int, bool], Session]
+"""Makes a session of so many threads, with simulated time or not."""
+
 
 class Harness:
-    """Carries out an examiner's requests on the nodes of one namespace, in one session."""
+    """Carries out an examiner's requests on the nodes of one namespace."""
 
-    def __init__(self, session: Session, namespace: Mapping[str, Any]) -> None:
-        """Serve the classes found in ``namespace`` (a notebook's globals) in ``session``."""
-        self._session = session
+    def __init__(self, open_session: OpenSession, namespace: Mapping[str, Any]) -> None:
+        """Serve what ``namespace`` (a notebook's globals) has, in sessions of ``open_session``."""
+        self._open_session = open_session
+        self._session: Session | None = None
         self._namespace = namespace
         self._nodes: dict[str, Any] = {}
 
@@ -36,13 +43,15 @@ class Harness:
         except ChannelClosed:
             pass
         finally:
-            self._session.stop()
+            self._close()
 
     def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
         try:
             operation = {
-                "start": self._start, "stop": self._stop,
-                "pause": self._pause, "resume": self._resume, "errors": self._errors,
+                "open": self._open, "start": self._start, "start_all": self._start_all,
+                "stop": self._stop, "pause": self._pause, "resume": self._resume,
+                "advance": self._advance, "call": self._call, "value": self._value,
+                "errors": self._errors,
             }[request["op"]]  # fmt: skip
             return {"ok": True, **operation(request)}
         except Exception as error:  # noqa: BLE001 - a student's code may raise anything
@@ -52,39 +61,103 @@ class Harness:
                 "trace": _student_trace(error),
             }
 
-    def _start(self, request: dict[str, Any]) -> dict[str, Any]:
-        name = request["class"]
+    @property
+    def _hosting(self) -> Session:
+        if self._session is None:
+            self._session = self._open_session(1, False)
+        return self._session
+
+    def _close(self) -> None:
+        self._nodes.clear()
+        if self._session is not None:
+            self._session.close()
+            self._session = None
+
+    def _open(self, request: dict[str, Any]) -> dict[str, Any]:
+        self._close()
+        self._session = self._open_session(int(request["threads"]), bool(request["sim_time"]))
+        return {}
+
+    def _find(self, name: str, what: str = "class") -> Any:
         try:
-            factory = self._namespace[name]
+            return self._namespace[name]
         except KeyError:
-            raise LookupError(f"there is no class named {name} in the notebook") from None
+            raise LookupError(f"there is no {what} named {name} in the notebook") from None
+
+    def _start(self, request: dict[str, Any]) -> dict[str, Any]:
+        name = request["name"]
+        return {"node": self._run(name, self._find(name))}
+
+    def _start_all(self, request: dict[str, Any]) -> dict[str, Any]:
+        name = request["name"]
+        factories = self._find(name, "design").node_factories()
+        return {
+            "nodes": {
+                str(label): self._run(f"{name}.{label}", factory)
+                for label, factory in factories.items()
+            }
+        }
+
+    def _run(self, name: str, factory: Any) -> str:
         # Two classes may share a node name, or come out of one function: both have to run.
-        node = self._session.run_beside(factory)
+        node = self._hosting.run_beside(factory)
         self._nodes[name] = node
-        return {"node": node.get_fully_qualified_name()}
+        return str(node.get_fully_qualified_name())
 
     def _stop(self, request: dict[str, Any]) -> dict[str, Any]:
-        node = self._nodes.pop(request["class"], None)
+        node = self._nodes.pop(request["name"], None)
         if node is not None:
-            self._session.stop(node)
+            self._hosting.stop(node)
         return {}
 
     def _pause(self, request: dict[str, Any]) -> dict[str, Any]:
-        self._session.pause(self._nodes[request["class"]])
+        self._hosting.pause(self._nodes[request["name"]])
         return {}
 
     def _resume(self, request: dict[str, Any]) -> dict[str, Any]:
-        self._session.resume(self._nodes[request["class"]])
+        self._hosting.resume(self._nodes[request["name"]])
         return {}
 
+    def _advance(self, request: dict[str, Any]) -> dict[str, Any]:
+        self._hosting.sim.advance(float(request["seconds"]), float(request["step"]))
+        return {}
+
+    def _call(self, request: dict[str, Any]) -> dict[str, Any]:
+        node = self._nodes[request["node"]]
+        method = getattr(node, request["method"], None)
+        if not callable(method):
+            raise LookupError(f"{request['node']} has no method {request['method']}()")
+        returned = method(*request["args"])
+        try:
+            return {"value": _as_json(returned)}
+        except (TypeError, ValueError, RecursionError):
+            return {"value": repr(returned)[:1000]}
+
+    def _value(self, request: dict[str, Any]) -> dict[str, Any]:
+        found = self._find(request["name"], "variable")
+        try:
+            return {"value": _as_json(found)}
+        except (TypeError, ValueError, RecursionError):
+            raise TypeError(
+                f"{request['name']} must be made of strings, numbers, lists and dictionaries"
+            ) from None
+
     def _errors(self, request: dict[str, Any]) -> dict[str, Any]:
-        recent = self._session.errors[-5:]
+        recent = self._hosting.errors[-5:]
         return {
             "errors": [
                 f"{e.callback} of {e.node}: {type(e.exception).__name__}: {e.exception}"[:500]
                 for e in recent
             ]
         }
+
+
+def _as_json(value: Any) -> Any:
+    """Return a copy of ``value`` as JSON knows it; raises TypeError or ValueError if it cannot."""
+    text = json.dumps(value)
+    if len(text) > MAX_VALUE:
+        raise ValueError(f"{len(text)} characters are more than the {MAX_VALUE} that are read")
+    return json.loads(text)
 
 
 def _student_trace(error: BaseException) -> str:

@@ -16,7 +16,7 @@ from nbgrader.api import Gradebook
 from nbgrader.coursedir import CourseDirectory
 from nbgrader.preprocessors import NbGraderPreprocessor
 
-from autograder import submission
+from autograder import cells, submission
 from autograder.report import Report
 from autograder.verdict import Verdict
 
@@ -55,7 +55,12 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         code_cells = [cell for cell in nb.cells if cell.cell_type == "code"]
         for cell, outputs in zip(code_cells, outcome.outputs, strict=True):
             verdict = outcome.verdicts.get(submission.grade_id(cell))
-            cell.outputs = _graded(verdict) if verdict else [new_output(**o) for o in outputs]  # type: ignore[no-untyped-call]
+            if verdict is None:
+                cell.outputs = [new_output(**output) for output in outputs]  # type: ignore[no-untyped-call]
+            else:
+                # What stands here goes into the student's feedback: no hidden check, no key.
+                cell.source = cells.without_hidden(cell.source)
+                cell.outputs = _graded(verdict)
         resources["ros2_course_flags"] = [
             name
             for name, verdict in outcome.verdicts.items()

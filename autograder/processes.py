@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Mapping
 from types import TracebackType
+from typing import Any
 
 from autograder.verdict import MAX_BYTES, Verdict
 from course.errors import CourseError
@@ -48,14 +49,34 @@ class ExaminerProcess:
         control.close()
         self._buffer = b""
 
-    def request(self, exam: str, part: str, *, moved_on: bool = True) -> None:
+    def request(
+        self,
+        exam: str,
+        part: str,
+        *,
+        pid: int,
+        moved_on: bool = True,
+        key: Mapping[str, Any] | None = None,
+    ) -> None:
         """Ask for a part of an exam; its verdict comes with `verdict`.
 
-        ``moved_on`` is False if the notebook ran nothing since the last part: then what failed
-        there need not be tried again.
+        Args:
+            exam: the exam's name.
+            part: the part's name.
+            pid: the subject's process, as the examiner sees it: its threads, files and memory.
+            moved_on: False if the notebook ran nothing since the last part: then what failed
+                there need not be tried again.
+            key: the answer key of the part's hidden cell.
         """
         assert self._process.stdin is not None
-        line = json.dumps({"exam": exam, "part": part, "moved_on": moved_on}).encode() + b"\n"
+        asked = {
+            "exam": exam,
+            "part": part,
+            "moved_on": moved_on,
+            "key": dict(key or {}),
+            "pid": pid,
+        }
+        line = json.dumps(asked).encode() + b"\n"
         try:
             self._process.stdin.write(line)
             self._process.stdin.flush()

@@ -19,7 +19,7 @@ from typing import Any
 from autograder import exams
 from autograder.exam import unexamined
 from autograder.processes import ExaminerError, ExaminerProcess
-from autograder.submission import Program
+from autograder.submission import Cell, Program
 from autograder.verdict import Status, Verdict
 from autograder.wire import Channel, ChannelClosed, ChannelTimeout
 from course.domains import lease_domain
@@ -102,11 +102,13 @@ def _follow(
     """Walk through the program with the subject; on its end, account for what was not reached."""
     moved_on, number = True, 0
     try:
-        channel.send({"cells": [vars(cell) for cell in program]})
+        channel.send({"cells": [_shown(cell) for cell in program]})
         for number, cell in enumerate(program):
             message = channel.receive(cell_timeout)
             if cell.exam:
-                examiner.request(cell.exam, cell.part, moved_on=moved_on)
+                examiner.request(
+                    cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key
+                )
                 outcome.verdicts[cell.grade_id] = examiner.verdict()
                 moved_on = False
             else:
@@ -125,6 +127,11 @@ def _follow(
         _give_up(program, outcome, f"The notebook's process ended: {subject.fate()}.")
     except ExaminerError as error:
         _give_up(program, outcome, str(error), "grader_error")
+
+
+def _shown(cell: Cell) -> dict[str, str]:
+    """Return what a subject is told of a cell: never an answer key, nor which part comes."""
+    return {"source": "" if cell.exam else cell.source, "exam": cell.exam}
 
 
 def _outputs(message: dict[str, Any], number: int) -> list[dict[str, Any]]:
@@ -200,6 +207,7 @@ class _SubjectProcess:
         )  # fmt: skip
         engine.close()
         control.close()
+        self.pid = self._process.pid
 
     def fate(self) -> str:
         """Return how the process ended, in words."""

@@ -22,11 +22,14 @@ from course import Session
 def run(engine: Channel, control: Channel, domain_id: int) -> None:
     """Run the engine's program cell by cell, and serve the examiner where it says so."""
     shell = make_shell()
+
+    def open_session(threads: int, sim_time: bool) -> Session:
+        return Session(domain_id=domain_id, threads=threads, sim_time=sim_time)
+
     for number, cell in enumerate(engine.receive()["cells"]):
         if cell["exam"]:
-            with Session(domain_id=domain_id) as session:
-                engine.send({"exam": number})
-                Harness(session, shell.user_ns).serve(control)
+            engine.send({"exam": number})
+            Harness(open_session, shell.user_ns).serve(control)
         else:
             engine.send({"ran": number, "outputs": run_cell(shell, cell["source"])})
 

@@ -11,7 +11,7 @@ import json
 import stat
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +20,7 @@ import nbformat.v4
 import nbformat.validator
 from nbformat import NotebookNode
 
-from autograder import points
+from autograder import keys, points
 from course.errors import CourseError
 
 MAX_NOTEBOOK = 20 * 1024 * 1024
@@ -37,12 +37,16 @@ class SubmissionError(CourseError):
 
 @dataclass(frozen=True)
 class Cell:
-    """One code cell to run, or (``exam`` set) the place where a part of an exam is sat."""
+    """One code cell to run, or (``exam`` set) the place where a part of an exam is sat.
+
+    ``key`` is the answer key of that part, if its hidden cell has one: for the examiner only.
+    """
 
     source: str
     grade_id: str = ""
     exam: str = ""
     part: str = ""
+    key: Mapping[str, Any] = field(default_factory=dict)
 
 
 Program = tuple[Cell, ...]
@@ -256,7 +260,7 @@ def program(notebook: NotebookNode) -> Program:
         name = grade_id(cell)
         if is_locked(cell) and name in ours:
             exam, part = ours[name]
-            cells.append(Cell("", name, exam, part))
+            cells.append(Cell("", name, exam, part, keys.of_cell(cell.source)))
         else:
             cells.append(Cell(cell.source, name))
     return tuple(cells)

@@ -13,8 +13,8 @@ from nbformat import NotebookNode
 from autograder import corpus, submission
 from autograder.build import build
 from autograder.corpus import Case
+from autograder.corpus.trials import one_notebook
 from autograder.release import release
-from course.content import content_root, copy_authoring
 
 SUBMISSIONS = Path(__file__).parents[1] / "submissions"
 ASSIGNMENT, NOTEBOOK = "ch05", "qos-design"
@@ -50,7 +50,7 @@ class Course:
 
 @pytest.fixture(scope="session")
 def released_course(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = copy_authoring(content_root(), tmp_path_factory.mktemp("course"))
+    root = one_notebook(tmp_path_factory.mktemp("course"), "qos")
     build(root)
     release(root, ASSIGNMENT)
     return root

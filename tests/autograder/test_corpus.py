@@ -2,48 +2,106 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 from autograder import corpus, exams
-from autograder.corpus import Case, CorpusError
+from autograder.corpus import Case, CorpusError, tables, trials
+from autograder.corpus.trials import Notebooks
 
-from .conftest import SUBMISSIONS, Course
+from .conftest import SUBMISSIONS
 
-CASES = corpus.load(SUBMISSIONS, "qos")
+CASES = {exam: corpus.load(SUBMISSIONS, exam) for exam in exams.names()}
+EXAMS = pytest.mark.parametrize("exam", exams.names())
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
-def test_the_case_gets_its_verdict(case: Case, released_course: Path) -> None:
-    course = Course(released_course)
-    (trial,) = corpus.run([case], course.source, course.released, jobs=1)
+@cache
+def notebooks(exam: str) -> Notebooks:
+    return trials.notebooks(exam)
+
+
+@pytest.mark.parametrize(
+    "case",
+    [case for cases in CASES.values() for case in cases],
+    ids=lambda case: f"{case.exam}-{case.name}",
+)
+def test_the_case_gets_its_verdict(case: Case) -> None:
+    (trial,) = corpus.run([case], *notebooks(case.exam), jobs=1)
     assert trial.difference == "", trial.outcome.verdicts
 
 
-def test_a_check_that_no_mutant_needs_is_not_a_check() -> None:
-    killers = {name for case in CASES for name in case.fails or ()}
-    assert killers == set(exams.load("qos").checks)
+@EXAMS
+def test_a_check_that_no_mutant_needs_is_not_a_check(exam: str) -> None:
+    assert tables.without_mutant(exam, CASES[exam]) == []
 
 
-def test_every_mutant_is_killed_and_designs_differ() -> None:
-    for case in CASES:
-        assert (case.fails == frozenset()) == case.name.startswith("right-")
-    assert sum(case.name.startswith("right-") for case in CASES) >= 5
+@EXAMS
+def test_every_mutant_is_killed_and_designs_differ(exam: str) -> None:
+    own = CASES[exam]
+    for case in own:
+        assert (not case.fails) == case.name.startswith("right-"), case.name
+        assert case.must_fail <= set(exams.load(exam).checks), case.name
+    assert sum(not case.fails for case in own) >= 6
+    assert sum(bool(case.fails) for case in own) >= 15
 
 
-def test_a_difference_is_reported(released_course: Path, cases: dict[str, Case]) -> None:
-    course = Course(released_course)
-    right = cases["right-chapter"]
-    claimed = Case("qos", "claimed", "t", frozenset({"imu_burst"}), right.body)
-    (trial,) = corpus.run([claimed], course.source, course.released, jobs=1)
-    assert trial.difference == "passed but must fail: imu_burst"
+def test_the_table_of_checks_and_mutants_is_in_step() -> None:
+    assert (SUBMISSIONS / "README.md").read_text(encoding="utf-8") == tables.matrix(CASES)
 
 
-def test_a_corpus_without_a_header_is_named(tmp_path: Path) -> None:
+def test_a_difference_is_reported() -> None:
+    right = next(case for case in CASES["qos"] if case.name == "right-chapter")
+    claimed = Case("qos", "claimed", "t", frozenset({"imu_burst"}), stub=right.stub)
+    (trial,) = corpus.run([claimed], *notebooks("qos"), jobs=1)
+    assert trial.difference == "did not fail but must: imu_burst"
+
+
+def test_a_message_without_its_fragment_is_reported() -> None:
+    wrong = next(case for case in CASES["qos"] if case.name == "wrong-imu-single")
+    says = {"imu_burst": "the moon"}
+    case = Case("qos", "claimed", "t", wrong.fails, says=says, stub=wrong.stub)
+    (trial,) = corpus.run([case], *notebooks("qos"), jobs=1)
+    assert trial.difference.startswith("imu_burst does not say 'the moon': ")
+
+
+def test_a_flip_between_repeats_is_found() -> None:
+    case = CASES["qos"][0]
+    (first,) = corpus.run([case], *notebooks("qos"), jobs=1)
+    second = trials.Trial(case, first.outcome, "")
+    assert tables.all_flips([first, second]) == []
+    second.outcome.verdicts.clear()
+    third = trials.Trial(case, corpus.run([case], *notebooks("qos"), jobs=1)[0].outcome, "")
+    assert tables.all_flips([second, third]) != []
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("case.py", "x = 1\n", r"case\.py must begin with"),
+        ("mutants.toml", "[broken\n", r"mutants\.toml is not TOML"),
+        ("mutants.toml", "[mutant]\ntitle = 'x'\n", r"mutant 'mutant' needs title, fails"),
+    ],
+)
+def test_a_corpus_that_is_not_well_formed_is_named(
+    tmp_path: Path, name: str, text: str, message: str
+) -> None:
     (tmp_path / "qos").mkdir()
-    (tmp_path / "qos" / "case.py").write_text("x = 1\n")
-    with pytest.raises(CorpusError, match=r"case\.py must begin with"):
+    (tmp_path / "qos" / "right.py").write_text("# title: t\n# fails: nothing\nx = 1\n")
+    (tmp_path / "qos" / name).write_text(text)
+    with pytest.raises(CorpusError, match=message):
         corpus.load(tmp_path, "qos")
+
+
+def test_a_missing_corpus_is_named(tmp_path: Path) -> None:
     with pytest.raises(CorpusError, match="no corpus for 'other'"):
         corpus.load(tmp_path, "other")
+
+
+def test_a_splice_that_does_not_fit_the_exemplar_is_refused() -> None:
+    source, released = notebooks("qos")
+    splices = {"qos-solution": (("not there", "new"),)}
+    case = Case("qos", "mutant", "t", frozenset({"imu_burst"}), splices=splices)
+    with pytest.raises(CorpusError, match="'not there' stands 0 times in the exemplar"):
+        case.submission(source, released)

@@ -80,7 +80,7 @@ def test_a_subject_that_ends_fails_the_check(exam: Exam[list[str]]) -> None:
         """It stays."""
         raise SubjectGone("It left.")
 
-    points.table()["toy"]["late"] = {"gone": 1.0}
+    points.table()["toy"].parts["late"] = {"gone": 1.0}
     (check,) = exam.sit("late", BENCH).checks
     assert (check.status, check.actual) == ("failed", "It left.")
 
@@ -121,8 +121,7 @@ def test_an_unknown_exam_names_those_there_are() -> None:
 @pytest.mark.parametrize("name", exams.names())
 def test_every_exam_and_the_table_of_points_agree(name: str) -> None:
     exam = exams.load(name)
-    parts = [part for part in points.table()[name] if part != "manual"]
-    worth = [check for part in parts for check in exam.part(part)]
+    worth = [check for part in points.table()[name].parts for check in exam.part(part)]
     assert sorted(worth) == sorted(exam.checks), "each check has points in exactly one part"
     for check in exam.checks.values():
         assert check.rationale, f"{check.name} must say why it matters on a robot"

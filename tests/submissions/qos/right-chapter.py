@@ -1,5 +1,6 @@
 # title: The chapter's own answer
 # fails: nothing
+# in: the stub
 
 camera_qos = QoSProfile(
     reliability=ReliabilityPolicy.BEST_EFFORT,

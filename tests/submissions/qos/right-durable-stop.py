@@ -1,5 +1,6 @@
 # title: A stop that late joiners hear, too
 # fails: nothing
+# in: the stub
 
 camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 lidar_qos = QoSProfile(depth=1)

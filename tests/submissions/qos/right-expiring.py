@@ -1,5 +1,6 @@
 # title: Queues without an end whose readings expire instead
 # fails: nothing
+# in: the stub
 
 from rclpy.duration import Duration
 

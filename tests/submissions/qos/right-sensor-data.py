@@ -1,5 +1,6 @@
 # title: Field practice: the sensor data preset, a deep queue for the stop
 # fails: nothing
+# in: the stub
 
 camera_qos = qos_profile_sensor_data
 lidar_qos = qos_profile_sensor_data

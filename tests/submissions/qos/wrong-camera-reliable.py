@@ -1,5 +1,6 @@
 # title: A camera that re-sends lost frames
 # fails: camera_best_effort
+# in: the stub
 
 camera_qos = QoSProfile(depth=5)
 lidar_qos = QoSProfile(depth=1)

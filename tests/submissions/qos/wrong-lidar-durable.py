@@ -1,5 +1,6 @@
 # title: Old scans for whoever starts late
 # fails: late_joiner
+# in: the stub
 
 camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 lidar_qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

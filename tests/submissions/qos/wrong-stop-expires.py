@@ -1,5 +1,6 @@
 # title: Stop events that expire while they wait
 # fails: stop_complete
+# in: the stub
 
 from rclpy.duration import Duration
 

@@ -1,5 +1,6 @@
 # title: Stop events that are forgotten after five seconds
 # fails: stop_complete
+# in: the stub
 
 from rclpy.duration import Duration
 

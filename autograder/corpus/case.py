@@ -1,0 +1,141 @@
+"""One case of the corpus: what a student handed in, and the verdict that it must get."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import nbformat
+from nbformat import NotebookNode
+
+from autograder import exams, submission
+from autograder.cells import without_markers
+from autograder.runner import CELL_TIMEOUT, Outcome
+from autograder.verdict import CheckResult
+from course.errors import CourseError
+
+STUB_MARK = "# Your work goes here."
+"""What nbgrader leaves in place of a solution (``ClearSolutions.code_stub``)."""
+
+EVERYTHING = "everything"
+ROOTS = "the first"
+
+Splice = tuple[str, str]
+
+
+class CorpusError(CourseError):
+    """A case of the corpus that is not well formed, or a corpus that is not there."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """One submission and the checks that it must fail.
+
+    Attributes:
+        exam: the exam that it is a submission of.
+        name: unique within the exam; begins with "right-", "wrong-" or "broken-".
+        title: one line that says what is special about it.
+        fails: names of checks; `EVERYTHING` for one that cannot be examined at all, `ROOTS` for
+            one that fails every check that depends on no other.
+        says: {check: a fragment that its result must hold}.
+        cells: {grade id: text that replaces the cell's}; the rest stays as it is released.
+        stub: {grade id: text that takes the place of the stub's mark}.
+        splices: {grade id: (old, new) texts}, applied to the exemplar's cell.
+        blank: empty the other cells in which a solution is asked for.
+        cell_timeout: seconds that one of its cells may run.
+    """
+
+    exam: str
+    name: str
+    title: str
+    fails: frozenset[str]
+    says: Mapping[str, str] = field(default_factory=dict)
+    cells: Mapping[str, str] = field(default_factory=dict)
+    stub: Mapping[str, str] = field(default_factory=dict)
+    splices: Mapping[str, tuple[Splice, ...]] = field(default_factory=dict)
+    blank: bool = False
+    cell_timeout: float = CELL_TIMEOUT
+
+    @property
+    def must_fail(self) -> frozenset[str]:
+        """The names of the checks that must fail; none for `EVERYTHING`, which are unexamined."""
+        if self.fails == {EVERYTHING}:
+            return frozenset()
+        if self.fails == {ROOTS}:
+            checks = exams.load(self.exam).checks.values()
+            return frozenset(check.name for check in checks if not check.needs)
+        return self.fails
+
+    @property
+    def fails_in_words(self) -> str:
+        """What must fail, as a phrase for a table."""
+        return ", ".join(sorted(self.fails)) or "nothing"
+
+    def submission(self, source: NotebookNode, released: NotebookNode) -> NotebookNode:
+        """Return the released notebook as this student hands it in.
+
+        Raises:
+            CorpusError: a splice does not fit the exemplar, or there is no such cell.
+        """
+        exemplar = {submission.grade_id(cell): cell.source for cell in source.cells}
+        for grade_id in (*self.cells, *self.stub, *self.splices):
+            if grade_id not in exemplar:
+                raise self._wrong(f"there is no cell '{grade_id}' in the notebook")
+        notebook: NotebookNode = nbformat.from_dict(dict(released))  # type: ignore[no-untyped-call]
+        notebook.cells = [nbformat.from_dict(dict(cell)) for cell in released.cells]  # type: ignore[no-untyped-call]
+        for cell in notebook.cells:
+            name, data = submission.grade_id(cell), submission.metadata(cell)
+            if name in self.splices:
+                cell.source = self._spliced(without_markers(exemplar[name]), self.splices[name])
+            elif name in self.cells:
+                cell.source = self.cells[name]
+            elif name in self.stub:
+                cell.source = cell.source.replace(STUB_MARK, self.stub[name])
+            elif cell.cell_type == "code" and data.get("solution"):
+                if self.blank:
+                    cell.source = ""
+                elif self.splices:
+                    cell.source = without_markers(exemplar[name])
+            elif cell.cell_type == "markdown" and data.get("grade") and data.get("solution"):
+                cell.source = f"My idea: {self.title[0].lower()}{self.title[1:]}."
+        return notebook
+
+    def _spliced(self, text: str, splices: tuple[Splice, ...]) -> str:
+        for old, new in splices:
+            if text.count(old) != 1:
+                raise self._wrong(
+                    f"{old!r} stands {text.count(old)} times in the exemplar, not once"
+                )
+            text = text.replace(old, new)
+        return text
+
+    def _wrong(self, what: str) -> CorpusError:
+        return CorpusError(f"Corpus case {self.exam}/{self.name}: {what}.")
+
+    def verdict_of(self, outcome: Outcome) -> str:
+        """Return an empty string if ``outcome`` is what must come out, else what is different."""
+        checks = {check.name: check for v in outcome.verdicts.values() for check in v.checks}
+        if self.fails == {EVERYTHING}:
+            wrong = [name for name, check in checks.items() if check.status != "not_checked"]
+            return f"checked nevertheless: {', '.join(wrong)}" if wrong or not checks else ""
+        failed = {name for name, check in checks.items() if check.status == "failed"}
+        spoilt = {name for name, check in checks.items() if check.status == "grader_error"}
+        passed = {name for name, check in checks.items() if check.passed}
+        differences = [
+            f"{what} {', '.join(sorted(names))}"
+            for what, names in (
+                ("did not fail but must:", self.must_fail - failed),
+                ("failed but must not:", failed - self.must_fail),
+                ("must pass:", set() if self.fails else set(checks) - passed - failed),
+                ("grader error in:", spoilt),
+            )
+            if names
+        ]
+        for name, fragment in self.says.items():
+            if name in checks and fragment not in _words(checks[name]):
+                differences.append(f"{name} does not say {fragment!r}: {_words(checks[name])!r}")
+        return "; ".join(differences)
+
+
+def _words(result: CheckResult) -> str:
+    return f"{result.expected} {result.actual}"

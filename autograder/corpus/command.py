@@ -1,0 +1,71 @@
+"""What ``autograder corpus`` does: run the corpus of one exam or of all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from autograder import exams
+from autograder.corpus import files, trials
+from autograder.corpus.case import Case, CorpusError
+from autograder.corpus.trials import Trial
+from course.content import corpus_root
+
+
+def cases(exam: str = "") -> dict[str, list[Case]]:
+    """Return the cases of one exam or (empty) of all, by exam.
+
+    Raises:
+        ExamError: there is no such exam; names the ones there are.
+        CorpusError: a corpus is missing or not well formed.
+    """
+    chosen = [exams.load(exam).name] if exam else exams.names()
+    return {name: files.load(corpus_root(), name) for name in chosen}
+
+
+def run(
+    exam: str = "",
+    *,
+    only: Sequence[str] = (),
+    repeat: int = 1,
+    jobs: int = 2,
+    load: int = 0,
+    say: Callable[[str], None] = lambda _line: None,
+) -> list[Trial]:
+    """Run the corpus of ``exam`` (of all exams if it is empty).
+
+    Args:
+        exam: the exam's name.
+        only: names of cases, if not all.
+        repeat: how often each case is run.
+        jobs: how many run at a time.
+        load: how many busy loops run beside them.
+        say: is told a line a run.
+
+    Raises:
+        ExamError: an unknown exam.
+        CorpusError: no case of that name; or a corpus that is not well formed.
+    """
+    done = []
+    with trials.busy_loops(load):
+        for name, own in cases(exam).items():
+            chosen = [case for case in own if not only or case.name in only]
+            if exam and not chosen:
+                raise CorpusError(
+                    f"The corpus of '{name}' has no case {', '.join(only)}: there are "
+                    f"{', '.join(case.name for case in own)}."
+                )
+            if chosen:
+                source, released = trials.notebooks(name)
+                done += trials.run(
+                    chosen, source, released, jobs=jobs, repeat=repeat,
+                    done=lambda trial: say(_line(trial)),
+                )  # fmt: skip
+    return done
+
+
+def _line(trial: Trial) -> str:
+    case = trial.case
+    return (
+        f"  {case.exam}/{case.name}: {trial.difference or 'as expected'} "
+        f"({trial.outcome.seconds:.1f} s)"
+    )

@@ -1,0 +1,117 @@
+"""Reading the corpus: files of whole solutions, and a table of splices.
+
+``<exam>/<name>.py`` is what a student wrote, under a header of comments:
+
+    # title: one line that says what is special about it
+    # fails: the checks that must fail, by name; "nothing" for a correct design, "the first" for
+    #        every check that needs no other, "everything" for what cannot be examined at all
+    # says: check: a fragment that its result must hold        (any number of them)
+    # in: the stub                                             (the text replaces the stub's mark)
+    # seconds: 5                                               (what one of its cells may take)
+
+The text is that of the cell ``<exam>-solution``. A line ``# %% <grade id>`` begins that of another.
+
+``<exam>/mutants.toml`` has one table a mutant: ``title``, ``fails`` (a list), ``says`` (a table),
+and ``splices``: a list of {cell, old, new}, applied to the exemplar's cells, so that mutants follow
+the exemplar. ``cell`` is ``<exam>-solution`` if it is left out.
+
+``every/<name>.py`` are cases for every exam: their text replaces the solution cell, and the other
+solution cells are emptied.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from autograder.corpus.case import EVERYTHING, ROOTS, Case, CorpusError, Splice
+from autograder.runner import CELL_TIMEOUT
+
+EVERY = "every"
+MUTANTS = "mutants.toml"
+
+_HEADER = re.compile(r"(?:# (?:title|fails|says|in|seconds): .*\n)+")
+_LINE = re.compile(r"# (\w+): (.*)\n")
+_CELL = re.compile(r"^# %% ([\w-]+)\n", re.MULTILINE)
+
+
+def load(folder: Path, exam: str) -> list[Case]:
+    """Return the cases of an exam, sorted by name.
+
+    Raises:
+        CorpusError: the folder is missing, or a case is not well formed.
+    """
+    own = sorted((folder / exam).glob("*.py"))
+    if not own:
+        raise CorpusError(f"There is no corpus for '{exam}' in {folder}.")
+    cases = [_case(exam, file) for file in own]
+    cases += [_case(exam, file, every=True) for file in sorted((folder / EVERY).glob("*.py"))]
+    cases += _mutants(exam, folder / exam / MUTANTS)
+    names = [case.name for case in cases]
+    for name in names:
+        if names.count(name) > 1:
+            raise CorpusError(f"The corpus of '{exam}' has two cases called '{name}'.")
+    return sorted(cases, key=lambda case: case.name)
+
+
+def _case(exam: str, file: Path, *, every: bool = False) -> Case:
+    text = file.read_text(encoding="utf-8")
+    header = _HEADER.match(text)
+    fields: dict[str, list[str]] = {}
+    for key, value in _LINE.findall(header[0] if header else ""):
+        fields.setdefault(key, []).append(value.strip())
+    if header is None or "title" not in fields or "fails" not in fields:
+        raise CorpusError(f"{file} must begin with the lines '# title: …' and '# fails: …'.")
+    says = [line.partition(": ") for line in fields.get("says", [])]
+    texts = _texts(exam, text[header.end() :])
+    in_stub = "in" in fields
+    return Case(
+        exam, file.stem, fields["title"][0], _fails(fields["fails"][0]),
+        says={check: fragment for check, _, fragment in says},
+        cells={} if in_stub else texts, stub=texts if in_stub else {}, blank=every,
+        cell_timeout=float(fields.get("seconds", [CELL_TIMEOUT])[0]),
+    )  # fmt: skip
+
+
+def _fails(text: str) -> frozenset[str]:
+    if text in (EVERYTHING, ROOTS):
+        return frozenset({text})
+    return frozenset() if text == "nothing" else frozenset(re.findall(r"\w+", text))
+
+
+def _texts(exam: str, body: str) -> dict[str, str]:
+    first, *rest = _CELL.split(body)
+    texts = {f"{exam}-solution": first.strip() + "\n"} if first.strip() or not rest else {}
+    for grade_id, text in zip(rest[::2], rest[1::2], strict=True):
+        texts[grade_id] = text.strip() + "\n"
+    return texts
+
+
+def _mutants(exam: str, file: Path) -> Iterator[Case]:
+    if not file.exists():
+        return
+    try:
+        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+    except tomllib.TOMLDecodeError as error:
+        raise CorpusError(f"{file} is not TOML: {error}.") from error
+    for name, data in tables.items():
+        try:
+            yield Case(
+                exam, name, data["title"], frozenset(data["fails"]), says=data.get("says", {}),
+                splices=_splices(exam, data["splices"]),
+            )  # fmt: skip
+        except (KeyError, TypeError, AttributeError) as error:
+            raise CorpusError(
+                f"{file}: mutant '{name}' needs title, fails and splices of old and new ({error})."
+            ) from error
+
+
+def _splices(exam: str, data: list[dict[str, Any]]) -> dict[str, tuple[Splice, ...]]:
+    splices: dict[str, tuple[Splice, ...]] = {}
+    for splice in data:
+        cell = splice.get("cell", f"{exam}-solution")
+        splices[cell] = (*splices.get(cell, ()), (splice["old"], splice["new"]))
+    return splices

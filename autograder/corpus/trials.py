@@ -1,0 +1,103 @@
+"""Running cases of the corpus, as often as asked and beside as much other work as asked."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from nbformat import NotebookNode
+
+from autograder import exams, points, runner, submission
+from autograder.build import build
+from autograder.corpus.case import Case
+from autograder.release import release
+from autograder.runner import Outcome
+from course.content import content_root, copy_authoring
+
+Notebooks = tuple[NotebookNode, NotebookNode]
+"""The source and the released version of one notebook."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run of a case: its outcome, and how that differs from what must come out."""
+
+    case: Case
+    outcome: Outcome
+    difference: str
+
+    @property
+    def statuses(self) -> dict[str, str]:
+        """{check: status} over all parts."""
+        verdicts = self.outcome.verdicts.values()
+        return {check.name: check.status for verdict in verdicts for check in verdict.checks}
+
+
+def notebooks(exam: str) -> Notebooks:
+    """Build and release the notebook of one exam by itself; return both versions."""
+    entry = points.table()[exams.load(exam).name]
+    with tempfile.TemporaryDirectory(prefix="ros2-course-corpus-") as folder:
+        root = one_notebook(Path(folder), exam)
+        build(root)
+        release(root, entry.assignment)
+        source, released = (
+            submission.read(root / step / entry.assignment / f"{entry.notebook}.ipynb")
+            for step in ("source", "release")
+        )
+    return source, released
+
+
+def one_notebook(folder: Path, exam: str) -> Path:
+    """Make ``folder`` a course root with the text source of one exam's notebook; return it."""
+    entry = points.table()[exam]
+    root = copy_authoring(content_root(), folder)
+    for path in (root / "authoring" / "assignments").glob("*/*"):
+        if (path.parent.name, path.stem) != (entry.assignment, entry.notebook):
+            path.unlink()
+    return root
+
+
+def run(
+    cases: list[Case],
+    source: NotebookNode,
+    released: NotebookNode,
+    *,
+    jobs: int = 2,
+    repeat: int = 1,
+    done: Callable[[Trial], None] = lambda _trial: None,
+) -> list[Trial]:
+    """Run every case ``repeat`` times, ``jobs`` at a time, and compare."""
+
+    def one(case: Case) -> Trial:
+        handed_in = case.submission(source, released)
+        notebook, _ = submission.restore(handed_in, source, released)
+        program = submission.program(notebook)
+        outcome = runner.run(program, cell_timeout=case.cell_timeout)
+        trial = Trial(case, outcome, case.verdict_of(outcome))
+        done(trial)
+        return trial
+
+    def rounds() -> Iterator[Case]:
+        for _ in range(repeat):
+            yield from cases
+
+    with ThreadPoolExecutor(max_workers=jobs) as pool:
+        return list(pool.map(one, rounds()))
+
+
+@contextmanager
+def busy_loops(number: int) -> Iterator[None]:
+    """Keep ``number`` processes computing for as long as the block lasts."""
+    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(number)]
+    try:
+        yield
+    finally:
+        for loop in loops:
+            loop.kill()
+            loop.wait()

@@ -1,0 +1,3 @@
+# title: An empty cell
+# fails: the first
+

@@ -1,0 +1,6 @@
+# title: A cell that never ends
+# fails: everything
+# seconds: 6
+
+while True:
+    pass
