@@ -6,11 +6,14 @@ import html
 import weakref
 from typing import Any
 
+from rclpy.exceptions import NotInitializedException
+
 from course.interfaces import magic
 from course.runtime import closing
 from course.runtime.callback_errors import CallbackError
 from course.runtime.session import Session
 
+_LONG = 3.0  # s that a callback may hold all others up before the learner is told
 _INIT_TWICE = "Context.init() must only be called once"
 
 
@@ -54,6 +57,7 @@ class _Reported:
     def __init__(self) -> None:
         self._errors: weakref.WeakKeyDictionary[Any, dict[int, int]] = weakref.WeakKeyDictionary()
         self._notices: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
+        self._blocked: weakref.WeakKeyDictionary[Any, set[Any]] = weakref.WeakKeyDictionary()
 
     def news(self, session: Session) -> list[News]:
         seen = self._errors.setdefault(session, {})
@@ -62,6 +66,13 @@ class _Reported:
             if error.count > seen.get(index, 0):
                 news.append(_about(error, again=index in seen))
                 seen[index] = error.count
+        known = self._blocked.setdefault(session, set())
+        for blocked in session.blocked_callbacks():
+            # A goal may well take its time in one of several threads: only what is in the way.
+            serious = blocked.reason or (blocked.holds_up and blocked.seconds > _LONG)
+            if serious and blocked.key not in known:
+                known.add(blocked.key)
+                news.append(News(str(blocked)))
         told = self._notices.get(session, 0)
         news += [News(notice) for notice in session.notices[told:]]
         self._notices[session] = len(session.notices)
@@ -72,9 +83,12 @@ _reported = _Reported()
 
 
 def _about(error: CallbackError, *, again: bool) -> News:
+    sentence = str(error)
+    if not sentence.endswith((".", "!", "?")):
+        sentence += "."  # what was raised may be a sentence already
     if again:
-        return News(f"Again: {error}.")
-    return News(f"{error}. The node goes on spinning.", error.traceback)
+        return News(f"Again: {sentence}")
+    return News(f"{sentence} The node goes on spinning.", error.traceback)
 
 
 def _report(result: Any) -> None:
@@ -86,6 +100,14 @@ def _report(result: Any) -> None:
             News(
                 "The course's session has initialised rclpy for this notebook already: leave "
                 "rclpy.init() out, or call course.close() before it."
+            )
+        )
+    if isinstance(error, NotInitializedException):
+        display(  # type: ignore[no-untyped-call]
+            News(
+                "This node was made where rclpy was not initialised: pass its class to the "
+                "session, without parentheses, as in course.run(Talker), or call course.session() "
+                "first."
             )
         )
     for session in closing.known():

@@ -39,14 +39,15 @@ def _domain(environment: Environment) -> Iterator[Finding]:
     name, text = "ROS_DOMAIN_ID", environment.get("ROS_DOMAIN_ID", "")
     if not text:
         return
+    # A session leases a domain of its own, whatever stands here: only other programs follow it.
+    note = "The course does not use it, but other ROS programs in this shell will not start well."
     mend = f"Run `unset {name}`, or set it to a number from {MIN_DOMAIN} to {MAX_DOMAIN}."
     if not text.strip().isdecimal():
-        yield problem(name, f"{text!r} is not a whole number, and rclpy refuses it.", mend)
+        yield warning(name, f"{text!r} is not a whole number. {note}", mend)
     elif int(text) >= _ENDS_THE_PROCESS:
-        yield problem(name, f"{text} is too large: DDS ends the process.", mend)
+        yield warning(name, f"{text} is too large. {note}", mend)
     elif int(text) > MAX_DOMAIN:
         yield warning(name, f"{text} can collide with other programs' ports on Linux.", mend)
-    # A sound domain id changes nothing here: a session leases a domain of its own.
 
 
 def _middleware(environment: Environment) -> Iterator[Finding]:

@@ -11,44 +11,26 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import errno
-import fcntl
 import functools
 import hashlib
 import json
 import os
-import secrets
 import shutil
 import sys
 import sysconfig
 import tempfile
-import threading
-import time
-from collections.abc import Iterator
 from pathlib import Path
 
 from course.interfaces import installed
 from course.interfaces.build import Unit, build
 from course.interfaces.errors import BuildError
+from course.interfaces.locks import locked
+from course.interfaces.pruning import MANIFEST, lock_of, prune, scratch_name, touch
 
 VARIABLE = "COURSE_INTERFACES_CACHE"
-MANIFEST = "manifest.json"
-LOCK_DEADLINE = 120.0  # seconds to wait for another process's build before building privately
 RECIPE = ("generate.py", "build.py", "toolchain.py", "dispatch.c")
 
-_locks: set[int] = set()  # descriptors of locks held now
 _private: list[Path] = []  # the folder used instead of a cache that cannot be written
-
-
-def _forget_locks() -> None:
-    # A forked child shares the lock: without this it would hold it for as long as it lives.
-    for descriptor in _locks:
-        with contextlib.suppress(OSError):
-            os.close(descriptor)
-    _locks.clear()
-
-
-os.register_at_fork(after_in_child=_forget_locks)
 
 
 def root() -> Path:
@@ -94,7 +76,10 @@ def folder_of(unit: Unit, base: Path) -> Path:
 def find(unit: Unit) -> Path | None:
     """Return the folder of ``unit`` if it is built and whole, else None."""
     folders = [folder_of(unit, base) for base in (root(), *_private)]
-    return next((folder for folder in folders if is_whole(folder)), None)
+    found = next((folder for folder in folders if is_whole(folder)), None)
+    if found is not None:
+        touch(found)
+    return found
 
 
 def is_whole(folder: Path) -> bool:
@@ -110,6 +95,18 @@ def is_whole(folder: Path) -> bool:
 def checksum(file: Path) -> str:
     """Return the SHA-256 of ``file``."""
     return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def defined_before(package: str) -> list[str]:
+    """Return the interfaces of ``package`` that were built here once, for instance by a notebook.
+
+    Cheap for a package of which there is nothing: every failing import in the process asks.
+    """
+    if not any(root().glob(f"*/{package}")):
+        return []
+    classes = (root() / environment_key() / package).glob("[!.]*-*/python/*/_*.py")
+    found = {(file.parent.name, file.parents[2].name.rpartition("-")[0]) for file in classes}
+    return [f"{package}/{kind}/{name}" for kind, name in sorted(found)]
 
 
 def ensure(unit: Unit, *, rebuild: bool = False) -> Path:
@@ -157,7 +154,7 @@ def build_in(base: Path, unit: Unit, *, rebuild: bool) -> Path:
     """
     folder = folder_of(unit, base)
     folder.parent.mkdir(parents=True, exist_ok=True)
-    with locked(folder.parent / f".{folder.name}.lock"):
+    with locked(lock_of(folder)):
         if not rebuild and is_whole(folder):
             return folder
         clear(folder)
@@ -169,12 +166,9 @@ def build_in(base: Path, unit: Unit, *, rebuild: bool) -> Path:
             temporary.rename(folder)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
+    with contextlib.suppress(OSError):  # what was asked for is there
+        prune(base)
     return folder
-
-
-def scratch_name(folder: Path) -> Path:
-    """Return a new name beside ``folder`` that no reader takes for a built unit."""
-    return folder.parent / f".building-{folder.name}-{secrets.token_hex(4)}"
 
 
 def clear(folder: Path) -> None:
@@ -194,27 +188,3 @@ def write_manifest(folder: Path) -> None:
     files = sorted(f for f in folder.rglob("*") if f.is_file())
     manifest = {f.relative_to(folder).as_posix(): checksum(f) for f in files}
     (folder / MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")
-
-
-@contextlib.contextmanager
-def locked(file: Path) -> Iterator[None]:
-    """Hold ``file`` locked; the kernel lets go of it if this process dies.
-
-    Raises ``TimeoutError`` (an ``OSError``) if another process holds it past the deadline.
-    """
-    descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
-    _locks.add(descriptor)
-    try:
-        deadline, pause = time.monotonic() + LOCK_DEADLINE, threading.Event()
-        while True:
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                break
-            except BlockingIOError:
-                if time.monotonic() > deadline:
-                    raise TimeoutError(errno.ETIMEDOUT, "another process keeps it locked") from None
-                pause.wait(0.05)
-        yield
-    finally:
-        _locks.discard(descriptor)
-        os.close(descriptor)

@@ -26,3 +26,7 @@ class CompilerMissingError(BuildError):
 
 class RestartNeededError(InterfaceError):
     """A definition changed while the old one is loaded; a process can hold only one of them."""
+
+
+class NotDefinedYetError(InterfaceError, ModuleNotFoundError):
+    """A package is imported whose ``%%interface`` cell has not run in this kernel."""

@@ -15,7 +15,7 @@ from types import ModuleType
 
 from course.interfaces import bundled, cache, packages, standins
 from course.interfaces.build import Unit
-from course.interfaces.errors import BuildError
+from course.interfaces.errors import BuildError, NotDefinedYetError
 
 
 class Finder(importlib.abc.MetaPathFinder):
@@ -29,6 +29,8 @@ class Finder(importlib.abc.MetaPathFinder):
             return packages.package_spec(fullname, BundledLoader())
         if packages.is_ours(fullname):  # importlib.reload asks again
             return packages.package_spec(fullname)
+        if fullname.isidentifier() and (names := cache.defined_before(fullname)):
+            return packages.package_spec(fullname, NotYetLoader(names))
         return None
 
 
@@ -45,6 +47,26 @@ class BundledLoader(packages.MadeHere):
             obtain(unit)
         except BuildError as error:
             standins.load(package, str(error))
+
+
+class NotYetLoader(packages.MadeHere):
+    """Stands for a learner's own package before its cells have run, after a restart above all.
+
+    What the cache holds is not imported by itself: the cell may say something else by now.
+    """
+
+    def __init__(self, names: list[str]) -> None:
+        """Stand for the package that defines ``names``."""
+        self.names = names
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Say what to do."""
+        cells = " and ".join(f"`%%interface {name}`" for name in self.names[:3])
+        one = len(self.names) == 1
+        raise NotDefinedYetError(
+            f"{module.__name__} is a package of your own, and this kernel does not know it yet: "
+            f"run the cell{'' if one else 's'} {cells} first, and then this one again."
+        )
 
 
 def obtain(unit: Unit) -> None:

@@ -15,12 +15,14 @@ from rclpy.qos import QoSProfile
 from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
 from course.errors import WaitTimeout
-from course.runtime.offers import full_topic, why_no_service
+from course.runtime import arguments
+from course.runtime.offers import full_service, full_topic, why_no_service
 from course.runtime.probe import Probe
 from course.runtime.settle import settle
 from course.runtime.waiting import Deadline, poll
 
 _FEEDBACK_DEPTH = 1000
+_SEND = "/_action/send_goal"
 
 
 class GoalState(IntEnum):
@@ -83,6 +85,7 @@ class GoalRun:
         Raises:
             WaitTimeout: no result within `timeout` seconds.
         """
+        timeout = arguments.seconds(timeout)
         if not poll(lambda: self.done, timeout, self._probe.pulse):
             raise WaitTimeout(
                 f"The goal on {self.name} has no result after {timeout:g} s; "
@@ -100,6 +103,7 @@ class GoalRun:
         Raises:
             WaitTimeout: the server did not answer within `timeout` seconds.
         """
+        timeout = arguments.seconds(timeout)
         if self._handle is None or not self.accepted:
             return False
         with self._probe.executor.held():  # as in Goals.send
@@ -180,13 +184,13 @@ class Goals:
             WaitTimeout: no server, or no answer, within `timeout` seconds.
         """
         probe, deadline = self._probe, Deadline(timeout)
+        service = full_service(probe.node, f"{arguments.text(name, 'The action', '/dock')}{_SEND}")
         action = self._actions.get((action_type, name))
         if action is None:
             action = self._actions[action_type, name] = _Action(probe, action_type, name)
         if not poll(action.is_ready, deadline.left, probe.pulse):
-            service = str(probe.node.resolve_service_name(f"{name}/_action/send_goal"))
             reason = why_no_service(probe.node, service, action_type.Impl.SendGoalService)
-            reason = reason.replace("/_action/send_goal", "")
+            reason = reason.replace(_SEND, "")
             raise WaitTimeout(f"The action {name} was not ready in {timeout:g} s. {reason}")
         run = GoalRun(probe, name, on_feedback)
         # rclpy registers the request after it has sent it: no answer may come in between.

@@ -9,12 +9,14 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
-from rclpy.context import Context
 from rclpy.qos import QoSProfile
 
 from course.errors import WaitTimeout
+from course.runtime import arguments
 from course.runtime.actions import GoalRun, Goals
+from course.runtime.blocked import BlockedCallback
 from course.runtime.hosting import Hosting
+from course.runtime.interruptible import SessionContext
 from course.runtime.jobs import current_job
 from course.runtime.probe import Probe
 from course.runtime.recorder import Recorder
@@ -26,7 +28,7 @@ T = TypeVar("T")
 class Asking(Hosting):
     """The part of a Session that waits and asks."""
 
-    def __init__(self, context: Context, threads: int) -> None:
+    def __init__(self, context: SessionContext, threads: int) -> None:
         """Ask in `context`; see `Hosting`."""
         super().__init__(context, threads)
         self._asking_lock = threading.Lock()
@@ -48,6 +50,8 @@ class Asking(Hosting):
         Raises:
             WaitTimeout: it was not true in time.
         """
+        arguments.function(condition, "The condition", "lambda: len(heard) > 3")
+        timeout = arguments.seconds(timeout)
         with self._explaining():
             value = poll(condition, timeout, self._pulse)
             if value is None:
@@ -73,8 +77,11 @@ class Asking(Hosting):
         Raises:
             WaitTimeout: none came in time; it says why, as far as the ROS graph knows.
         """
+        arguments.ros_type(msg_type, "message")
+        timeout = arguments.seconds(timeout)
         with self._explaining():
-            return self._probe.next_message(msg_type, topic, qos, timeout)
+            profile = arguments.qos(qos)
+            return self._probe.next_message(msg_type, topic, profile, timeout)
 
     def wait_for_service(self, srv_type: Any, name: str, timeout: float = 5.0) -> None:
         """Return when a server of `name` is ready.
@@ -82,6 +89,8 @@ class Asking(Hosting):
         Raises:
             WaitTimeout: none was in time; it says why.
         """
+        arguments.ros_type(srv_type, "service")
+        timeout = arguments.seconds(timeout)
         with self._explaining(), self._probe.client(srv_type, name, Deadline(timeout)):
             pass
 
@@ -91,6 +100,9 @@ class Asking(Hosting):
         Raises:
             WaitTimeout: no server, or no answer, within `timeout` seconds; it says which.
         """
+        arguments.ros_type(srv_type, "service")
+        arguments.instance(request, srv_type.Request, "request")
+        timeout = arguments.seconds(timeout)
         with self._explaining():
             return self._probe.call(srv_type, name, request, timeout)
 
@@ -115,6 +127,11 @@ class Asking(Hosting):
         Raises:
             WaitTimeout: no server, or no answer, in time.
         """
+        arguments.ros_type(action_type, "action")
+        arguments.instance(goal, action_type.Goal, "goal")
+        if on_feedback is not None:
+            arguments.function(on_feedback, "on_feedback", "print")
+        timeout = arguments.seconds(timeout)
         with self._explaining():
             probe = self._probe
             self._goals_made = self._goals_made or Goals(probe)
@@ -139,8 +156,12 @@ class Asking(Hosting):
         Raises:
             WaitTimeout: `msg_type` is None, and the topic does not appear.
         """
+        if msg_type is not None:
+            arguments.ros_type(msg_type, "message")
+        arguments.whole(limit, "limit", least=1, example=1000)
         with self._explaining():
-            return Recorder(self._probe, topic, msg_type, qos, limit, self._now_ns)
+            profile = arguments.qos(qos)
+            return Recorder(self._probe, topic, msg_type, profile, limit, self._now_ns)
 
     # Inside.
 
@@ -172,4 +193,15 @@ class Asking(Hosting):
                 hints.append(f"Meanwhile {latest}.")
             if (job := current_job()) is not None and job.home.threads == 1:
                 hints.append("A wait inside a callback holds up all others: run with threads=2.")
+            if moved := self._residents.moved():
+                hints.append(
+                    f"{', '.join(moved)}: in an executor of your own, where callbacks run only "
+                    "while it spins; executor.remove_node(node) gives a node back."
+                )
+            hints += [str(blocked) for blocked in self._held_up_by()[:2]]
             raise WaitTimeout(" ".join(hints)) from None
+
+    def _held_up_by(self) -> list[BlockedCallback]:
+        me = current_job()
+        mine = None if me is None else (id(me), me.since)
+        return [blocked for blocked in self.blocked_callbacks() if blocked.key != mine]

@@ -62,7 +62,7 @@ class ErrorLog:
         frames = _learner_frames(exception.__traceback__)
         error = CallbackError(
             node=node_name(job.node),
-            callback=_callback_name(job, frames),
+            callback=callback_name(job, frames),
             exception=exception,
             traceback="".join(
                 traceback.format_exception(type(exception), exception, frames)
@@ -81,7 +81,8 @@ class ErrorLog:
                 self.items.append(error)
 
 
-def _callback_name(job: Job, frames: TracebackType | None) -> str:
+def callback_name(job: Job, frames: TracebackType | None = None) -> str:
+    """Return the qualified name of the callback that `job` runs, or the outermost of `frames`."""
     callback: Any = getattr(job.callback, "func", job.callback)  # functools.partial
     name = getattr(callback, "__qualname__", None)
     if name is None and frames is not None:

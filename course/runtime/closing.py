@@ -74,7 +74,6 @@ def close(session: Closable, report: CloseReport, timeout: float) -> CloseReport
     report.leaked[:] = leaked
     if not _open and not leaked:
         streams.uninstall()
-        rcutils_tap.uninstall()
     report.duration = time.monotonic() - start
     return report
 

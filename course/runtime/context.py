@@ -23,6 +23,7 @@ from rclpy.context import Context
 
 from course.errors import SessionError
 from course.runtime import rcutils_tap
+from course.runtime.interruptible import SessionContext
 
 Discovery = Literal["LOCALHOST", "SUBNET", "SYSTEM_DEFAULT"]
 
@@ -33,7 +34,7 @@ _default_context_lock = threading.RLock()
 
 def open_context(
     domain_id: int, discovery: Discovery, peers: Sequence[str], *, sim_time: bool
-) -> Context:
+) -> SessionContext:
     """Return an initialised Context on `domain_id`.
 
     With `COURSE_DISCOVERY=inherit` in the environment, a discovery range that is set there is kept:
@@ -45,6 +46,8 @@ def open_context(
     if discovery not in get_args(Discovery):
         names = ", ".join(get_args(Discovery))
         raise SessionError(f"Unknown discovery range {discovery!r}: choose one of {names}.")
+    if isinstance(peers, str) or not all(isinstance(peer, str) for peer in peers):
+        raise SessionError(f'peers is a list of addresses, such as ["192.168.1.7"], not {peers!r}.')
     ensure_log_dir()
     arguments = ["--ros-args", "--disable-stdout-logs", "--disable-external-lib-logs"]
     # rclpy 7.1 leaves this service of a destroyed node on the graph, until the context ends.
@@ -52,7 +55,7 @@ def open_context(
     if sim_time:
         # The one way to reach a class that calls super().__init__("name") and nothing else.
         arguments += ["-p", "use_sim_time:=true"]
-    context = Context()
+    context = SessionContext()
     with _environment(_discovery_variables(discovery, peers)):
         ours = rclpy.context.g_logging_ref_count == 0  # then our arguments configure logging
         try:

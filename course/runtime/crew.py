@@ -26,13 +26,16 @@ class Crew:
         self._report = report
         self._pulse = pulse
         self._executors: dict[tuple[int, str], BackgroundExecutor] = {}
+        self._ended: list[BackgroundExecutor] = []
         self._lock = threading.Lock()
 
     def executor(self, threads: int, purpose: str = "") -> BackgroundExecutor:
         """Return the spinning executor of `threads` threads for `purpose`; make it at first use."""
         with self._lock:
             executor = self._executors.get((threads, purpose))
-            if executor is None:
+            if executor is None or executor.ended:  # a callback may shut its executor down
+                if executor is not None:
+                    self._ended.append(executor)
                 name = f"{self._label} {purpose}".rstrip()
                 executor = BackgroundExecutor(
                     self._context,
@@ -49,7 +52,7 @@ class Crew:
     def all(self) -> list[BackgroundExecutor]:
         """Return the executors made so far."""
         with self._lock:
-            return list(self._executors.values())
+            return [*self._ended, *self._executors.values()]
 
     def nodes(self) -> list[Node]:
         """Return the nodes of all executors."""
@@ -76,5 +79,6 @@ class Crew:
 
 
 def _busy_with(executor: BackgroundExecutor, thread: threading.Thread) -> str:
-    names = [node_name(j.node) for j in executor.running.copy() if j.thread_id == thread.ident]
+    jobs = executor.running.copy() | executor.given_up.copy()
+    names = [node_name(job.node) for job in jobs if job.thread_id == thread.ident]
     return f" (a callback of {names[0]})" if names else ""

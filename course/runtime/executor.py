@@ -5,9 +5,9 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import threading
 import time
-import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -22,15 +22,19 @@ from rclpy.executors import (
 )
 from rclpy.node import Node
 from rclpy.task import Future, Task
-from rclpy.waitable import Waitable
 
 from course.runtime import streams
 from course.runtime.gate import Gate
-from course.runtime.jobs import Job, Report, attributed, current_job, watched
-from course.runtime.waiting import Pulse
+from course.runtime.jobs import Job, Report
+from course.runtime.tasks import CreatedTasks, find_owner
+from course.runtime.teardown import is_alive
+from course.runtime.threads import Threads
+from course.runtime.waiting import Pulse, poll
 from course.runtime.workers import Workers, sleeps
 
-_WAY_OUT = 5.0  # s; a woken thread needs microseconds to end, unless the machine is very busy
+
+def _never() -> bool:
+    return False
 
 
 class BackgroundExecutor(Executor):
@@ -38,9 +42,12 @@ class BackgroundExecutor(Executor):
 
     It is an executor as rclpy documents one: it overrides public methods only. What it adds:
     a raising callback is reported and spinning goes on; `held()` keeps it from waiting on its nodes
-    while they are removed or destroyed, which rclpy answers with InvalidHandle otherwise.
+    while they are removed or destroyed, which rclpy answers with InvalidHandle otherwise;
+    `give_up` gets it going again when a callback never returns.
 
-    All its threads are daemons: a callback that never returns must not keep a process alive.
+    Attributes:
+        running: the callbacks that run, or wait for a free worker.
+        given_up: those that ran too long, in threads that have been replaced.
     """
 
     def __init__(
@@ -60,49 +67,45 @@ class BackgroundExecutor(Executor):
         super().__init__(context=context)
         self.threads = threads
         self.session_key = session_key
-        self.running: set[Job] = set()
-        self._scheduled: weakref.WeakSet[Task] = weakref.WeakSet()
         self.report = report
-        self._pulse = pulse
-        self._gate = Gate(self.wake)
-        self._interrupted = self._gate.new_interrupt()
+        self.running: set[Job] = set()
+        self.given_up: set[Job] = set()
+        self.pulse = pulse
+        self.gate = Gate(self.wake)
+        self.finished = 0  # callbacks; told apart only from what it was
+        self._created = CreatedTasks()
+        self._interrupted = self.gate.new_interrupt()
         self._round = _fresh_false()
         self._workers = Workers(threads, self._run, name) if threads > 1 else None
-        self._threads = [threading.Thread(target=self._loop, name=f"{name} spin", daemon=True)]
-        if self._workers is not None:
-            self._threads += self._workers.threads
+        self._threads = Threads(self._loop, self._workers, name)
 
     def start(self) -> None:
         """Start spinning in the background."""
-        for thread in self._threads:
-            thread.start()
+        self._threads.start()
 
     def request_stop(self) -> None:
         """Let every thread end after the callback that it runs; do not wait for it."""
-        self._gate.stop()
+        self.gate.stop()
         if self._workers is not None:
             self._workers.stop()
 
     def join(self, deadline: float) -> list[threading.Thread]:
         """Wait for the threads to end; return those that run a callback past `deadline`.
 
-        Args:
-            deadline: as of time.monotonic(), s. A thread outside callbacks is on its way out, and
-                is waited for in any case: one that is still inside rclpy when the interpreter ends
-                would abort the process.
+        See `Threads.join`. A thread that was given up is not waited for.
         """
-        for thread in self._threads:
-            thread.join(max(0.0, deadline - time.monotonic()))
-        busy = {job.thread_id for job in self.running.copy()}
-        for thread in self._threads:
-            if thread.ident not in busy:
-                thread.join(_WAY_OUT)
+        left = self._threads.join(deadline, self.running, self.given_up)
         self._drop_what_never_began()
-        return [thread for thread in self._threads if thread.is_alive()]
+        return left
 
     def owns(self, thread: threading.Thread) -> bool:
         """Return whether `thread` is one of this executor's own."""
-        return thread in self._threads
+        return self._threads.own(thread)
+
+    @property
+    def ended(self) -> bool:
+        """Whether it has stopped for good."""
+        return self.gate.stopping
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
@@ -110,7 +113,7 @@ class BackgroundExecutor(Executor):
 
         Callbacks that already run are not waited for. May be called from a callback.
         """
-        with self._gate.held():
+        with self.gate.held():
             yield
 
     def run_ready(self) -> bool:
@@ -122,8 +125,8 @@ class BackgroundExecutor(Executor):
             return False  # the one thread has a callback to run, and the others wait for it
         busy = False
         while True:
-            if self._gate.stale:  # a callback removed a node under this round
-                self._round, self._gate.stale = _fresh_false(), False
+            if self.gate.stale:  # a callback removed a node under this round
+                self._round, self.gate.stale = _fresh_false(), False
             try:
                 ready: Any = super().wait_for_ready_callbacks(0.0, None, self._round)
             except (TimeoutException, ShutdownException):
@@ -149,12 +152,37 @@ class BackgroundExecutor(Executor):
 
     def wait_for_a_job(self, timeout: float) -> None:
         """Return when a running callback has ended, or after `timeout` s; while `held`."""
-        self._gate.wait(timeout)
+        self.gate.wait(timeout)
 
-    def is_running(self, node: Node) -> bool:
-        """Return whether a callback of `node` runs, or is about to, in another thread than this."""
+    def runs_elsewhere(self) -> bool:
+        """Return whether a callback runs, or is about to, in another thread than this."""
         me = threading.get_ident()
-        return any(job.node is node and job.thread_id != me for job in self.running.copy())
+        return any(job.thread_id != me for job in self.running.copy())
+
+    def running_of(self, node: Node) -> list[Job]:
+        """Return callbacks of `node` that run, or are about to, in another thread than this."""
+        me = threading.get_ident()
+        return [job for job in self.running.copy() if job.node is node and job.thread_id != me]
+
+    def give_up(self, job: Job) -> bool:
+        """Go on without the thread that runs `job`, whose callback does not return.
+
+        A new thread takes its place; the old one ends when its callback does. Return whether that
+        was needed: the job may have ended just now.
+        """
+        with self.held():
+            try:
+                # Whoever removes a job decides what its thread does next: `_run` or we.
+                self.running.remove(job)
+            except KeyError:
+                return False
+            self.given_up.add(job)
+            for outer in self.running.copy():  # a callback that spun, and ran this one in between
+                if outer.thread_id == job.thread_id:
+                    self.running.discard(outer)
+                    self.given_up.add(outer)
+            self._threads.replace_busy()
+        return True
 
     # What rclpy's own executors override.
 
@@ -163,53 +191,68 @@ class BackgroundExecutor(Executor):
         job = self._next_job(args[0] if args else kwargs.get("timeout_sec"))
         return job, job.entity, job.node
 
+    def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Task:
+        """Schedule a function, a coroutine function or a coroutine, as every executor does."""
+        owner, args = find_owner(callback, args, self.get_nodes())
+        make = functools.partial(super().create_task, callback, *args, **kwargs)
+        return self._created.create(make, owner)
+
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Wait for one callback and run it, or hand it to a worker."""
-        try:
-            job = self._next_job(timeout_sec)
-        except (ShutdownException, TimeoutException, ConditionReachedException):
-            return
-        self._execute(job)
+        """Return when one more callback has run, or after `timeout_sec` s (None: no limit).
+
+        The executor spins by itself, so this only waits; except in a callback on the one thread
+        that there is, which runs the next callback itself.
+        """
+        self._spin_once(timeout_sec, _never)
 
     def spin_once_until_future_complete(self, future: Future, timeout_sec: Any = None) -> None:
-        """Run one callback; `future` wakes this executor when it is done."""
+        """Do `spin_once`, or return when `future` is done."""
         future.add_done_callback(lambda _: self.wake())
-        self.spin_once(getattr(timeout_sec, "timeout", timeout_sec))
+        self._spin_once(getattr(timeout_sec, "timeout", timeout_sec), future.done)
 
-    def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Task:
-        """Schedule `callback`; it is attributed to the node that it belongs to."""
-        owner = getattr(getattr(callback, "func", callback), "__self__", None)
-        node = owner if isinstance(owner, Node) else None
-        shown = callback
-        if isinstance(owner, Waitable):  # an action server starts the execution of a goal
-            node = next((n for n in self.get_nodes() if owner in n.waitables), None)
-            shown = next((arg for arg in args if callable(arg)), callback)
-            # rclpy swallows what an execute callback raises: hear of it before rclpy does.
-            args = tuple(watched(arg) if arg is shown else arg for arg in args)
-        elif node is None and (job := current_job()) is not None:
-            node = job.node
-        task = super().create_task(attributed(callback, node, shown), *args, **kwargs)
-        self._scheduled.add(task)
-        return task
+    def shutdown(self, timeout_sec: float | None = None) -> bool:
+        """Stop spinning; return whether every callback ended within `timeout_sec` s."""
+        self.request_stop()
+        forever = timeout_sec is None or timeout_sec < 0
+        patience = threading.TIMEOUT_MAX if forever else timeout_sec
+        inside = self.owns(threading.current_thread())  # a callback cannot wait for its own end
+        left = [] if inside else self.join(time.monotonic() + (patience or 0.0))
+        return super().shutdown(timeout_sec=0.0) and not left
 
     # Inside.
 
-    def _next_job(self, timeout: Any) -> Job:
+    def _spin_once(self, timeout: float | None, done: Callable[[], bool]) -> None:
+        if threading.current_thread() is self._threads.spinner and self._workers is None:
+            with contextlib.suppress(ShutdownException, TimeoutException):
+                self._run(self._next_job(timeout, done))
+            return
+        seen = self.finished
+        limit = float("inf") if timeout is None or timeout < 0 else timeout
+        poll(lambda: done() or self.ended or self.finished != seen, limit, self.pulse)
+
+    def _next_job(self, timeout: Any, done: Callable[[], bool] = _never) -> Job:
         try:
-            if self._gate.enter():
+            if self.gate.enter():
                 # Equal arguments resume rclpy's suspended wait; a new condition starts afresh.
-                self._interrupted = self._gate.new_interrupt()
+                self._interrupted = self.gate.new_interrupt()
+            interrupted = self._interrupted
+            condition = interrupted if done is _never else lambda: interrupted() or done()
             while True:
-                ready: Any = super().wait_for_ready_callbacks(timeout, None, self._interrupted)
+                ready: Any = super().wait_for_ready_callbacks(timeout, None, condition)
                 if self._workers is None or (job := self._workers.job_of(ready[0])) is None:
                     return self._job(*ready)
                 # rclpy offers a task again and again until a worker has begun it.
-                self._gate.watch(lambda begun=job: begun.thread_id)  # type: ignore[misc]
+                self.gate.watch(lambda begun=job: begun.thread_id)  # type: ignore[misc]
+        except ConditionReachedException:
+            raise ShutdownException from None  # nothing to run for now
         finally:
-            self._gate.leave()
+            self.gate.leave()
 
     def _job(self, task: Any, entity: Any, node: Any) -> Job:
-        job = Job(task, entity, node, self)
+        shown = None
+        if entity is None:
+            node, shown = self._created.owner(task)
+        job = Job(task, entity, node, self, shown)
         self.running.add(job)
         return job
 
@@ -220,30 +263,50 @@ class BackgroundExecutor(Executor):
             self._workers.put(job)
 
     def _loop(self) -> None:
-        while not self._gate.stopping:
+        me, threads, gate = threading.current_thread(), self._threads, self.gate
+        execute = self._run if self._workers is None else self._workers.put
+        while threads.spinner is me and not gate.stopping:
             try:
-                self.spin_once()
+                execute(self._next_job(None))
+            except ShutdownException:
+                continue
             except ExternalShutdownException:
                 return
             except InvalidHandle:
-                self._drop_destroyed_nodes()
+                for node in self.get_nodes():  # one was destroyed behind our back
+                    if not is_alive(node):
+                        self.remove_node(node)
+            except Exception as error:  # noqa: BLE001 - a waitable of the learner's, for instance
+                if self.context.ok():  # else rclpy.shutdown() came in between
+                    self.report(Job(Task(_never), None, None, self), error)
+                self.request_stop()
 
-    def _run(self, job: Job) -> None:
+    def _run(self, job: Job) -> bool:
+        """Run a callback; return whether this thread is to go on with others."""
         job.thread_id = threading.get_ident()
-        self._gate.notify_watchers()
+        self.gate.notify_watchers()
         streams.install()
         failure = job()
         if job.unfinished is not None:
             streams.finish_lines(job)
         if failure is not None:
             self.report(job, failure)
-        self.running.discard(job)
-        self._pulse.beat()
-        self._gate.notify_watchers()
+        if job.entity is None and (job.task.done() or job.task.cancelled()):
+            self._created.forget(job.task)
+        self.finished += 1
+        try:
+            self.running.remove(job)
+            goes_on = True
+        except KeyError:  # somebody has given this thread up
+            self.given_up.discard(job)
+            goes_on = False
+        self.pulse.beat()
+        self.gate.notify_watchers()
+        return goes_on
 
     def _drop_what_never_began(self) -> None:
         # A coroutine that never began would complain on stderr.
-        tasks = list(self._scheduled)
+        tasks = self._created.all()
         if self._workers is not None:
             never_begun = self._workers.never_begun()
             self.running.difference_update(never_begun)
@@ -251,15 +314,6 @@ class BackgroundExecutor(Executor):
         for task in tasks:
             if not task.executing():
                 task.cancel()
-
-    def _drop_destroyed_nodes(self) -> None:
-        """Take out nodes destroyed behind our back: they make every wait fail."""
-        for node in self.get_nodes():
-            try:
-                with node.handle:
-                    pass
-            except InvalidHandle:
-                self.remove_node(node)
 
 
 def _fresh_false() -> Callable[[], bool]:

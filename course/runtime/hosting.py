@@ -7,14 +7,15 @@ from __future__ import annotations
 import time
 from typing import Any
 
-from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from course.errors import SessionError
-from course.runtime import logs
+from course.runtime import arguments, logs
+from course.runtime.blocked import BlockedCallback, blocked_callbacks
 from course.runtime.callback_errors import CallbackError, ErrorLog
 from course.runtime.crew import Crew
+from course.runtime.interruptible import SessionContext
 from course.runtime.jobs import Job
 from course.runtime.log_store import store
 from course.runtime.logs import LogTable
@@ -22,6 +23,8 @@ from course.runtime.names import node_name
 from course.runtime.rcutils_tap import keep_every_level
 from course.runtime.residents import Factory, Residents
 from course.runtime.waiting import Pulse
+
+_TIMER_CANCELLED = "failed to call timer: timer is canceled"
 
 
 class Hosting:
@@ -33,7 +36,7 @@ class Hosting:
         notices: sentences for the learner about what the session had to put right.
     """
 
-    def __init__(self, context: Context, threads: int) -> None:
+    def __init__(self, context: SessionContext, threads: int) -> None:
         """Host nodes of `context`, their callbacks in `threads` threads."""
         self.context = context
         self.threads = threads
@@ -42,7 +45,7 @@ class Hosting:
         self._errors = ErrorLog()
         label = f"ROS domain {context.get_domain_id()}"
         self._crew = Crew(context, label, self._record, self._pulse)
-        self._residents = Residents(context, self._crew, self._pulse)
+        self._residents = Residents(context, self._crew, self._pulse, self.notices.append)
         self._residents.on_made += [keep_every_level, self._claim_log]
         self._opened = time.time()
 
@@ -70,6 +73,8 @@ class Hosting:
             SessionError: the session is closed, or the factory made no node for it.
         """
         self._require_open()
+        if threads is not None:
+            arguments.whole(threads, "threads", least=1, example=4)
         return self._residents.run(factory, args, kwargs, threads or self.threads)
 
     def run_beside(self, factory: Factory) -> Node:
@@ -127,8 +132,18 @@ class Hosting:
         Raises:
             SessionError: an unknown level, or a name that this session never ran.
         """
+        if last is not None:
+            arguments.whole(last, "last", least=0, example=50)
         names = None if node is None else self._residents.names(node)
         return logs.table(self._crew, self._opened, names, level, last)
+
+    def blocked_callbacks(self, longer_than: float = 1.0) -> list[BlockedCallback]:
+        """Return the callbacks that have been running for over `longer_than` seconds.
+
+        Each says where it is, why it does not return if that can be told (a deadlock, above all),
+        and what to do about it.
+        """
+        return blocked_callbacks(self._crew.all(), longer_than)
 
     def take_back_stolen_nodes(self) -> None:
         """Spin nodes again that `rclpy.spin_once(node)` and its like took away; leave a notice.
@@ -137,7 +152,7 @@ class Hosting:
         """
         for name in self._residents.take_back_stolen():
             self.notices.append(
-                f"{name} was taken out of this session by rclpy.spin_once(node) or one of its "
+                f"{name} was taken out of this session by rclpy.spin(node) or one of its "
                 "relatives, and would never have run another callback. The session has taken it "
                 "back; it spins its nodes by itself, so you can leave that line out."
             )
@@ -152,6 +167,8 @@ class Hosting:
         store.claim(node_name(node), self._crew)
 
     def _record(self, job: Job, failure: BaseException) -> None:
-        # A callback that outlives its stopped node finds everything destroyed: that is no news.
-        if not (isinstance(failure, InvalidHandle) and job.node in self._residents.stopped):
+        # A callback that outlives its stopped node finds everything destroyed, and a timer may be
+        # cancelled while rclpy calls it: neither is news.
+        outlived = isinstance(failure, InvalidHandle) and job.node in self._residents.stopped
+        if not outlived and _TIMER_CANCELLED not in str(failure):
             self._errors.record(job, failure)

@@ -49,13 +49,19 @@ class Job:
 
     __slots__ = ("entity", "home", "node", "shown", "since", "task", "thread_id", "unfinished")
 
-    def __init__(self, task: Task, entity: object, node: Node | None, home: Home) -> None:
-        """Take over `task`, made for `entity` of `node`, on the executor `home`."""
+    def __init__(
+        self, task: Task, entity: object, node: Node | None, home: Home, shown: Any = None
+    ) -> None:
+        """Take over `task`, made for `entity` of `node`, on the executor `home`.
+
+        `shown` is the callable to name where there is no entity: rclpy makes tasks for the
+        execution of a goal and for the done callbacks of a future.
+        """
         self.task = task
         self.entity = entity
         self.node = node
         self.home = home
-        self.shown: Callable[..., Any] | None = None
+        self.shown = shown
         self.since = time.monotonic()
         self.thread_id = 0
         self.unfinished: dict[str, str] | None = None  # printed without a line end, by level
@@ -86,32 +92,6 @@ class Job:
     def say(self, level: str, text: str) -> None:
         """Log a line that the callback printed."""
         note(level, node_name(self.node), text, self.home.session_key)
-
-
-def attributed(callback: Any, node: Node | None, shown: Any) -> Any:
-    """Return `callback`, made to sign the job that runs it with `node` and the callable `shown`.
-
-    rclpy makes tasks for what has no entity of its own (the execution of a goal, the done callback
-    of a future): without a signature nobody could tell whose they are.
-    """
-
-    def sign() -> None:
-        if (job := _current.job) is not None:
-            job.node, job.shown = node, shown
-
-    if inspect.iscoroutinefunction(callback):
-
-        async def run_async(*args: Any, **kwargs: Any) -> Any:
-            sign()
-            return await callback(*args, **kwargs)
-
-        return run_async
-
-    def run(*args: Any, **kwargs: Any) -> Any:
-        sign()
-        return callback(*args, **kwargs)
-
-    return run
 
 
 def watched(callback: Callable[..., Any]) -> Callable[..., Any]:

@@ -77,7 +77,8 @@ def table(
     Raises:
         SessionError: there is no such level.
     """
-    lowest = SEVERITIES.get({"WARNING": "WARN"}.get(level.upper(), level.upper()))
+    name = level.upper() if isinstance(level, str) else ""
+    lowest = SEVERITIES.get({"WARNING": "WARN"}.get(name, name))
     if lowest is None:
         raise SessionError(
             f"There is no log level {level!r}: choose DEBUG, INFO, WARN, ERROR or FATAL."

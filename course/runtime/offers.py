@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import difflib
 import importlib
+from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
@@ -18,6 +19,7 @@ from rclpy.qos import (
 )
 
 from course.errors import SessionError, WaitTimeout
+from course.runtime import arguments
 from course.runtime.names import type_name
 
 
@@ -27,11 +29,25 @@ def full_topic(node: Node, topic: str) -> str:
     Raises:
         SessionError: it is not a topic name.
     """
+    return _resolved(node.resolve_topic_name, arguments.text(topic, "The topic", "/scan"), "topic")
+
+
+def full_service(node: Node, name: str) -> str:
+    """Return the service `name` as the graph spells it, seen from `node`.
+
+    Raises:
+        SessionError: it is not a service name.
+    """
+    name = arguments.text(name, "The service", "/reset")
+    return _resolved(node.resolve_service_name, name, "service")
+
+
+def _resolved(resolve: Callable[[str], str], name: str, kind: str) -> str:
     try:
-        return str(node.resolve_topic_name(topic))
+        return str(resolve(name))
     except RuntimeError as error:  # rclpy's RCLError: the reason, and a place in its C source
         reason = str(error).removeprefix("failed to resolve name: ").partition(", at ")[0]
-        raise SessionError(f"{topic!r} is not a topic name: {reason}.") from None
+        raise SessionError(f"{name!r} is not a {kind} name: {reason}.") from None
 
 
 def fitting_qos(node: Node, topic: str, depth: int) -> QoSProfile:

@@ -21,6 +21,7 @@ from course.errors import WaitTimeout
 from course.runtime.crew import Crew
 from course.runtime.offers import (
     fitting_qos,
+    full_service,
     full_topic,
     require_type,
     why_no_message,
@@ -71,13 +72,13 @@ class Probe:
                 self.node.destroy_client(entity)
 
     def next_message(
-        self, msg_type: Any, topic: str, qos: QoSProfile | int | None, timeout: float
+        self, msg_type: Any, topic: str, qos: QoSProfile | None, timeout: float
     ) -> Any:
         """Return the next message; see `Session.next_message`."""
         topic = full_topic(self.node, topic)
         inbox: list[Any] = []
         deadline = Deadline(timeout)
-        profile = _profile(qos) or fitting_qos(self.node, topic, _LISTEN_DEPTH)
+        profile = qos or fitting_qos(self.node, topic, _LISTEN_DEPTH)
         with self._listening(msg_type, topic, inbox, profile):
             # Listen at once, whatever is offered: the publisher may appear and publish meanwhile.
             poll(lambda: inbox or self.node.count_publishers(topic), deadline.left, self.pulse)
@@ -97,7 +98,7 @@ class Probe:
         Raises:
             WaitTimeout: no server by the deadline.
         """
-        name = str(self.node.resolve_service_name(name))
+        name = full_service(self.node, name)
         require_type(name, srv_type, self.node.get_service_names_and_types())
         client = self.node.create_client(srv_type, name)
         try:
@@ -140,7 +141,3 @@ class Probe:
             yield
         finally:
             self.drop(subscription)
-
-
-def _profile(qos: QoSProfile | int | None) -> QoSProfile | None:
-    return QoSProfile(depth=qos) if isinstance(qos, int) else qos

@@ -8,11 +8,13 @@ keeps each line and hands it on to the handler that was there, so that /rosout w
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import threading
+from collections.abc import Iterator
 
 from rclpy.impl.logging_severity import LoggingSeverity
-from rclpy.logging import get_logger_level
+from rclpy.logging import get_logger_level, set_logger_level
 from rclpy.node import Node
 
 from course.runtime.jobs import current_job
@@ -31,17 +33,22 @@ _Handler = ctypes.CFUNCTYPE(
 )
 _VA_LIST_BYTES = 24  # System V ABI for x86-64, section 3.5.7
 _TEXT_BYTES = 4096
+_EVERYBODY = ""  # the logger whose level those without one of their own have
+_MIDDLEWARE = ("rcl", "rcl_action", "rcl_lifecycle", "rcutils", "rmw", "rmw_fastrtps_cpp",
+               "rmw_fastrtps_shared_cpp", "rmw_dds_common", "rosidl_typesupport")  # fmt: skip
 
 _rcutils = ctypes.CDLL("librcutils.so")
 _rcutils.rcutils_logging_get_output_handler.restype = ctypes.c_void_p
 _rcutils.rcutils_logging_set_output_handler.argtypes = [ctypes.c_void_p]
+_console = ctypes.cast(_rcutils.rcutils_logging_console_output_handler, ctypes.c_void_p).value
 _vsnprintf = ctypes.CDLL(None).vsnprintf
 _vsnprintf.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_void_p]
 
 _lock = threading.Lock()
 _next: ctypes._CFunctionType | None = None
-_next_address: int | None = None
 _lowered: set[str] = set()
+_being_made = 0  # nodes
+_level_before = LoggingSeverity.UNSET
 
 
 def install(*, hand_on: bool) -> None:
@@ -50,24 +57,62 @@ def install(*, hand_on: bool) -> None:
     Args:
         hand_on: whether the handler that is there now is to hear it as well.
     """
-    global _next, _next_address
+    global _next
     with _lock:
         address = _rcutils.rcutils_logging_get_output_handler()
         if address == _ours:
             return
-        _next_address = address
         _next = _Handler(address) if hand_on and address else None
         _rcutils.rcutils_logging_set_output_handler(_ours)
 
 
-def uninstall() -> None:
-    """Put the handler back that was there before, if ours is still in place. Idempotent.
+def stay() -> None:
+    """Go on hearing when the last context has been shut down, which turns the console on again.
 
-    Needed before the interpreter ends: threads of DDS may log later than that.
+    A student may still hold a node of a session that is closed, and its logger still works.
+    """
+    global _next
+    with _lock:
+        if _rcutils.rcutils_logging_get_output_handler() == _console:
+            _next = None
+            _rcutils.rcutils_logging_set_output_handler(_ours)
+
+
+def uninstall() -> None:
+    """Let nobody hear what is logged from now on, if ours is still in place. Idempotent.
+
+    Needed before the interpreter ends: threads of DDS may log later than that, and so may what
+    destroys the last nodes.
     """
     with _lock:
-        if _rcutils.rcutils_logging_get_output_handler() == _ours:
-            _rcutils.rcutils_logging_set_output_handler(_next_address)
+        if _rcutils.rcutils_logging_get_output_handler() in (_ours, _console):
+            _rcutils.rcutils_logging_set_output_handler(None)
+
+
+@contextlib.contextmanager
+def hearing_constructors() -> Iterator[None]:
+    """Keep every level of what nodes log that are made in the block.
+
+    A node has no logger before its constructor runs, so nobody can set that logger's level: for
+    the length of the block, loggers without a level of their own emit DEBUG. The libraries of
+    ROS 2 itself do not: they would talk about every entity.
+    """
+    global _being_made, _level_before
+    with _lock:
+        _being_made += 1
+        if _being_made == 1:
+            for name in _MIDDLEWARE:
+                if get_logger_level(name) == LoggingSeverity.UNSET:
+                    set_logger_level(name, LoggingSeverity.INFO)
+            _level_before = get_logger_level(_EVERYBODY)
+            set_logger_level(_EVERYBODY, LoggingSeverity.DEBUG)
+    try:
+        yield
+    finally:
+        with _lock:
+            _being_made -= 1
+            if _being_made == 0:
+                set_logger_level(_EVERYBODY, _level_before)
 
 
 def keep_every_level(node: Node) -> None:
@@ -100,11 +145,13 @@ def _hear(
     job = current_job()
     home = None if job is None else job.home.session_key
     store.add(stamp / 1e9, severity, logger, _text(text_format, arguments), home)
-    if _next is not None and (severity >= LoggingSeverity.INFO or not _is_lowered(logger)):
+    if _next is not None and (severity >= LoggingSeverity.INFO or not _is_ours_to_lower(logger)):
         _next(location, severity, name, stamp, text_format, arguments)
 
 
-def _is_lowered(logger: str) -> bool:
+def _is_ours_to_lower(logger: str) -> bool:
+    if _being_made and get_logger_level(logger) == LoggingSeverity.UNSET:
+        return True
     while logger:
         if logger in _lowered:
             return True

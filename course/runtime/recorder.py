@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, Self
 from rclpy.qos import QoSProfile
 
 from course.errors import WaitTimeout
+from course.runtime import arguments
 from course.runtime.names import type_name
 from course.runtime.offers import fitting_qos, full_topic, type_on, why_no_message
 from course.runtime.probe import Probe
@@ -41,7 +42,7 @@ class Recorder:
         probe: Probe,
         topic: str,
         msg_type: Any | None,
-        qos: QoSProfile | int | None,
+        qos: QoSProfile | None,
         limit: int,
         now_ns: Callable[[], int | None],
     ) -> None:
@@ -50,8 +51,7 @@ class Recorder:
         self._now_ns = now_ns
         self.topic = full_topic(probe.node, topic)
         self.msg_type = msg_type or self._wait_for_type()
-        self.qos = QoSProfile(depth=qos) if isinstance(qos, int) else qos
-        self.qos = self.qos or fitting_qos(probe.node, self.topic, limit)
+        self.qos = qos or fitting_qos(probe.node, self.topic, limit)
         self._kept: deque[Stamped] = deque(maxlen=limit)
         self._count = 0
         self._lock = threading.Lock()
@@ -78,11 +78,11 @@ class Recorder:
         Raises:
             WaitTimeout: fewer arrived within `timeout` seconds; it says why if none did.
         """
+        n, timeout = arguments.whole(n, "n", least=0, example=1), arguments.seconds(timeout)
         if poll(lambda: self._count >= n, timeout, self._probe.pulse):
             return self.messages
         message = f"{self._count} of {n} messages arrived on {self.topic} in {timeout:g} s."
         if not self._count:
-            assert self.qos is not None
             message += " " + why_no_message(self._probe.node, self.topic, self.msg_type, self.qos)
         raise WaitTimeout(message)
 

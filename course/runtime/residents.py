@@ -12,14 +12,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from rclpy.context import Context
+from rclpy.executors import Executor
 from rclpy.node import Node
 
 from course.errors import SessionError
+from course.runtime import arguments
+from course.runtime.blocked import describe
 from course.runtime.context import as_default_context
 from course.runtime.crew import Crew
 from course.runtime.executor import BackgroundExecutor
-from course.runtime.jobs import current_job
+from course.runtime.jobs import Job, current_job
 from course.runtime.names import is_name, node_name
+from course.runtime.rcutils_tap import hearing_constructors
 from course.runtime.teardown import destroy_half_made, destroy_node, is_alive
 from course.runtime.waiting import Pulse, poll
 
@@ -43,13 +47,16 @@ class Resident:
 class Residents:
     """Keeps the nodes of one session."""
 
-    def __init__(self, context: Context, crew: Crew, pulse: Pulse) -> None:
-        """Keep nodes of `context`, spun by `crew`."""
+    def __init__(
+        self, context: Context, crew: Crew, pulse: Pulse, tell: Callable[[str], None]
+    ) -> None:
+        """Keep nodes of `context`, spun by `crew`; `tell` passes a sentence on to the learner."""
         self.stopped: weakref.WeakSet[Node] = weakref.WeakSet()
         self.on_made: list[Callable[[Node], None]] = []
         self._context = context
         self._crew = crew
         self._pulse = pulse
+        self._tell = tell
         self._residents: dict[Node, Resident] = {}
         self._made_by: dict[str, object] = {}  # every name that ever ran
         self._lock = threading.RLock()
@@ -73,6 +80,7 @@ class Residents:
         replace: bool = True,
     ) -> Node:
         """Make a node and spin it; see `Session.run` and, for ``replace=False``, `run_beside`."""
+        arguments.factory(factory, args, kwargs)
         key = _key(factory, args, kwargs) if replace else None
         for resident in self.all():
             if key is not None and resident.key == key:
@@ -103,18 +111,29 @@ class Residents:
         if resident is None:
             return
         self.stopped.add(node)
-        self._take_out(resident)
+        for job in self._take_out(resident):
+            blocked = describe(job)  # before its thread is another's business
+            if resident.executor.give_up(job):
+                self._tell(
+                    f"{resident.name} was stopped, but its callback {blocked.what} goes on: it has "
+                    f"been running for {blocked.seconds:.0f} s. {blocked.reason} The session goes "
+                    "on without it; only a restart of the kernel or program ends it for good."
+                )
         destroy_node(node)
 
     def pause(self, resident: Resident) -> None:
         """Stop executing callbacks; DDS goes on receiving into the node's queues."""
         resident.paused = True
-        self._take_out(resident)
+        for job in self._take_out(resident):
+            self._tell(
+                f"{resident.name} is paused, but a callback that had begun has not ended: "
+                f"{describe(job)}"
+            )
 
     def resume(self, resident: Resident) -> None:
         """Execute callbacks again, beginning with what the queues hold."""
+        resident.executor.add_node(resident.node)  # first: it must not look stolen
         resident.paused = False
-        resident.executor.add_node(resident.node)
 
     def forget_all(self) -> list[str]:
         """Destroy every node; no executor may be spinning. Return which cleanups raised what."""
@@ -142,6 +161,7 @@ class Residents:
             return residents
         found = []
         for item in what:
+            arguments.node_or_name(item)
             matches = [resident for resident in residents if _matches(resident, item)]
             if not matches and isinstance(item, str):
                 self._require_seen(item, residents)
@@ -154,6 +174,7 @@ class Residents:
         Raises:
             SessionError: a name that was never run.
         """
+        arguments.node_or_name(what)
         if isinstance(what, Node):
             return [node_name(what)]
         if isinstance(what, str):
@@ -166,15 +187,14 @@ class Residents:
         """Return nodes that some other executor took over and then let go of.
 
         `rclpy.spin_once(node)` does that: the node leaves its executor and does not come back. A
-        node that another executor still holds was moved there on purpose.
+        node that another executor still holds was moved there on purpose; so was one whose own
+        executor has been shut down.
         """
-        return [
-            resident
-            for resident in self.all()
-            if not resident.paused
-            and (holder := resident.node.executor) is not resident.executor
-            and (holder is None or resident.node not in holder.get_nodes())
-        ]
+        return [resident for resident in self._elsewhere() if not _holder(resident)]
+
+    def moved(self) -> list[str]:
+        """Return the names of nodes that an executor holds which is not the session's."""
+        return [resident.name for resident in self._elsewhere() if _holder(resident)]
 
     def take_back_stolen(self) -> list[str]:
         """Spin nodes again that were `stolen`; return their names."""
@@ -187,7 +207,7 @@ class Residents:
 
     def _make(self, factory: Factory, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Node:
         try:
-            with as_default_context(self._context):
+            with as_default_context(self._context), hearing_constructors():
                 node = factory(*args, **kwargs)
         except BaseException as error:
             destroy_half_made(error.__traceback__)
@@ -200,12 +220,23 @@ class Residents:
             )
         return node
 
-    def _take_out(self, resident: Resident) -> None:
+    def _elsewhere(self) -> list[Resident]:
+        """Return the nodes that should be spinning and are not in the executor they belong to."""
+        return [
+            resident
+            for resident in self.all()
+            if not (resident.paused or resident.executor.ended)
+            and _holder(resident) is not resident.executor
+        ]
+
+    def _take_out(self, resident: Resident) -> list[Job]:
+        """Stop spinning a node; return its callbacks that have not ended after some time."""
         node, executor = resident.node, resident.executor
         with executor.held():
             executor.remove_node(node)
         if (job := current_job()) is None or job.node is not node:
-            poll(lambda: not executor.is_running(node), _CALLBACK_GRACE, self._pulse)
+            poll(lambda: not executor.running_of(node), _CALLBACK_GRACE, self._pulse)
+        return [job for job in executor.running_of(node) if job.thread_id]
 
     def _require_seen(self, name: str, residents: list[Resident]) -> None:
         with self._lock:
@@ -213,6 +244,12 @@ class Residents:
         if not seen:
             running = ", ".join(sorted(resident.name for resident in residents)) or "none"
             raise SessionError(f"No node {name!r} ran in this session; running now: {running}.")
+
+
+def _holder(resident: Resident) -> Executor | None:
+    """Return the executor that has the node, whose wish it is or not."""
+    executor = resident.node.executor
+    return executor if executor is not None and resident.node in executor.get_nodes() else None
 
 
 def _matches(resident: Resident, what: Any) -> bool:

@@ -5,12 +5,13 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Sequence
 from typing import Self
 
 from course.domains import check_domain_id, lease_domain
 from course.errors import SessionError
-from course.runtime import closing, signals
+from course.runtime import arguments, closing, signals
 from course.runtime.asking import Asking
 from course.runtime.closing import CloseReport
 from course.runtime.context import Discovery, open_context
@@ -50,8 +51,7 @@ class Session(Asking):
             DomainError: the domain is out of range, or none is free.
             SessionError: ROS 2 does not start.
         """
-        if threads < 1:
-            raise SessionError(f"A session needs at least 1 thread, not {threads}.")
+        arguments.whole(threads, "threads", least=1, example=4)
         self._lease = lease_domain() if domain_id is None else None
         self.domain_id: int = check_domain_id(self._lease.domain_id if self._lease else domain_id)
         self.options = {
@@ -127,6 +127,7 @@ class Session(Asking):
             self._closing = True
             threading.Thread(target=self.close, args=(timeout,), name="ROS session closer").start()
             return self._report
+        timeout = arguments.seconds(timeout)
         with self._lock:
             if not self._closed:
                 self._closing = True
@@ -136,6 +137,7 @@ class Session(Asking):
 
     def on_close(self, callback: Callable[[], None]) -> None:
         """Call `callback` when the session closes, after its threads have stopped."""
+        arguments.function(callback, "The callback", "lambda: print('closed')")
         self._on_close.append(callback)
 
     def __enter__(self) -> Self:
@@ -173,6 +175,7 @@ class Session(Asking):
         self._pulse.beat()
         self.context.try_shutdown()
         self._crew.shutdown(deadline)
+        self.context.join(max(0.1, deadline - time.monotonic()))
         self.context.destroy()
         self._release_domain()
         store.disclaim(self._crew)

@@ -20,6 +20,7 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
 from course.errors import SessionError, WaitTimeout
+from course.runtime import arguments
 from course.runtime.crew import Crew
 from course.runtime.jobs import current_job
 from course.runtime.names import node_name
@@ -65,11 +66,15 @@ class SimulatedTime:
             SessionError: called from a callback, or with a step or time that is not positive.
             WaitTimeout: a callback kept its node from following for 10 s of wall time.
         """
-        if seconds < 0 or step <= 0:
+        if (
+            any(isinstance(value, int | float) and value < 0 for value in (seconds, step))
+            or not step
+        ):
             raise SessionError(
-                f"Simulated time moves forward, in positive steps: not by {seconds:g} s in steps "
-                f"of {step:g} s."
+                f"Simulated time moves forward, in positive steps: not by {seconds} s in steps of "
+                f"{step} s."
             )
+        seconds, step = arguments.seconds(seconds, "seconds"), arguments.seconds(step, "step")
         if current_job() is not None:
             raise SessionError("A callback cannot move the time that it runs in.")
         with self._moving, all_held(self._crew.all()):

@@ -20,16 +20,25 @@ from course.runtime.jobs import Job
 class Workers:
     """Runs jobs in `count` threads, first come, first served."""
 
-    def __init__(self, count: int, run: Callable[[Job], None], name: str) -> None:
-        """Make the pool; its threads, `threads`, are for the caller to start and to join."""
+    def __init__(self, count: int, run: Callable[[Job], bool], name: str) -> None:
+        """Make the pool; its threads, `threads`, are for the caller to start and to join.
+
+        `run` runs a job and returns whether its thread is to go on with the next one.
+        """
         self._run = run
+        self._name = name
         self._queue: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
         self._in_hand: dict[Task, Job] = {}
         self._stopping = False
-        self.threads = [
-            threading.Thread(target=self._work, name=f"{name} worker {number}", daemon=True)
-            for number in range(1, count + 1)
-        ]
+        self.threads: list[threading.Thread] = []
+        for _ in range(count):
+            self.new_thread()
+
+    def new_thread(self) -> threading.Thread:
+        """Add a thread, in the place of one that is to end; the caller starts it."""
+        name = f"{self._name} worker {len(self.threads) + 1}"
+        self.threads.append(threading.Thread(target=self._work, name=name, daemon=True))
+        return self.threads[-1]
 
     def put(self, job: Job) -> None:
         """Hand `job` to the next worker that is free."""
@@ -60,8 +69,10 @@ class Workers:
             if self._stopping:
                 self._queue.put(job)  # for `never_begun`
                 return
-            self._run(job)
+            goes_on = self._run(job)
             self._in_hand.pop(job.task, None)
+            if not goes_on:
+                return
 
 
 def sleeps(thread_id: int) -> bool:

@@ -1,8 +1,8 @@
 """What a Session costs against plain rclpy: latency, throughput, leaks.
 
 Run it as ``python tests/benchmarks/bench_session.py``; ``--json`` prints the figures for machines.
-Session and plain rclpy (an executor of rclpy's own, spinning in a thread) take turns, block by
-block in one run, so that a busy machine is busy for both. Nothing here is a test: timing is shown,
+Session and plain rclpy (an executor of rclpy's own, spinning in a thread) take many short turns in
+one run, so that a busy machine is busy for both. Nothing here is a test: timing is shown,
 never asserted.
 """
 
@@ -29,6 +29,7 @@ import course
 from course.domains import lease_domain
 
 Run = Callable[[Callable[[], Node]], Node]
+MESSAGES = 250  # in each part of a turn: short, so that both sides see the same load
 KEEP_ALL_OF_A_BURST = QoSProfile(depth=2000)
 
 
@@ -130,31 +131,55 @@ def throughput(echo: Echo, count: int) -> float:
     return count / ((echo.stamp - start) / 1e9)
 
 
+class Side:
+    """Plain rclpy or a session, open for the whole measurement, and what it took so far."""
+
+    def __init__(self, run: Run) -> None:
+        """Start the node that echoes, and warm up."""
+        echo = run(Echo)
+        assert isinstance(echo, Echo)
+        self.echo = echo
+        self.times: list[float] = []
+        latencies(echo, 200)
+
+    def turn(self) -> dict[str, float]:
+        """Return the figures of one short turn."""
+        times = latencies(self.echo, MESSAGES)
+        self.times += times
+        before = time.process_time_ns()
+        rate = throughput(self.echo, MESSAGES)
+        cpu = (time.process_time_ns() - before) / MESSAGES / 1e3
+        return {"latency": statistics.median(times), "throughput": rate, "cpu": cpu}
+
+
 def compare(threads: int, rounds: int) -> dict[str, float]:
-    """Return the figures of both, measured in turns."""
-    times: dict[str, list[float]] = {"plain": [], "session": []}
-    rates: dict[str, list[float]] = {"plain": [], "session": []}
-    ways = {"plain": plain, "session": session}
-    for round_number in range(rounds):
-        order = list(ways) if round_number % 2 else list(reversed(ways))
-        for name in order:
-            with ways[name](threads) as run:
-                echo = run(Echo)
-                assert isinstance(echo, Echo)
-                latencies(echo, 100)  # warm up
-                times[name] += latencies(echo, 400)
-                rates[name].append(throughput(echo, 1000))
+    """Return the figures of both, measured in short turns, and the ratios of neighbouring turns.
+
+    A busy machine is busy for both turns of a pair, more or less: the median of the pairs' ratios
+    is steadier than the ratio of two medians. "cpu" is processor time of the whole process for a
+    message of a burst, which others' load hardly changes.
+    """
+    pairs = []
+    with plain(threads) as run_plain, session(threads) as run_session:
+        sides = {"plain": Side(run_plain), "session": Side(run_session)}
+        for number in range(rounds):
+            order = list(sides) if number % 2 else list(reversed(sides))
+            pairs.append({name: sides[name].turn() for name in order})
     figures = {}
-    for name in ways:
-        figures[f"{name} latency p50 (us)"] = statistics.median(times[name])
-        figures[f"{name} latency p99 (us)"] = statistics.quantiles(times[name], n=100)[98]
-        figures[f"{name} throughput (1/s)"] = statistics.median(rates[name])
-    figures["latency ratio"] = (
-        figures["session latency p50 (us)"] / figures["plain latency p50 (us)"]
-    )
-    figures["throughput ratio"] = (
-        figures["session throughput (1/s)"] / figures["plain throughput (1/s)"]
-    )
+    for name, side in sides.items():
+        cuts = statistics.quantiles(side.times, n=100)
+        figures[f"{name} latency p50 (us)"] = cuts[49]
+        figures[f"{name} latency p99 (us)"] = cuts[98]
+        for what, unit in (("throughput", "1/s"), ("cpu", "us")):
+            middle = statistics.median(pair[name][what] for pair in pairs)
+            figures[f"{name} {what} ({unit})"] = middle
+    for what in ("latency", "throughput", "cpu"):
+        low, middle, high = statistics.quantiles(
+            [pair["session"][what] / pair["plain"][what] for pair in pairs], n=4
+        )
+        figures[f"{what} ratio"] = middle
+        figures[f"{what} ratio, lower quartile"] = low
+        figures[f"{what} ratio, upper quartile"] = high
     return figures
 
 
@@ -191,12 +216,12 @@ def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--json", action="store_true", help="print the figures as JSON")
-    parser.add_argument("--rounds", type=int, default=10, help="turns of each side")
+    parser.add_argument("--rounds", type=int, default=40, help="turns of each side")
     options = parser.parse_args()
     measurements: dict[str, Callable[[], dict[str, float]]] = {
         "one thread": lambda: compare(1, options.rounds),
         # rclpy's own pool misses wake-ups and then waits for a third of a second: fewer turns.
-        "four threads": lambda: compare(4, max(1, options.rounds // 5)),
+        "four threads": lambda: compare(4, max(2, options.rounds // 5)),
         "100 nodes": lambda: leaks(100),
         "machine": lambda: {"cores": float(os.cpu_count() or 0), "load": os.getloadavg()[0]},
     }
@@ -204,7 +229,7 @@ def main() -> None:
     for title, measure in measurements.items():
         results[title] = measure()
         if not options.json:
-            lines = [f"  {name:28} {value:12.2f}\n" for name, value in results[title].items()]
+            lines = [f"  {name:34} {value:12.2f}\n" for name, value in results[title].items()]
             sys.stdout.write("".join([f"\n{title}\n", *lines]))
             sys.stdout.flush()
     if options.json:

@@ -32,11 +32,11 @@ def test_the_environment_of_a_plain_shell_is_well() -> None:
 @pytest.mark.parametrize(
     ("variables", "status", "says"),
     [
-        ({"ROS_DOMAIN_ID": "300"}, "problem", "too large"),
-        ({"ROS_DOMAIN_ID": "233"}, "problem", "too large"),
+        ({"ROS_DOMAIN_ID": "300"}, "warning", "too large"),
+        ({"ROS_DOMAIN_ID": "233"}, "warning", "too large"),
         ({"ROS_DOMAIN_ID": "102"}, "warning", "collide"),
-        ({"ROS_DOMAIN_ID": "-1"}, "problem", "whole number"),
-        ({"ROS_DOMAIN_ID": "seven"}, "problem", "'seven'"),
+        ({"ROS_DOMAIN_ID": "-1"}, "warning", "whole number"),
+        ({"ROS_DOMAIN_ID": "seven"}, "warning", "'seven'"),
         ({"RMW_IMPLEMENTATION": "rmw_cyclonedds_cpp"}, "problem", "rmw_cyclonedds_cpp"),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, "warning", "OFF"),
         ({"ROS_AUTOMATIC_DISCOVERY_RANGE": "localhost"}, "warning", "none of"),
@@ -206,7 +206,7 @@ def test_the_command_survives_an_environment_that_breaks_ros() -> None:
     done = run(ROS_DOMAIN_ID="300", RMW_IMPLEMENTATION="rmw_cyclonedds_cpp")
     assert done.returncode == 1
     assert done.stderr == ""
-    assert "problem  ROS_DOMAIN_ID: 300 is too large" in done.stdout
+    assert "warning  ROS_DOMAIN_ID: 300 is too large" in done.stdout
     assert "problem  RMW_IMPLEMENTATION: It asks for rmw_cyclonedds_cpp" in done.stdout
     assert "Traceback" not in done.stdout
 

@@ -74,26 +74,30 @@ def test_a_lease_dies_with_its_process_however_it_ends(start_script, monkeypatch
     lease_domain().release()
 
 
-def test_a_forked_child_does_not_keep_a_lease_alive(monkeypatch):
-    lease = lease_domain()
-    go_on, let_go = os.pipe()
-    begun, say_begun = os.pipe()
-    child = os.fork()
-    if child == 0:
-        os.close(let_go)
-        os.write(say_begun, b"!")
-        os.read(go_on, 1)  # returns when the parent has closed its end
-        os._exit(0)
+FORKED = """
+import os, signal
+from course.domains import lease_domain
+
+lease = lease_domain()
+child = os.fork()
+if child == 0:
+    print(lease.domain_id, os.getpid(), flush=True)
+    signal.pause()
+signal.pause()
+"""
+
+
+def test_a_forked_child_does_not_keep_a_lease_alive(start_script, monkeypatch):
+    process = start_script(FORKED)
+    domain_id, child = (int(word) for word in process.stdout.readline().split())
     try:
-        os.read(begun, 1)
-        lease.release()
-        monkeypatch.setattr(domains, "MIN_DOMAIN", lease.domain_id - 1)
-        monkeypatch.setattr(domains, "MAX_DOMAIN", lease.domain_id)
+        process.kill()
+        process.wait()
+        monkeypatch.setattr(domains, "MIN_DOMAIN", domain_id - 1)
+        monkeypatch.setattr(domains, "MAX_DOMAIN", domain_id)
         lease_domain().release()
     finally:
-        for pipe_end in (let_go, go_on, begun, say_begun):
-            os.close(pipe_end)
-        os.waitpid(child, 0)
+        os.kill(child, signal.SIGKILL)
 
 
 def test_a_domain_whose_ports_are_open_is_passed_over():

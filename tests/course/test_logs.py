@@ -7,6 +7,8 @@ from __future__ import annotations
 import sys
 
 import pytest
+import rclpy.logging
+from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
@@ -142,3 +144,93 @@ def test_a_table_is_a_sequence_of_rows():
     table = LogTable(rows)
     assert (list(table), table[0], table[1:], len(table)) == (rows, rows[0], rows[1:], 3)
     assert len(repr(table).splitlines()) == 3
+
+
+class Careful(Node):
+    """Has something to say before anybody can set its logger's level."""
+
+    def __init__(self, level=None):
+        super().__init__("careful")
+        self.get_logger().debug("in the constructor")
+        self.get_logger().get_child("lens").debug("opened")
+        if level is not None:
+            self.get_logger().set_level(level)
+        self.get_logger().debug("at the end of the constructor")
+
+
+def test_debug_logs_of_a_constructor_are_kept(session, capfd):
+    others = rclpy.logging.get_logger("somebody_else")
+    heard_before = others.is_enabled_for(LoggingSeverity.DEBUG)
+    careful = session.run(Careful)
+    messages = session.logs(careful, level="DEBUG").messages
+    wanted = ["in the constructor", "opened", "at the end of the constructor"]
+    assert [message for message in messages if message in wanted] == wanted
+    assert [row for row in session.logs(level="DEBUG", last=None) if row.node != "/careful"] == []
+    assert others.is_enabled_for(LoggingSeverity.DEBUG) == heard_before
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_level_that_a_constructor_sets_counts(session):
+    careful = session.run(Careful, LoggingSeverity.INFO)
+    assert "at the end of the constructor" not in session.logs(careful, level="DEBUG").messages
+
+
+def test_a_constructor_that_raises_leaves_the_levels_as_they_were(session):
+    with pytest.raises(ZeroDivisionError):
+        session.run(lambda: Node("half_made") and 1 / 0)
+    others = rclpy.logging.get_logger("somebody_else")
+    assert not others.is_enabled_for(LoggingSeverity.DEBUG)
+
+
+AFTERWARDS = """
+import course, rclpy, sys
+from rclpy.action import ActionClient, ActionServer
+from rclpy.node import Node
+from test_msgs.action import Fibonacci
+
+class Doer(Node):
+    def __init__(self):
+        super().__init__("doer")
+        self.server = ActionServer(self, Fibonacci, "count", lambda goal: Fibonacci.Result())
+        self.client = ActionClient(self, Fibonacci, "count")
+
+def log(node):
+    logger = node.get_logger()
+    logger.debug("said too late")
+    logger.info("said too late")
+    logger.get_child("arm").error("said too late")
+    logger.fatal("said too late")
+
+doer = course.run(Doer, threads=THREADS)
+goal = course.send_goal(Fibonacci, "count", Fibonacci.Goal(order=1))
+END
+log(doer)
+again = course.run(Doer)
+assert "said too late" not in course.logs(last=None).messages
+course.close()
+log(doer)
+kept = [doer, again, again.server, again.client, goal]
+sys.modules["kept_until_the_very_end"] = kept
+"""
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("end", ["course.close()", "rclpy.shutdown()", "rclpy.try_shutdown()"])
+def test_a_node_of_a_closed_session_is_quiet(start_script, end, threads):
+    """Its logger still works, and rclpy's destructors run when the interpreter has half gone."""
+    source = AFTERWARDS.replace("END", end).replace("THREADS", str(threads))
+    process = start_script(source)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (0, "", "")
+
+
+def test_the_console_of_a_plain_context_opened_later_is_its_own(start_script):
+    process = start_script(
+        "import course, rclpy\nfrom rclpy.node import Node\n"
+        "course.run(Node, 'quiet').get_logger().info('kept')\ncourse.close()\n"
+        "rclpy.init()\nNode('loud').get_logger().info('on the console')\nrclpy.shutdown()\n"
+    )
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert "on the console" in out + err
+    assert "kept" not in out + err

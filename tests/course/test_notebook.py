@@ -112,6 +112,87 @@ def test_a_restart_and_an_interrupt_leave_nothing_behind(notebook):
     assert status == "ok"  # the node went on spinning
 
 
+SILENT = """
+class Silent(Node):
+    def __init__(self):
+        super().__init__("silent")
+node = course.run(Silent)
+from rclpy.executors import SingleThreadedExecutor
+executor = SingleThreadedExecutor()
+"""
+
+
+@pytest.mark.parametrize("cell", ["rclpy.spin(node)", "executor.add_node(node); executor.spin()"])
+def test_the_interrupt_button_ends_rclpys_own_spinning(notebook, cell):
+    notebook.run(SETUP)
+    notebook.run(SILENT)
+    spinning = notebook.client.execute(f"print('spinning', flush=True)\n{cell}")
+    while notebook.client.get_iopub_msg(timeout=60)["msg_type"] != "stream":
+        pass  # until the cell has begun
+    notebook.manager.interrupt_kernel()
+    while True:
+        reply = notebook.client.get_shell_msg(timeout=60)
+        if reply["parent_header"]["msg_id"] == spinning:
+            break
+    assert reply["content"]["ename"] == "KeyboardInterrupt"
+    if "executor" in cell:
+        _, shown = notebook.run("course.until(lambda: False, timeout=0.1)")
+        assert "/silent: in an executor of your own" in shown
+        notebook.run("executor.remove_node(node)")
+    # The node is back: it runs callbacks without anybody's spinning.
+    status, _ = notebook.run(
+        "ran = []; node.create_timer(0.01, lambda: ran.append(1)); course.until(lambda: ran); None"
+    )
+    assert status == "ok"
+
+
+BLOCKED = """
+from std_srvs.srv import Trigger
+class Server(Node):
+    def __init__(self):
+        super().__init__("server")
+        self.create_service(Trigger, "switch", lambda request, response: response)
+class Asker(Node):
+    def __init__(self):
+        super().__init__("asker")
+        self.client = self.create_client(Trigger, "switch")
+        self.timer = self.create_timer(0.01, self.ask)
+    def ask(self):
+        self.client.wait_for_service()
+        self.client.call(Trigger.Request())
+"""
+
+
+def test_a_deadlock_is_news_at_the_next_cell_and_replacing_the_node_ends_it(notebook):
+    notebook.run(SETUP + BLOCKED)
+    notebook.run("course.run(Server); course.run(Asker)")
+    status, shown = notebook.run("course.until(lambda: False, timeout=2.0)")
+    assert status == "error"
+    assert "Asker.ask of /asker (at line" in shown
+    assert shown.count("Deadlock: it waits for the answer of switch") == 2  # error, and news
+    assert notebook.run("None") == ("ok", "")  # said once
+    _, shown = notebook.run("course.stop(Asker)")
+    assert "/asker was stopped, but its callback" in shown
+    status, _ = notebook.run("t = course.run(Talker); course.until(lambda: t.count > 1); None")
+    assert status == "ok"
+    _, shown = notebook.run("print(course.close(timeout=0.2).leaked)")
+    assert "a callback of /asker" in shown
+
+
+def test_what_is_raised_as_a_sentence_ends_with_one_full_stop(notebook):
+    notebook.run(SETUP)
+    notebook.run(
+        "class Wrong(Node):\n"
+        "    def __init__(self):\n"
+        "        super().__init__('wrong')\n"
+        "        self.create_timer(0.01, self.tick)\n"
+        "    def tick(self):\n"
+        "        raise ValueError('No camera.')\n"
+    )
+    _, shown = notebook.run("course.run(Wrong); course.until(lambda: course.session().errors);None")
+    assert "raised ValueError: No camera. The node goes on spinning." in shown
+
+
 def test_news_is_escaped():
     page = News("<b>", "<i>")._repr_html_()
     assert "<b>" not in page

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import threading
 
 import pytest
@@ -253,12 +254,13 @@ def test_a_raising_callback_is_recorded_and_spinning_goes_on(any_session):
 
     stumbler = any_session.run(Stumbler)
     any_session.until(lambda: stumbler.count > 5)
+    any_session.until(lambda: sum(error.count for error in any_session.errors) == 3)
     (error,) = any_session.errors
     assert error.node == "/talker"
     assert error.callback.endswith("Stumbler.say")
-    assert str(error.exception) == "stumbled at 3"
-    assert error.count == 3
-    assert "raised ValueError: stumbled at 3 (3 times)" in str(error)
+    # In a pool, the thread of an earlier callback may be the later one to report.
+    last = "3" if any_session.threads == 1 else "[123]"
+    assert re.search(rf"raised ValueError: stumbled at {last} \(3 times\)", str(error))
     assert "rclpy" not in error.traceback
     assert "say" in error.traceback
 
@@ -366,7 +368,7 @@ def test_a_session_can_be_joined_on_its_domain(session):
     ("options", "error", "sentence"),
     [
         ({"domain_id": 233}, DomainError, "domain 233 is out of range"),
-        ({"threads": 0}, SessionError, "at least 1 thread"),
+        ({"threads": 0}, SessionError, "at least 1, not 0"),
         ({"discovery": "EVERYWHERE"}, SessionError, "LOCALHOST, SUBNET, SYSTEM_DEFAULT"),
     ],
 )

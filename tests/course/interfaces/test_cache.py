@@ -16,6 +16,9 @@ from pathlib import Path
 
 import pytest
 
+from course.interfaces import pruning
+from course.interfaces.locks import locked
+
 # A small type builds in a third of the time of example_interfaces.
 USE = """
 made = interfaces.define("cache_msgs/msg/Small", "int32 x 7")
@@ -178,17 +181,17 @@ def test_a_forked_child_does_not_keep_the_lock(python, tmp_path: Path) -> None:
     code = """
 import os
 from pathlib import Path
-from course.interfaces import cache
+from course.interfaces import locks
 file = Path("lock")
 reader, writer = os.pipe()
-with cache.locked(file):
+with locks.locked(file):
     child = os.fork()
     if child == 0:
         os.close(writer)
         os.read(reader, 1)  # lives until the parent lets go
         os._exit(0)
-cache.LOCK_DEADLINE = 5.0
-with cache.locked(file):
+locks.LOCK_DEADLINE = 5.0
+with locks.locked(file):
     print("locked again while the child lives")
 os.close(writer)
 os.waitpid(child, 0)
@@ -198,12 +201,10 @@ os.waitpid(child, 0)
 
 
 def test_a_lock_that_stays_taken_is_passed_by(python, cache: Path, tmp_path: Path) -> None:
-    from course.interfaces import cache as cache_module
-
     folder = entry(cache)
     shutil.rmtree(folder)
-    with cache_module.locked(folder.parent / f".{folder.name}.lock"):
-        code = f"from course.interfaces import cache\ncache.LOCK_DEADLINE = 0.1\n{USE}"
+    with locked(folder.parent / f".{folder.name}.lock"):
+        code = f"from course.interfaces import locks\nlocks.LOCK_DEADLINE = 0.1\n{USE}"
         done = python(code)
     assert (done.stdout, done.stderr) == (USED, "")
     assert not folder.exists()
@@ -231,3 +232,101 @@ def test_the_key_of_the_environment_changes_with_what_was_compiled_in(
     assert json.dumps(before).isascii()
     monkeypatch.setattr(sys, "prefix", os.fspath(Path(sys.prefix) / "elsewhere"))
     assert key() != before
+
+
+def aged(folder: Path, seconds: float) -> Path:
+    """Return `folder`, as if it had last been used `seconds` ago."""
+    then = time.time() - seconds
+    os.utime(folder / pruning.MANIFEST, (then, then))
+    return folder
+
+
+def copies(cache: Path, count: int) -> list[Path]:
+    """Return more units like the small one: as old as days can make them different."""
+    unit = entry(cache)
+    made = [unit.with_name(f"Small-{number:016x}") for number in range(count)]
+    return [aged(Path(shutil.copytree(unit, folder)), 86400.0 * 2) for folder in made]
+
+
+def test_what_nobody_used_for_long_goes_and_the_rest_stays(cache: Path) -> None:
+    unit = entry(cache)
+    elsewhere = Path(shutil.copytree(unit.parent, cache / "0123456789ab/cache_msgs")) / unit.name
+    old = unit.with_name("Small-0000000000000000")
+    recent = unit.with_name("Small-0000000000000001")
+    for folder in (old, recent):
+        aged(Path(shutil.copytree(unit, folder)), 86400.0 * 2)
+    aged(old, pruning.UNUSED_FOR + 60)
+    aged(elsewhere, pruning.UNUSED_FOR + 60)  # built for wheels that are no longer installed
+    assert sorted(pruning.prune(cache)) == sorted([old, elsewhere])
+    assert not old.exists()
+    assert not elsewhere.exists()
+    assert unit.exists()
+    assert recent.exists()
+    assert leftovers(cache) == []
+    assert pruning.prune(cache) == []
+
+
+def test_a_cache_that_is_too_full_loses_the_oldest(cache: Path, monkeypatch) -> None:
+    made = copies(cache, 5)
+    for number, folder in enumerate(made):
+        aged(folder, 86400.0 * (2 + number))
+    units = len(list(cache.glob(f"*/*/*/{pruning.MANIFEST}")))
+    monkeypatch.setattr(pruning, "MOST", units - 2)
+    assert sorted(pruning.prune(cache)) == sorted(made[-2:])
+    monkeypatch.setattr(pruning, "MOST", 0)
+    assert all(folder in made for folder in pruning.prune(cache))  # not what is in use today
+    assert len(list(cache.glob(f"*/*/*/{pruning.MANIFEST}"))) == units - 5
+
+
+def test_a_unit_that_is_being_built_or_was_used_just_now_stays(cache: Path) -> None:
+    (old,) = copies(cache, 1)
+    aged(old, pruning.UNUSED_FOR + 60)
+    with locked(pruning.lock_of(old)):
+        assert pruning.prune(cache) == []
+    pruning.touch(old)
+    assert pruning.prune(cache) == []
+    assert old.exists()
+
+
+def test_finding_a_unit_counts_as_using_it_and_building_one_prunes(python, cache: Path) -> None:
+    unit = aged(entry(cache), pruning.UNUSED_FOR + 60)
+    (old,) = copies(cache, 1)
+    aged(old, pruning.UNUSED_FOR + 60)
+    done = python(f"{USE}\ninterfaces.define('cache_msgs/msg/Other', 'int32 y')")
+    assert (done.stdout, done.stderr) == (USED, "")
+    assert unit.exists()
+    assert not old.exists()
+
+
+def test_processes_that_prune_at_once_do_not_disturb_each_other(python, cache: Path) -> None:
+    old = [aged(folder, pruning.UNUSED_FOR + 60) for folder in copies(cache, 40)]
+    code = f"""
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from course.interfaces.pruning import prune
+import multiprocessing
+with ProcessPoolExecutor(4, mp_context=multiprocessing.get_context("spawn")) as pool:
+    gone = [folder for folders in pool.map(prune, [Path({str(cache)!r})] * 8) for folder in folders]
+print(len(gone), len(set(gone)))
+"""
+    done = python("if __name__ == '__main__':\n" + code.replace("\n", "\n    "))
+    assert (done.stdout, done.stderr) == ("40 40\n", "")
+    assert not any(folder.exists() for folder in old)
+    assert leftovers(cache) == []
+
+
+def test_a_lock_that_was_deleted_while_it_was_waited_for_is_taken_anew(tmp_path: Path) -> None:
+    file = tmp_path / "lock"
+    inside = []
+
+    def wait_and_take() -> None:
+        with locked(file, deadline=60.0):
+            inside.append(file.stat().st_ino)
+
+    with locked(file):
+        waiting = threading.Thread(target=wait_and_take)
+        waiting.start()
+        file.unlink()
+    waiting.join()
+    assert len(inside) == 1
+    assert file.exists()

@@ -169,3 +169,33 @@ except interfaces.DefinitionError as error:
     print(error)
 """)
     assert done.stdout == "The course does not build turtlesim; it builds example_interfaces.\n"
+
+
+def test_an_own_package_after_a_restart_names_the_cell_to_run(python) -> None:
+    done = python("""
+interfaces.define("robot_msgs/srv/GetPose", "string robot\\n---\\nfloat64 x")
+interfaces.define("robot_msgs/msg/Wheel", "float64 speed")
+""")
+    assert (done.stdout, done.stderr) == ("", "")
+    done = python("""
+import importlib.util
+for statement in ("import robot_msgs", "from robot_msgs.srv import GetPose"):
+    try:
+        exec(statement)
+    except ModuleNotFoundError as error:
+        print(type(error).__name__, error)
+try:
+    import other_msgs
+except ModuleNotFoundError as error:
+    print(type(error).__name__)
+interfaces.define("robot_msgs/srv/GetPose", "string robot\\n---\\nfloat64 x")
+from robot_msgs.srv import GetPose
+print(GetPose.Response(x=1.0).x)
+""")
+    sentence = (
+        "NotDefinedYetError robot_msgs is a package of your own, and this kernel does not know it "
+        "yet: run the cells `%%interface robot_msgs/msg/Wheel` and "
+        "`%%interface robot_msgs/srv/GetPose` first, and then this one again.\n"
+    )
+    assert done.stderr == ""
+    assert done.stdout == 2 * sentence + "ModuleNotFoundError\n1.0\n"
