@@ -57,6 +57,9 @@ class LiveView:
     script: ClassVar[str] = ""
     """Name of the view's own script and style in ``static``."""
 
+    shared: ClassVar[tuple[str, ...]] = ()
+    """Further scripts and styles that it uses."""
+
     period: ClassVar[float] = FASTEST
     """Seconds between two looks at the model."""
 
@@ -84,10 +87,11 @@ class LiveView:
         """The widget that shows this view; made, and kept up to date, from its first use."""
         if self._widget is None:
             # One module: a browser cannot import the common part from beside it.
+            parts = ("live", *self.shared, self.script)
             self._widget = LiveWidget(
                 kind=self.script,
-                _esm=_static("live.js") + "\n" + _static(f"{self.script}.js"),
-                _css=_static("live.css") + "\n" + _static(f"{self.script}.css"),
+                _esm="\n".join(_static(f"{part}.js") for part in parts),
+                _css="\n".join(_static(f"{part}.css") for part in parts),
             )
             self._widget.on_msg(self._heard)
             # The widget keeps its view alive, and the ticker keeps neither: when the widget is
