@@ -89,8 +89,15 @@ def fields(msg_type: Any) -> Iterator[tuple[str, AbstractType]]:
 
 def example(msg_type: Any) -> str:
     """Return a message of ``msg_type`` with its defaults, as one line of YAML."""
-    text: str = yaml.safe_dump(to_data(msg_type()), default_flow_style=True, width=10**6)
-    return text.strip()
+    return one_line(to_data(msg_type()))
+
+
+def one_line(data: Any) -> str:
+    """Return plain data as one line of YAML."""
+    text: str = yaml.safe_dump(
+        data, default_flow_style=True, width=10**6, sort_keys=False, allow_unicode=True
+    )
+    return text.strip().removesuffix("\n...")
 
 
 def class_of(slot: NamespacedType) -> Any:

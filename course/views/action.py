@@ -7,6 +7,7 @@ from typing import Any
 
 from course.errors import CourseError
 from course.runtime.session import Session
+from course.values import one_line
 from course.views.live import Frame, LiveView
 from course.watch import forms
 from course.watch.goals import Goal, GoalBoard
@@ -77,9 +78,9 @@ class ActionView(LiveView):
 
 
 def _shown(goal: Goal) -> dict[str, Any]:
-    asked = f"asked: {goal.asked}. " if goal.asked is not None else ""
-    feedback = f"feedback {goal.feedback}: {goal.latest}" if goal.feedback else ""
-    result = f"result: {goal.result}" if goal.result is not None else ""
+    asked = f"asked: {one_line(goal.asked)} " if goal.asked is not None else ""
+    feedback = f"feedback {goal.feedback}: {one_line(goal.latest)}" if goal.feedback else ""
+    result = f"result: {one_line(goal.result)}" if goal.result is not None else ""
     return {
         "number": goal.number,
         "states": [[state.name, f"{when:.1f} s"] for state, when in goal.states],

@@ -38,8 +38,6 @@ class LiveWidget(anywidget.AnyWidget):
         number: counts frames; the browser sends back the number that it has drawn.
     """
 
-    _esm = traitlets.Unicode().tag(sync=True)
-    _css = traitlets.Unicode().tag(sync=True)
     kind = traitlets.Unicode().tag(sync=True)
     frame = traitlets.Dict().tag(sync=True)
     words = traitlets.Unicode().tag(sync=True)
@@ -86,13 +84,7 @@ class LiveView:
     def widget(self) -> LiveWidget:
         """The widget that shows this view; made, and kept up to date, from its first use."""
         if self._widget is None:
-            # One module: a browser cannot import the common part from beside it.
-            parts = ("live", *self.shared, self.script)
-            self._widget = LiveWidget(
-                kind=self.script,
-                _esm="\n".join(_static(f"{part}.js") for part in parts),
-                _css="\n".join(_static(f"{part}.css") for part in parts),
-            )
+            self._widget = _widget_class((*self.shared, self.script))(kind=self.script)
             self._widget.on_msg(self._heard)
             # The widget keeps its view alive, and the ticker keeps neither: when the widget is
             # closed and forgotten, the view ends by itself.
@@ -154,5 +146,15 @@ class LiveView:
 
 
 @cache
-def _static(name: str) -> str:
-    return (_STATIC / name).read_text(encoding="utf-8")
+def _widget_class(parts: tuple[str, ...]) -> type[LiveWidget]:
+    """Return the widget class of a view: its script and style are of the class, as anywidget's are.
+
+    Script and style are one text each: a browser cannot import the shared parts from beside it.
+    """
+    names = ("live", *parts)
+    texts = {
+        f"_{key}": "\n".join((_STATIC / f"{name}.{kind}").read_text("utf-8") for name in names)
+        for key, kind in (("esm", "js"), ("css", "css"))
+    }
+    name = f"{parts[-1].title()}Widget"
+    return type(name, (LiveWidget,), {**texts, "_anywidget_id": f"{__name__}.{name}"})

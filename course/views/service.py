@@ -7,6 +7,7 @@ from typing import Any
 
 from course.errors import CourseError
 from course.runtime.session import Session
+from course.values import one_line
 from course.views.live import Frame, LiveView
 from course.watch import forms
 from course.watch.calls import Call, Calls
@@ -61,8 +62,8 @@ class ServiceConsole(LiveView):
         """Return the calls as text."""
         lines = [f"Service {self._model.name}, {len(self.calls)} calls"]
         for call in self.calls:
-            outcome = "waiting" if call.waiting else call.problem or call.answer
-            lines.append(f"  {call.number}: {call.request} -> {outcome}")
+            outcome = "waiting" if call.waiting else call.problem or one_line(call.answer)
+            lines.append(f"  {call.number}: {one_line(call.request)} -> {outcome}")
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
 
 

@@ -158,7 +158,7 @@ class GoalBoard:
                 goal = self._goal(bytes(status.goal_info.goal_id.uuid))
                 state = GoalState(status.status)
                 if goal.state != state:
-                    goal.states.append((state, now - goal.seen))
+                    goal.states.append((state, max(0.0, now - goal.seen)))
 
     def _on_feedback(self, message: Any) -> None:
         with self._lock:

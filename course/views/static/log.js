@@ -21,17 +21,20 @@ const view = {
     );
     stage.append(make("div", {}, level, " ", search, count), box);
     let frame = { rows: [], total: 0 };
+    let following = true; // the end, until somebody scrolls up to read
+    box.addEventListener("scroll", () => {
+      following = box.scrollTop + box.clientHeight >= box.scrollHeight - 8;
+    });
     const redraw = () => {
       const least = LEVELS[level.value];
       const wanted = search.value.toLowerCase();
       const found = frame.rows.filter((row) => (LEVELS[row[1]] ?? 20) >= least
         && (!wanted || row.join(" ").toLowerCase().includes(wanted)));
-      const atEnd = box.scrollTop + box.clientHeight >= box.scrollHeight - 4;
       rows.replaceChildren(...found.map((row) => make(
         "tr", { class: `roslog-${row[1].toLowerCase()}` },
         ...row.map((cell) => make("td", {}, cell)),
       )));
-      if (atEnd) box.scrollTop = box.scrollHeight;
+      if (following) requestAnimationFrame(() => { box.scrollTop = box.scrollHeight; });
       const said = `${found.length} of the last ${frame.rows.length} lines`;
       if (count.textContent !== said) count.textContent = said;
     };

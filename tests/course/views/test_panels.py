@@ -92,7 +92,7 @@ def test_a_service_is_called_by_its_form(session: Session) -> None:
     (call,) = shown(console)["calls"]
     assert call["answer"] == {"success": True, "message": "lamp"}
     assert call["time"].endswith(" ms")
-    assert "1: {'data': True} -> {'success': True, 'message': 'lamp'}" in console.words()
+    assert "1: {data: true} -> {success: true, message: lamp}" in console.words()
 
 
 def test_a_service_that_is_gone_is_a_sentence_in_the_view(session: Session) -> None:
