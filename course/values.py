@@ -81,10 +81,14 @@ def from_data(msg_type: Any, data: Any) -> Any:
 
 def fields(msg_type: Any) -> Iterator[tuple[str, AbstractType]]:
     """Yield (name, type) of each field, in the order of the definition."""
-    names = list(msg_type.get_fields_and_field_types())
-    for name, slot in zip(names, msg_type.SLOT_TYPES, strict=True):
+    for name, slot in all_fields(msg_type):
         if name != "structure_needs_at_least_one_member":
             yield name, slot
+
+
+def all_fields(msg_type: Any) -> Iterator[tuple[str, AbstractType]]:
+    """Yield the same, with the field that an empty message has on the wire."""
+    yield from zip(msg_type.get_fields_and_field_types(), msg_type.SLOT_TYPES, strict=True)
 
 
 def example(msg_type: Any) -> str:
@@ -115,7 +119,7 @@ def in_words(slot: AbstractType) -> str:
         bound = getattr(slot, "maximum_size", None)
         return f"{in_words(slot.value_type)}[{f'<={bound}' if bound else ''}]"
     if isinstance(slot, AbstractString | AbstractWString):
-        return "string"
+        return "string" if isinstance(slot, AbstractString) else "wstring"
     assert isinstance(slot, BasicType)
     name: str = slot.typename
     return {"boolean": "bool", "double": "float64", "float": "float32", "octet": "byte"}.get(
