@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from course.views.log import LogPanel
     from course.views.parameters import ParameterPanel
     from course.views.service import ServiceConsole
+    from course.views.timeline import Timeline
 
 
 class Showing(Asking):
@@ -35,9 +36,12 @@ class Showing(Asking):
         return self._probe.node
 
     def watch(
-        self, msg_type: Any, topic: str, callback: Callable[[Any], None], qos: QoSProfile | int
+        self, msg_type: Any, topic: str, callback: Callable[..., None], qos: QoSProfile | int
     ) -> Subscription:
         """Call ``callback`` with each message on a topic, in a background thread.
+
+        With a second argument, it gets what DDS says about the message, too: its time stamps and
+        number (see rclpy's ``create_subscription``).
 
         For live views: a node that blocks does not hold it up. `unwatch` ends it.
         """
@@ -122,6 +126,23 @@ class Showing(Asking):
         self._require_open()
         name = node if isinstance(node, str) else node.get_fully_qualified_name()
         return ParameterPanel(self._me, name if name.startswith("/") else f"/{name}")
+
+    def timeline(self, *topics: str | tuple[str, Any], window: float = 10.0) -> Timeline:
+        """Return a live view of when messages were published, received and worked on.
+
+        Args:
+            topics: names, or (name, message class) where nobody uses the topic yet; 1 to 6.
+            window: how many seconds it shows, up to 60.
+
+        Raises:
+            SessionError: no topic, too many, a window out of range, or a closed session.
+            WaitTimeout: a topic that nobody uses.
+        """
+        from course.views.timeline import Timeline
+
+        self._require_open()
+        named = [(topic, None) if isinstance(topic, str) else topic for topic in topics]
+        return Timeline(self._me, named, window)
 
     @property
     def _me(self) -> Session:
