@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from course.views.graph import GraphView
     from course.views.log import LogPanel
     from course.views.parameters import ParameterPanel
+    from course.views.qos_lab import QoSLab
     from course.views.service import ServiceConsole
     from course.views.timeline import Timeline
 
@@ -143,6 +144,24 @@ class Showing(Asking):
         self._require_open()
         named = [(topic, None) if isinstance(topic, str) else topic for topic in topics]
         return Timeline(self._me, named, window)
+
+    def qos_lab(
+        self, offered: QoSProfile | None = None, requested: QoSProfile | None = None
+    ) -> QoSLab:
+        """Return the QoS lab: predict what two profiles do together, then see it happen.
+
+        Args:
+            offered: the writer's profile to begin with; None is the default one.
+            requested: the reader's.
+
+        Raises:
+            ProfileError: a policy that the lab does not know (SYSTEM_DEFAULT, say).
+            SessionError: the session is closed.
+        """
+        from course.views.qos_lab import QoSLab
+
+        self._require_open()
+        return QoSLab(self._me, offered, requested)
 
     @property
     def _me(self) -> Session:
