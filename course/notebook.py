@@ -9,6 +9,7 @@ from typing import Any
 from rclpy.exceptions import NotInitializedException
 
 from course.interfaces import magic
+from course.ros import magic as ros_magic
 from course.runtime import closing
 from course.runtime.callback_errors import CallbackError
 from course.runtime.session import Session
@@ -20,6 +21,7 @@ _INIT_TWICE = "Context.init() must only be called once"
 def load_ipython_extension(shell: Any) -> None:
     """Set up a notebook's shell; IPython calls this for `%load_ext course`. Idempotent."""
     magic.register(shell)
+    ros_magic.register(shell)
     unload_ipython_extension(shell)
     shell.events.register("post_run_cell", _report)
 

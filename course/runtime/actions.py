@@ -60,6 +60,11 @@ class GoalRun:
         self._future: Any = None
 
     @property
+    def goal_id(self) -> bytes:
+        """The goal's id, 16 bytes; empty before the server has answered."""
+        return b"" if self._handle is None else bytes(self._handle.goal_id.uuid)
+
+    @property
     def done(self) -> bool:
         """Whether the result is here, or never will be because the goal was rejected."""
         return not self.accepted or bool(self._future.done())

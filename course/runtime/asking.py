@@ -83,6 +83,23 @@ class Asking(Hosting):
             profile = arguments.qos(qos)
             return self._probe.next_message(msg_type, topic, profile, timeout)
 
+    def publish(
+        self, topic: str, message: Any, *, qos: QoSProfile | int = 10, timeout: float = 5.0
+    ) -> None:
+        """Publish one message, once somebody is there to get it.
+
+        Args:
+            topic: its name.
+            message: what to publish.
+            qos: the QoS to offer.
+            timeout: seconds to wait for a subscription that fits, and for it to have the message.
+
+        Raises:
+            WaitTimeout: nobody subscribes with a QoS that fits, or the topic has another type.
+        """
+        with self._explaining():
+            self._probe.publish(topic, message, qos, timeout)
+
     def wait_for_service(self, srv_type: Any, name: str, timeout: float = 5.0) -> None:
         """Return when a server of `name` is ready.
 

@@ -74,7 +74,7 @@ def type_on(node: Node, topic: str) -> Any | None:
     """
     for name, types in node.get_topic_names_and_types():
         if name == topic:
-            return _load(types[0], topic)
+            return load_type(types[0], topic)
     return None
 
 
@@ -135,12 +135,26 @@ def _reasons(reason: str) -> list[str]:
     return [p.removeprefix("ERROR:") for p in parts if p.startswith("ERROR:")] or [reason]
 
 
-def _load(name: str, topic: str) -> Any:
-    package, kind, cls = name.split("/")
+def load_type(name: str, topic: str = "") -> Any:
+    """Return the class of an interface such as ``std_msgs/msg/String``.
+
+    Args:
+        name: package, kind and name; the kind may be left out for a message.
+        topic: who needs it, for the error.
+
+    Raises:
+        SessionError: it is not installed here, or that is no name of an interface.
+    """
+    parts = name.split("/")
+    package, kind, cls = parts if len(parts) == 3 else (parts[0], "msg", parts[-1])
     try:
         return getattr(importlib.import_module(f"{package}.{kind}"), cls)
-    except (ImportError, AttributeError):
+    except (ImportError, AttributeError, ValueError):
+        why = (
+            f"{topic} carries {name}, which is not installed here"
+            if topic
+            else (f"There is no {name} here")
+        )
         raise SessionError(
-            f"{topic} carries {name}, which is not installed here: install its package, or define "
-            f"it with `%%interface {name}`."
+            f"{why}: install its package, or define it with `%%interface {name}`."
         ) from None

@@ -11,6 +11,7 @@ from typing import Any
 
 from rclpy.client import Client
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -90,6 +91,23 @@ class Probe:
                     return inbox[0]
         reason = why_no_message(self.node, topic, msg_type, better)
         raise WaitTimeout(f"No message on {topic} in {timeout:g} s. {reason}")
+
+    def publish(self, topic: str, message: Any, qos: QoSProfile | int, timeout: float) -> None:
+        """Publish one message as soon as a subscription matches; see `Session.publish`."""
+        topic = full_topic(self.node, topic)
+        require_type(topic, type(message), self.node.get_topic_names_and_types())
+        publisher = self.node.create_publisher(type(message), topic, qos)
+        try:
+            if not poll(publisher.get_subscription_count, timeout, self.pulse):
+                raise WaitTimeout(
+                    f"Nobody with a QoS that fits subscribes to {topic}, so nothing was published "
+                    f"in {timeout:g} s."
+                )
+            publisher.publish(message)
+            publisher.wait_for_all_acked(Duration(seconds=timeout))
+        finally:
+            with self.executor.held():
+                self.node.destroy_publisher(publisher)
 
     @contextlib.contextmanager
     def client(self, srv_type: Any, name: str, deadline: Deadline) -> Iterator[Client]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 from rclpy.qos import QoSProfile
@@ -97,6 +98,16 @@ class Recorder:
         with self._lock:
             self._kept.clear()
             self._count = 0
+
+    def save(self, path: str | Path) -> Path:
+        """Write the kept messages to an MCAP file, for Foxglove or `ros2 bag`; return its path.
+
+        Raises:
+            RecordingError: the file cannot be written.
+        """
+        from course import mcap_file
+
+        return mcap_file.write(Path(path), {self.topic: (self.msg_type, self.messages)})
 
     def stop(self) -> None:
         """Stop recording; what was recorded stays. Idempotent."""

@@ -12,15 +12,15 @@ from typing import Self
 from course.domains import check_domain_id, lease_domain
 from course.errors import SessionError
 from course.runtime import arguments, closing, signals
-from course.runtime.asking import Asking
 from course.runtime.closing import CloseReport
 from course.runtime.context import Discovery, open_context
 from course.runtime.jobs import current_job
 from course.runtime.log_store import store
+from course.runtime.showing import Showing
 from course.runtime.simtime import SimulatedTime
 
 
-class Session(Asking):
+class Session(Showing):
     """One private rclpy Context on one domain, and the nodes it runs in the background.
 
     Attributes:

@@ -1,0 +1,211 @@
+"""Where to draw a graph's boxes: layers from left to right, few crossings (Sugiyama's method)."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import igraph
+
+from course.graph import words
+from course.graph.model import Exchange, Graph, Topic
+
+BOX_HEIGHT = 40  # px, with room for a name and a type below it
+_CHARACTER, _LEAST_WIDTH, _LONGEST_LABEL = 7.5, 80, 34
+_COLUMN_GAP, _ROW_GAP, _MARGIN = 70, 18, 8
+
+
+@dataclass(frozen=True)
+class Box:
+    """A node, topic, service or action; ``x`` and ``y`` are the left upper corner in pixels."""
+
+    kind: str
+    label: str
+    note: str
+    tip: str
+    bad: bool
+    x: float
+    y: float
+    width: float
+    height: float = BOX_HEIGHT
+
+
+@dataclass(frozen=True)
+class Line:
+    """An arrow: an SVG path, and a label at ``x``, ``y`` where there is something to say.
+
+    ``low`` is the largest y that its curve comes near to.
+    """
+
+    kind: str
+    path: str
+    tip: str
+    bad: bool
+    label: str
+    x: float
+    y: float
+    low: float = 0.0
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A graph's boxes and lines, and the size of it all in pixels."""
+
+    boxes: tuple[Box, ...]
+    lines: tuple[Line, ...]
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class _Thing:
+    kind: str
+    name: str
+    note: str
+    tip: str
+    bad: bool = False
+
+    @property
+    def width(self) -> float:
+        longest = max(len(_short(self.name)), len(_short(self.note)) * 0.85)
+        return max(_LEAST_WIDTH, longest * _CHARACTER + 24)
+
+
+@dataclass(frozen=True)
+class _Link:
+    source: tuple[str, str]
+    target: tuple[str, str]
+    kind: str
+    tip: str
+    bad: str = ""
+
+
+def draw(graph: Graph) -> Drawing:
+    """Return a drawing of ``graph`` with its arrows from publisher to subscription."""
+    things = {(thing.kind, thing.name): thing for thing in _things(graph)}
+    if not things:
+        return Drawing((), (), 0, 0)
+    links = [link for link in _links(graph) if link.source in things and link.target in things]
+    keys = list(things)
+    places = _places(things, keys, links)
+    boxes = tuple(_box(things[key], *places[key]) for key in keys)
+    by_key = dict(zip(keys, boxes, strict=True))
+    lines = tuple(_line(link, by_key[link.source], by_key[link.target]) for link in links)
+    return Drawing(
+        boxes, lines,
+        max(box.x + box.width for box in boxes) + _MARGIN,
+        max(*(box.y + box.height for box in boxes), *(line.low for line in lines), 0) + _MARGIN,
+    )  # fmt: skip
+
+
+def _things(graph: Graph) -> Iterator[_Thing]:
+    mentioned = {end.node for t in graph.topics for end in (*t.publishers, *t.subscriptions)}
+    mentioned |= {n for x in (*graph.services, *graph.actions) for n in (*x.servers, *x.clients)}
+    for name in sorted(mentioned | set(graph.nodes)):
+        twins = name in graph.twins
+        tip = f"Two nodes are called {name}: rename one." if twins else f"node {name}"
+        yield _Thing("node", name, "", tip, twins)
+    for topic in graph.topics:
+        ends = [f"published by {end.node} [{words.qos(end)}]" for end in topic.publishers]
+        ends += [f"read by {end.node} [{words.qos(end)}]" for end in topic.subscriptions]
+        note = ", ".join(_last(type_) for type_ in topic.types)
+        yield _Thing(
+            "topic", topic.name, note, "\n".join([f"topic {topic.name}", *topic.types, *ends]),
+            bad=bool(topic.mismatches),
+        )  # fmt: skip
+    for kind, exchanges in (("service", graph.services), ("action", graph.actions)):
+        for exchange in exchanges:
+            tip = f"{kind} {exchange.name}\n{exchange.type}"
+            yield _Thing(kind, exchange.name, f"{kind} {_last(exchange.type)}", tip)
+
+
+def _links(graph: Graph) -> Iterator[_Link]:
+    for topic in graph.topics:
+        yield from _topic_links(topic)
+    for kind, exchanges in (("service", graph.services), ("action", graph.actions)):
+        for exchange in exchanges:
+            yield from _exchange_links(kind, exchange)
+
+
+def _topic_links(topic: Topic) -> Iterator[_Link]:
+    here = ("topic", topic.name)
+    for end in {end.node: end for end in topic.publishers}.values():
+        yield _Link(("node", end.node), here, "topic", f"{end.node} offers {words.qos(end)}")
+    refused = {pair.subscription: pair for pair in topic.mismatches}
+    for end in {end.node: end for end in topic.subscriptions}.values():
+        pair = refused.get(end.node)
+        tip = f"{end.node} requests {words.qos(end)}"
+        if pair:
+            tip += "\n" + words.mismatch(topic.name, pair)
+        why = ", ".join(pair.policies).lower() if pair else ""
+        yield _Link(here, ("node", end.node), "topic", tip, why)
+
+
+def _exchange_links(kind: str, exchange: Exchange) -> Iterator[_Link]:
+    here = (kind, exchange.name)
+    for node in exchange.clients:
+        yield _Link(("node", node), here, kind, f"{node} uses {exchange.name}")
+    for node in exchange.servers:
+        yield _Link(here, ("node", node), kind, f"{node} serves {exchange.name}")
+
+
+def _places(
+    things: dict[tuple[str, str], _Thing], keys: list[tuple[str, str]], links: list[_Link]
+) -> dict[tuple[str, str], tuple[float, float]]:
+    """Return {thing: left upper corner}; columns are as wide as their widest box."""
+    numbers = {key: number for number, key in enumerate(keys)}
+    edges = [(numbers[link.source], numbers[link.target]) for link in links]
+    net = igraph.Graph(n=len(keys), edges=edges, directed=True)
+    spots = net.layout_sugiyama(vgap=1, hgap=1, maxiter=200)[: len(keys)]
+    columns = sorted({round(spot[1]) for spot in spots})
+    left, place = float(_MARGIN), {}
+    for column in columns:
+        inside = [n for n, spot in enumerate(spots) if round(spot[1]) == column]
+        width = max(things[keys[n]].width for n in inside)
+        place.update({n: left + (width - things[keys[n]].width) / 2 for n in inside})
+        left += width + _COLUMN_GAP
+    top = min(spot[0] for spot in spots)
+    row = BOX_HEIGHT + _ROW_GAP
+    return {key: (place[n], _MARGIN + (spots[n][0] - top) * row) for n, key in enumerate(keys)}
+
+
+def _box(thing: _Thing, x: float, y: float) -> Box:
+    return Box(
+        thing.kind, _short(thing.name), _short(thing.note), thing.tip, thing.bad,
+        round(x, 1), round(y, 1), round(thing.width, 1),
+    )  # fmt: skip
+
+
+def _line(link: _Link, source: Box, target: Box) -> Line:
+    """Return a curve from the right side of ``source`` to the left of ``target``, or back."""
+    forward = target.x >= source.x + source.width
+    x1 = source.x + (source.width if forward else source.width / 2)
+    y1 = source.y + (source.height / 2 if forward else source.height)
+    x2 = target.x if forward else target.x + target.width / 2
+    y2 = target.y + (target.height / 2 if forward else target.height)
+    if forward:
+        bend = max(30.0, (x2 - x1) / 2)
+        path = f"M{x1:g},{y1:g} C{x1 + bend:g},{y1:g} {x2 - bend:g},{y2:g} {x2:g},{y2:g}"
+    else:
+        low = max(y1, y2) + BOX_HEIGHT / 2 + 6
+        path = f"M{x1:g},{y1:g} C{x1:g},{low:g} {x2:g},{low:g} {x2:g},{y2:g}"
+    middle = ((x1 + x2) / 2, (y1 + y2) / 2 - 6)
+    return Line(
+        link.kind,
+        path,
+        link.tip,
+        bool(link.bad),
+        link.bad,
+        *middle,
+        max(y1, y2) if forward else low,
+    )
+
+
+def _short(label: str) -> str:
+    return label if len(label) <= _LONGEST_LABEL else f"{label[: _LONGEST_LABEL - 1]}…"
+
+
+def _last(type_: str) -> str:
+    return type_.rpartition("/")[2]

@@ -1,0 +1,223 @@
+"""Read the ROS graph through a node: what DDS discovery has told it, as a `Graph`."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from rclpy.action.graph import (
+    get_action_client_names_and_types_by_node,
+    get_action_server_names_and_types_by_node,
+)
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from course.graph.model import QOS_POLICIES, Endpoint, Exchange, Graph, Mismatch, Topic
+
+ForEvent = Callable[[str, str], str | None]
+"""Tells which policy DDS has named for (topic, subscribing node), if it has raised an event."""
+
+_PLUMBING = ("/rosout", "/parameter_events", "/clock")
+_PLUMBING_TYPES = ("rcl_interfaces/", "type_description_interfaces/")
+
+
+Queues = dict[tuple[str, str, str], QoSProfile]
+"""{(node, topic, role): profile}: history and depth, which only the process itself knows."""
+
+
+def read(
+    node: Node,
+    *,
+    everything: bool = False,
+    own: Iterable[Node] = (),
+    event: ForEvent | None = None,
+) -> Graph:
+    """Return what ``node`` can see now.
+
+    Args:
+        node: any node of the context whose graph is wanted.
+        everything: keep what the ROS tools hide, too: names that begin with an underscore,
+            /rosout, /parameter_events, /clock, parameter services, and the topics of actions.
+        own: nodes of this process: their history and depth are shown, too, which DDS never tells.
+        event: says what DDS's own events have reported.
+    """
+    queues = _queues(own)
+    names = [
+        (name, namespace)
+        for name, namespace in node.get_node_names_and_namespaces()
+        if everything or not _hidden(name)
+    ]
+    services, actions = _exchanges(node, names, everything)
+    return Graph(
+        nodes=tuple(sorted(_full(name, namespace) for name, namespace in names)),
+        topics=tuple(_topics(node, everything, queues, event)),
+        services=services,
+        actions=actions,
+    )
+
+
+def _queues(nodes: Iterable[Node]) -> Queues:
+    found: Queues = {}
+    for node in nodes:
+        name = node.get_fully_qualified_name()
+        for publisher in node.publishers:
+            found[name, publisher.topic_name, "publisher"] = publisher.qos_profile
+        for subscription in node.subscriptions:
+            found[name, subscription.topic_name, "subscription"] = subscription.qos_profile
+    return found
+
+
+def _topics(
+    node: Node, everything: bool, queues: Queues, event: ForEvent | None
+) -> Iterable[Topic]:
+    for name, _ in sorted(node.get_topic_names_and_types()):
+        if not everything and (name in _PLUMBING or _hidden(name)):
+            continue
+        pairs = [
+            [
+                (info, _endpoint(info, role, name, queues))
+                for info in infos
+                if everything or not _hidden(info.node_name)
+            ]
+            for role, infos in (
+                ("publisher", node.get_publishers_info_by_topic(name)),
+                ("subscription", node.get_subscriptions_info_by_topic(name)),
+            )
+        ]
+        publishers, subscriptions = pairs
+        if publishers or subscriptions:
+            yield Topic(
+                name,
+                tuple(sorted(end for _, end in publishers)),
+                tuple(sorted(end for _, end in subscriptions)),
+                tuple(_mismatches(name, publishers, subscriptions, event)),
+            )
+
+
+def _mismatches(
+    topic: str,
+    publishers: list[tuple[TopicEndpointInfo, Endpoint]],
+    subscriptions: list[tuple[TopicEndpointInfo, Endpoint]],
+    event: ForEvent | None,
+) -> Iterable[Mismatch]:
+    for offered, writer in publishers:
+        for requested, reader in subscriptions:
+            if writer.type != reader.type:
+                reason = f"carries {writer.type}, reads {reader.type}"
+                yield Mismatch(writer.node, reader.node, (reason,), ("TYPE",))
+                continue
+            reasons = incompatibilities(offered.qos_profile, requested.qos_profile)
+            if reasons:
+                policies = tuple(reasons)
+                named = event(topic, reader.node) if event else None
+                yield Mismatch(
+                    writer.node, reader.node, tuple(reasons.values()), policies,
+                    from_event=named in policies,
+                )  # fmt: skip
+
+
+def incompatibilities(offered: QoSProfile, requested: QoSProfile) -> dict[str, str]:
+    """Return {policy: what does not fit} of a pair of profiles; empty if DDS connects them.
+
+    The rules are DDS 1.4, section 2.2.3, as `qos_check_compatible` applies them.
+    """
+    verdict, _ = qos_check_compatible(offered, requested)
+    if verdict != QoSCompatibility.ERROR:  # what is left unsaid gives a warning, and may well fit
+        return {}
+    ours, theirs = _words(offered), _words(requested)
+    found = {
+        policy.upper(): f"offers {ours[policy]}, requests {theirs[policy]}"
+        for policy, changed in _CHANGES.items()
+        if qos_check_compatible(*(_only(profile, changed) for profile in (offered, requested)))[0]
+        == QoSCompatibility.ERROR
+    }
+    return found or {"QOS": "offers less than is requested"}
+
+
+_CHANGES = {
+    "reliability": ("reliability",),
+    "durability": ("durability",),
+    "deadline": ("deadline",),
+    "liveliness": ("liveliness", "liveliness_lease_duration"),
+}
+
+
+def _only(profile: QoSProfile, policies: tuple[str, ...]) -> QoSProfile:
+    """Return a default profile with only these policies of ``profile``."""
+    return QoSProfile(depth=1, **{policy: getattr(profile, policy) for policy in policies})
+
+
+def _endpoint(info: TopicEndpointInfo, role: Any, topic: str, queues: Queues) -> Endpoint:
+    node = _full(info.node_name, info.node_namespace)
+    words = _words(info.qos_profile) | _queue(queues.get((node, topic, role), info.qos_profile))
+    qos = {policy: words[policy] for policy in QOS_POLICIES if policy in words}
+    return Endpoint(node, role, info.topic_type, qos, bytes(info.endpoint_gid).hex())
+
+
+def _words(profile: QoSProfile) -> dict[str, str]:
+    """Return a profile in words; what is unknown or not set is left out."""
+    return {
+        "reliability": profile.reliability.name,
+        "durability": profile.durability.name,
+        "liveliness": profile.liveliness.name,
+        "deadline": _span(profile.deadline),
+        "lifespan": _span(profile.lifespan),
+    }
+
+
+def _queue(profile: QoSProfile) -> dict[str, str]:
+    if profile.history == HistoryPolicy.KEEP_LAST:
+        return {"history": "KEEP_LAST", "depth": str(profile.depth)}
+    return {"history": "KEEP_ALL"} if profile.history == HistoryPolicy.KEEP_ALL else {}
+
+
+def _span(duration: Duration) -> str:
+    seconds = duration.nanoseconds / 1e9
+    return "none" if seconds <= 0 or seconds > 1e9 else f"{seconds:g} s"
+
+
+def _exchanges(
+    node: Node, names: list[tuple[str, str]], everything: bool
+) -> tuple[tuple[Exchange, ...], tuple[Exchange, ...]]:
+    found: dict[str, dict[tuple[str, str], tuple[set[str], set[str]]]] = {
+        kind: defaultdict(lambda: (set(), set())) for kind in ("service", "action")
+    }
+    readers: tuple[tuple[str, int, Callable[[str, str], Any]], ...] = (
+        ("service", 0, node.get_service_names_and_types_by_node),
+        ("service", 1, node.get_client_names_and_types_by_node),
+        ("action", 0, lambda *of: get_action_server_names_and_types_by_node(node, *of)),
+        ("action", 1, lambda *of: get_action_client_names_and_types_by_node(node, *of)),
+    )
+    for name, namespace in names:
+        for kind, side, ask in readers:
+            try:
+                answers = ask(name, namespace)
+            except Exception:  # noqa: BLE001 - the node has gone since: rclpy has no one error
+                continue
+            for exchange, types in answers:
+                if everything or not _plumbing(exchange, types[0]):
+                    found[kind][exchange, types[0]][side].add(_full(name, namespace))
+    return tuple(
+        tuple(
+            Exchange(name, type_, tuple(sorted(servers)), tuple(sorted(clients)))
+            for (name, type_), (servers, clients) in sorted(found[kind].items())
+        )
+        for kind in ("service", "action")
+    )  # type: ignore[return-value]
+
+
+def _plumbing(exchange: str, type_: str) -> bool:
+    return type_.startswith(_PLUMBING_TYPES) or _hidden(exchange)
+
+
+def _hidden(name: str) -> bool:
+    return any(part.startswith("_") for part in name.split("/"))
+
+
+def _full(name: str, namespace: str) -> str:
+    return f"{namespace.rstrip('/')}/{name}"

@@ -1,0 +1,66 @@
+"""A graph in words: what a screen reader reads, and what a notebook without widgets shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from course.graph.model import Endpoint, Exchange, Graph, Mismatch, Topic
+
+
+def describe(graph: Graph) -> str:
+    """Return the whole graph as text, a paragraph a topic, service and action."""
+    if not graph.nodes:
+        return "No nodes."
+    lines = [f"{_count(graph.nodes, 'node')}: {', '.join(graph.nodes)}"]
+    lines += [f"  Two nodes are called {name}: rename one." for name in graph.twins]
+    for topic in graph.topics:
+        lines += _topic(topic)
+    for kind, exchanges in (("service", graph.services), ("action", graph.actions)):
+        for exchange in exchanges:
+            lines += _exchange(kind, exchange)
+    return "\n".join(lines)
+
+
+def qos(endpoint: Endpoint) -> str:
+    """Return an endpoint's QoS in one line, without what is at its default."""
+    parts: list[str] = []
+    for policy, value in endpoint.qos.items():
+        if policy == "depth":
+            parts[-1] += f"({value})"
+        elif policy in ("deadline", "lifespan"):
+            parts += [f"{policy} {value}"] if value != "none" else []
+        elif policy != "liveliness" or value != "AUTOMATIC":
+            parts.append(value)
+    return ", ".join(parts)
+
+
+def mismatch(topic: str, pair: Mismatch) -> str:
+    """Return one sentence about a pair that DDS does not connect."""
+    source = "DDS reports it" if pair.from_event else "DDS does not connect them"
+    return (
+        f"{pair.publisher} and {pair.subscription} do not connect on {topic}: "
+        f"{', '.join(policy.lower() for policy in pair.policies)} ({'; '.join(pair.reasons)}). "
+        f"{source}."
+    )
+
+
+def _topic(topic: Topic) -> Iterable[str]:
+    yield f"topic {topic.name} ({', '.join(topic.types)})"
+    for verb, ends in (("published by", topic.publishers), ("read by", topic.subscriptions)):
+        for end in ends:
+            yield f"  {verb} {end.node} [{qos(end)}]"
+        if not ends:
+            yield f"  {verb} nobody"
+    for pair in topic.mismatches:
+        yield f"  ! {mismatch(topic.name, pair)}"
+
+
+def _exchange(kind: str, exchange: Exchange) -> Iterable[str]:
+    yield f"{kind} {exchange.name} ({exchange.type})"
+    yield f"  served by {', '.join(exchange.servers) or 'nobody'}"
+    if exchange.clients:
+        yield f"  used by {', '.join(exchange.clients)}"
+
+
+def _count(things: tuple[str, ...], what: str) -> str:
+    return f"{len(things)} {what}{'' if len(things) == 1 else 's'}"

@@ -1,0 +1,107 @@
+"""Recordings as MCAP files, which Foxglove, PlotJuggler and ``ros2 bag`` read."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import IO, Any
+
+from mcap.writer import Writer
+from rclpy.serialization import serialize_message
+
+from course import values
+from course.errors import CourseError
+from course.runtime.names import type_name
+
+_RULE = "=" * 80
+
+
+class RecordingError(CourseError):
+    """A recording that cannot be written; the message says where, and what to do."""
+
+
+def write(path: Path, recordings: Mapping[str, tuple[Any, Sequence[tuple[int, Any]]]]) -> Path:
+    """Write recordings to an MCAP file of profile "ros2"; return its path.
+
+    Args:
+        path: the file; ".mcap" is added if it has no suffix. One that is there is replaced.
+        recordings: {topic: (message class, [(time in ns, message), ...])}.
+
+    Raises:
+        RecordingError: the file cannot be written.
+    """
+    path = path if path.suffix else path.with_suffix(".mcap")
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        temporary = Path(name)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                _write(file, recordings)
+            temporary.chmod(0o644)
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    except OSError as error:
+        raise RecordingError(
+            f"{path} cannot be written ({error.strerror or error}): choose another place."
+        ) from error
+    return path
+
+
+def definition(msg_type: Any) -> str:
+    """Return the text of a message definition, the messages that it contains below it."""
+    parts: dict[str, str] = {}
+    _collect(msg_type, parts)
+    first, *rest = parts.items()
+    texts = [first[1], *(f"{_RULE}\nMSG: {name}\n{text}" for name, text in rest)]
+    return "\n".join(texts)
+
+
+def _write(
+    file: IO[bytes], recordings: Mapping[str, tuple[Any, Sequence[tuple[int, Any]]]]
+) -> None:
+    writer = Writer(file)
+    writer.start(profile="ros2", library="ros2-course")
+    schemas: dict[str, int] = {}
+    channels = {}
+    for topic, (msg_type, _) in recordings.items():
+        name = type_name(msg_type)
+        if name not in schemas:
+            schemas[name] = writer.register_schema(name, "ros2msg", definition(msg_type).encode())
+        channels[topic] = writer.register_channel(topic, "cdr", schemas[name])
+    for number, (stamp, topic, message) in enumerate(_in_order(recordings)):
+        writer.add_message(
+            channels[topic], log_time=stamp, publish_time=stamp, sequence=number,
+            data=serialize_message(message),
+        )  # fmt: skip
+    writer.finish()
+
+
+def _in_order(
+    recordings: Mapping[str, tuple[Any, Sequence[tuple[int, Any]]]],
+) -> Iterator[tuple[int, str, Any]]:
+    rows = [
+        (stamp, topic, message)
+        for topic, (_, stamped) in recordings.items()
+        for stamp, message in stamped
+    ]
+    return iter(sorted(rows, key=lambda row: row[0]))
+
+
+def _collect(msg_type: Any, parts: dict[str, str]) -> None:
+    package, _, name = type_name(msg_type).split("/")
+    key = f"{package}/{name}"
+    if key in parts:
+        return
+    parts[key] = ""  # its place is before what it contains
+    lines = []
+    for field, slot in values.all_fields(msg_type):
+        lines.append(f"{values.in_words(slot)} {field}")
+        inner = getattr(slot, "value_type", slot)
+        if hasattr(inner, "namespaces"):
+            _collect(values.class_of(inner), parts)
+    parts[key] = "\n".join(lines) + "\n"

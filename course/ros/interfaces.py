@@ -1,0 +1,77 @@
+"""Interfaces: show the fields of a message, service or action."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from course import values
+from course.errors import SessionError
+from course.interfaces import installed
+from course.interfaces.names import parse_name
+from course.runtime.offers import load_type
+
+NOUN = "interface"
+
+
+def show(type: str) -> str:  # noqa: A002 - as the command line says
+    """Show the definition of an interface; what is nested is indented."""
+    return "\n".join(definition(type))
+
+
+def list_(package: str = "") -> str:
+    """List the installed interfaces, or those of one package."""
+    known = installed.interfaces()
+    if package and package not in known:
+        raise SessionError(f"There is no package {package} with interfaces here.")
+    return "\n".join(
+        f"{name}/{interface}"
+        for name in ([package] if package else sorted(known))
+        for interface in sorted(known[name])
+    )
+
+
+def definition(name: str) -> list[str]:
+    """Return an interface's fields, a line each, with the fields of nested messages below.
+
+    Raises:
+        SessionError: there is no such interface here.
+    """
+    cls = load_type(name)
+    kind = parse_name(name).kind if name.count("/") == 2 else "msg"
+    parts = {
+        "msg": (cls,),
+        "srv": tuple(getattr(cls, part, None) for part in ("Request", "Response")),
+        "action": tuple(getattr(cls, part, None) for part in ("Goal", "Result", "Feedback")),
+    }[kind]
+    lines: list[str] = []
+    for number, part in enumerate(parts):
+        lines += ["---"] if number else []
+        lines += _fields(part, "")
+    return lines
+
+
+def _fields(msg_type: Any, indent: str) -> list[str]:
+    lines = []
+    for name, slot in values.fields(msg_type):
+        lines.append(f"{indent}{values.in_words(slot)} {name}")
+        inner = getattr(slot, "value_type", slot)
+        if hasattr(inner, "namespaces"):
+            lines += _fields(values.class_of(inner), indent + "\t")
+    constants = getattr(type(msg_type), f"_Metaclass_{msg_type.__name__}__constants", {})
+    return [f"{indent}{_constant(name, value)}" for name, value in constants.items()] + lines
+
+
+def _constant(name: str, value: Any) -> str:
+    return f"{type(value).__name__} {name}={value}"
+
+
+def _declare_show(add: Callable[..., Any]) -> None:
+    add("type", help="as in sensor_msgs/msg/Image")
+
+
+def _declare_list(add: Callable[..., Any]) -> None:
+    add("package", nargs="?", default="")
+
+
+VERBS = {"show": (show, _declare_show), "list": (list_, _declare_list)}

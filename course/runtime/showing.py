@@ -1,0 +1,176 @@
+"""What a session shows of itself: the live views, each made on demand."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from rclpy.action.graph import get_action_names_and_types
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+
+from course.errors import SessionError
+from course.runtime.asking import Asking
+from course.runtime.offers import load_type
+
+if TYPE_CHECKING:
+    from course.runtime.session import Session
+    from course.views.action import ActionView
+    from course.views.graph import GraphView
+    from course.views.log import LogPanel
+    from course.views.parameters import ParameterPanel
+    from course.views.qos_lab import QoSLab
+    from course.views.service import ServiceConsole
+    from course.views.timeline import Timeline
+
+
+class Showing(Asking):
+    """The part of a Session that shows things. Widgets are imported when one is asked for."""
+
+    @property
+    def observer(self) -> Node:
+        """The hidden node through which the session looks at the graph."""
+        return self._probe.node
+
+    def watch(
+        self, msg_type: Any, topic: str, callback: Callable[..., None], qos: QoSProfile | int
+    ) -> Subscription:
+        """Call ``callback`` with each message on a topic, in a background thread.
+
+        With a second argument, it gets what DDS says about the message, too: its time stamps and
+        number (see rclpy's ``create_subscription``).
+
+        For live views: a node that blocks does not hold it up. `unwatch` ends it.
+        """
+        return self._probe.subscribe(msg_type, topic, callback, qos)
+
+    def unwatch(self, subscription: Subscription) -> None:
+        """End a `watch`. Idempotent."""
+        if not self.closed:
+            self._probe.drop(subscription)
+
+    def graph(self, *, everything: bool = False) -> GraphView:
+        """Return a live view of the ROS graph as this session sees it.
+
+        Args:
+            everything: show what the ROS tools hide, too: /rosout, parameter services and the like.
+
+        Raises:
+            SessionError: the session is closed.
+        """
+        from course.views.graph import GraphView
+
+        self._require_open()
+        return GraphView(self._me, everything=everything)
+
+    def log_panel(self, *, level: str = "DEBUG") -> LogPanel:
+        """Return a live view of what all nodes log and print, of at least this level.
+
+        Raises:
+            SessionError: the session is closed, or there is no such level.
+        """
+        from course.views.log import LogPanel
+
+        self._require_open()
+        return LogPanel(self._me, level)
+
+    def service(
+        self, name: str, srv_type: Any | None = None, *, timeout: float = 5.0
+    ) -> ServiceConsole:
+        """Return a console that calls a service by a form made from its type.
+
+        Args:
+            name: the service.
+            srv_type: its class; None takes it from the graph.
+            timeout: seconds that an answer may take.
+
+        Raises:
+            SessionError: nobody offers it, so its type is unknown; or the session is closed.
+        """
+        from course.views.service import ServiceConsole
+
+        full = str(self.observer.resolve_service_name(name))
+        known = self.observer.get_service_names_and_types()
+        found = srv_type or self._type_of("service", full, known)
+        return ServiceConsole(self._me, found, full, timeout)
+
+    def action(self, name: str, action_type: Any | None = None) -> ActionView:
+        """Return a live view of an action's goals, with a form that sends one.
+
+        Args:
+            name: the action.
+            action_type: its class; None takes it from the graph.
+
+        Raises:
+            SessionError: nobody offers it, so its type is unknown; or the session is closed.
+        """
+        from course.views.action import ActionView
+
+        full = str(self.observer.resolve_service_name(name))
+        known = get_action_names_and_types(self.observer)
+        found = action_type or self._type_of("action", full, known)
+        return ActionView(self._me, found, full)
+
+    def parameters(self, node: Node | str) -> ParameterPanel:
+        """Return a live panel of a node's parameters.
+
+        Raises:
+            WaitTimeout: there is no such node, or it does not answer.
+            SessionError: the session is closed.
+        """
+        from course.views.parameters import ParameterPanel
+
+        self._require_open()
+        name = node if isinstance(node, str) else node.get_fully_qualified_name()
+        return ParameterPanel(self._me, name if name.startswith("/") else f"/{name}")
+
+    def timeline(self, *topics: str | tuple[str, Any], window: float = 10.0) -> Timeline:
+        """Return a live view of when messages were published, received and worked on.
+
+        Args:
+            topics: names, or (name, message class) where nobody uses the topic yet; 1 to 6.
+            window: how many seconds it shows, up to 60.
+
+        Raises:
+            SessionError: no topic, too many, a window out of range, or a closed session.
+            WaitTimeout: a topic that nobody uses.
+        """
+        from course.views.timeline import Timeline
+
+        self._require_open()
+        named = [(topic, None) if isinstance(topic, str) else topic for topic in topics]
+        return Timeline(self._me, named, window)
+
+    def qos_lab(
+        self, offered: QoSProfile | None = None, requested: QoSProfile | None = None
+    ) -> QoSLab:
+        """Return the QoS lab: predict what two profiles do together, then see it happen.
+
+        Args:
+            offered: the writer's profile to begin with; None is the default one.
+            requested: the reader's.
+
+        Raises:
+            ProfileError: a policy that the lab does not know (SYSTEM_DEFAULT, say).
+            SessionError: the session is closed.
+        """
+        from course.views.qos_lab import QoSLab
+
+        self._require_open()
+        return QoSLab(self._me, offered, requested)
+
+    @property
+    def _me(self) -> Session:
+        return self  # type: ignore[return-value]  # Session is the one class made of this part
+
+    def _type_of(self, what: str, name: str, known: list[tuple[str, list[str]]]) -> Any:
+        types = dict(known)
+        if name not in types:
+            close = difflib.get_close_matches(name, types, n=1)
+            guess = f" Is it {close[0]}?" if close else ""
+            raise SessionError(f"Nobody offers the {what} {name}, so its type is unknown.{guess}")
+        return load_type(types[name][0], name)

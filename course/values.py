@@ -1,0 +1,215 @@
+"""ROS messages as plain data (dicts, lists, numbers, strings), and back.
+
+For what people type and read: a request on a command line, a form, a printed message. The rules of
+each field are those of the ROS 2 interface definition.
+"""
+
+from __future__ import annotations
+
+import array
+import math
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any
+
+import yaml
+from rosidl_parser.definition import (
+    AbstractSequence,
+    AbstractString,
+    AbstractType,
+    AbstractWString,
+    Array,
+    BasicType,
+    NamespacedType,
+)
+
+from course.errors import CourseError
+from course.runtime.names import type_name
+
+LONGEST = 64
+"""Elements of a sequence, or bytes, that `to_data` keeps by default; the rest is only counted."""
+
+_BYTES = ("octet", "uint8", "int8", "char")
+_INTEGERS = {
+    f"{sign}int{bits}": (0 if sign else -(2 ** (bits - 1)), 2 ** (bits if sign else bits - 1) - 1)
+    for sign in ("", "u")
+    for bits in (8, 16, 32, 64)
+} | {"octet": (0, 255)}
+
+
+class MisfitError(CourseError):
+    """A value that does not fit its field; the message names the field and what it takes."""
+
+
+def to_data(message: Any, longest: int | None = LONGEST) -> dict[str, Any]:
+    """Return a message's fields as plain data, nested messages as dicts.
+
+    Args:
+        message: any ROS message.
+        longest: keep so many elements of each sequence, and say how many more there are in a
+            last element; None keeps all.
+    """
+    return {name: _plain(getattr(message, name), longest) for name, _ in fields(type(message))}
+
+
+def from_text(msg_type: Any, text: str) -> Any:
+    """Return a message of ``msg_type`` from YAML or JSON, as in ``{data: true}``.
+
+    Raises:
+        MisfitError: it is no YAML, or a value does not fit; says which field, and what it takes.
+    """
+    try:
+        data = yaml.safe_load(text) if text.strip() else {}
+    except yaml.YAMLError as error:
+        reason = str(error).splitlines()[0]
+        raise MisfitError(
+            f"{text!r} is not YAML ({reason}): write the fields as in {example(msg_type)!r}."
+        ) from None
+    return from_data(msg_type, data)
+
+
+def from_data(msg_type: Any, data: Any) -> Any:
+    """Return a message of ``msg_type`` whose fields have the values of ``data``.
+
+    Fields that are left out keep their defaults.
+
+    Raises:
+        MisfitError: an unknown field, or a value that does not fit its field.
+    """
+    return _message(msg_type, data, "")
+
+
+def fields(msg_type: Any) -> Iterator[tuple[str, AbstractType]]:
+    """Yield (name, type) of each field, in the order of the definition."""
+    for name, slot in all_fields(msg_type):
+        if name != "structure_needs_at_least_one_member":
+            yield name, slot
+
+
+def all_fields(msg_type: Any) -> Iterator[tuple[str, AbstractType]]:
+    """Yield the same, with the field that an empty message has on the wire."""
+    yield from zip(msg_type.get_fields_and_field_types(), msg_type.SLOT_TYPES, strict=True)
+
+
+def example(msg_type: Any) -> str:
+    """Return a message of ``msg_type`` with its defaults, as one line of YAML."""
+    return one_line(to_data(msg_type()))
+
+
+def one_line(data: Any) -> str:
+    """Return plain data as one line of YAML."""
+    text: str = yaml.safe_dump(
+        data, default_flow_style=True, width=10**6, sort_keys=False, allow_unicode=True
+    )
+    return text.strip().removesuffix("\n...")
+
+
+def class_of(slot: NamespacedType) -> Any:
+    """Return the message class of a field that is a message itself."""
+    return _class("/".join((*slot.namespaces, slot.name)))
+
+
+def in_words(slot: AbstractType) -> str:
+    """Return what a field takes, as an interface definition says it (``float64[]``)."""
+    if isinstance(slot, NamespacedType):
+        return f"{slot.namespaces[0]}/{slot.name}"
+    if isinstance(slot, Array):
+        return f"{in_words(slot.value_type)}[{slot.size}]"
+    if isinstance(slot, AbstractSequence):
+        bound = getattr(slot, "maximum_size", None)
+        return f"{in_words(slot.value_type)}[{f'<={bound}' if bound else ''}]"
+    if isinstance(slot, AbstractString | AbstractWString):
+        return "string" if isinstance(slot, AbstractString) else "wstring"
+    assert isinstance(slot, BasicType)
+    name: str = slot.typename
+    return {"boolean": "bool", "double": "float64", "float": "float32", "octet": "byte"}.get(
+        name, name
+    )
+
+
+@cache
+def _class(name: str) -> Any:
+    from course.runtime.offers import load_type
+
+    return load_type(name)
+
+
+def _plain(value: Any, longest: int | None) -> Any:
+    if hasattr(value, "get_fields_and_field_types"):
+        return to_data(value, longest)
+    if isinstance(value, bytes):
+        return value[0] if len(value) == 1 else list(value)
+    if isinstance(value, str | bool | int | float):
+        return value
+    items = value.tolist() if hasattr(value, "tolist") else list(value)
+    kept = items if longest is None else items[:longest]
+    plain = [_plain(item, longest) for item in kept]
+    return plain if len(kept) == len(items) else [*plain, f"… {len(items) - len(kept)} more"]
+
+
+def _message(msg_type: Any, data: Any, where: str) -> Any:
+    if not isinstance(data, Mapping):
+        raise MisfitError(
+            f"{_named(where, type_name(msg_type))} takes fields, as in {example(msg_type)!r}, not "
+            f"{data!r}."
+        )
+    slots = dict(fields(msg_type))
+    for name in data:
+        if name not in slots:
+            raise MisfitError(
+                f"{type_name(msg_type)} has no field {name!r}: it has {', '.join(slots) or 'none'}."
+            )
+    message = msg_type()
+    for name, value in data.items():
+        setattr(message, name, _value(slots[name], value, f"{where}.{name}" if where else name))
+    return message
+
+
+def _value(slot: AbstractType, value: Any, where: str) -> Any:
+    if isinstance(slot, NamespacedType):
+        return _message(class_of(slot), value, where)
+    if isinstance(slot, Array | AbstractSequence):
+        return _sequence(slot, value, where)
+    if isinstance(slot, AbstractString | AbstractWString):
+        if isinstance(value, str):
+            return value
+        raise _misfit(where, slot, value)
+    assert isinstance(slot, BasicType)
+    return _basic(slot, value, where)
+
+
+def _sequence(slot: Any, value: Any, where: str) -> Any:
+    if not isinstance(value, list | tuple | bytes | array.array):
+        raise _misfit(where, slot, value)
+    size, bound = getattr(slot, "size", None), getattr(slot, "maximum_size", None)
+    if size is not None and len(value) != size:
+        raise MisfitError(f"{where} takes exactly {size} elements, not {len(value)}.")
+    if bound and len(value) > bound:
+        raise MisfitError(f"{where} takes at most {bound} elements, not {len(value)}.")
+    return [_value(slot.value_type, item, f"{where}[{n}]") for n, item in enumerate(value)]
+
+
+def _basic(slot: BasicType, value: Any, where: str) -> Any:
+    name = slot.typename
+    if name == "boolean":
+        if isinstance(value, bool):
+            return value
+    elif name in _INTEGERS:
+        least, most = _INTEGERS[name]
+        if isinstance(value, int) and not isinstance(value, bool):
+            if least <= value <= most:
+                return bytes([value]) if name == "octet" else value
+            raise MisfitError(f"{where} takes {least} to {most}, not {value}.")
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        return float(value)
+    elif isinstance(value, str) and value.lower().lstrip("+-.") in ("nan", "inf", "infinity"):
+        return float(value.replace(".", "")) if value else math.nan
+    raise _misfit(where, slot, value)
+
+
+def _misfit(where: str, slot: AbstractType, value: Any) -> MisfitError:
+    return MisfitError(f"{where} takes {in_words(slot)}, not {value!r}.")
+
+
+def _named(where: str, name: str) -> str:
+    return f"{where} ({name})" if where else name

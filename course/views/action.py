@@ -1,0 +1,91 @@
+"""One action, live: every goal's way through its states, feedback, result, and a cancel button."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from course.errors import CourseError
+from course.runtime.session import Session
+from course.values import one_line
+from course.views.live import Frame, LiveView
+from course.watch import forms
+from course.watch.goals import Goal, GoalBoard
+
+
+class ActionView(LiveView):
+    """Shows all goals of an action, whoever sent them, and sends and cancels goals itself."""
+
+    script = "action"
+    shared = ("forms",)
+
+    def __init__(self, session: Session, action_type: Any, name: str) -> None:
+        """Watch the action ``name``."""
+        super().__init__(session)
+        self._board = GoalBoard(session, action_type, name)
+        self._problem = ""
+
+    @property
+    def goals(self) -> list[Goal]:
+        """The latest goals, oldest first."""
+        return self._board.goals
+
+    def send(self, **typed: Any) -> None:
+        """Send a goal with values by field, as the form does.
+
+        Raises:
+            MisfitError: a value that does not fit its field.
+        """
+        self._board.send({path.replace("__", "."): value for path, value in typed.items()})
+
+    def cancel(self, number: int) -> None:
+        """Ask the server to cancel a goal.
+
+        Raises:
+            WaitTimeout: the server does not answer.
+        """
+        self._board.cancel(number)
+
+    def control(self, message: dict[str, Any]) -> None:
+        """Send or cancel a goal."""
+        try:
+            if isinstance(message.get("goal"), dict):
+                self._board.send(message["goal"])
+            elif isinstance(message.get("cancel"), int):
+                self._board.cancel(message["cancel"])
+            self._problem = ""
+        except CourseError as error:
+            self._problem = str(error)
+
+    def frame(self) -> Frame:
+        """Return the form and the goals."""
+        return {
+            "title": f"Action {self._board.name}",
+            "fields": [asdict(field) for field in forms.fields(self._board.action_type.Goal)],
+            "problem": self._problem,
+            "goals": [_shown(goal) for goal in self.goals],
+        }
+
+    def words(self) -> str:
+        """Return the goals as text."""
+        lines = [f"Action {self._board.name}, {len(self.goals)} goals"]
+        for goal in self.goals:
+            shown = _shown(goal)
+            states = " -> ".join(f"{name} ({when})" for name, when in shown["states"])
+            parts = (f"goal {goal.number}: {states}", shown["text"], shown["outcome"])
+            lines.append("  " + "; ".join(part for part in parts if part))
+        return "\n".join([*lines, *([self._problem] if self._problem else [])])
+
+
+def _shown(goal: Goal) -> dict[str, Any]:
+    asked = f"asked: {one_line(goal.asked)} " if goal.asked is not None else ""
+    feedback = f"feedback {goal.feedback}: {one_line(goal.latest)}" if goal.feedback else ""
+    result = f"result: {one_line(goal.result)}" if goal.result is not None else ""
+    return {
+        "number": goal.number,
+        "states": [[state.name, f"{when:.1f} s"] for state, when in goal.states],
+        "text": asked + feedback,
+        "outcome": goal.problem or result,
+        "bad": bool(goal.problem),
+        "over": goal.over,
+    }

@@ -1,0 +1,160 @@
+"""What every live view shares: a frame for the browser, the same in words, and a bounded pace."""
+
+from __future__ import annotations
+
+import json
+import time
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar
+
+import anywidget
+import traitlets
+
+from course.runtime.session import Session
+from course.views.ticker import ticker_of
+
+FASTEST = 0.1
+"""Seconds between two frames at least: ten a second, whatever the publishers do."""
+
+PATIENCE = 20
+"""Frames that may be on their way before a browser that confirms none gets one a second only."""
+
+MAX_FRAME = 256 * 1024
+"""Bytes of JSON that a frame may have; a view bounds its model to stay far below."""
+
+_STATIC = Path(__file__).parent / "static"
+
+Frame = dict[str, Any]
+
+
+class LiveWidget(anywidget.AnyWidget):
+    """The browser's end of a view. It draws `frame` and knows nothing of ROS.
+
+    Attributes:
+        frame: what to draw; JSON data.
+        words: the same as text, for screen readers.
+        ended: why nothing comes any more; empty while the view is live.
+        number: counts frames; the browser sends back the number that it has drawn.
+    """
+
+    kind = traitlets.Unicode().tag(sync=True)
+    frame = traitlets.Dict().tag(sync=True)
+    words = traitlets.Unicode().tag(sync=True)
+    ended = traitlets.Unicode().tag(sync=True)
+    number = traitlets.Int().tag(sync=True)
+
+
+class LiveView:
+    """A view of a session that keeps itself up to date while somebody looks at it.
+
+    A subclass says what there is to see (`frame`, `words`) and what a control does (`control`).
+    In a notebook it shows a widget; anywhere else, and for a screen reader, its words.
+    """
+
+    script: ClassVar[str] = ""
+    """Name of the view's own script and style in ``static``."""
+
+    shared: ClassVar[tuple[str, ...]] = ()
+    """Further scripts and styles that it uses."""
+
+    period: ClassVar[float] = FASTEST
+    """Seconds between two looks at the model."""
+
+    def __init__(self, session: Session) -> None:
+        """Show what happens in ``session``."""
+        self.session = session
+        self._widget: LiveWidget | None = None
+        self._due = 0.0
+        self._last = ""
+        self._drawn = 0
+
+    def frame(self) -> Frame:
+        """Return what is to be drawn now, as JSON data of a bounded size."""
+        raise NotImplementedError
+
+    def words(self) -> str:
+        """Return what there is to see now, as text."""
+        raise NotImplementedError
+
+    def control(self, message: dict[str, Any]) -> None:
+        """Do what a control in the browser asks for. Runs in the kernel's main thread."""
+
+    @property
+    def widget(self) -> LiveWidget:
+        """The widget that shows this view; made, and kept up to date, from its first use."""
+        if self._widget is None:
+            self._widget = _widget_class((*self.shared, self.script))(kind=self.script)
+            self._widget.on_msg(self._heard)
+            # The widget keeps its view alive, and the ticker keeps neither: when the widget is
+            # closed and forgotten, the view ends by itself.
+            self._widget.view = self
+            self._look()
+            self._due = time.monotonic() + self.period
+            ticker_of(self.session).add(self)
+        return self._widget
+
+    def tick(self, now: float) -> float:
+        """Send a frame if one is due and something has changed; return when the next is due."""
+        if now >= self._due:
+            self._look()
+            slow = self._widget is not None and self._widget.number - self._drawn > PATIENCE
+            self._due = time.monotonic() + (max(1.0, self.period) if slow else self.period)
+        return self._due
+
+    def end(self, why: str) -> None:
+        """Say in the view that nothing will come any more."""
+        if self._widget is not None:
+            self._widget.ended = why
+
+    def __repr__(self) -> str:
+        """Return the view in words."""
+        return self.words()
+
+    def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        bundle = self.widget._repr_mimebundle_(**kwargs)
+        data, metadata = bundle if isinstance(bundle, tuple) else (bundle or {}, {})
+        return {**data, "text/plain": repr(self)}, metadata
+
+    def _look(self) -> None:
+        widget = self._widget
+        if widget is None or widget.ended:
+            return
+        try:
+            frame, words = self.frame(), self.words()
+            text = json.dumps([frame, words])
+        except Exception as error:  # noqa: BLE001 - a view must never take its thread down
+            if not self.session.closed:
+                widget.ended = f"This view has stopped ({type(error).__name__}: {error})."
+            return
+        if text != self._last and len(text) <= MAX_FRAME:
+            self._last = text
+            with widget.hold_sync():
+                widget.frame, widget.words = frame, words
+                widget.number += 1
+
+    def _heard(self, _widget: Any, message: Any, _buffers: Any) -> None:
+        if not isinstance(message, dict):
+            return
+        if isinstance(message.get("drawn"), int):
+            self._drawn = max(self._drawn, message["drawn"])
+        elif "hello" in message:
+            assert self._widget is not None
+            self._widget.send({"here": True})
+        else:
+            self.control(message)
+
+
+@cache
+def _widget_class(parts: tuple[str, ...]) -> type[LiveWidget]:
+    """Return the widget class of a view: its script and style are of the class, as anywidget's are.
+
+    Script and style are one text each: a browser cannot import the shared parts from beside it.
+    """
+    names = ("live", *parts)
+    texts = {
+        f"_{key}": "\n".join((_STATIC / f"{name}.{kind}").read_text("utf-8") for name in names)
+        for key, kind in (("esm", "js"), ("css", "css"))
+    }
+    name = f"{parts[-1].title()}Widget"
+    return type(name, (LiveWidget,), {**texts, "_anywidget_id": f"{__name__}.{name}"})

@@ -1,0 +1,100 @@
+"""A node's parameters, live: sliders and inputs from their descriptors."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import asdict
+from typing import Any
+
+from course.errors import CourseError
+from course.runtime.session import Session
+from course.views.live import Frame, LiveView
+from course.watch.parameters import Entry, ParameterSheet
+
+ASK_TIMEOUT = 2.0
+
+
+class ParameterPanel(LiveView):
+    """Shows and changes the parameters of one node; what it refuses is shown with its reason."""
+
+    script = "parameters"
+    shared = ("forms",)
+    period = 0.5  # s: each look is three service calls
+
+    def __init__(self, session: Session, node: str) -> None:
+        """Show the parameters of ``node``.
+
+        Raises:
+            WaitTimeout: there is no such node, or it does not answer.
+        """
+        super().__init__(session)
+        self._sheet = ParameterSheet(session, node)
+        self._entries = self._sheet.entries()
+        self._problem = ""
+        self._changes = 0
+        self._silent = ""
+        self._lock = threading.Lock()
+        self._asking = threading.Lock()
+
+    @property
+    def entries(self) -> list[Entry]:
+        """The parameters, as they were at the last look."""
+        return list(self._entries)
+
+    def set(self, name: str, value: Any) -> None:
+        """Change a parameter.
+
+        Raises:
+            ParameterError: the node refused, for the reason in the message; or no such value.
+            WaitTimeout: the node does not answer.
+        """
+        self._sheet.set(name, value)
+        self._entries = self._sheet.entries()
+
+    def control(self, message: dict[str, Any]) -> None:
+        """Change a parameter as typed."""
+        if not isinstance(message.get("set"), str):
+            return
+        problem = ""
+        try:
+            self._sheet.set(message["set"], message.get("value"), ASK_TIMEOUT)
+        except CourseError as error:
+            problem = str(error)
+        with self._lock:
+            self._problem, self._changes = problem, self._changes + 1
+
+    def frame(self) -> Frame:
+        """Return the parameters, and what the last change led to."""
+        self._refresh()
+        with self._lock:
+            problem, changes = self._problem or self._silent, self._changes
+        return {
+            "title": f"Parameters of {self._sheet.node}",
+            "entries": [asdict(entry) for entry in self._entries],
+            "problem": problem,
+            "changes": changes,
+        }
+
+    def _refresh(self) -> None:
+        """Ask for the values in a thread: a node that is stuck must not hold up other views."""
+        if self._asking.acquire(blocking=False):
+            threading.Thread(target=self._ask, name="ROS parameters", daemon=True).start()
+
+    def _ask(self) -> None:
+        try:
+            self._entries, self._silent = self._sheet.entries(ASK_TIMEOUT), ""
+        except CourseError as error:
+            self._silent = str(error)
+        except Exception as error:  # noqa: BLE001 - the session may end meanwhile
+            self._silent = f"{type(error).__name__}: {error}"
+        finally:
+            self._asking.release()
+
+    def words(self) -> str:
+        """Return the parameters as text."""
+        lines = [f"Parameters of {self._sheet.node}"]
+        for entry in self._entries:
+            limits = f" ({entry.least:g} to {entry.most:g})" if entry.least is not None else ""
+            about = f"  # {entry.description}" if entry.description else ""
+            lines.append(f"  {entry.name}: {entry.value}{limits}{about}")
+        return "\n".join([*lines, *([self._problem] if self._problem else [])])

@@ -1,0 +1,187 @@
+"""The QoS lab as a view: two profiles side by side, a prediction, and what really happens."""
+
+from __future__ import annotations
+
+import statistics
+import threading
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from rclpy.qos import QoSProfile
+
+from course.errors import CourseError
+from course.qoslab import lab, link, rules
+from course.qoslab.experiment import COUNT, SCENARIOS, Experiment, Outcome
+from course.qoslab.profile import CHOICES, NUMBERS, Profile
+from course.runtime.session import Session
+from course.views.live import Frame, LiveView
+
+KEPT = 8
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One experiment with the prediction that was made before it, and what was seen."""
+
+    experiment: Experiment
+    connects: bool
+    arrive: int | None
+    outcome: Outcome | None = None
+    problem: str = ""
+
+    @property
+    def right(self) -> bool | None:
+        """Whether the prediction came true; None while it is not known."""
+        if self.outcome is None:
+            return None
+        arrived = len(self.outcome.received)
+        return self.outcome.connected == self.connects and self.arrive in (None, arrived)
+
+
+class QoSLab(LiveView):
+    """Predict first, then run: real endpoints in two processes, in one of five scenarios.
+
+    The kernel's own nodes are not touched. With a loss, both processes are in a network namespace
+    of their own, where the machine allows it.
+    """
+
+    script = "qos_lab"
+    shared = ("forms",)
+    period = 0.2
+
+    def __init__(
+        self, session: Session, offered: QoSProfile | None, requested: QoSProfile | None
+    ) -> None:
+        """Begin with two profiles; None is the default one."""
+        super().__init__(session)
+        self._offered = Profile.of(offered) if offered else Profile()
+        self._requested = Profile.of(requested) if requested else Profile()
+        self._trials: list[Trial] = []
+        self._running = False
+        self._problem = ""
+        self._lock = threading.Lock()
+
+    @property
+    def trials(self) -> list[Trial]:
+        """The latest trials, oldest first."""
+        with self._lock:
+            return list(self._trials)
+
+    def run(
+        self,
+        scenario: str = "stream",
+        *,
+        connects: bool,
+        arrive: int | None = None,
+        loss: int = 0,
+        offered: QoSProfile | None = None,
+        requested: QoSProfile | None = None,
+    ) -> Trial:
+        """Say what you expect, run a scenario, and return the trial.
+
+        Args:
+            scenario: "stream", "late joiner", "slow reader", "deadline" or "liveliness".
+            connects: whether you expect DDS to connect the two.
+            arrive: how many of 30 messages you expect to arrive; None leaves that open.
+            loss: share of packets that the link drops, in %.
+            offered: the writer's profile from now on.
+            requested: the reader's profile from now on.
+
+        Raises:
+            LabError: no such scenario, or its processes failed.
+            ProfileError: a profile that the lab does not know.
+        """
+        self._offered = Profile.of(offered) if offered else self._offered
+        self._requested = Profile.of(requested) if requested else self._requested
+        experiment = Experiment(self._offered, self._requested, scenario, loss)
+        trial = Trial(experiment, connects, arrive, lab.run(experiment))
+        self._keep(trial)
+        return trial
+
+    def control(self, message: dict[str, Any]) -> None:
+        """Run what the browser asks for, in a thread: the kernel goes on."""
+        asked = message.get("run")
+        if not isinstance(asked, dict):
+            return
+        with self._lock:
+            if self._running:
+                return
+            self._running, self._problem = True, ""
+        threading.Thread(target=self._run, args=(asked,), name="QoS lab", daemon=True).start()
+
+    def frame(self) -> Frame:
+        """Return profiles, rules and trials."""
+        return {
+            "offered": self._offered.data(),
+            "requested": self._requested.data(),
+            "choices": {name: list(choices) for name, choices in CHOICES.items()},
+            "numbers": {name: list(limits) for name, limits in NUMBERS.items()},
+            "scenarios": SCENARIOS,
+            "count": COUNT,
+            "no_loss": link.problem(),
+            "running": self._running,
+            "problem": self._problem,
+            "trials": [_shown(trial) for trial in reversed(self.trials)],
+        }
+
+    def words(self) -> str:
+        """Return the trials as text."""
+        lines = [f"offered: {self._offered}", f"requested: {self._requested}"]
+        for trial in self.trials:
+            shown = _shown(trial)
+            lines += [f"{shown['title']}: {shown['seen']}", f"  {shown['why']}"]
+            lines += [f"  {shown['verdict']}"]
+        return "\n".join([*lines, *([self._problem] if self._problem else [])])
+
+    def _run(self, asked: dict[str, Any]) -> None:
+        problem = ""
+        try:
+            self._offered = Profile.from_data(asked.get("offered"))
+            self._requested = Profile.from_data(asked.get("requested"))
+            scenario, loss = str(asked.get("scenario")), _whole(asked.get("loss")) or 0
+            experiment = Experiment(self._offered, self._requested, scenario, loss)
+            connects, arrive = bool(asked.get("connects")), _whole(asked.get("arrive"))
+            self._keep(Trial(experiment, connects, arrive, lab.run(experiment)))
+        except CourseError as error:
+            problem = str(error)
+        with self._lock:
+            self._running, self._problem = False, problem
+
+    def _keep(self, trial: Trial) -> None:
+        with self._lock:
+            self._trials = [*self._trials, trial][-KEPT:]
+
+
+def _shown(trial: Trial) -> dict[str, Any]:
+    experiment, outcome = trial.experiment, trial.outcome
+    assert outcome is not None
+    loss = f", {experiment.loss} % loss" if outcome.lossy else ""
+    said = "connected" if trial.connects else "not connected"
+    said += f", {trial.arrive} messages" if trial.arrive is not None else ""
+    truth = "That was right." if trial.right else "It came out otherwise."
+    return {
+        "title": f"{experiment.scenario}{loss}",
+        "pair": f"{experiment.offered} -> {experiment.requested}",
+        "seen": _seen(outcome),
+        "why": " ".join(filter(None, [rules.explain(experiment, outcome), outcome.remark])),
+        "right": trial.right,
+        "verdict": f"You said: {said}. {truth}",
+        "received": outcome.received,
+        "sent": outcome.sent,
+        "rules": [asdict(r) for r in rules.compare(experiment.offered, experiment.requested)],
+    }
+
+
+def _seen(outcome: Outcome) -> str:
+    if not outcome.connected:
+        return f"not connected ({outcome.broken.lower() or 'nothing was found'})"
+    parts = [f"connected, {len(outcome.received)} of {outcome.sent} arrived"]
+    if outcome.latency_ms:
+        parts.append(f"latency p50 {statistics.median(outcome.latency_ms):.2f} ms")
+    if outcome.received and not outcome.in_order:
+        parts.append("not in order")
+    return ", ".join(parts)
+
+
+def _whole(value: Any) -> int | None:
+    return value if isinstance(value, int) else None

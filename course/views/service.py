@@ -1,0 +1,71 @@
+"""A console for one service: a form made from its type, and its latest calls."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from course.errors import CourseError
+from course.runtime.session import Session
+from course.values import one_line
+from course.views.live import Frame, LiveView
+from course.watch import forms
+from course.watch.calls import Call, Calls
+
+
+class ServiceConsole(LiveView):
+    """Calls a service by a form. ``calls`` has what was asked and answered."""
+
+    script = "service"
+    shared = ("forms",)
+
+    def __init__(self, session: Session, srv_type: Any, name: str, timeout: float = 5.0) -> None:
+        """Call ``name``, and wait ``timeout`` s for each answer."""
+        super().__init__(session)
+        self._model = Calls(session, srv_type, name)
+        self._timeout = timeout
+        self._problem = ""
+
+    @property
+    def calls(self) -> list[Call]:
+        """The latest calls, oldest first."""
+        return self._model.calls
+
+    def call(self, **typed: Any) -> None:
+        """Call with values by field, as the form does; the answer comes in the background.
+
+        Raises:
+            MisfitError: a value that does not fit its field.
+        """
+        self._model.send({path.replace("__", "."): v for path, v in typed.items()}, self._timeout)
+
+    def control(self, message: dict[str, Any]) -> None:
+        """Call with what was typed."""
+        if not isinstance(message.get("call"), dict):
+            return
+        try:
+            self._model.send(message["call"], self._timeout)
+            self._problem = ""
+        except CourseError as error:
+            self._problem = str(error)
+
+    def frame(self) -> Frame:
+        """Return the form and the calls."""
+        return {
+            "title": f"Service {self._model.name}",
+            "fields": [asdict(field) for field in forms.fields(self._model.srv_type.Request)],
+            "problem": self._problem,
+            "calls": [asdict(call) | {"time": _time(call)} for call in self.calls],
+        }
+
+    def words(self) -> str:
+        """Return the calls as text."""
+        lines = [f"Service {self._model.name}, {len(self.calls)} calls"]
+        for call in self.calls:
+            outcome = "waiting" if call.waiting else call.problem or one_line(call.answer)
+            lines.append(f"  {call.number}: {one_line(call.request)} -> {outcome}")
+        return "\n".join([*lines, *([self._problem] if self._problem else [])])
+
+
+def _time(call: Call) -> str:
+    return "" if call.seconds is None else f"{call.seconds * 1000:.1f} ms"

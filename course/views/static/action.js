@@ -1,0 +1,60 @@
+// An action's form, and its goals: states passed, feedback, result, and a button that cancels.
+
+const view = {
+  label: "Action view",
+  start(stage, send) {
+    const title = make("h4", { class: "rosview-title" });
+    const form = formFor("Goal", "Send goal", (values) => send({ goal: values }));
+    const list = make("ul", { class: "rosgoals" });
+    stage.append(title, form.element, list);
+    const cards = new Map();
+    return {
+      draw(frame) {
+        title.textContent = frame.title;
+        form.draw(frame.fields, frame.problem);
+        for (const goal of frame.goals) {
+          if (!cards.has(goal.number)) cards.set(goal.number, card(goal.number, send));
+          cards.get(goal.number).draw(goal);
+        }
+        const kept = frame.goals.map((goal) => goal.number).reverse();
+        for (const number of cards.keys()) if (!kept.includes(number)) cards.delete(number);
+        const elements = kept.map((number) => cards.get(number).element);
+        // Moving an element takes its focus away: only when the list itself has changed.
+        if (elements.some((element, place) => list.children[place] !== element)
+            || list.children.length !== elements.length) {
+          list.replaceChildren(...elements);
+        }
+      },
+    };
+  },
+};
+
+/** A goal's card is kept from frame to frame, so that its button keeps the focus. */
+function card(number, send) {
+  const states = make("ol", { class: "rosstates" });
+  const text = make("p", { class: "rosgoal-text" });
+  const state = make("p", { class: "rosgoal-state", role: "status" });
+  const cancel = make(
+    "button", { type: "button", "aria-label": `Cancel goal ${number}`,
+      onclick: () => send({ cancel: number }) }, "Cancel",
+  );
+  const element = make(
+    "li", { class: "rosgoal" }, make("strong", {}, `Goal ${number}`), states, text, state, cancel,
+  );
+  return {
+    element,
+    draw(goal) {
+      states.replaceChildren(...goal.states.map(([name, when], place) => make(
+        "li", { class: `rosstate rosstate-${name.toLowerCase()}`,
+          "aria-current": place === goal.states.length - 1 ? "step" : null },
+        `${name} ${when}`,
+      )));
+      text.textContent = goal.text;
+      if (state.textContent !== goal.outcome) state.textContent = goal.outcome;
+      state.className = `rosgoal-state ${goal.bad ? "rosbad" : ""}`;
+      cancel.hidden = goal.over;
+    },
+  };
+}
+
+export default { render };

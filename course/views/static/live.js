@@ -1,0 +1,119 @@
+// What every live view shares in the browser: a labelled region, the drawing, the same in words,
+// a line that says whether it is live, and a confirmation of each frame that was drawn.
+//
+// A view's own script, which follows this one in the same module, defines
+//   const view = { label: "…", start(stage, send) { return { draw(frame) {…} } } }
+// `send(message)` goes to the view's `control` in the kernel. Everything is made of elements and
+// text: nothing from the kernel is ever read as HTML.
+
+const SVG = "http://www.w3.org/2000/svg";
+const DEAD =
+  "Not live any more: the kernel of this notebook was restarted or has ended. " +
+  "Run this cell again.";
+const FOCUSABLE = "a, button, input, select, summary, textarea, [tabindex]";
+
+/** Make an element; `on…` are listeners, other keys attributes, `true` sets an empty one. */
+function make(tag, attributes = {}, ...children) {
+  return fill(document.createElement(tag), attributes, children);
+}
+
+/** The same for SVG. */
+function shape(tag, attributes = {}, ...children) {
+  return fill(document.createElementNS(SVG, tag), attributes, children);
+}
+
+function fill(element, attributes, children) {
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (value === true) element.setAttribute(name, "");
+    else if (value !== false && value !== null && value !== undefined) {
+      element.setAttribute(name, value);
+    }
+  }
+  element.append(...children);
+  return element;
+}
+
+/** JupyterLab's shortcuts leave a control alone only if the control itself says so. */
+function guard(root) {
+  for (const element of root.querySelectorAll(FOCUSABLE)) {
+    element.setAttribute("data-lm-suppress-shortcuts", "true");
+  }
+}
+
+function render({ model, el }) {
+  let dead = false; // until the kernel says otherwise
+  const send = (message) => {
+    try {
+      model.send(message);
+    } catch {
+      dead = true; // the connection has been taken down
+    }
+  };
+  const stage = make("div", { class: "rosview-stage" });
+  const words = make("pre", { class: "rosview-words", tabindex: "0" });
+  const status = make("p", { class: "rosview-status", role: "status" });
+  const root = make(
+    "section", { class: `rosview rosview-${model.get("kind")}`, "aria-label": view.label },
+    stage,
+    make("details", {}, make("summary", {}, "In words"), words),
+    status,
+  );
+  for (const name of ["keydown", "keypress", "keyup"]) {
+    root.addEventListener(name, (event) => event.stopPropagation());
+  }
+  el.append(root);
+  const drawing = view.start(stage, send);
+
+  let waiting = 0;
+  const draw = () => {
+    waiting = 0;
+    drawing.draw(model.get("frame"));
+    words.textContent = model.get("words");
+    guard(root);
+    send({ drawn: model.get("number") });
+  };
+  // At most one drawing a screen refresh, always of the latest frame.
+  const refresh = () => {
+    alive();
+    waiting ||= requestAnimationFrame(draw);
+  };
+  const say = () => {
+    const ended = model.get("ended");
+    const text = dead ? DEAD : ended;
+    root.classList.toggle("rosview-over", Boolean(text));
+    for (const control of stage.querySelectorAll("button, input, select")) {
+      control.disabled = Boolean(text);
+    }
+    if (status.textContent !== text) status.textContent = text;
+  };
+  // JupyterLab says that the connection has changed, not how: a kernel that lives answers.
+  const connection = () => {
+    dead = true;
+    say();
+    send({ hello: true });
+  };
+  const alive = () => {
+    if (dead) {
+      dead = false;
+      say();
+    }
+  };
+  const heard = (message) => message?.here && alive();
+
+  model.on("change:number", refresh);
+  model.on("change:ended", say);
+  model.on("comm_live_update", connection);
+  model.on("msg:custom", heard);
+  draw();
+  say();
+  return () => {
+    cancelAnimationFrame(waiting);
+    model.off("change:number", refresh);
+    model.off("change:ended", say);
+    model.off("comm_live_update", connection);
+    model.off("msg:custom", heard);
+    drawing.stop?.();
+    root.remove();
+  };
+}

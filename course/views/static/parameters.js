@@ -1,0 +1,69 @@
+// A node's parameters: a control for each, and the node's own reason where it refuses a value.
+
+const view = {
+  label: "Parameter panel",
+  start(stage, send) {
+    const title = make("h4", { class: "rosview-title" });
+    const grid = make("div", { class: "rosform-grid" });
+    const problem = make("p", { class: "rosform-problem", role: "alert" });
+    stage.append(title, grid, problem);
+    const rows = new Map();
+    let known = "";
+    return {
+      draw(frame) {
+        title.textContent = frame.title;
+        const shape = JSON.stringify(frame.entries.map(({ value, ...rest }) => rest));
+        if (shape !== known) {
+          known = shape;
+          rows.clear();
+          grid.replaceChildren(...frame.entries.flatMap((entry, number) => {
+            const made = row(entry, `${frame.title}-${number}`, send);
+            rows.set(entry.name, made);
+            return made.elements;
+          }));
+        }
+        for (const entry of frame.entries) rows.get(entry.name).draw(entry.value, frame.changes);
+        if (problem.textContent !== frame.problem) problem.textContent = frame.problem;
+      },
+    };
+  },
+};
+
+function row(entry, id, send) {
+  const slider = entry.kind === "slider";
+  const input = make("input", {
+    id, type: slider ? "range" : entry.kind === "checkbox" ? "checkbox" : "text",
+    min: entry.least, max: entry.most,
+    step: slider ? entry.step ?? (Number.isInteger(entry.least) && Number.isInteger(entry.value) ? 1 : "any") : null,
+    disabled: entry.read_only, "aria-describedby": `${id}-about`, spellcheck: "false",
+    onchange: () => send({ set: entry.name, value: valueOf(input) }),
+  });
+  const shown = make("output", { for: id, class: "rosparam-value" });
+  input.addEventListener("input", () => { if (slider) shown.textContent = input.value; });
+  const about = [entry.description, range(entry), entry.read_only ? "read only" : ""]
+    .filter(Boolean).join("; ");
+  let drawn = -1;
+  return {
+    elements: [
+      make("label", { for: id }, entry.name),
+      make("span", {}, input, slider ? shown : "",
+        make("span", { class: "rosform-takes", id: `${id}-about` }, about)),
+    ],
+    draw(value, changes) {
+      // What somebody is typing is left alone, until the node has answered to it.
+      if (document.activeElement === input && drawn === changes && !slider) return;
+      drawn = changes;
+      if (input.type === "checkbox") input.checked = value === true;
+      else if (document.activeElement !== input || !slider || !input.matches(":active")) {
+        input.value = Array.isArray(value) ? `[${value.join(", ")}]` : String(value ?? "");
+      }
+      shown.textContent = String(value);
+    },
+  };
+}
+
+function range(entry) {
+  return entry.least === null ? "" : `${entry.least} to ${entry.most}`;
+}
+
+export default { render };

@@ -1,0 +1,90 @@
+"""One thread a session that keeps its live views up to date, and ends with the session."""
+
+from __future__ import annotations
+
+import threading
+import time
+import weakref
+from typing import Protocol
+
+from course.runtime.session import Session
+
+LONGEST_REST = 1.0
+"""Seconds that the thread sleeps at most, so that it notices views that nobody has any more."""
+
+
+class Ticking(Protocol):
+    """What a ticker keeps up to date."""
+
+    def tick(self, now: float) -> float:
+        """Do what is due at monotonic time ``now`` (s); return when something is due next."""
+
+    def end(self, why: str) -> None:
+        """Say that nothing will come any more, and ``why``."""
+
+
+class Ticker:
+    """Calls ``tick`` of each of its views when it is due.
+
+    Views are held weakly: one whose widget is gone is not kept up to date any more. Its thread
+    ends when it has no view left, and starts again with the next.
+    """
+
+    def __init__(self, session: Session) -> None:
+        """Serve views of ``session`` until it closes."""
+        self._views: weakref.WeakSet[Ticking] = weakref.WeakSet()
+        self._changed = threading.Condition()
+        self._thread: threading.Thread | None = None
+        self._why = ""
+        session.on_close(lambda: self.stop("The session has been closed."))
+
+    def add(self, view: Ticking) -> None:
+        """Keep ``view`` up to date from now on."""
+        with self._changed:
+            if self._why:
+                view.end(self._why)
+                return
+            self._views.add(view)
+            if self._thread is None:
+                self._thread = threading.Thread(
+                    target=self._run, name="ROS session views", daemon=True
+                )
+                self._thread.start()
+            self._changed.notify_all()
+
+    def stop(self, why: str) -> None:
+        """End every view, saying ``why``, and the thread. Idempotent."""
+        with self._changed:
+            self._why = self._why or why
+            views, thread = list(self._views), self._thread
+            self._views.clear()
+            self._changed.notify_all()
+        for view in views:
+            view.end(why)
+        if thread is not None and thread is not threading.current_thread():
+            thread.join(LONGEST_REST)
+
+    def _run(self) -> None:
+        while True:
+            due = time.monotonic() + LONGEST_REST
+            views = list(self._views)
+            for view in views:
+                due = min(due, view.tick(time.monotonic()))
+            del views
+            with self._changed:
+                if not self._views:
+                    self._thread = None
+                    return
+                self._changed.wait(max(0.0, due - time.monotonic()))
+
+
+_tickers: weakref.WeakKeyDictionary[Session, Ticker] = weakref.WeakKeyDictionary()
+_lock = threading.Lock()
+
+
+def ticker_of(session: Session) -> Ticker:
+    """Return the ticker of a session, made on first use."""
+    with _lock:
+        if session not in _tickers:
+            _tickers[session] = Ticker(session)
+        return _tickers[session]

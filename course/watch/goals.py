@@ -1,0 +1,167 @@
+"""All goals of one action, whoever sent them: their states, feedback, and results."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from action_msgs.msg import GoalStatusArray
+from action_msgs.srv import CancelGoal
+from rclpy.qos import QoSProfile, qos_profile_action_status_default
+from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
+
+from course import values
+from course.errors import CourseError
+from course.runtime.actions import GoalRun, GoalState
+from course.runtime.session import Session
+from course.watch import forms
+
+KEPT = 12
+OVER = (GoalState.SUCCEEDED, GoalState.CANCELED, GoalState.ABORTED)
+
+
+@dataclass
+class Goal:
+    """One goal: the states that it went through with their times (s since it was first seen)."""
+
+    number: int
+    states: list[tuple[GoalState, float]] = field(default_factory=list)
+    feedback: int = 0
+    latest: dict[str, Any] = field(default_factory=dict)
+    result: dict[str, Any] | None = None
+    asked: dict[str, Any] | None = None
+    problem: str = ""
+    seen: float = 0.0
+
+    @property
+    def state(self) -> GoalState:
+        """The latest state."""
+        return self.states[-1][0] if self.states else GoalState.UNKNOWN
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended."""
+        return self.state in OVER or bool(self.problem)
+
+
+class GoalBoard:
+    """Watches the status and feedback of one action, sends goals of its own, and cancels any."""
+
+    def __init__(self, session: Session, action_type: Any, name: str) -> None:
+        """Watch the action ``name`` of ``session``'s graph."""
+        self.name = name
+        self.action_type = action_type
+        self._session = session
+        self._goals: OrderedDict[bytes, Goal] = OrderedDict()
+        self._rejected: list[Goal] = []
+        self._count = 0
+        self._lock = threading.Lock()
+        subscribe = session.watch
+        subscribe(
+            GoalStatusArray, f"{name}/_action/status", self._on_status,
+            qos_profile_action_status_default,
+        )  # fmt: skip
+        subscribe(
+            action_type.Impl.FeedbackMessage, f"{name}/_action/feedback", self._on_feedback,
+            QoSProfile(depth=100),
+        )  # fmt: skip
+
+    @property
+    def goals(self) -> list[Goal]:
+        """The latest goals, oldest first (a snapshot)."""
+        with self._lock:
+            both = [*self._goals.values(), *self._rejected]
+            return sorted(both, key=lambda goal: goal.number)[-KEPT:]
+
+    def send(self, typed: Mapping[str, Any], timeout: float = 5.0) -> None:
+        """Send a goal made of what was typed into the form; its result is awaited in a thread.
+
+        Raises:
+            MisfitError: something does not fit its field.
+        """
+        goal = forms.message(self.action_type.Goal, typed)
+        threading.Thread(
+            target=self._follow, args=(goal, timeout), name="ROS goal", daemon=True
+        ).start()
+
+    def cancel(self, number: int, timeout: float = 5.0) -> None:
+        """Ask the server to cancel a goal, whoever sent it.
+
+        Raises:
+            WaitTimeout: the server does not answer.
+        """
+        with self._lock:
+            wanted = [(key, goal) for key, goal in self._goals.items() if goal.number == number]
+        for key, goal in wanted:
+            request = CancelGoal.Request()
+            request.goal_info.goal_id = UUID(uuid=list(key))
+            response = self._session.call(
+                CancelGoal, f"{self.name}/_action/cancel_goal", request, timeout
+            )
+            agreed = any(bytes(info.goal_id.uuid) == key for info in response.goals_canceling)
+            goal.problem = "" if agreed or goal.over else "The server refused to cancel."
+
+    def _follow(self, goal: Any, timeout: float) -> None:
+        asked = values.to_data(goal)
+        try:
+            run = self._session.send_goal(self.action_type, self.name, goal, timeout=timeout)
+        except CourseError as error:
+            self._reject(asked, str(error))
+            return
+        except Exception as error:  # noqa: BLE001 - the session may end under it
+            self._reject(asked, f"{type(error).__name__}: {error}")
+            return
+        if not run.accepted:
+            self._reject(asked, "The server rejected this goal.")
+            return
+        with self._lock:
+            kept = self._goal(run.goal_id)
+            kept.asked = asked
+        self._await(run, kept)
+
+    def _await(self, run: GoalRun, kept: Goal) -> None:
+        while not self._session.closed:
+            try:
+                result = run.wait(timeout=1.0)
+            except CourseError:
+                continue  # not yet
+            except Exception:  # noqa: BLE001 - the session has ended
+                return
+            kept.result = values.to_data(result) if result is not None else None
+            return
+
+    def _reject(self, asked: dict[str, Any], problem: str) -> None:
+        with self._lock:
+            self._count += 1
+            self._rejected.append(Goal(self._count, asked=asked, problem=problem))
+            del self._rejected[:-KEPT]
+
+    def _goal(self, key: bytes) -> Goal:
+        """Return the goal of an id; called with the lock held."""
+        if key not in self._goals:
+            self._count += 1
+            self._goals[key] = Goal(self._count, seen=time.monotonic())
+            while len(self._goals) > KEPT:
+                self._goals.popitem(last=False)
+        return self._goals[key]
+
+    def _on_status(self, message: Any) -> None:
+        now = time.monotonic()
+        with self._lock:
+            for status in message.status_list:
+                goal = self._goal(bytes(status.goal_info.goal_id.uuid))
+                state = GoalState(status.status)
+                if goal.state != state:
+                    goal.states.append((state, max(0.0, now - goal.seen)))
+
+    def _on_feedback(self, message: Any) -> None:
+        with self._lock:
+            goal = self._goal(bytes(message.goal_id.uuid))
+            goal.feedback += 1
+            goal.latest = values.to_data(message.feedback)

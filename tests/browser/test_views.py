@@ -1,0 +1,255 @@
+"""The live views in a real browser: they render, update, take keys, and end honestly."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import nbformat
+import pytest
+from playwright.sync_api import Locator, expect
+
+from .lab import Lab
+from .notebook_page import NotebookPage
+
+SETUP = """\
+import sys
+sys.path.insert(0, ".")
+import course
+from robot import Listener, Robot
+session = course.session(threads=4)
+robot, listener = course.run(Robot, {rate}), course.run(Listener)
+session.until(lambda: listener.heard)
+"""
+
+VIEWS = {
+    "graph": ("session.graph()", "ROS graph"),
+    "log": ("session.log_panel()", "Log panel"),
+    "timeline": ('session.timeline("chatter")', "Timeline"),
+    "action": ('session.action("count")', "Action view"),
+    "service": ('session.service("lamp")', "Service console"),
+    "parameters": ('session.parameters("robot")', "Parameter panel"),
+    "qos_lab": ("session.qos_lab()", "QoS lab"),
+}
+
+Open = Callable[..., NotebookPage]
+
+
+@pytest.fixture
+def open_cells(lab: Lab, open_notebook: Callable[[str], NotebookPage]) -> Open:
+    """Open a notebook of these cells, after one that runs the robot, and run it all."""
+    shutil.copy(Path(__file__).parent / "robot.py", lab.work / "robot.py")
+
+    def open_(*sources: str, rate: float = 20.0) -> NotebookPage:
+        cells = [SETUP.format(rate=rate), *sources]
+        notebook = nbformat.v4.new_notebook(
+            cells=[nbformat.v4.new_code_cell(source) for source in cells],
+            metadata={
+                "kernelspec": {
+                    "name": "python3", "display_name": "Python 3 (ipykernel)", "language": "python",
+                }
+            },
+        )  # fmt: skip
+        nbformat.write(notebook, lab.work / "views.ipynb")
+        page = open_notebook("views.ipynb")
+        page.run_all()
+        return page
+
+    return open_
+
+
+def region(page: NotebookPage, label: str) -> Locator:
+    return page.page.get_by_role("region", name=label)
+
+
+def words(view: Locator) -> Locator:
+    return view.locator(".rosview-words")
+
+
+def test_every_view_renders_updates_and_speaks(open_cells: Open, tmp_path: Path) -> None:
+    page = open_cells(*(source for source, _ in VIEWS.values()))
+    graph = region(page, "ROS graph")
+    expect(graph.locator("svg text", has_text="/chatter")).to_be_visible()
+    expect(graph.locator(".rosgraph-line.rosgraph-bad")).to_have_count(1)
+    expect(words(graph)).to_contain_text("do not connect on /scan: reliability")
+    expect(region(page, "Log panel").get_by_role("log")).to_contain_text("heard hello")
+    expect(region(page, "Timeline").locator("svg")).to_have_attribute("role", "img")
+    expect(words(region(page, "Timeline"))).to_contain_text("callbacks of /listener")
+    service = region(page, "Service console")
+    service.get_by_label("data").check()
+    service.get_by_role("button", name="Call").click()
+    expect(service.locator("tbody")).to_contain_text("{success: true, message: lamp}")
+    action = region(page, "Action view")
+    action.get_by_label("order").fill("3")
+    action.get_by_role("button", name="Send goal").click()
+    expect(action.locator("[aria-current]")).to_contain_text("EXECUTING")
+    action.get_by_role("button", name="Cancel goal 1").click()
+    expect(action.locator("[aria-current]")).to_contain_text("CANCELED")
+    panel = region(page, "Parameter panel")
+    slider = panel.get_by_role("slider", name="speed")
+    slider.focus()
+    page.page.keyboard.press("ArrowRight")
+    expect(panel.locator("output")).to_have_text("1")
+    for _ in range(2):
+        page.page.keyboard.press("ArrowRight")
+    expect(panel.get_by_role("alert")).to_contain_text("too fast for a corridor")
+    lab_view = region(page, "QoS lab")
+    lab_view.get_by_role("button", name="Run").click()
+    expect(lab_view.get_by_role("alert")).to_contain_text("Predict first")
+    lab_view.get_by_label("I predict that they will").select_option("yes")
+    lab_view.get_by_role("button", name="Run").click()
+    expect(lab_view.locator(".roslab-results li").first).to_contain_text("30 of 30 arrived")
+    expect(lab_view.locator(".roslab-results li").first).to_contain_text("That was right.")
+    assert page.errors == []
+    assert page.foreign_requests() == []
+
+
+def test_nodes_come_and_go_in_the_graph(open_cells: Open) -> None:
+    page = open_cells("session.graph()", "")
+    graph = region(page, "ROS graph")
+    expect(graph.locator("svg text", has_text="/listener")).to_be_visible()
+    run_in_kernel(page, "session.stop('listener')")
+    expect(graph.locator("svg text", has_text="/listener")).to_have_count(0)
+    run_in_kernel(page, "course.run(Listener)")
+    expect(graph.locator("svg text", has_text="/listener")).to_be_visible()
+
+
+def test_a_view_survives_a_reload_and_says_when_the_kernel_is_gone(open_cells: Open) -> None:
+    page = open_cells("session.graph()", "")
+    page.save()
+    page.reload()
+    graph = region(page, "ROS graph")
+    expect(graph.locator("svg text", has_text="/listener")).to_be_visible()
+    run_in_kernel(page, "session.stop('listener')")
+    expect(graph.locator("svg text", has_text="/listener")).to_have_count(0)
+    page.restart_kernel()
+    expect(graph.get_by_role("status")).to_contain_text("Run this cell again")
+    page.run_all()
+    expect(region(page, "ROS graph").locator("svg text", has_text="/listener")).to_be_visible()
+    expect(region(page, "ROS graph").get_by_role("status")).to_have_text("")
+
+
+def test_a_closed_session_is_said(open_cells: Open) -> None:
+    page = open_cells("session.log_panel()", "")
+    run_in_kernel(page, "course.close()")
+    status = region(page, "Log panel").locator(".rosview-status")
+    expect(status).to_have_text("The session has been closed.")
+    expect(region(page, "Log panel").get_by_label("Search")).to_be_disabled()
+
+
+def test_keys_stay_in_their_control(open_cells: Open) -> None:
+    page = open_cells(*(source for source, _ in VIEWS.values()))
+    expect(region(page, "QoS lab")).to_be_visible()
+    before = page.cells()
+    controls = page.page.locator(
+        ".rosview button, .rosview input, .rosview select, .rosview summary, "
+        ".rosview [tabindex='0']"
+    )
+    names = set()
+    for number in range(controls.count()):
+        control = controls.nth(number)
+        if not control.is_visible() or control.is_disabled():
+            continue
+        control.focus()
+        names.add(control.evaluate("element => element.tagName"))
+        for key in ("x", "a", "b", "d", "d", "m", "ArrowDown", "ArrowUp"):
+            page.page.keyboard.press(key)
+        assert page.cells() == before, control.evaluate("element => element.outerHTML")
+    assert {"BUTTON", "INPUT", "SELECT", "SUMMARY"} <= names
+
+
+def test_what_a_streaming_cell_prints_never_lands_in_another(open_cells: Open) -> None:
+    page = open_cells(
+        "from std_msgs.msg import String\n"
+        "listener.create_subscription(String, 'chatter', lambda m: print('stray'), 10)\n"
+        "session.until(lambda: len(session.logs(listener)) > 5)\n"
+        "print('first')",
+        "session.log_panel()",
+        "print('second')",
+    )
+    expect(region(page, "Log panel").get_by_role("log")).to_contain_text("stray")
+    texts = {
+        number: page.cell(number).locator(".jp-OutputArea-output pre").all_inner_texts()
+        for number in (1, 3)
+    }
+    assert [text.strip() for text in texts[1]] == ["first"]
+    assert [text.strip() for text in texts[3]] == ["second"]
+
+
+def test_a_flood_leaves_the_page_responsive_and_the_frames_bounded(open_cells: Open) -> None:
+    page = open_cells(
+        'session.timeline("chatter")', "session.log_panel()", "session.graph()", rate=1000.0
+    )
+    expect(words(region(page, "Timeline"))).to_contain_text("Hz")
+    page.frames.clear()
+    seconds, longest = page.page.evaluate(
+        """() => new Promise(resolve => {
+            const start = performance.now();
+            let last = start, longest = 0;
+            const tick = now => {
+                longest = Math.max(longest, now - last);
+                last = now;
+                if (now - start < 10000) requestAnimationFrame(tick);
+                else resolve([(now - start) / 1000, longest]);
+            };
+            requestAnimationFrame(tick);
+        })"""
+    )
+    updates = [frame for frame in page.frames if '"comm_msg"' in frame and '"update"' in frame]
+    assert 0 < len(updates) <= 3 * 10 * seconds + 3, "at most ten frames a second for each view"
+    assert sum(map(len, updates)) / seconds < 600_000, "bytes a second"
+    assert longest < 5_000, "the page never stands still for long (ms)"
+    expect(region(page, "Log panel").get_by_label("Search")).to_be_editable()
+    region(page, "Log panel").get_by_label("Search").fill("hello")
+    assert page.errors == []
+
+
+@pytest.mark.parametrize("theme", ["JupyterLab Light", "JupyterLab Dark"])
+def test_text_stands_out_from_its_background_in_both_themes(open_cells: Open, theme: str) -> None:
+    page = open_cells(*(source for source, _ in VIEWS.values()))
+    page.theme(theme)
+    for _, label in VIEWS.values():
+        view = region(page, label)
+        expect(view).to_be_visible()
+        ratio = view.evaluate(CONTRAST)
+        assert ratio >= 4.5, f"{label}: WCAG 2.2 asks for 4.5, here it is {ratio:.1f}"
+
+
+CONTRAST = """element => {
+    const parse = text => text.match(/[\\d.]+/g).map(Number);
+    const light = ([r, g, b]) => [r, g, b]
+        .map(v => v / 255).map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+        .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+    let back = element;
+    const clear = e => parse(getComputedStyle(e).backgroundColor)[3] === 0;
+    while (back && clear(back)) back = back.parentElement;
+    const one = light(parse(getComputedStyle(element).color));
+    const two = light(parse(getComputedStyle(back ?? document.body).backgroundColor));
+    return (Math.max(one, two) + 0.05) / (Math.min(one, two) + 0.05);
+}"""
+
+
+def run_in_kernel(page: NotebookPage, source: str) -> None:
+    """Run code in the page's kernel as a cell would, and wait until it is done."""
+    page.page.evaluate(
+        """async source => {
+            const kernel = window.jupyterapp.shell.currentWidget.sessionContext.session.kernel;
+            await kernel.requestExecute({code: source, stop_on_error: false}).done;
+        }""",
+        source,
+    )
+    page.wait_until_ready()
+
+
+def test_the_accessibility_tree_names_every_control(open_cells: Open) -> None:
+    page = open_cells(*(source for source, _ in VIEWS.values()))
+    for _, label in VIEWS.values():
+        snapshot = region(page, label).aria_snapshot()
+        assert label in snapshot
+        nameless = [
+            line.strip() for line in snapshot.splitlines()
+            if line.strip().lstrip("- ") in ("textbox", "combobox", "checkbox", "button", "slider")
+        ]  # fmt: skip
+        assert nameless == [], json.dumps(snapshot)

@@ -1,0 +1,166 @@
+"""The lab's rules and what DDS really does agree, between two processes and over a lossy link."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+
+from course import Session
+from course.qoslab import lab, link, rules
+from course.qoslab.experiment import COUNT, Experiment, Outcome
+from course.qoslab.lab import LabError
+from course.qoslab.profile import Profile, ProfileError
+
+
+def best_effort(**policies: Any) -> Profile:
+    return Profile(reliability="BEST_EFFORT", **policies)
+
+
+def durable(**policies: Any) -> Profile:
+    return Profile(durability="TRANSIENT_LOCAL", **policies)
+
+
+CASES = {
+    "all arrives": Experiment(),
+    "refused": Experiment(best_effort(), Profile()),
+    "asks for less": Experiment(Profile(), best_effort(), "slow reader"),
+    "refused durability": Experiment(Profile(), durable()),
+    "repaired": Experiment(
+        Profile(history="KEEP_ALL"), Profile(history="KEEP_ALL"), "stream", loss=25
+    ),
+    "late": Experiment(durable(depth=5), durable(depth=20), "late joiner"),
+    "late, shallow reader": Experiment(durable(depth=20), durable(depth=3), "late joiner"),
+    "late, one side": Experiment(durable(depth=5), Profile(), "late joiner"),
+    "late, best effort": Experiment(
+        best_effort(durability="TRANSIENT_LOCAL"), best_effort(durability="TRANSIENT_LOCAL"),
+        "late joiner",
+    ),
+    "slow, newest": Experiment(Profile(), Profile(depth=1), "slow reader"),
+    "slow, all": Experiment(Profile(), Profile(history="KEEP_ALL"), "slow reader"),
+    "no deadline": Experiment(Profile(), Profile(deadline=0.1), "deadline"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("experiment", CASES.values(), ids=CASES)
+def test_dds_does_what_the_rules_say(experiment: Experiment) -> None:
+    outcome = lab.run(experiment)
+    assert outcome.remark == ""
+    assert outcome.connected == rules.connects(experiment)
+    assert len(outcome.received) == rules.expected(experiment)
+    assert outcome.in_order
+    assert outcome.lossy == (experiment.loss > 0)
+    if not outcome.connected:
+        broken = [r.policy for r in rules.compare(*_pair(experiment)) if not r.fits]
+        assert outcome.broken.lower() in broken
+    if experiment.scenario == "slow reader":
+        assert outcome.received[-1] == COUNT - 1, "the newest are kept"
+
+
+def _pair(experiment: Experiment) -> tuple[Profile, Profile]:
+    return experiment.offered, experiment.requested
+
+
+def test_what_is_lost_is_lost_under_best_effort() -> None:
+    outcome = lab.run(Experiment(best_effort(), best_effort(), "stream", loss=60))
+    assert outcome.missing > 0
+    assert "never sends anything twice" in rules.explain(
+        Experiment(best_effort(), best_effort(), "stream", 60), outcome
+    )
+
+
+def test_a_shallow_writer_cannot_repair() -> None:
+    experiment = Experiment(Profile(depth=1), Profile(depth=1), "stream", loss=60)
+    outcome = lab.run(experiment)
+    assert outcome.missing > 0
+    assert "although the connection is reliable" in rules.explain(experiment, outcome)
+
+
+def test_a_missed_deadline_is_an_event() -> None:
+    experiment = Experiment(Profile(deadline=0.2), Profile(deadline=0.2), "deadline")
+    outcome = lab.run(experiment)
+    assert outcome.deadlines_missed > 0
+    assert "deadline had passed" in rules.explain(experiment, outcome)
+
+
+@pytest.mark.parametrize("manual", [True, False])
+def test_silence_is_noticed_where_life_has_to_be_asserted(manual: bool) -> None:
+    kind = "MANUAL_BY_TOPIC" if manual else "AUTOMATIC"
+    profile = Profile(liveliness=kind, lease=0.3)
+    assert lab.run(Experiment(profile, profile, "liveliness")).liveliness_lost is manual
+
+
+def test_without_namespaces_the_loss_is_left_out_and_that_is_said(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(link, "problem", lambda: "No namespaces here.")
+    outcome = lab.run(Experiment(loss=50))
+    assert (outcome.remark, outcome.lossy, outcome.missing) == ("No namespaces here.", False, 0)
+
+
+@pytest.mark.parametrize(
+    ("experiment", "sentence"),
+    [
+        (Experiment(scenario="party"), "no scenario 'party': choose stream"),
+        (Experiment(loss=95), "0 to 90 % of its packets, not 95"),
+    ],
+)
+def test_what_cannot_be_run_is_said(experiment: Experiment, sentence: str) -> None:
+    with pytest.raises(LabError, match=sentence):
+        lab.run(experiment)
+
+
+@pytest.mark.parametrize(
+    ("data", "sentence"),
+    [
+        ({"reliability": "MAYBE"}, "reliability is RELIABLE or BEST_EFFORT, not 'MAYBE'."),
+        ({"depth": 0}, "depth is 1 to 5000, not 0."),
+        ({"depth": "x"}, "depth is a whole number"),
+        ({"deadline": -1}, "deadline is 0 to 60, not -1.0."),
+        ({"colour": "red"}, "A profile has deadline"),
+        (None, "A profile has deadline"),
+    ],
+)
+def test_a_profile_that_cannot_be_is_refused(data: Any, sentence: str) -> None:
+    with pytest.raises(ProfileError) as caught:
+        Profile.from_data(data)
+    assert sentence in str(caught.value)
+
+
+def test_profiles_go_there_and_back() -> None:
+    profile = QoSProfile(
+        depth=7, reliability=ReliabilityPolicy.BEST_EFFORT, deadline=Duration(seconds=0.5)
+    )
+    data = Profile.of(profile)
+    assert str(data) == "BEST_EFFORT, VOLATILE, KEEP_LAST(7), deadline 0.5 s"
+    assert Profile.of(data.qos()) == data
+    assert Profile.from_data(data.data()) == data
+
+
+def test_experiments_and_outcomes_go_over_a_pipe() -> None:
+    experiment = CASES["late"]
+    assert Experiment.from_json(experiment.to_json()) == experiment
+    outcome = Outcome(connected=True, received=[1, 2])
+    assert Outcome.from_json(json.dumps(json.loads(outcome.to_json()))) == outcome
+
+
+def test_the_view_keeps_the_prediction_beside_what_was_seen(session: Session) -> None:
+    view = session.qos_lab(qos_profile_sensor_data, QoSProfile(depth=10))
+    trial = view.run("stream", connects=True, arrive=30)
+    assert trial.right is False
+    words = view.words()
+    assert "not connected (reliability)" in words
+    assert "You said: connected, 30 messages. It came out otherwise." in words
+    asked = {
+        "offered": Profile().data(), "requested": Profile().data(), "scenario": "stream",
+        "connects": True, "arrive": 30, "loss": 0,
+    }  # fmt: skip
+    view._heard(view.widget, {"run": asked}, [])
+    session.until(lambda: len(view.trials) == 2, timeout=60)
+    assert view.trials[1].right is True
+    session.until(lambda: not view.widget.frame["running"])
+    view._heard(view.widget, {"run": {**asked, "offered": {"depth": 0}}}, [])
+    session.until(lambda: "depth is 1 to 5000" in view.widget.frame["problem"])

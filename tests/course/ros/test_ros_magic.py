@@ -1,0 +1,196 @@
+"""``%ros`` answers as the ROS 2 command line does, on real nodes, and complains in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from IPython.core.completer import IPCompleter, provisionalcompleter
+from IPython.core.interactiveshell import InteractiveShell
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.action import ActionServer
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+from test_msgs.action import Fibonacci
+
+import course
+from course.errors import CourseError
+from course.ros import magic
+
+
+class Robot(Node):
+    """Publishes, serves, acts, and has a parameter that knows its bounds."""
+
+    def __init__(self) -> None:
+        super().__init__("robot")
+        self.declare_parameter("speed", 0.5, ParameterDescriptor(description="m/s"))
+        self.add_on_set_parameters_callback(self._judge)
+        publisher = self.create_publisher(String, "chatter", 10)
+        self.create_timer(0.02, lambda: publisher.publish(String(data="hello")))
+        self.create_subscription(String, "orders", self._obey, 10)
+        self.orders: list[str] = []
+        self.create_service(SetBool, "lamp", self._switch)
+        self._action = ActionServer(self, Fibonacci, "fibonacci", self._count)
+
+    def _judge(self, parameters: list[Any]) -> SetParametersResult:
+        fast = any(p.name == "speed" and p.value > 1 for p in parameters)
+        return SetParametersResult(successful=not fast, reason="at most 1 m/s" if fast else "")
+
+    def _obey(self, message: String) -> None:
+        self.orders.append(message.data)
+
+    def _switch(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        response.success, response.message = True, f"lamp {request.data}"
+        return response
+
+    def _count(self, goal: Any) -> Fibonacci.Result:
+        goal.publish_feedback(Fibonacci.Feedback(sequence=[0, 1]))
+        goal.succeed()
+        return Fibonacci.Result(sequence=[0, 1, 1])
+
+
+@pytest.fixture
+def robot() -> Iterator[Robot]:
+    node = course.run(Robot)
+    assert isinstance(node, Robot)
+    yield node
+    course.close()
+
+
+def answer(capsys: pytest.CaptureFixture[str], line: str) -> str:
+    magic.ros(line)
+    return capsys.readouterr().out
+
+
+def test_topics(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert answer(capsys, "topic list") == "/chatter\n/orders\n"
+    assert "/chatter [std_msgs/msg/String]" in answer(capsys, "topic list -t")
+    assert "/rosout" in answer(capsys, "topic list -a")
+    info = answer(capsys, "topic info -v chatter")
+    assert "Publisher count: 1\n  Node: /robot\n  Type: std_msgs/msg/String" in info
+    assert "    reliability: RELIABLE" in info
+    assert "    depth: 10" in info
+    assert answer(capsys, "topic echo /chatter -n 2") == "data: hello\n---\ndata: hello\n\n"
+
+
+def test_the_rate_is_measured(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    text = answer(capsys, "topic hz /chatter")
+    assert 20 < float(text.split()[2]) < 51
+    assert "period: min" in text
+
+
+def test_publishing_reaches_the_node(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "Published on /orders" in answer(capsys, "topic pub /orders '{data: go}'")
+    course.until(lambda: robot.orders == ["go"])
+
+
+def test_nodes(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert answer(capsys, "node list") == "/robot\n"
+    info = answer(capsys, "node info robot")
+    assert "  Publishers:\n" in info
+    assert "    /chatter: std_msgs/msg/String" in info
+    assert "  Service servers:\n" in info
+    assert "  Action servers:\n    /fibonacci: test_msgs/action/Fibonacci" in info
+
+
+def test_services_and_actions(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert answer(capsys, "service list") == "/lamp\n"
+    assert "message: lamp True" in answer(capsys, "service call /lamp '{data: true}'")
+    assert answer(capsys, "action list -t") == "/fibonacci [test_msgs/action/Fibonacci]\n"
+    goal = answer(capsys, "action send_goal fibonacci '{order: 2}' -f")
+    assert "feedback: {'sequence': [0, 1]}" in goal
+    assert goal.endswith("state: SUCCEEDED\n")
+
+
+def test_parameters(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "  speed" in answer(capsys, "param list /robot")
+    assert answer(capsys, "param set robot speed 0.8") == "/robot: speed is now 0.8\n"
+    assert answer(capsys, "param get /robot speed") == "0.8\n"
+    refused = answer(capsys, "param set robot speed 2.0")
+    assert refused == "/robot refused speed = 2.0: at most 1 m/s\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "parts"),
+    [
+        ("geometry_msgs/msg/PoseStamped", ["std_msgs/Header header", "\tstring frame_id"]),
+        ("std_srvs/srv/SetBool", ["bool data", "---", "bool success", "string message"]),
+        ("test_msgs/action/Fibonacci", ["int32 order", "---", "int32[] sequence"]),
+        ("sensor_msgs/msg/BatteryState", ["int POWER_SUPPLY_STATUS_CHARGING=1"]),
+    ],
+)
+def test_interfaces(capsys: pytest.CaptureFixture[str], name: str, parts: list[str]) -> None:
+    lines = answer(capsys, f"interface show {name}").splitlines()
+    assert all(part in lines for part in parts)
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("", "Usage: %ros"),
+        ("topic", "Usage: %ros topic"),
+        ("topic shout /x", "shout"),
+        ("topic info", "The following arguments are required: topic"),
+        ("topic info /nowhere", "There is no topic /nowhere: there are /chatter, /orders."),
+        ("topic echo /nowhere --timeout 0.1", "/nowhere"),
+        ("topic pub /orders '{dat: go}'", "std_msgs/msg/String has no field 'dat'"),
+        ("topic pub /orders '{data: 3}'", "data takes string, not 3"),
+        ("topic pub /new '{data: x}'", "name it with --type"),
+        ("node info ghost", "There is no node /ghost: there are /robot."),
+        ("service call /lamp '{data: 7}'", "data takes bool, not 7"),
+        ("service call /light", "There is no service /light: there are /lamp."),
+        ("action send_goal /fly", "There is no action /fly: there are /fibonacci."),
+        ("param get robot colour", "/robot has no parameter 'colour'"),
+        ("param set ghost speed 1", "There is no node /ghost"),
+        ("interface show no_msgs/msg/Such", "There is no no_msgs/msg/Such here"),
+        ("topic echo 'unfinished", "No closing quotation"),
+    ],
+)
+def test_a_mistake_is_a_sentence(robot: Robot, line: str, sentence: str) -> None:
+    with pytest.raises(CourseError) as caught:
+        magic.ros(line)
+    assert sentence in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_help_is_shown_and_ends_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "echo" in answer(capsys, "topic -h")
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ([""], "param"),
+        (["topic", ""], "echo"),
+        (["topic", "info", ""], "/chatter"),
+        (["topic", "info", "-v", ""], "/chatter"),
+        (["service", "call", ""], "/lamp"),
+        (["action", "send_goal", ""], "/fibonacci"),
+        (["param", "get", "/robot", ""], "speed"),
+        (["interface", "show", ""], "std_msgs/msg/String"),
+    ],
+)
+def test_the_tab_key_offers_what_may_follow(robot: Robot, words: list[str], expected: str) -> None:
+    assert expected in magic.candidates(words)
+
+
+@pytest.mark.parametrize("words", [["x", ""], ["topic", "x", "y", ""], ["param", "get", "/no", ""]])
+def test_the_tab_key_offers_nothing_where_nothing_can_follow(
+    robot: Robot, words: list[str]
+) -> None:
+    assert magic.candidates(words) == []
+
+
+def test_the_magic_and_its_completion_are_in_the_shell(robot: Robot) -> None:
+    shell = InteractiveShell.instance()
+    try:
+        shell.run_line_magic("load_ext", "course")
+        line = "%ros topic info /ch"
+        assert isinstance(shell.Completer, IPCompleter)
+        with provisionalcompleter():
+            matches = {c.text for c in shell.Completer.completions(line, len(line))}
+        assert "/chatter" in matches
+    finally:
+        InteractiveShell.clear_instance()

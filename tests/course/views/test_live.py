@@ -1,0 +1,118 @@
+"""Live views keep a bounded pace, end with their session, and never take their thread down."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from course import Session
+from course.views import live
+from course.views.graph import GraphView
+from course.views.live import LiveView
+
+
+class Counter(LiveView):
+    """Shows how often it was looked at: something new at every look."""
+
+    script = "graph"
+    looks = 0
+
+    def frame(self) -> dict[str, Any]:
+        self.looks += 1
+        return {"looks": self.looks}
+
+    def words(self) -> str:
+        return f"{self.looks} looks"
+
+
+def views_threads() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == "ROS session views"]
+
+
+def test_a_view_that_nobody_shows_costs_nothing(session: Session) -> None:
+    view = Counter(session)
+    assert repr(view) == "0 looks"
+    assert (view.looks, views_threads()) == (0, [])
+
+
+def test_at_most_ten_frames_a_second(session: Session) -> None:
+    view = Counter(session)
+    started = time.monotonic()
+    session.until(lambda: view.widget.number >= 8, 10)
+    least = (view.widget.number - 1) * live.FASTEST  # the first one comes at once
+    assert time.monotonic() - started >= least * 0.99
+
+
+def test_a_browser_that_confirms_nothing_gets_a_frame_a_second(
+    session: Session,
+) -> None:
+    view = Counter(session)
+    view.widget.number = live.PATIENCE + 5
+    now = time.monotonic()
+    assert view.tick(now + 60) - time.monotonic() > 0.9
+    view._heard(view.widget, {"drawn": view.widget.number}, [])
+    assert view.tick(now + 120) - time.monotonic() <= live.FASTEST
+
+
+def test_what_has_not_changed_is_not_sent_again(session: Session) -> None:
+    view = GraphView(session)
+    number = view.widget.number
+    for _ in range(3):
+        view._look()
+    assert view.widget.number == number
+
+
+def test_a_new_node_appears_and_a_stopped_one_goes(session: Session) -> None:
+    view = GraphView(session)
+
+    def labels() -> set[str]:
+        return {box["label"] for box in view.widget.frame["boxes"]}
+
+    assert labels() == set()
+
+    def talker() -> Node:
+        node = Node("talker")
+        node.create_publisher(String, "chatter", 10)
+        return node
+
+    session.run(talker)
+    session.until(lambda: labels() == {"/talker", "/chatter"})
+    session.stop("talker")
+    session.until(lambda: labels() == set())
+
+
+def test_a_closed_session_ends_its_views_and_their_thread() -> None:
+    with Session() as session:
+        view = GraphView(session)
+        assert view.widget.ended == ""
+        assert len(views_threads()) == 1
+    assert view.widget.ended == "The session has been closed."
+    assert views_threads() == []
+
+
+def test_a_view_that_fails_says_so_and_the_others_go_on(session: Session) -> None:
+    class Broken(Counter):
+        def frame(self) -> dict[str, Any]:
+            raise ZeroDivisionError("no rate yet")
+
+    broken, sound = Broken(session), Counter(session)
+    assert broken.widget.ended == "This view has stopped (ZeroDivisionError: no rate yet)."
+    before = sound.widget.number
+    session.until(lambda: sound.widget.number > before)
+
+
+def test_the_bundle_has_a_widget_and_words(session: Session) -> None:
+    data, _ = GraphView(session)._repr_mimebundle_()
+    assert data["text/plain"] == "No nodes."
+    assert "application/vnd.jupyter.widget-view+json" in data
+
+
+def test_messages_that_are_none_are_passed_over(session: Session) -> None:
+    view = GraphView(session)
+    for message in ("x", None, [], {}, {"drawn": "9"}, {"drawn": None}):
+        view._heard(view.widget, message, [])
+    assert view.widget.ended == ""

@@ -1,0 +1,239 @@
+"""The panels over real nodes: what is typed reaches the node, and what it says reaches the view."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_srvs.srv import SetBool
+from test_msgs.action import Fibonacci
+from test_msgs.msg import Nested
+
+from course import Session
+from course.errors import CourseError, SessionError, WaitTimeout
+from course.runtime.actions import GoalState
+from course.values import MisfitError
+from course.views.live import LiveView
+from course.watch import forms
+
+
+class Robot(Node):
+    """Serves, acts, logs, and has parameters; `go` lets its goals end."""
+
+    def __init__(self) -> None:
+        super().__init__("robot")
+        limits = FloatingPointRange(from_value=0.0, to_value=2.0, step=0.5)
+        about = ParameterDescriptor(description="m/s", floating_point_range=[limits])
+        self.declare_parameter("speed", 0.5, about)
+        self.declare_parameter("name", "r2")
+        self.declare_parameter("lights", value=True)
+        self.declare_parameter("legs", 4)
+        self.add_on_set_parameters_callback(self._judge)
+        self.go = threading.Event()
+        group = ReentrantCallbackGroup()
+        self.create_service(SetBool, "lamp", self._switch, callback_group=group)
+        self._action = ActionServer(
+            self, Fibonacci, "count", self._count, callback_group=group,
+            goal_callback=self._accept, cancel_callback=lambda _goal: CancelResponse.ACCEPT,
+        )  # fmt: skip
+
+    def _judge(self, parameters: list[Any]) -> SetParametersResult:
+        bad = any(p.name == "legs" and p.value > 8 for p in parameters)
+        return SetParametersResult(successful=not bad, reason="no insect has so many" * bad)
+
+    def _switch(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        response.success, response.message = request.data, "lamp"
+        return response
+
+    def _accept(self, goal: Fibonacci.Goal) -> GoalResponse:
+        return GoalResponse.REJECT if goal.order < 0 else GoalResponse.ACCEPT
+
+    def _count(self, goal: Any) -> Fibonacci.Result:
+        goal.publish_feedback(Fibonacci.Feedback(sequence=[0, 1]))
+        while not self.go.wait(0.01):
+            if goal.is_cancel_requested:
+                goal.canceled()
+                return Fibonacci.Result()
+        goal.succeed()
+        return Fibonacci.Result(sequence=[0, 1, 1])
+
+
+@pytest.fixture
+def busy() -> Iterator[Session]:
+    """Give a session whose nodes may block in one of three threads."""
+    with Session(threads=3) as opened:
+        yield opened
+
+
+def shown(view: LiveView) -> dict[str, Any]:
+    frame: dict[str, Any] = view.widget.frame
+    return frame
+
+
+def say(view: LiveView, **message: Any) -> None:
+    """Do what the browser does."""
+    view._heard(view.widget, message, [])
+
+
+def test_a_service_is_called_by_its_form(session: Session) -> None:
+    session.run(Robot)
+    console = session.service("lamp")
+    (field,) = shown(console)["fields"]
+    assert (field["path"], field["kind"], field["default"]) == ("data", "checkbox", "false")
+    say(console, call={"data": True})
+    session.until(lambda: [c["answer"] for c in shown(console)["calls"] if c["answer"]])
+    (call,) = shown(console)["calls"]
+    assert call["answer"] == {"success": True, "message": "lamp"}
+    assert call["time"].endswith(" ms")
+    assert "1: {data: true} -> {success: true, message: lamp}" in console.words()
+
+
+def test_a_service_that_is_gone_is_a_sentence_in_the_view(session: Session) -> None:
+    session.run(Robot)
+    console = session.service("lamp", timeout=0.2)
+    session.stop("robot")
+    say(console, call={"data": True})
+    session.until(lambda: [c["problem"] for c in shown(console)["calls"] if c["problem"]])
+    assert "Nobody offers /lamp" in shown(console)["calls"][0]["problem"]
+
+
+def test_what_does_not_fit_is_said_beside_the_form(session: Session) -> None:
+    session.run(Robot)
+    view = session.action("count")
+    say(view, goal={"order": "many"})
+    assert view.frame()["problem"] == "order takes int32, not 'many'."
+    with pytest.raises(MisfitError, match="order takes int32"):
+        view.send(order=0.5)
+
+
+def test_goals_pass_through_their_states(busy: Session) -> None:
+    robot = busy.run(Robot)
+    assert isinstance(robot, Robot)
+    view = busy.action("count")
+    say(view, goal={"order": "2"})
+    busy.until(lambda: view.goals and view.goals[0].state == GoalState.EXECUTING)
+    busy.until(lambda: view.goals[0].feedback == 1)
+    robot.go.set()
+    busy.until(lambda: view.goals[0].result is not None and view.goals[0].over)
+    (goal,) = view.goals
+    assert goal.state == GoalState.SUCCEEDED
+    assert goal.result == {"sequence": [0, 1, 1]}
+    assert goal.asked == {"order": 2}
+    assert "SUCCEEDED" in view.words()
+    assert [name for name, _ in view.frame()["goals"][0]["states"]][-1] == "SUCCEEDED"
+
+
+def test_a_goal_of_somebody_else_is_seen_and_can_be_cancelled(busy: Session) -> None:
+    busy.run(Robot)
+    view = busy.action("count")
+    run = busy.send_goal(Fibonacci, "count", Fibonacci.Goal(order=3))
+    busy.until(lambda: view.goals and view.goals[0].state == GoalState.EXECUTING)
+    say(view, cancel=view.goals[0].number)
+    run.wait()
+    assert run.status == GoalState.CANCELED
+    busy.until(lambda: view.goals[0].over)
+    assert view.goals[0].state == GoalState.CANCELED
+
+
+def test_a_rejected_goal_is_said(busy: Session) -> None:
+    busy.run(Robot)
+    view = busy.action("count")
+    view.send(order=-1)
+    busy.until(lambda: view.goals)
+    assert view.goals[0].problem == "The server rejected this goal."
+    assert view.goals[0].over
+
+
+def test_parameters_have_controls_from_their_descriptors(session: Session) -> None:
+    session.run(Robot)
+    panel = session.parameters("robot")
+    kinds = {entry.name: entry.kind for entry in panel.entries}
+    assert kinds == {"speed": "slider", "name": "text", "lights": "checkbox", "legs": "number"}
+    speed = next(entry for entry in panel.entries if entry.name == "speed")
+    assert (speed.least, speed.most, speed.step, speed.description) == (0.0, 2.0, 0.5, "m/s")
+    assert "speed: 0.5 (0 to 2)  # m/s" in panel.words()
+
+
+def test_a_parameter_is_changed_and_a_refusal_has_its_reason(session: Session) -> None:
+    robot = session.run(Robot)
+    panel = session.parameters(robot)
+    say(panel, set="speed", value="1.5")
+    assert robot.get_parameter("speed").value == 1.5
+    say(panel, set="legs", value="100")
+    assert "no insect has so many" in panel.frame()["problem"]
+    assert robot.get_parameter("legs").value == 4
+    say(panel, set="legs", value="6")
+    assert panel.frame()["problem"] == ""
+    session.until(lambda: {e["name"]: e["value"] for e in shown(panel)["entries"]}["legs"] == 6)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "sentence"),
+    [
+        ("legs", "two", "legs takes a whole number, not 'two'."),
+        ("legs", "2.5", "legs takes a whole number, not '2.5'."),
+        ("speed", "fast", "speed takes a number, not 'fast'."),
+        ("speed", "9.0", "refused speed = 9.0"),
+        ("wings", "1", "/robot has no parameter 'wings'."),
+    ],
+)
+def test_a_value_that_does_not_fit_is_a_sentence(
+    session: Session, name: str, value: str, sentence: str
+) -> None:
+    session.run(Robot)
+    with pytest.raises(CourseError) as caught:
+        session.parameters("robot").set(name, value)
+    assert sentence in str(caught.value)
+
+
+def test_a_change_from_elsewhere_is_shown(session: Session) -> None:
+    robot = session.run(Robot)
+    panel = session.parameters("robot")
+    assert shown(panel)["entries"]
+    robot.set_parameters([Parameter("name", value="c3")])
+    session.until(lambda: "c3" in [e["value"] for e in shown(panel)["entries"]])
+
+
+def test_the_log_panel_has_the_latest_lines(session: Session) -> None:
+    robot = session.run(Robot)
+    panel = session.log_panel()
+    for number in range(300):
+        robot.get_logger().info(f"line {number}")
+    session.until(lambda: shown(panel)["rows"] and shown(panel)["rows"][-1][3] == "line 299")
+    assert len(shown(panel)["rows"]) == 200
+    assert shown(panel)["rows"][-1][1:3] == ["INFO", "/robot"]
+    assert "line 299" in panel.words()
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda s: s.service("lampe"), "Nobody offers the service /lampe"),
+        (lambda s: s.action("cont"), "Is it /count?"),
+        (lambda s: s.log_panel(level="LOUD"), "no log level 'LOUD'"),
+    ],
+)
+def test_what_is_not_there_is_named(session: Session, make: Any, sentence: str) -> None:
+    session.run(Robot)
+    with pytest.raises(SessionError) as caught:
+        make(session)
+    assert sentence in str(caught.value)
+
+
+def test_a_panel_of_no_node_says_so(session: Session) -> None:
+    with pytest.raises(WaitTimeout, match="/ghost/list_parameters"):
+        session.parameters("ghost")
+
+
+def test_forms_flatten_nested_messages() -> None:
+    fields = {field.path: field for field in forms.fields(Nested)}
+    assert fields["basic_types_value.bool_value"].kind == "checkbox"
+    message = forms.message(Nested, {"basic_types_value.int8_value": "-3"})
+    assert message.basic_types_value.int8_value == -3

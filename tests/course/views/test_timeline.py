@@ -1,0 +1,139 @@
+"""The timeline measures what DDS stamps and counts, and what callbacks really did."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from course import Session
+from course.errors import SessionError, WaitTimeout
+from course.views.timeline import Timeline, describe
+from course.watch import timeline
+from course.watch.callbacks import CallbackTap
+from course.watch.timeline import Passage
+
+MS = 1_000_000
+
+
+def passages(*stamps_ms: int, latency_ms: int = 2, first: int = 1) -> list[Passage]:
+    return [
+        Passage(stamp * MS, (stamp + latency_ms) * MS, first + number)
+        for number, stamp in enumerate(stamps_ms)
+    ]
+
+
+def test_rate_and_latency_are_taken_from_the_stamps() -> None:
+    found = timeline.figures(passages(*range(0, 1000, 100)))
+    assert found.rate == pytest.approx(10)
+    assert found.latency_p50 == pytest.approx(0.002)
+    assert found.latency_p95 == pytest.approx(0.002)
+    assert (found.lost, found.gaps) == (0, ())
+
+
+def test_a_pause_is_a_gap_and_a_missing_number_is_a_loss() -> None:
+    late = passages(0, 100, 200, 300) + passages(900, 1000, first=7)
+    found = timeline.figures(late)
+    assert found.gaps == (pytest.approx((0.3, 0.9)),)
+    assert found.lost == 2
+    assert "1 gap, the longest 0.60 s, 2 lost on the way" in describe(found)
+
+
+def test_two_publishers_count_for_themselves_so_nothing_is_said_of_losses() -> None:
+    assert timeline.figures(passages(0, 1, 2) + passages(3, 4, 5)).lost == 0
+
+
+def test_nothing_is_said_of_nothing() -> None:
+    assert describe(timeline.figures([])) == "nothing"
+    assert timeline.figures(passages(5)).rate is None
+
+
+def test_columns_cover_the_window() -> None:
+    counts = timeline.columns([0, 1, 999, 1000, -1], 0, 1000)
+    assert (counts[0], counts[-1], sum(counts)) == (2, 1, 3)
+
+
+class Listener(Node):
+    """Has a callback of each kind that rclpy knows."""
+
+    def __init__(self) -> None:
+        super().__init__("listener")
+        self.seen: list[Any] = []
+        self.create_subscription(String, "chatter", self.one, 10)
+        self.create_subscription(String, "chatter", self.two, 10)
+        self.create_subscription(String, "chatter", self.later, 10)
+
+    def one(self, message: String) -> None:
+        self.seen.append(("one", message.data))
+
+    def two(self, message: String, info: dict[str, int]) -> None:
+        self.seen.append(("two", info["publication_sequence_number"]))
+
+    async def later(self, message: String) -> None:
+        self.seen.append(("later", message.data))
+
+
+def test_callbacks_run_as_before_and_are_seen(session: Session) -> None:
+    talker = session.run(lambda: Node("talker"))
+    publisher = talker.create_publisher(String, "chatter", 10)
+    listener = session.run(Listener)
+    assert isinstance(listener, Listener)
+    originals = [subscription.callback for subscription in listener.subscriptions]
+    view = Timeline(session, [("chatter", None)])
+    session.until(lambda: publisher.get_subscription_count() >= 5)
+    for number in range(3):
+        publisher.publish(String(data=f"{number}"))
+    session.until(lambda: len(listener.seen) == 9)
+    session.until(lambda: len(view.runs("/chatter")) == 9)
+    assert {kind for kind, _ in listener.seen} == {"one", "two", "later"}
+    runs = view.runs("/chatter")
+    assert all(run.published <= run.started <= run.ended for run in runs)
+    assert view.figures()["/chatter"].count == 3
+    assert "callbacks of /listener: 9" in view.words()
+    (topic,) = view.frame()["topics"]
+    assert [lane["label"] for lane in topic["lanes"]] == [
+        "published", "received", "callback of /listener",
+    ]  # fmt: skip
+    assert [sum(lane["counts"]) for lane in topic["lanes"]] == [3, 3, 9]
+    view.stop()
+    assert [subscription.callback for subscription in listener.subscriptions] == originals
+
+
+def test_a_callback_that_raises_is_reported_as_ever(session: Session) -> None:
+    def broken(_message: String) -> None:
+        raise ZeroDivisionError("as ever")
+
+    node = session.run(lambda: Node("n"))
+    node.create_subscription(String, "chatter", broken, 10)
+    tap = CallbackTap("/chatter")
+    tap.watch([node])
+    session.publish("chatter", String())
+    session.until(lambda: session.errors)
+    assert str(session.errors[0].exception) == "as ever"
+    assert len(tap.since(0)) == 1
+
+
+def test_its_messages_can_be_saved(session: Session, tmp_path: Path) -> None:
+    talker = session.run(lambda: Node("talker"))
+    publisher = talker.create_publisher(String, "chatter", 10)
+    view = Timeline(session, [("chatter", String)])
+    session.until(lambda: publisher.get_subscription_count() == 2)
+    publisher.publish(String(data="x"))
+    session.until(lambda: view.figures()["/chatter"].count == 1)
+    with view.save(tmp_path / "t.mcap").open("rb") as file:
+        assert [channel.topic for _, channel, _ in make_reader(file).iter_messages()] == [
+            "/chatter"
+        ]
+
+
+def test_what_a_timeline_cannot_show_is_said(session: Session) -> None:
+    with pytest.raises(SessionError, match="1 to 6 topics, not 0"):
+        session.timeline()
+    with pytest.raises(SessionError, match="up to 60 s, not 90 s"):
+        session.timeline(("x", String), window=90)
+    with pytest.raises(WaitTimeout, match="somebody to use /x"):
+        Timeline(session, [("x", None)])
