@@ -51,16 +51,17 @@ def build(
         root: the nbgrader course root, with the text sources in ``authoring``.
         check: write nothing, only compare.
         with_solutions: keep the chapters' cells tagged "solutions".
-        points: points by grade id, in place of the package's ``points.toml``.
+        points: points by grade id, in place of the package's ``points.toml`` and quizzes.
 
     Raises:
         BuildError: a source is not sound, there is none, a notebook cannot be written, or
             (``check``) some are not in step. A source that is not sound leaves all as it was.
     """
     if points is None:
-        from autograder.points import of_grade_cells
+        from autograder import points as exams
+        from autograder import quiz_marks
 
-        points = of_grade_cells()
+        points = exams.of_grade_cells() | quiz_marks.of_grade_cells()
     built = dict(_built(root, points, with_solutions))
     if not built:
         raise BuildError(f"There is nothing to build: no {root / 'authoring'}/*/*.py.")

@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from autograder import quiz_cli
 from course.errors import CourseError
 
 EXIT_DIFFERENT = 1
@@ -23,6 +24,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(quiz_cli.app, name="quiz")
 out = Console()
 err = Console(stderr=True)
 
@@ -157,14 +159,21 @@ def corpus(
 
 @app.command()
 def report(assignment: str, root: Root = None, as_json: AsJson = False) -> None:
-    """Show the grades of an assignment, and what still needs a person."""
+    """Show the grades of an assignment, what still needs a person, and how its quizzes went."""
+    from autograder import quiz_report
     from autograder.gradebook import CourseGradebook
 
-    grades = CourseGradebook(_root(root)).grades(assignment)
+    where = _root(root)
+    grades = CourseGradebook(where).grades(assignment)
+    quizzes = quiz_report.of_assignment(where, assignment)
     if as_json:
-        _print_json({"grades": [vars(grade) for grade in grades]})
-    else:
-        _grades_table(grades, {})
+        data = [quiz.as_data() for quiz in quizzes]
+        _print_json({"grades": [vars(grade) for grade in grades], "quizzes": data})
+        return
+    _grades_table(grades, {})
+    for quiz in quizzes:
+        out.print(*quiz.tables(), sep="\n")
+        out.print(f"Written: {', '.join(map(str, quiz.files))}", soft_wrap=True, highlight=False)
 
 
 @app.command()

@@ -17,7 +17,7 @@ from nbformat import NotebookNode
 from nbgrader.utils import parse_utc
 
 from autograder import nbgrader_bridge as bridge
-from autograder import runner, submission
+from autograder import quiz_marks, runner, submission
 from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.runner import Outcome
 from autograder.store import OutcomeStore, StoreError
@@ -116,6 +116,7 @@ class _Class:
         outcomes, problems = {}, _stage_timestamp(submitted, staged)
         for name in self._originals:
             notebook, outcome = self._one(submitted / f"{name}.ipynb")
+            outcome = quiz_marks.with_quizzes(outcome, notebook, submitted, student)
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
             outcomes[name] = outcome
             problems += outcome.notes if outcome.unreadable else []

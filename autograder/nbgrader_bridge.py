@@ -69,6 +69,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         return nb, resources
 
     def _run(self, nb: NotebookNode, resources: Resources) -> Any:
+        from autograder import quiz_marks
         from autograder.store import OutcomeStore
 
         coursedir = _coursedir(self)
@@ -76,7 +77,8 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         folder = coursedir.format_path(coursedir.submitted_directory, student, assignment)
         program, files = submission.program(nb), submission.extras(Path(folder))
         store = OutcomeStore(Path(coursedir.root) / WORK_FOLDER / "outcomes")
-        return store.outcome(program, files)
+        outcome = store.outcome(program, files)
+        return quiz_marks.with_quizzes(outcome, nb, Path(folder), student)
 
 
 class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]

@@ -17,6 +17,7 @@ from course.content import content_root
 from course.errors import CourseError
 
 CHAPTER, EXERCISE = Path("ch05-building-blocks.ipynb"), Path("ch05/qos-design.ipynb")
+QUIZ = Path("ch05-quiz/quiz.ipynb")
 COMMAND = [sys.executable, "-c", "from course.launch import course; course()", "lab"]
 
 
@@ -48,9 +49,9 @@ def everything(folder: Path) -> dict[Path, bytes]:
 
 def test_a_new_copy_has_the_chapters_and_the_student_versions(root: Path, folder: Path) -> None:
     copied = lab.make_copy(folder, root)
-    assert copied.new == [CHAPTER, EXERCISE]
+    assert copied.new == [CHAPTER, EXERCISE, QUIZ]
     assert not copied.beside
-    assert set(everything(folder)) == {CHAPTER, EXERCISE, Path(lab.MANIFEST)}
+    assert set(everything(folder)) == {CHAPTER, EXERCISE, QUIZ, Path(lab.MANIFEST)}
     exercise = (folder / EXERCISE).read_text(encoding="utf-8")
     assert "# Your work goes here." in exercise
     assert "BEGIN SOLUTION" not in exercise
@@ -92,7 +93,7 @@ def test_a_file_from_elsewhere_is_kept_and_a_deleted_one_comes_back(
     (folder / "ch05").mkdir(parents=True)
     (folder / EXERCISE).write_text("fetched elsewhere, and worked on")
     copied = lab.make_copy(folder, root)
-    assert copied.new == [CHAPTER]
+    assert copied.new == [CHAPTER, QUIZ]
     assert copied.beside == {EXERCISE: Path("ch05/qos-design.new.ipynb")}
     assert (folder / EXERCISE).read_text() == "fetched elsewhere, and worked on"
     (folder / CHAPTER).unlink()

@@ -1,0 +1,156 @@
+"""Quizzes in the gradebook: the saved answers of a submission, marked with the instructor's keys.
+
+A grade cell whose grade id is ``quiz-NAME`` stands for the quiz NAME. The scores in a student's
+attempts file are not looked at: its best attempt is marked again (see `quizzes.regrade`), so a
+file that was written by hand earns what its answers earn.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from nbformat import NotebookNode
+
+from autograder import submission
+from autograder.runner import Outcome
+from autograder.verdict import CheckResult, Status, Verdict
+from course.errors import CourseError
+from quizzes import loader, record, regrade, rendering, text
+from quizzes.bank import Bank
+from quizzes.errors import QuizError
+from quizzes.marking import Mark
+
+PREFIX = "quiz-"
+PART = "answers"
+
+
+class QuizMarksError(CourseError):
+    """A quiz whose bank cannot be used for marking."""
+
+
+def of_grade_cells() -> dict[str, float]:
+    """Return {grade_id: points} for the quizzes there are: one point for each concept.
+
+    Raises:
+        QuizMarksError: a bank is not sound.
+    """
+    return {f"{PREFIX}{name}": float(len(_bank(name).concepts)) for name in loader.names()}
+
+
+def with_quizzes(outcome: Outcome, notebook: NotebookNode, folder: Path, student: str) -> Outcome:
+    """Return an outcome that holds the marks of the notebook's quizzes, too.
+
+    Args:
+        outcome: what came of running the notebook.
+        notebook: the submitted notebook, its cells restored.
+        folder: the submission, with the attempts file in it.
+        student: whose submission it is.
+
+    Raises:
+        QuizMarksError: a bank is not sound.
+    """
+    marked = {
+        f"{PREFIX}{name}": verdict(_bank(name), folder, student) for name in _quizzes(notebook)
+    }
+    return replace(outcome, verdicts={**outcome.verdicts, **marked}) if marked else outcome
+
+
+def verdict(bank: Bank, folder: Path, student: str) -> Verdict:
+    """Mark the best attempt that lies in ``folder``."""
+    name = record.filename(bank.quiz)
+    try:
+        content = _read(folder / name)
+    except FileNotFoundError:
+        reason = (
+            f"There is no {name} in the submission: it lies beside the notebook once you have "
+            "submitted the quiz, and has to be handed in with it."
+        )
+        return _unmarked(bank, reason)
+    except OSError as error:
+        return _unmarked(bank, f"{name} cannot be read ({error.strerror or error}).")
+    marked = regrade.mark_file(bank, content)
+    if marked.best is None:
+        return _none_counts(bank, name, marked)
+    checks = tuple(_check(mark) for mark in marked.best.marks)
+    return Verdict(f"{PREFIX}{bank.quiz}", PART, checks, tuple(_notes(marked, student)))
+
+
+def _quizzes(notebook: NotebookNode) -> Iterator[str]:
+    known = loader.names()
+    for cell in notebook.cells:
+        name = submission.grade_id(cell).removeprefix(PREFIX)
+        graded = bool(submission.metadata(cell).get("grade")) and submission.is_locked(cell)
+        if graded and submission.grade_id(cell).startswith(PREFIX) and name in known:
+            yield name
+
+
+def _bank(name: str) -> Bank:
+    try:
+        return loader.load_bank(name)
+    except QuizError as error:
+        raise QuizMarksError(str(error)) from error
+
+
+def _read(path: Path) -> bytes:
+    """Return what a plain file holds, but not much more than is ever marked; follow no link."""
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(handle, "rb") as file:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError("it is not a file")
+        return file.read(record.MAX_FILE + 1)
+
+
+def _check(mark: Mark) -> CheckResult:
+    wrong = [remark for remark in mark.remarks if not remark.right]
+    answer = rendering.plain(text.of_answer(mark.item, mark.answer))
+    return CheckResult(
+        mark.item.variant.id, rendering.plain(mark.item.concept.objective),
+        "passed" if mark.right else "failed", round(mark.credit, 2), 1.0,
+        rationale=" ".join(rendering.plain(remark.feedback) for remark in wrong),
+        actual=f"The answer was: {answer}",
+    )  # fmt: skip
+
+
+def _notes(marked: regrade.Marked, student: str) -> Iterator[str]:
+    assert marked.best is not None
+    paper = marked.best.paper
+    yield (
+        f"The best of {len(marked.results)} attempts counts: number {paper.attempt}. "
+        f"{marked.best.headline}"
+    )
+    if paper.student != student:
+        yield f"It was made under the login '{paper.student}'."
+    yield from _remarks(marked)
+
+
+def _remarks(marked: regrade.Marked) -> Iterator[str]:
+    yield from marked.problems[:5]
+    if marked.damaged:
+        yield f"{marked.damaged} lines of the file are no attempts and were left out."
+    if marked.other_edition:
+        yield f"{marked.other_edition} attempts were made with another edition of the quiz."
+
+
+def _none_counts(bank: Bank, name: str, marked: regrade.Marked) -> Verdict:
+    remarks = tuple(_remarks(marked))
+    if marked.other_edition:
+        reason = (
+            "The attempts were made with another edition of the quiz than the one that is "
+            "installed here, so a person has to mark them."
+        )
+        return _unmarked(bank, reason, remarks, "grader_error")
+    return _unmarked(bank, f"{name} holds no attempt that counts.", remarks)
+
+
+def _unmarked(
+    bank: Bank, reason: str, notes: tuple[str, ...] = (), status: Status = "not_checked"
+) -> Verdict:
+    checks = tuple(
+        CheckResult(c.id, rendering.plain(c.objective), status, 0.0, 1.0, actual=reason)
+        for c in bank.concepts
+    )
+    return Verdict(f"{PREFIX}{bank.quiz}", PART, checks, notes)

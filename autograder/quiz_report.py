@@ -1,0 +1,83 @@
+"""The quizzes of an assignment in ``autograder report``: item analysis of a class's attempts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+
+from autograder.quiz_cli import as_course_errors
+from quizzes import loader, record
+
+if TYPE_CHECKING:
+    from quizzes.insight.analysis import Analysis
+
+
+@dataclass(frozen=True)
+class QuizReport:
+    """What the attempts at one quiz say, and the files in which it stands."""
+
+    analysis: Analysis
+    files: list[Path]
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the report for machines."""
+        analysis = self.analysis
+        return {
+            "quiz": analysis.bank.quiz,
+            "learners": analysis.learners,
+            "passed": analysis.passed,
+            "items": [vars(figures) for figures in (*analysis.concepts, *analysis.variants)],
+            "misconceptions": [
+                {**vars(figures), "share": figures.share} for figures in analysis.beliefs
+            ],
+            "notes": list(analysis.notes),
+            "files": [str(path) for path in self.files],
+        }
+
+    def tables(self) -> tuple[Table, Table]:
+        """Return the items and the misconceptions that somebody holds, for a terminal."""
+        from quizzes.insight import report
+
+        items = Table("Item", "Kind", "Learners", "p", "r", "Remark", padding=(0, 0))
+        items.caption = "p: difficulty, mean credit; r: discrimination, correlation with the rest"
+        for column in items.columns[:5]:
+            column.no_wrap = True
+        for row in report.item_rows(self.analysis):
+            if row[1] == "concept" or row[2] != "0":  # the page has the other variants, too
+                items.add_row(*row, style="bold" if row[1] == "concept" else None)
+        beliefs = Table("Misconception", "Held by", "Share")
+        for figures in self.analysis.beliefs:
+            if figures.holders:
+                held = f"{figures.holders} of {figures.met}"
+                beliefs.add_row(figures.belief, held, f"{100 * figures.share:.0f} %")
+        return items, beliefs
+
+
+def of_assignment(root: Path, assignment: str) -> list[QuizReport]:
+    """Analyse each quiz that somebody has handed in with an assignment, and write the reports.
+
+    They are written into ``reports/ASSIGNMENT`` of the course root.
+
+    Raises:
+        QuizCommandError: a bank is not sound, or the reports cannot be written.
+    """
+    submitted = sorted((root / "submitted").glob(f"*/{assignment}"))
+    folders = {folder.parent.name: folder for folder in submitted}
+    reports = []
+    for name in loader.names():
+        if any((folder / record.filename(name)).exists() for folder in folders.values()):
+            reports.append(_report(name, folders, root / "reports" / assignment))
+    return reports
+
+
+def _report(name: str, folders: dict[str, Path], target: Path) -> QuizReport:
+    from quizzes import insight  # plots take a moment to import
+
+    with as_course_errors():
+        bank = loader.load_bank(name)
+        collected = insight.collect(bank, folders)
+        analysis = insight.analyse(bank, collected.results, collected.notes)
+        return QuizReport(analysis, insight.write(analysis, target))

@@ -1,0 +1,120 @@
+"""Answers as learners give them, brought into the one form in which they are saved and marked.
+
+An answer is a number (numeric) or a string of letters: ``"b"`` (single, predict), ``"ac"``
+(multiple, sorted), ``"cabd"`` (ordering: first to last; matching: for each left side the letter of
+its right one, ``-`` where none is chosen yet). ``""`` is no answer yet.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from quizzes.bank import Matching, Multiple, Numeric, Ordering
+from quizzes.errors import AnswerError
+from quizzes.model import Item
+
+Answer = str | float
+
+NOTHING = ""
+OPEN = "-"
+"""Stands in a matching for a left side that has no right one yet."""
+
+
+def normal(item: Item, given: Any) -> Answer:
+    """Return an answer in its saved form; None and "" take an answer back.
+
+    Args:
+        item: the question.
+        given: a letter, letters as a string or a list, a number, or for a matching also
+            ``{1: "b", 2: "a"}`` with the number of the left side.
+
+    Raises:
+        AnswerError: it does not fit the question; the message says what does.
+    """
+    if given is None or (isinstance(given, str) and not given.strip()):
+        return NOTHING
+    if isinstance(item.variant, Numeric):
+        return _number(item, given)
+    letters = _letters(item, given)
+    unknown = sorted(set(letters) - set(item.letters) - {OPEN})
+    if unknown:
+        raise AnswerError(f"Question {item.number} has no '{unknown[0]}': {fits(item)}.")
+    if isinstance(item.variant, Matching):
+        if len(letters) != len(item.variant.pairs):
+            raise _wrong(item, given)
+        return NOTHING if set(letters) == {OPEN} else letters
+    if OPEN in letters or len(set(letters)) < len(letters):
+        raise _wrong(item, given)
+    if isinstance(item.variant, Multiple):
+        return "".join(sorted(letters))
+    wanted = len(item.letters) if isinstance(item.variant, Ordering) else 1
+    if len(letters) != wanted:
+        raise _wrong(item, given)
+    return letters
+
+
+def complete(item: Item, answer: Answer) -> bool:
+    """Whether a saved answer answers the question (rightly or not)."""
+    if isinstance(item.variant, Matching):
+        return answer != NOTHING and OPEN not in str(answer)
+    return answer != NOTHING
+
+
+def fits(item: Item) -> str:
+    """Return a phrase that says what an answer to this question looks like."""
+    first, last = item.letters[:1], item.letters[-1:]
+    if isinstance(item.variant, Numeric):
+        return "answer with a number" + (f" in {item.variant.unit}" if item.variant.unit else "")
+    if isinstance(item.variant, Ordering):
+        return f"answer with all letters from a to {last} in order, such as '{item.letters}'"
+    if isinstance(item.variant, Matching):
+        count = len(item.variant.pairs)
+        return f"answer with one letter (a to {last}) for each of the {count} left sides, in order"
+    if isinstance(item.variant, Multiple):
+        return f"answer with one or more letters from {first} to {last}, such as 'ab'"
+    return f"answer with one letter from {first} to {last}"
+
+
+def _number(item: Item, given: Any) -> float:
+    if isinstance(given, bool) or not isinstance(given, int | float | str):
+        raise _wrong(item, given)
+    try:
+        number = float(given)
+    except (ValueError, OverflowError):
+        raise _wrong(item, given) from None
+    if not math.isfinite(number):
+        raise _wrong(item, given)
+    return number
+
+
+def _letters(item: Item, given: Any) -> str:
+    if isinstance(given, Mapping) and isinstance(item.variant, Matching):
+        lefts = range(1, len(item.variant.pairs) + 1)
+        if not set(given) <= set(lefts):
+            raise AnswerError(
+                f"Question {item.number} has the left sides 1 to {len(lefts)}, not "
+                f"{sorted(set(given) - set(lefts), key=str)[0]!r}."
+            )
+        given = [given.get(left, OPEN) for left in lefts]
+    elif isinstance(given, set | frozenset):
+        given = sorted(given, key=str)
+    if not isinstance(given, str):
+        if not isinstance(given, Iterable) or isinstance(given, bytes | Mapping):
+            raise _wrong(item, given)
+        given = list(given)
+        if not all(isinstance(letter, str) and len(letter.strip()) == 1 for letter in given):
+            raise _wrong(item, given)
+        given = "".join(given)
+    return re.sub(r"[\s,;]", "", given).lower()
+
+
+def _wrong(item: Item, given: Any) -> AnswerError:
+    try:
+        shown = repr(given)
+    except ValueError:  # an integer of too many digits
+        shown = "That"
+    shown = shown if len(shown) <= 40 else f"{shown[:37]}..."
+    return AnswerError(f"{shown} does not fit question {item.number}: {fits(item)}.")

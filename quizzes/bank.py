@@ -1,0 +1,273 @@
+"""What a bank holds: a quiz of concepts, each with variants that can stand in for one another.
+
+The classes are the schema of ``banks/NAME.yaml`` (see `quizzes.loader`, which reads it). Texts are
+Markdown: fenced code, ``$LaTeX$``, and images ``![alt](assets/NAME.svg)`` beside the bank.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, StringConstraints, model_validator
+
+MIN_VARIANTS = 4
+"""Variants a concept has at least: with fewer, a retry is too soon the same quiz again."""
+
+Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
+Code = Annotated[str, StringConstraints(min_length=1)]
+Id = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=60)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Part(BaseModel):
+    """Base of all parts of a bank: nothing is converted, nothing unknown is passed over."""
+
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class Option(Part):
+    """One option of a choice. A wrong one names the belief that makes it tempting.
+
+    ``show`` is Python that demonstrates on live nodes what really happens.
+    """
+
+    text: Text
+    correct: bool = False
+    feedback: Text
+    misconception: Id | None = None
+    show: Code | None = None
+
+    @model_validator(mode="after")
+    def _wrong_ones_have_a_reason(self) -> Self:
+        if not self.correct and self.misconception is None:
+            raise ValueError("a wrong option needs a misconception")
+        if self.correct and self.misconception is not None:
+            raise ValueError("a right option has no misconception")
+        return self
+
+
+class _Variant(Part):
+    id: Id
+    stem: Text
+    code: Code | None = None
+    proof: Text | list[Text]
+
+    @property
+    def proofs(self) -> tuple[str, ...]:
+        """The names of the tests that prove the key on real endpoints."""
+        return (self.proof,) if isinstance(self.proof, str) else tuple(self.proof)
+
+
+class _Choice(_Variant):
+    options: list[Option] = Field(min_length=2, max_length=10)
+
+    @property
+    def texts(self) -> list[str]:
+        """The texts that letters stand for, in the order of the bank."""
+        return [option.text for option in self.options]
+
+    @property
+    def right(self) -> list[int]:
+        """The positions of the right options, in the order of the bank."""
+        return [index for index, option in enumerate(self.options) if option.correct]
+
+
+class _OneRight(_Choice):
+    @model_validator(mode="after")
+    def _one_key(self) -> Self:
+        if len(self.right) != 1:
+            raise ValueError(f"exactly one option must be correct, not {len(self.right)}")
+        return self
+
+
+class Single(_OneRight):
+    """Choose the one right option."""
+
+    kind: Literal["single"]
+
+
+class Predict(_OneRight):
+    """Say what a cell will show, then run it: ``code`` is that cell."""
+
+    kind: Literal["predict"]
+    code: Code
+
+
+class Multiple(_Choice):
+    """Choose every right option."""
+
+    kind: Literal["multiple"]
+
+    @model_validator(mode="after")
+    def _some_right_some_wrong(self) -> Self:
+        if not 0 < len(self.right) < len(self.options):
+            raise ValueError("at least one option must be correct and one wrong")
+        return self
+
+
+class Trap(Part):
+    """A wrong number that a known misconception leads to."""
+
+    value: Finite
+    tolerance: Finite = Field(default=0.0, ge=0)
+    misconception: Id
+    feedback: Text
+    show: Code | None = None
+
+    def holds(self, number: float) -> bool:
+        """Whether ``number`` is the one this trap is about."""
+        return near(number, self.value, self.tolerance)
+
+
+class _Built(_Variant):
+    """A question whose answer is made rather than chosen: one feedback for every wrong one."""
+
+    feedback: Text
+    wrong_feedback: Text
+    misconception: Id
+    show: Code | None = None
+
+
+class Numeric(_Variant):
+    """Give a number: right within ``tolerance`` of ``answer``, both in ``unit``."""
+
+    kind: Literal["numeric"]
+    answer: Finite
+    tolerance: Finite = Field(default=0.0, ge=0)
+    unit: str = ""
+    traps: list[Trap] = Field(default_factory=list)
+    feedback: Text
+    wrong_feedback: Text | None = None
+    misconception: Id | None = None
+    show: Code | None = None
+
+    @property
+    def texts(self) -> list[str]:
+        """No letters here."""
+        return []
+
+    def holds(self, number: float) -> bool:
+        """Whether ``number`` is right."""
+        return near(number, self.answer, self.tolerance)
+
+    @model_validator(mode="after")
+    def _traps_are_wrong(self) -> Self:
+        for trap in self.traps:
+            if self.holds(trap.value):
+                raise ValueError(f"the trap {trap.value:g} lies within the tolerance of the answer")
+        return self
+
+
+class Ordering(_Built):
+    """Put ``items`` (given in the right order) in order."""
+
+    kind: Literal["ordering"]
+    items: list[Text] = Field(min_length=3, max_length=8)
+
+    @property
+    def texts(self) -> list[str]:
+        """The texts that letters stand for, in the right order."""
+        return list(self.items)
+
+
+class Pair(Part):
+    """Two things that belong together."""
+
+    left: Text
+    right: Text
+
+
+class Matching(_Built):
+    """Find for each left side its right one; ``extras`` are right sides without a left."""
+
+    kind: Literal["matching"]
+    pairs: list[Pair] = Field(min_length=2, max_length=8)
+    extras: list[Text] = Field(default_factory=list, max_length=6)
+
+    @property
+    def texts(self) -> list[str]:
+        """The right sides that letters stand for, each once; those of the pairs come first."""
+        return list(dict.fromkeys([*(pair.right for pair in self.pairs), *self.extras]))
+
+    @model_validator(mode="after")
+    def _something_to_choose(self) -> Self:
+        lefts = [pair.left for pair in self.pairs]
+        if len(set(lefts)) < len(lefts):
+            raise ValueError("a left side stands there twice")
+        if set(self.extras) & {pair.right for pair in self.pairs}:
+            raise ValueError("an extra is the right side of a pair, too")
+        if len(self.texts) < 2:
+            raise ValueError("there must be two different right sides to choose from")
+        return self
+
+
+Variant = Annotated[
+    Single | Predict | Multiple | Numeric | Ordering | Matching, Field(discriminator="kind")
+]
+
+
+class Concept(Part):
+    """One thing to understand, with interchangeable questions about it."""
+
+    id: Id
+    objective: Text
+    variants: list[Variant] = Field(min_length=MIN_VARIANTS)
+
+    def variant(self, name: str) -> Variant | None:
+        """Return the variant with the id ``name``, if there is one."""
+        return next((variant for variant in self.variants if variant.id == name), None)
+
+
+class Bank(Part):
+    """A quiz: its concepts in order, and what learners may wrongly believe about them.
+
+    ``pass_mark`` is how many concepts must be fully right.
+    """
+
+    quiz: Id
+    title: Text
+    chapter: Text
+    pass_mark: int = Field(ge=1)
+    misconceptions: dict[Id, Text]
+    concepts: list[Concept] = Field(min_length=1)
+    _folder: Path = PrivateAttr(default=Path())
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the bank's file, where ``assets`` lies."""
+        return self._folder
+
+    @property
+    def pass_text(self) -> str:
+        """What is needed to pass, as people say it: "4 of 5 needed"."""
+        return f"{self.pass_mark} of {len(self.concepts)} needed"
+
+    @property
+    def edition(self) -> str:
+        """A digest of all that saved answers refer to: the ids, and the texts behind letters.
+
+        Mending a key, a stem or a feedback keeps it, so saved answers can be marked anew.
+        """
+        content = [
+            [concept.id, [[variant.id, variant.kind, _texts(variant)]
+                          for variant in concept.variants]]
+            for concept in self.concepts
+        ]  # fmt: skip
+        return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+
+    def concept(self, name: str) -> Concept | None:
+        """Return the concept with the id ``name``, if there is one."""
+        return next((concept for concept in self.concepts if concept.id == name), None)
+
+
+def near(number: float, target: float, tolerance: float) -> bool:
+    """Whether a number is within ``tolerance`` of ``target``; rounding in binary is forgiven."""
+    return abs(number - target) <= tolerance + 1e-9 * max(1.0, abs(target))
+
+
+def _texts(variant: Variant) -> list[str]:
+    lefts = [pair.left for pair in variant.pairs] if isinstance(variant, Matching) else []
+    return [*lefts, *variant.texts]

@@ -1,0 +1,1 @@
+"""Banks and learning platforms: export to Moodle and Canvas, and back from Moodle."""

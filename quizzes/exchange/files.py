@@ -1,0 +1,89 @@
+"""Files of other formats: write a bank as one, read one into a bank."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from quizzes import loader
+from quizzes.bank import Bank
+from quizzes.exchange import gift, merge, questions
+from quizzes.exchange.questions import ExchangeError
+
+FORMATS = {"gift": ".gift", "qti": ".qti.zip"}
+"""What a bank can be exported as, and how such a file's name ends."""
+
+
+def open_bank(name: str) -> Bank:
+    """Return the bank of an installed quiz, or the one in the YAML file called ``name``.
+
+    Raises:
+        BankError: there is none, or it is not sound.
+    """
+    if name.endswith((".yaml", ".yml")):
+        return loader.read_bank(Path(name))
+    return loader.load_bank(name)
+
+
+def export_bank(bank: Bank, format_name: str, to: Path | None = None) -> tuple[Path, list[str]]:
+    """Write a bank in another format; return the file, and what it leaves out, a sentence each.
+
+    Args:
+        bank: what to write.
+        format_name: one of `FORMATS`.
+        to: the file; by default it is named like the quiz, in the current folder.
+
+    Raises:
+        ExchangeError: there is no such format, a question does not fit it, or the file cannot be
+            written.
+    """
+    if format_name not in FORMATS:
+        raise ExchangeError(
+            f"There is no format '{format_name}': choose one of {', '.join(FORMATS)}."
+        )
+    path = to or Path(f"{bank.quiz}{FORMATS[format_name]}")
+    if format_name == "gift":
+        found, notes = questions.of_bank(bank)
+        content = gift.write(found, bank.title).encode()
+    else:
+        from quizzes.exchange import qti  # text2qti takes a moment to import
+
+        content, notes = qti.package(bank)
+    _write(path, content)
+    return path, notes
+
+
+def import_gift(path: Path, bank: Bank, to: Path | None = None) -> tuple[Path, merge.Merged]:
+    """Bring a GIFT file into a bank, and write that as YAML; the bank's own file stays as it is.
+
+    Args:
+        path: the GIFT file.
+        bank: the bank that the questions belong to.
+        to: the YAML file; by default it is named like the quiz, in the current folder.
+
+    Raises:
+        ExchangeError: a file cannot be read or written, is no GIFT, or does not fit the bank.
+    """
+    try:
+        with path.open("rb") as file:
+            raw = file.read(4 * gift.MAX_SIZE + 1)
+        content = raw.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise ExchangeError(f"{path}, line {line}: this is not UTF-8 text.") from None
+    except OSError as error:
+        raise ExchangeError(f"{path} cannot be read: {error.strerror or error}.") from None
+    merged = merge.merge(bank, gift.read(content, path.name), path.name)
+    target = to or Path(f"{bank.quiz}.yaml")
+    if to is None and target.exists():
+        raise ExchangeError(f"{target} is there already: name the file to write with --to.")
+    _write(target, merged.to_yaml().encode())
+    return target, merged
+
+
+def _write(path: Path, content: bytes) -> None:
+    try:
+        path.write_bytes(content)
+    except OSError as error:
+        raise ExchangeError(
+            f"{path} cannot be written: {error.strerror or error}; name another file with --to."
+        ) from None

@@ -1,0 +1,284 @@
+"""Brings questions from a learning platform back into a bank.
+
+A question that a bank has under the same name is compared with what the bank would export. What is
+equal stays as the bank has it, with its picture and its formulas; what is not takes the new text,
+and keeps the misconceptions, cells and proofs of the answers that it can recognize.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from quizzes.bank import Bank, Concept
+from quizzes.exchange.questions import (
+    BOTH,
+    POSITION,
+    ChoiceQuestion,
+    ExchangeError,
+    MatchQuestion,
+    NumberQuestion,
+    Question,
+    code_block,
+    from_plain,
+    of_variant,
+    plain,
+    unit_line,
+)
+
+UNNAMED = "not-named-yet"
+"""The misconception of wrong answers that come without one."""
+UNPROVEN = "not proven yet"
+"""The proof of a question that comes without one; the bank's tests refuse it."""
+
+NO_FEEDBACK = "This answer was imported without feedback."
+
+_UNIT = re.compile(r"\n\n\*\(Answer in ([^)\n]+)\.\)\*$")
+_ID = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+_CODE_AT_END = re.compile(r"\n\n```python\n((?:(?!```).)*)\n```$", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Merged:
+    """A bank as it is after an import, and what a person should know, a sentence each."""
+
+    bank: Bank
+    notes: list[str]
+    changed: int
+
+    def to_yaml(self) -> str:
+        """Return the bank as YAML."""
+        return dump(self.bank)
+
+
+def merge(bank: Bank, questions: Sequence[Question], source: str) -> Merged:
+    """Return ``bank`` with the questions of a file named ``source`` in it.
+
+    Raises:
+        ExchangeError: a question cannot be placed, or the bank would not hold together.
+    """
+    data = bank.model_dump(exclude_none=True)
+    known = {variant.id: (concept, variant) for concept in bank.concepts
+             for variant in concept.variants}  # fmt: skip
+    notes: list[str] = []
+    changed = 0
+    for question in questions:
+        concept, variant = known.get(question.name, (None, None))
+        place = _place(data, question, concept, source)
+        if concept is None or variant is None:
+            changed += 1
+            place.append(_built(question, None, {}))
+            notes.append(f"'{question.name}' is new: name its proofs, misconceptions and cells.")
+            continue
+        before = of_variant(bank.quiz, concept, variant)
+        if _same(before, question):
+            continue
+        changed += 1
+        index = next(i for i, old in enumerate(place) if old["id"] == variant.id)
+        place[index] = _built(question, before, place[index])
+        notes.append(f"'{question.name}' has changed: see that its proofs still prove its key.")
+    missing = known.keys() - {question.name for question in questions}
+    if missing:
+        notes.append(f"{source} does not have {', '.join(sorted(missing))}: kept as they are.")
+    if UNNAMED in str(data["concepts"]):
+        data["misconceptions"][UNNAMED] = "Imported: name the belief behind this answer."
+    return Merged(_checked(data, bank, source), notes, changed)
+
+
+def dump(bank: Bank) -> str:
+    """Return a bank as YAML that people can edit: texts of several lines as blocks."""
+    data = bank.model_dump(exclude_none=True)
+    return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
+
+
+class _Dumper(yaml.SafeDumper):
+    pass
+
+
+def _represent(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    return dumper.represent_scalar(
+        "tag:yaml.org,2002:str", text, style="|" if "\n" in text else None
+    )
+
+
+_Dumper.add_representer(str, _represent)
+
+
+def _place(
+    data: dict[str, Any], question: Question, concept: Concept | None, source: str
+) -> list[dict[str, Any]]:
+    if concept is None and not _ID.fullmatch(question.name):
+        raise ExchangeError(
+            f"{source}, question '{question.name}': a new question's name becomes its id, which is "
+            "lower-case words joined by hyphens; call it something like 'qos-purpose-6'."
+        )
+    name = concept.id if concept else question.category.rpartition("/")[2]
+    for candidate in data["concepts"]:
+        if candidate["id"] == name:
+            variants: list[dict[str, Any]] = candidate["variants"]
+            return variants
+    names = ", ".join(candidate["id"] for candidate in data["concepts"])
+    raise ExchangeError(
+        f"{source}, question '{question.name}': its category '{question.category}' is no concept "
+        f"of the bank '{data['quiz']}'; put it under one of {names}."
+    )
+
+
+def _same(before: Question, question: Question) -> bool:
+    """Whether a question says what the bank would export; where it is filed does not matter."""
+    return {**vars(before), "category": ""} == {**vars(question), "category": ""}
+
+
+def _built(question: Question, before: Question | None, old: dict[str, Any]) -> dict[str, Any]:
+    """Return a variant's fields from a question, with all that can be kept of the old ones."""
+    data: dict[str, Any] = {"id": question.name}
+    if isinstance(question, ChoiceQuestion):
+        kind = "multiple" if not question.one else "single"
+        data["kind"] = "predict" if kind == "single" and old.get("kind") == "predict" else kind
+    elif isinstance(question, NumberQuestion):
+        data["kind"] = "numeric"
+    else:
+        data["kind"] = "ordering" if _is_ordering(question) else "matching"
+    data |= _texts(question, before, old)
+    if isinstance(question, ChoiceQuestion):
+        data |= _options(question, old)
+    elif isinstance(question, NumberQuestion):
+        data |= _numbers(question, old)
+    else:
+        data |= _pairs(question, old)
+    data["proof"] = old.get("proof", UNPROVEN)
+    return data
+
+
+def _texts(question: Question, before: Question | None, old: dict[str, Any]) -> dict[str, Any]:
+    if before is not None and before.text == question.text:
+        return {name: old[name] for name in ("stem", "code", "unit") if old.get(name)}
+    text = question.text
+    fields: dict[str, Any] = {}
+    if found := _UNIT.search(text):
+        assert unit_line(found[1]) == found[0]
+        fields["unit"] = found[1]
+        text = text[: found.start()]
+    if old.get("code") and (found := _CODE_AT_END.search(text)):
+        same = code_block(old["code"]) == found[0]
+        fields["code"] = old["code"] if same else f"{found[1]}\n"
+        text = text[: found.start()]
+    return {"stem": _kept(text, old.get("stem")), **fields}
+
+
+def _kept(text: str, *candidates: str | None) -> str:
+    """Return the bank's own form of a text if one of them is exported as it, else the text."""
+    return next((c for c in candidates if c is not None and plain(c) == text), from_plain(text))
+
+
+def _options(question: ChoiceQuestion, old: dict[str, Any]) -> dict[str, Any]:
+    left = list(old.get("options", []))
+    options = []
+    for choice in question.choices:
+        correct = choice.share > 0
+        twin = _twin(left, choice.text, choice.feedback, correct=correct)
+        if twin:
+            left.remove(twin)
+        option: dict[str, Any] = {
+            "text": _kept(choice.text, twin.get("text")),
+            "feedback": _kept(choice.feedback, twin.get("feedback")) or NO_FEEDBACK,
+        }
+        if correct:
+            option["correct"] = True
+        else:
+            option["misconception"] = twin.get("misconception", UNNAMED)
+        if twin.get("show"):
+            option["show"] = twin["show"]
+        options.append(option)
+    return {"options": options}
+
+
+def _twin(left: list[dict[str, Any]], text: str, feedback: str, *, correct: bool) -> dict[str, Any]:
+    """Return the old option that this one was: of the same text, or else of the same feedback."""
+    mine = [option for option in left if bool(option.get("correct")) is correct]
+    for field, wanted in (("text", text), ("feedback", feedback)):
+        for option in mine:
+            if plain(option[field]) == wanted:
+                return option
+    return {}
+
+
+def _numbers(question: NumberQuestion, old: dict[str, Any]) -> dict[str, Any]:
+    [right] = [number for number in question.numbers if number.share == 100]
+    traps = []
+    known = {trap["value"]: trap for trap in old.get("traps", [])}
+    for number in question.numbers:
+        if number is right:
+            continue
+        twin = known.get(number.value, {})
+        trap = {
+            "value": number.value,
+            "tolerance": number.tolerance,
+            "misconception": twin.get("misconception", UNNAMED),
+            "feedback": _kept(number.feedback, twin.get("feedback")) or NO_FEEDBACK,
+        }
+        traps.append(trap | ({"show": twin["show"]} if twin.get("show") else {}))
+    fields: dict[str, Any] = {
+        "answer": right.value,
+        "tolerance": right.tolerance,
+        "feedback": _kept(right.feedback or question.feedback, old.get("feedback")) or NO_FEEDBACK,
+        "traps": traps,
+    }
+    if question.wrong_feedback:
+        fields["wrong_feedback"] = _kept(question.wrong_feedback, old.get("wrong_feedback"))
+    return fields | {name: old[name] for name in ("misconception", "show") if old.get(name)}
+
+
+def _is_ordering(question: MatchQuestion) -> bool:
+    positions = [POSITION.format(number=n) for n in range(1, len(question.pairs) + 1)]
+    return not question.extras and [left for left, _ in question.pairs] == positions
+
+
+def _pairs(question: MatchQuestion, old: dict[str, Any]) -> dict[str, Any]:
+    right, _, wrong = question.feedback.partition(BOTH)
+    fields: dict[str, Any] = {
+        "feedback": _kept(right, old.get("feedback")) or NO_FEEDBACK,
+        "wrong_feedback": _kept(wrong or right, old.get("wrong_feedback")) or NO_FEEDBACK,
+        "misconception": old.get("misconception", UNNAMED),
+    }
+    if old.get("show"):
+        fields["show"] = old["show"]
+    if _is_ordering(question):
+        items = old.get("items", [])
+        return {"items": [_kept(item, *items) for _, item in question.pairs], **fields}
+    lefts = [pair["left"] for pair in old.get("pairs", [])]
+    rights = [*(pair["right"] for pair in old.get("pairs", [])), *old.get("extras", [])]
+    pairs = [
+        {"left": _kept(left, *lefts), "right": _kept(right, *rights)}
+        for left, right in question.pairs
+    ]
+    return {"pairs": pairs, "extras": [_kept(e, *rights) for e in question.extras], **fields}
+
+
+def _checked(data: dict[str, Any], bank: Bank, source: str) -> Bank:
+    try:
+        merged = Bank.model_validate(data)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        problem = first["msg"].removeprefix("Value error, ").rstrip(".")
+        where = f"{source}, question '{_item(data, first['loc'])}', field {first['loc'][-1]}"
+        raise ExchangeError(f"{where}: {problem[:1].lower()}{problem[1:]}.") from None
+    merged._folder = bank.folder
+    return merged
+
+
+def _item(data: Any, steps: Sequence[int | str]) -> str:
+    """Return the id of the innermost thing that has one on the way to a field."""
+    item, here = str(data["quiz"]), data
+    for step in steps:
+        if isinstance(here, dict) and step not in here:
+            continue  # pydantic names the kind of a variant as if it were a field
+        here = here[step]
+        if isinstance(here, dict) and "id" in here:
+            item = here["id"]
+    return item

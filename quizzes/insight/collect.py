@@ -1,0 +1,63 @@
+"""Collects a class: the first attempt of each learner, its answers marked again.
+
+First attempts only: a later one has seen the feedback of an earlier one, and would make every
+question look easier than it is.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from quizzes import record, regrade
+from quizzes.bank import Bank
+from quizzes.marking import Result
+
+
+@dataclass(frozen=True)
+class ClassResults:
+    """The first result of each learner who has one, and a sentence for each who has none."""
+
+    bank: Bank
+    results: dict[str, Result]
+    notes: tuple[str, ...]
+
+
+def collect(bank: Bank, folders: Mapping[str, Path]) -> ClassResults:
+    """Read and mark the attempts of a class.
+
+    Args:
+        bank: the quiz.
+        folders: for each learner the folder of their submission.
+    """
+    results: dict[str, Result] = {}
+    notes = []
+    name = record.filename(bank.quiz)
+    for learner, folder in sorted(folders.items()):
+        try:
+            marked = regrade.mark_file(bank, _read(folder / name))
+        except FileNotFoundError:
+            notes.append(f"{learner} has handed in no {name}.")
+            continue
+        except OSError as error:
+            notes.append(f"{name} of {learner} cannot be read ({error.strerror or error}).")
+            continue
+        if marked.first is not None:
+            results[learner] = marked.first
+        elif marked.other_edition:
+            notes.append(f"{learner} answered another edition of the quiz, which is left out.")
+        else:
+            notes.append(f"{name} of {learner} holds no attempt that counts.")
+    return ClassResults(bank, results, tuple(notes))
+
+
+def _read(path: Path) -> bytes:
+    """Return what a plain file holds, but not much more than is ever marked; follow no link."""
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(handle, "rb") as file:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError("it is not a plain file")
+        return file.read(record.MAX_FILE + 1)

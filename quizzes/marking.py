@@ -1,0 +1,150 @@
+"""Marking: what each answer earns, which belief a wrong one shows, and what to tell the learner."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from quizzes import model, text
+from quizzes.answers import NOTHING, OPEN, Answer, complete
+from quizzes.bank import Matching, Multiple, Numeric, Ordering, Predict, Single
+from quizzes.model import Item, Paper
+
+
+@dataclass(frozen=True)
+class Remark:
+    """Something to tell about an answer: Markdown, and Python that shows it on live nodes.
+
+    ``letter`` is the option that it is about, or "" if it is about the whole answer.
+    """
+
+    right: bool
+    feedback: str
+    letter: str = ""
+    misconception: str | None = None
+    show: str | None = None
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What one answer earned: ``credit`` from 0 to 1, and why."""
+
+    item: Item
+    answer: Answer
+    credit: float
+    remarks: tuple[Remark, ...]
+
+    @property
+    def right(self) -> bool:
+        """Whether the answer is fully right."""
+        return self.credit == 1.0
+
+    @property
+    def misconceptions(self) -> tuple[str, ...]:
+        """The ids of the beliefs that the answer shows, each once."""
+        return tuple(dict.fromkeys(r.misconception for r in self.remarks if r.misconception))
+
+
+@dataclass(frozen=True, repr=False)
+class Result:
+    """A marked quiz: one point a concept, with partial credit."""
+
+    paper: Paper
+    marks: tuple[Mark, ...]
+
+    @property
+    def score(self) -> float:
+        """Points earned, to the hundredth."""
+        return round(sum(mark.credit for mark in self.marks), 2)
+
+    @property
+    def max_score(self) -> int:
+        """Points there are: one for each concept."""
+        return len(self.marks)
+
+    @property
+    def right(self) -> int:
+        """How many concepts were fully right."""
+        return sum(mark.right for mark in self.marks)
+
+    @property
+    def passed(self) -> bool:
+        """Whether enough concepts were fully right."""
+        return self.right >= self.paper.bank.pass_mark
+
+    @property
+    def headline(self) -> str:
+        """The outcome in one sentence."""
+        word = "Passed" if self.passed else "Not passed yet"
+        of = f"{self.right} of {self.max_score} right"
+        score = "" if self.score == self.right else f" ({self.score:g} points with partial credit)"
+        return f"{word}: {of}{score}, {self.paper.bank.pass_text}."
+
+    def __repr__(self) -> str:
+        """Return the outcome and the feedback to each answer as text."""
+        return text.of_result(self)
+
+    def _repr_markdown_(self) -> str:
+        return text.of_result(self)
+
+
+def mark_paper(paper: Paper, answers: Mapping[str, Answer]) -> Result:
+    """Mark answers, given by concept; a concept without one earns nothing."""
+    marks = (mark(item, answers.get(item.concept.id, NOTHING)) for item in paper.items)
+    return Result(paper, tuple(marks))
+
+
+def mark(item: Item, answer: Answer) -> Mark:
+    """Mark one answer in its saved form (see `quizzes.answers`).
+
+    One choice is right or wrong. Of several choices each right one earns its share and each wrong
+    one loses as much, down to nothing. In an ordering each thing in its place earns its share, in
+    a matching each pair.
+    """
+    variant = item.variant
+    if not complete(item, answer) and not isinstance(variant, Matching):
+        return Mark(item, answer, 0.0, (Remark(False, "There is no answer."),))
+    if isinstance(variant, Numeric):
+        return _numeric(item, variant, float(answer))
+    letters = str(answer)
+    if isinstance(variant, Multiple):
+        return _multiple(item, variant, letters)
+    if isinstance(variant, Single | Predict):
+        option = variant.options[item.place(letters)]
+        remark = Remark(option.correct, option.feedback, letters, option.misconception, option.show)
+        return Mark(item, answer, float(option.correct), (remark,))
+    return _built(item, variant, letters)
+
+
+def _numeric(item: Item, variant: Numeric, number: float) -> Mark:
+    if variant.holds(number):
+        return Mark(item, number, 1.0, (Remark(True, variant.feedback),))
+    for trap in variant.traps:
+        if trap.holds(number):
+            remark = Remark(False, trap.feedback, "", trap.misconception, trap.show)
+            return Mark(item, number, 0.0, (remark,))
+    general = variant.wrong_feedback or variant.feedback
+    remark = Remark(False, general, "", variant.misconception, variant.show)
+    return Mark(item, number, 0.0, (remark,))
+
+
+def _multiple(item: Item, variant: Multiple, letters: str) -> Mark:
+    ticked = [variant.options[item.place(letter)].correct for letter in letters]
+    share = (ticked.count(True) - ticked.count(False)) / len(variant.right)
+    remarks = []
+    for letter in item.letters:
+        option = variant.options[item.place(letter)]
+        if option.correct or letter in letters:
+            well = option.correct and letter in letters
+            remarks.append(Remark(well, option.feedback, letter, option.misconception, option.show))
+    return Mark(item, letters, max(0.0, share), tuple(remarks))
+
+
+def _built(item: Item, variant: Ordering | Matching, letters: str) -> Mark:
+    wanted = str(model.key(item))
+    given = letters or OPEN * len(wanted)
+    share = sum(a == b for a, b in zip(given, wanted, strict=True)) / len(wanted)
+    if share == 1.0:
+        return Mark(item, letters, 1.0, (Remark(True, variant.feedback),))
+    remark = Remark(False, variant.wrong_feedback, "", variant.misconception, variant.show)
+    return Mark(item, letters, share, (remark,))

@@ -1,0 +1,101 @@
+"""One submitted attempt as a line of JSON, and back again from a file that anyone may have written.
+
+A reader takes nothing on trust: sizes, types and ranges are checked before anything is used.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from quizzes.answers import Answer
+
+VERSION = 1
+MAX_LINE = 64 * 1024
+MAX_FILE = 4 * 1024 * 1024
+"""Bytes of a line and of a file that are read; an attempt has about 1 kB."""
+
+MAX_TEXT = 200
+
+
+@dataclass(frozen=True)
+class Given:
+    """What was answered to one concept: the variant that was shown, and the answer to it."""
+
+    variant: str
+    answer: Answer
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One submitted attempt.
+
+    ``edition`` is the bank's (`quizzes.bank.Bank.edition`), ``submitted`` the UTC time in ISO 8601,
+    ``answers`` is by concept. ``score``, ``right`` and ``passed`` are as marked at that time.
+    """
+
+    quiz: str
+    student: str
+    attempt: int
+    edition: str
+    submitted: str
+    answers: dict[str, Given]
+    score: float
+    right: int
+    passed: bool
+    version: int = VERSION
+
+    def to_json(self) -> str:
+        """Return the attempt as one line of JSON."""
+        return json.dumps(asdict(self), ensure_ascii=False, allow_nan=False)
+
+
+def filename(quiz: str) -> str:
+    """Return the name of the file with the attempts of a quiz."""
+    return f"quiz-{quiz}.attempts.jsonl"
+
+
+def parse(content: bytes) -> tuple[list[Attempt], int]:
+    """Return the attempts in a file's content, and how many of its lines are none."""
+    attempts, damaged = [], 0
+    for line in content[:MAX_FILE].split(b"\n"):
+        if not line.strip():
+            continue
+        try:
+            attempts.append(_attempt(line))
+        except (ValueError, KeyError, TypeError, RecursionError, AttributeError):
+            damaged += 1
+    return attempts, damaged + (len(content) > MAX_FILE)
+
+
+def _attempt(line: bytes) -> Attempt:
+    if len(line) > MAX_LINE:
+        raise ValueError("too long")
+    data = json.loads(line.decode("utf-8"))
+    if data["version"] != VERSION or not data.keys() <= Attempt.__dataclass_fields__.keys():
+        raise ValueError("not of this version")
+    for name in ("quiz", "student", "edition", "submitted"):
+        _must(isinstance(data[name], str) and len(data[name]) <= MAX_TEXT)
+    for name in ("attempt", "right"):
+        _must(type(data[name]) is int and 0 <= data[name] < 10**6)
+    _must(data["attempt"] > 0 and type(data["passed"]) is bool)
+    _must(type(data["score"]) in (int, float) and math.isfinite(data["score"]))
+    answers = {str(name): _given(given) for name, given in data["answers"].items()}
+    return Attempt(**{**data, "answers": answers})
+
+
+def _given(data: Any) -> Given:
+    variant, answer = data["variant"], data["answer"]
+    _must(data.keys() == {"variant", "answer"} and isinstance(variant, str))
+    if type(answer) in (int, float):
+        _must(abs(answer) < 1e300)
+        answer = float(answer)
+    _must(isinstance(answer, float) or (isinstance(answer, str) and len(answer) <= MAX_TEXT))
+    return Given(variant, answer)
+
+
+def _must(holds: bool) -> None:
+    if not holds:
+        raise ValueError("a value of the wrong kind")

@@ -1,0 +1,108 @@
+"""Marks saved attempts again: what counts is what was answered, whatever score the file claims.
+
+An attempt counts if it is one that could have been dealt: to its student, for its number, the
+questions that it names. The letters in it mean nothing without that deal: under another name they
+are guesses. A file that was copied whole still says under which login it was made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from quizzes import answers, marking, model, record
+from quizzes.answers import Answer
+from quizzes.bank import Bank
+from quizzes.errors import AnswerError
+from quizzes.marking import Result
+from quizzes.record import Attempt
+
+MAX_ATTEMPT = 10_000
+"""Highest number of an attempt that is believed; nobody takes a quiz that often."""
+
+
+@dataclass(frozen=True)
+class Marked:
+    """The attempts of one file, marked again.
+
+    ``results`` are those that count, in the order of the file; ``problems`` says of each other one
+    why it does not count; ``other_edition`` is how many were made with another edition of the
+    bank, which cannot be marked with this one; ``damaged`` is how many lines are no attempt.
+    """
+
+    results: tuple[Result, ...]
+    problems: tuple[str, ...]
+    other_edition: int
+    damaged: int
+
+    @property
+    def best(self) -> Result | None:
+        """The result with the best score, the earliest of equal ones."""
+        return max(self.results, key=lambda r: (r.score, -r.paper.attempt), default=None)
+
+    @property
+    def first(self) -> Result | None:
+        """The result of the attempt with the lowest number."""
+        return min(self.results, key=lambda r: r.paper.attempt, default=None)
+
+    @property
+    def students(self) -> tuple[str, ...]:
+        """The logins under which the attempts that count were made."""
+        return tuple(dict.fromkeys(result.paper.student for result in self.results))
+
+
+def mark_file(bank: Bank, content: bytes) -> Marked:
+    """Mark every attempt in the content of an attempts file."""
+    found, damaged = record.parse(content)
+    return mark_all(bank, found, damaged)
+
+
+def mark_all(bank: Bank, found: Iterable[Attempt], damaged: int = 0) -> Marked:
+    """Mark attempts; of several with one number of one student, the first counts."""
+    results: list[Result] = []
+    problems: list[str] = []
+    seen: set[tuple[str, int]] = set()
+    other_edition = 0
+    for attempt in found:
+        name = f"Attempt {attempt.attempt} of '{attempt.student}'"
+        who = (attempt.student, attempt.attempt)
+        result = again(bank, attempt)
+        if attempt.quiz != bank.quiz:
+            problems.append(f"{name} belongs to the quiz '{attempt.quiz}'.")
+        elif attempt.edition != bank.edition:
+            other_edition += 1
+        elif result is None:
+            problems.append(f"{name} answers questions that were not asked in it.")
+        elif who in seen:
+            problems.append(f"{name} is there more than once; the first one counts.")
+        else:
+            seen.add(who)
+            results.append(result)
+    return Marked(tuple(results), tuple(problems), other_edition, damaged)
+
+
+def again(bank: Bank, attempt: Attempt) -> Result | None:
+    """Mark an attempt again; None if this edition of the bank could not have dealt it."""
+    if (attempt.quiz, attempt.edition) != (bank.quiz, bank.edition):
+        return None
+    if attempt.attempt > MAX_ATTEMPT:
+        return None
+    paper = model.draw(bank, attempt.student, attempt.attempt)
+    given: dict[str, Answer] = {}
+    for item in paper.items:
+        saved = attempt.answers.get(item.concept.id)
+        if saved is None or saved.variant != item.variant.id:
+            return None
+        try:
+            given[item.concept.id] = answers.normal(item, saved.answer)
+        except AnswerError:
+            return None
+    return marking.mark_paper(paper, given)
+
+
+def refreshed(bank: Bank, attempt: Attempt) -> Attempt:
+    """Return an attempt with the score that its answers earn, if they can be marked again."""
+    result = again(bank, attempt)
+    if result is None:
+        return attempt
+    return replace(attempt, score=result.score, right=result.right, passed=result.passed)

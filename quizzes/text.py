@@ -1,0 +1,93 @@
+"""Questions, answers and results as Markdown: for the headless quiz, and for reports."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from quizzes import answers
+from quizzes.answers import Answer
+from quizzes.bank import Matching, Multiple, Numeric, Ordering
+from quizzes.model import LETTERS, Item
+
+if TYPE_CHECKING:
+    from quizzes.marking import Mark, Result
+
+INSTRUCTIONS = {
+    "single": "Choose one.",
+    "predict": "What will this cell show? Choose one.",
+    "multiple": "Choose all that are right.",
+    "numeric": "Give a number.",
+    "ordering": "Put these in order.",
+    "matching": "Choose for each what belongs to it.",
+}
+
+
+@dataclass(frozen=True, repr=False)
+class QuestionText:
+    """A question to read in a cell or a terminal."""
+
+    item: Item
+
+    def __repr__(self) -> str:
+        """Return it as Markdown, which reads well as plain text, too."""
+        return of_question(self.item)
+
+    def _repr_markdown_(self) -> str:
+        return of_question(self.item)
+
+
+def of_question(item: Item) -> str:
+    """Return a question as Markdown: what is asked, what there is to choose from, how to answer."""
+    variant = item.variant
+    parts = [f"**Question {item.number}.** {INSTRUCTIONS[variant.kind]}", variant.stem]
+    if variant.code:
+        parts.append(f"```python\n{variant.code.strip()}\n```")
+    if isinstance(variant, Matching):
+        lefts = (f"{number}. {pair.left}" for number, pair in enumerate(variant.pairs, start=1))
+        parts.append("\n".join(lefts))
+    parts += [f"{letter}) {item.text(letter)}" for letter in item.letters]
+    how = answers.fits(item)
+    parts.append(f"*{how[0].upper()}{how[1:]}.*")
+    return "\n\n".join(parts)
+
+
+def of_answer(item: Item, answer: Answer) -> str:
+    """Return an answer in words, as Markdown."""
+    variant = item.variant
+    if answer == answers.NOTHING:
+        return "no answer"
+    if isinstance(variant, Numeric):
+        return f"{answer:g} {variant.unit}".strip()
+    letters = str(answer)
+    if isinstance(variant, Ordering):
+        return " → ".join(item.text(letter) for letter in letters)
+    if isinstance(variant, Matching):
+        rights = [item.text(c) if c in LETTERS else "nothing" for c in letters]
+        pairs = zip(variant.pairs, rights, strict=True)
+        return "; ".join(f"{pair.left}: {right}" for pair, right in pairs)
+    return "; ".join(f"{c}) {item.text(c)}" for c in letters)
+
+
+def of_result(result: Result) -> str:
+    """Return a marked quiz as Markdown."""
+    return "\n\n".join([f"**{result.headline}**", *(of_mark(mark) for mark in result.marks)])
+
+
+def of_mark(mark: Mark) -> str:
+    """Return a marked answer as Markdown: what it earned, and the feedback to it."""
+    lines = [f"**Question {mark.item.number}: {verdict(mark)}**"]
+    several = isinstance(mark.item.variant, Multiple)
+    for remark in mark.remarks:
+        label = f"{remark.letter}) " if several and remark.letter else ""
+        lines.append(f"{label}{remark.feedback}")
+        if remark.show and not remark.right:
+            lines.append(f"See it happen:\n\n```python\n{remark.show.strip()}\n```")
+    return "\n\n".join(lines)
+
+
+def verdict(mark: Mark) -> str:
+    """Return what an answer earned, in words."""
+    if mark.right:
+        return "right"
+    return f"partly right, {mark.credit:.2g} of 1" if mark.credit else "not right"

@@ -1,0 +1,101 @@
+"""What the browser gets to show, as plain data; every text is rendered here, in the kernel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from quizzes import marking, model, rendering, text
+from quizzes.bank import Matching, Multiple, Numeric
+from quizzes.model import Item
+
+if TYPE_CHECKING:
+    from quizzes.quiz import Quiz
+
+
+def paper(quiz: Quiz) -> dict[str, Any]:
+    """Return the questions of the attempt at hand: texts and letters, and nothing of the key."""
+    return {
+        "title": quiz.bank.title,
+        "chapter": quiz.bank.chapter,
+        "attempt": quiz.attempt,
+        "needed": quiz.bank.pass_text,
+        "standing": _standing(quiz),
+        "questions": [_question(item, quiz.bank.folder) for item in quiz.items],
+    }
+
+
+def _standing(quiz: Quiz) -> str:
+    """Return the first and the best score in words; empty before the first attempt."""
+    first, best = quiz.first, quiz.best
+    if first is None or best is None:
+        return ""
+    most = len(quiz.bank.concepts)
+    passed = "passed" if any(attempt.passed for attempt in quiz.attempts) else "not passed yet"
+    return (
+        f"First attempt: {first.score:g} of {most}. Best: {best.score:g} of {most} "
+        f"(attempt {best.attempt}). So far: {passed}."
+    )
+
+
+def _question(item: Item, folder: Path) -> dict[str, Any]:
+    variant = item.variant
+    lefts = [pair.left for pair in variant.pairs] if isinstance(variant, Matching) else []
+    return {
+        "number": item.number,
+        "kind": variant.kind,
+        "instruction": text.INSTRUCTIONS[variant.kind],
+        "stem": rendering.block(variant.stem, folder),
+        "code": rendering.code(variant.code) if variant.code else "",
+        "unit": variant.unit if isinstance(variant, Numeric) else "",
+        "lefts": [
+            {"html": rendering.inline(left, folder), "text": rendering.plain(left)}
+            for left in lefts
+        ],
+        "options": [
+            {
+                "letter": letter,
+                "html": rendering.inline(item.text(letter), folder),
+                "text": rendering.plain(item.text(letter)),
+            }
+            for letter in item.letters
+        ],
+    }
+
+
+def result(quiz: Quiz) -> dict[str, Any] | None:
+    """Return what came of the attempt at hand; None before it is submitted."""
+    if quiz.result is None:
+        return None
+    return {
+        "attempt": quiz.attempt,
+        "headline": quiz.result.headline,
+        "passed": quiz.result.passed,
+        "marks": [_mark(mark, quiz.bank.folder) for mark in quiz.result.marks],
+    }
+
+
+def _mark(mark: marking.Mark, folder: Path) -> dict[str, Any]:
+    variant = mark.item.variant
+    several = isinstance(variant, Multiple)
+    key = "" if mark.right or several else text.of_answer(mark.item, model.key(mark.item))
+    return {
+        "number": mark.item.number,
+        "right": mark.right,
+        "verdict": text.verdict(mark),
+        "key": rendering.inline(key, folder) if key else "",
+        "run": _cell(variant.code) if variant.kind == "predict" and variant.code else None,
+        "remarks": [
+            {
+                "letter": remark.letter if several else "",
+                "right": remark.right,
+                "html": rendering.block(remark.feedback, folder),
+                "show": _cell(remark.show) if remark.show and not remark.right else None,
+            }
+            for remark in mark.remarks
+        ],
+    }
+
+
+def _cell(source: str) -> dict[str, str]:
+    return {"html": rendering.code(source), "source": source.strip("\n") + "\n"}

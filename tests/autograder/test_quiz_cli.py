@@ -1,0 +1,135 @@
+"""`autograder quiz` and the quizzes in `autograder report`: files, sentences, exit codes."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+from autograder import cli, quiz_report
+from quizzes import loader, marking, model, record
+from quizzes.record import Attempt, Given
+
+BANK = loader.load_bank("ch05")
+
+
+Run = Callable[..., tuple[str, str]]
+
+
+@pytest.fixture
+def autograder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Run:
+    """The command, in this process and in a folder of its own; returns what it prints."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+    def run(*arguments: str, code: int = 0) -> tuple[str, str]:
+        monkeypatch.setattr(sys, "argv", ["autograder", *arguments])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        printed = capsys.readouterr()
+        assert ended.value.code == code, printed.out + printed.err
+        return printed.out, printed.err
+
+    return run
+
+
+def hand_in(root: Path, student: str) -> None:
+    """Hand in an attempt in which everything is right."""
+    paper = model.draw(BANK, student, 1)
+    result = marking.mark_paper(paper, {i.concept.id: model.key(i) for i in paper.items})
+    given = {m.item.concept.id: Given(m.item.variant.id, m.answer) for m in result.marks}
+    attempt = Attempt("ch05", student, 1, BANK.edition, "2026-01-01T00:00:00+00:00",
+                      given, 0.0, 0, False)  # fmt: skip
+    folder = root / "submitted" / student / "ch05-quiz"
+    folder.mkdir(parents=True)
+    (folder / record.filename("ch05")).write_text(attempt.to_json() + "\n", encoding="utf-8")
+
+
+def test_there_and_back_again(tmp_path: Path, autograder: Run) -> None:
+    said, _ = autograder("quiz", "export", "ch05", "--format", "gift")
+    assert "Written: ch05.gift" in said
+    assert "There is no ordering: pattern-navigation-2 became a matching" in said
+    file = tmp_path / "ch05.gift"
+    edited = file.read_text(encoding="utf-8").replace("Three nodes have", "Five nodes have")
+    file.write_text(edited, encoding="utf-8")
+    said, _ = autograder("quiz", "import", "ch05.gift", "--into", "ch05")
+    assert "Written: ch05.yaml (1 new or changed)" in said
+    assert "'pattern-camera-3' has changed" in said
+    shutil.copytree(BANK.folder / "assets", tmp_path / "assets")
+    assert "ch05: 0 to mend" in autograder("quiz", "lint", "ch05.yaml")[0]
+    _, error = autograder("quiz", "import", "ch05.gift", "--into", "ch05", code=1)
+    assert "ch05.yaml is there already: name the file to write with --to." in error
+
+
+def test_qti_is_a_zip_file(tmp_path: Path, autograder: Run) -> None:
+    said, _ = autograder("quiz", "export", "ch05", "-f", "qti", "--to", "q.zip")
+    assert "text2qti has neither ordering nor matching" in said
+    assert "imsmanifest.xml" in ZipFile(tmp_path / "q.zip").namelist()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ("export ch6 -f gift", "There is no quiz 'ch6': there are ch05"),
+        ("export ch05 -f xml", "There is no format 'xml': choose one of gift, qti."),
+        ("export ch05 -f gift --to no/x.gift", "no/x.gift cannot be written"),
+        ("import none.gift --into ch05", "none.gift cannot be read: No such file"),
+        ("import . --into ch05", ". cannot be read: Is a directory"),
+        ("import bytes.gift --into ch05", "bytes.gift, line 2: this is not UTF-8 text."),
+        ("import bad.gift --into ch05", "bad.gift, line 2, question 'q': it is an essay"),
+        ("lint broken.yaml", "broken.yaml, field quiz: "),
+        ("lint none.yaml", "There is no bank none.yaml."),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(
+    tmp_path: Path, autograder: Run, arguments: str, sentence: str
+) -> None:
+    (tmp_path / "bytes.gift").write_bytes(b"// fine\n\xff\xfe\n")
+    (tmp_path / "bad.gift").write_text("// fine\n::q::Why?{}\n")
+    (tmp_path / "broken.yaml").write_text("quiz: 5\n")
+    _, error = autograder("quiz", *arguments.split(), code=1)
+    assert sentence in error
+    assert len(error.strip().splitlines()) == 1
+
+
+def test_a_bank_with_something_to_mend_fails(tmp_path: Path, autograder: Run) -> None:
+    text = (BANK.folder / "ch05.yaml").read_text(encoding="utf-8")
+    stem = "What is the main purpose of QoS (Quality of Service) profiles in ROS 2?"
+    (tmp_path / "ch05.yaml").write_text(text.replace(stem, f"{stem} Who sets them?"))
+    shutil.copytree(BANK.folder / "assets", tmp_path / "assets")
+    said, _ = autograder("quiz", "lint", "ch05.yaml", code=1)
+    assert "item 'qos-purpose-1', field stem: it asks 2 questions" in said
+
+
+def test_a_classs_quiz_is_analysed(tmp_path: Path) -> None:
+    for student in ("ann", "ben"):
+        hand_in(tmp_path, student)
+    (tmp_path / "submitted" / "cem" / "ch05-quiz").mkdir(parents=True)
+    [report] = quiz_report.of_assignment(tmp_path, "ch05-quiz")
+    data = json.loads(json.dumps(report.as_data()))
+    assert (data["quiz"], data["learners"], data["passed"]) == ("ch05", 2, 2)
+    assert data["notes"] == ["cem has handed in no quiz-ch05.attempts.jsonl."]
+    assert {item["difficulty"] for item in data["items"]} == {1.0, None}
+    folder = tmp_path / "reports" / "ch05-quiz"
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "quiz-ch05-items.csv",
+        "quiz-ch05-misconceptions.csv",
+        "quiz-ch05-report.html",
+    ]
+    items, beliefs = report.tables()
+    dealt = {i.variant.id for s in ("ann", "ben") for i in model.draw(BANK, s, 1).items}
+    assert items.row_count == len(BANK.concepts) + len(dealt)
+    assert beliefs.row_count == 0
+
+
+def test_an_assignment_without_a_quiz_has_no_report(tmp_path: Path) -> None:
+    (tmp_path / "submitted" / "ann" / "ch05").mkdir(parents=True)
+    assert quiz_report.of_assignment(tmp_path, "ch05") == []
+    assert not (tmp_path / "reports").exists()

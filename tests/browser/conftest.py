@@ -1,0 +1,59 @@
+"""A real browser on a real JupyterLab: one of each for all tests, a window and a kernel for each.
+
+The browser is the system's Chromium (Debian's package ``chromium``). Without it these tests fail:
+a test that is passed over proves nothing.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+from .lab import Lab
+from .notebook_page import NotebookPage
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = [
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--disable-background-networking",
+    "--disable-dev-shm-usage",
+]  # fmt: skip
+
+
+@pytest.fixture(scope="session")
+def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
+    with Lab(tmp_path_factory.mktemp("lab")) as running:
+        yield running
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if path is None:
+        pytest.fail("There is no Chromium here: apt-get install chromium (.ci/run does it).")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+OpenNotebook = Callable[[Path | str], NotebookPage]
+
+
+@pytest.fixture
+def open_notebook(lab: Lab, browser: Browser, tmp_path: Path) -> Iterator[OpenNotebook]:
+    """Open notebooks of the work folder; each call gives a window of its own."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    pages: list[NotebookPage] = []
+
+    def open_(path: Path | str) -> NotebookPage:
+        pages.append(NotebookPage(lab, context))
+        pages[-1].open(str(path))
+        return pages[-1]
+
+    yield open_
+    context.close()
+    lab.end_kernels()

@@ -1,0 +1,179 @@
+"""The bank of chapter 5: its questions, its proofs, and every cell that it offers to run."""
+
+from __future__ import annotations
+
+import ast
+import os
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jupyter_client import KernelManager
+
+from quizzes import lint, loader
+from quizzes.bank import Bank, Predict
+
+BANK = loader.load_bank("ch05")
+PROOFS = Path(__file__).parent / "proofs"
+
+REQUIRED = {
+    "topic-stores-messages",
+    "one-node-one-process",
+    "broker-must-run",
+    "callbacks-without-spinning",
+    "services-suit-streams",
+    "sync-call-in-callback-is-safe",
+    "action-is-slow-service",
+    "cancel-stops-at-once",
+    "qos-must-be-equal",
+    "best-effort-satisfies-reliable",
+    "depth-affects-matching",
+    "transient-local-one-side",
+}
+
+
+def show_cells(bank: Bank) -> dict[str, str]:
+    """Every different `show` cell, by the place where it stands first."""
+    cells: dict[str, str] = {}
+    for place in lint.wrong_answers(bank):
+        if place.show is not None:
+            cells.setdefault(place.show, f"{place.variant.id}/{place.misconception}")
+    return {name: source for source, name in cells.items()}
+
+
+SHOWS = show_cells(BANK)
+PREDICTIONS = {
+    variant.id: variant
+    for concept in BANK.concepts
+    for variant in concept.variants
+    if isinstance(variant, Predict)
+}
+
+
+class Kernel:
+    """A real kernel, as a learner's notebook has one."""
+
+    def __init__(self) -> None:
+        environment = dict(os.environ)
+        # The ROS wheels mark a prepared environment; a child has to prepare its own.
+        environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
+        self.manager = KernelManager(kernel_name="python3", transport="ipc")
+        self.manager.start_kernel(env=environment)
+        self.client = self.manager.client()
+        self.client.start_channels()
+        try:
+            self.client.wait_for_ready(timeout=120)
+        except BaseException:
+            self.close()
+            raise
+
+    def run(self, source: str) -> str:
+        """Run a cell; it must raise nothing, write nothing to stderr, and print something."""
+        printed: dict[str, str] = {"stdout": "", "stderr": "", "error": ""}
+
+        def take(message: dict[str, Any]) -> None:
+            content = message["content"]
+            if message["msg_type"] == "stream":
+                printed[content["name"]] += content["text"]
+            elif message["msg_type"] == "error":
+                printed["error"] += "\n".join(content["traceback"])
+
+        self.client.execute_interactive(source, output_hook=take, timeout=150)
+        assert (printed["error"], printed["stderr"]) == ("", "")
+        assert printed["stdout"].strip()
+        return printed["stdout"]
+
+    def close(self) -> None:
+        self.client.stop_channels()
+        self.manager.shutdown_kernel()
+
+
+@pytest.fixture(scope="module")
+def kernel() -> Iterator[Kernel]:
+    """One kernel for all cells: a learner runs them in one notebook, too."""
+    opened = Kernel()
+    yield opened
+    opened.close()
+
+
+def test_the_five_questions_of_the_chapter_are_the_five_concepts() -> None:
+    assert [concept.id for concept in BANK.concepts] == [
+        "qos-purpose",
+        "pattern-camera",
+        "reliable-guarantee",
+        "pattern-navigation",
+        "service-vs-action",
+    ]
+    assert BANK.pass_text == "4 of 5 needed"
+    assert all(len(concept.variants) >= 4 for concept in BANK.concepts)
+
+
+def test_all_kinds_of_question_are_used() -> None:
+    kinds = Counter(v.kind for concept in BANK.concepts for v in concept.variants)
+    assert set(kinds) == {"single", "multiple", "numeric", "ordering", "matching", "predict"}
+
+
+def test_the_common_misconceptions_are_there() -> None:
+    assert set(BANK.misconceptions) >= REQUIRED
+
+
+def test_every_wrong_answer_can_be_shown() -> None:
+    assert [p.where for p in lint.wrong_answers(BANK) if p.show is None] == []
+
+
+def test_the_lint_finds_nothing() -> None:
+    assert [str(finding) for finding in lint.findings(BANK)] == []
+
+
+def test_every_proof_exists_and_every_proof_is_named_by_a_variant() -> None:
+    written = {
+        f"{path.name}::{node.name}"
+        for path in PROOFS.glob("test_*.py")
+        for node in ast.parse(path.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
+    }
+    named = {
+        proof for concept in BANK.concepts for variant in concept.variants
+        for proof in variant.proofs
+    }  # fmt: skip
+    assert named == written
+
+
+@pytest.mark.parametrize("name", SHOWS)
+def test_a_show_cell_runs_and_prints_what_happens(kernel: Kernel, name: str) -> None:
+    kernel.run(SHOWS[name])
+
+
+@pytest.mark.parametrize("name", PREDICTIONS)
+def test_a_prediction_comes_true(kernel: Kernel, name: str) -> None:
+    variant = PREDICTIONS[name]
+    printed = kernel.run(variant.code).strip().splitlines()[-1]
+    outcomes = {option.text: option.correct for option in variant.options}
+    assert outcomes[f"`{printed}`"]
+
+
+def test_cells_do_not_touch_the_learners_own_nodes(kernel: Kernel) -> None:
+    """A show cell opens its own session: the notebook's one, and its nodes, stay as they are."""
+    look = "print(list(course.session().nodes), course.session().domain_id)"
+    mine = "import course\nfrom rclpy.node import Node\nmine = course.run(Node, 'mine')\n"
+    before = kernel.run(mine + look)
+    assert "'/mine'" in before
+    kernel.run(SHOWS["qos-purpose-1/topic-stores-messages"])
+    assert kernel.run(look) == before
+
+
+def test_no_cell_sleeps() -> None:
+    for source in [*SHOWS.values(), *(v.code for v in PREDICTIONS.values())]:
+        assert not re.search(r"\bsleep\(", source)
+
+
+def test_pictures_say_in_words_what_they_show() -> None:
+    text = (loader.BANKS / "ch05.yaml").read_text(encoding="utf-8")
+    pictures = re.findall(r"!\[(.*?)\]\((.*?)\)", text)
+    assert pictures
+    for words, path in pictures:
+        assert len(words) > 20
+        assert (loader.BANKS / path).is_file()

@@ -1,0 +1,138 @@
+"""What counts of an attempts file that anyone may have written: its answers, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from quizzes import regrade
+from quizzes.bank import Bank
+from quizzes.regrade import Marked
+
+from .conftest import MakeQuiz, answer_all
+
+Line = dict[str, Any]
+
+
+@pytest.fixture
+def honest(make_quiz: MakeQuiz) -> list[Line]:
+    """Give three honest attempts: 1, 4 and 2 right."""
+    quiz = make_quiz()
+    for right in (1, 4, 2):
+        answer_all(quiz, right=right)
+        quiz.submit()
+        quiz.retry()
+    return [json.loads(line) for line in Path(quiz._file.path).read_text().splitlines()]
+
+
+def marked(bank: Bank, lines: list[Line]) -> Marked:
+    return regrade.mark_file(bank, "\n".join(map(json.dumps, lines)).encode())
+
+
+def test_the_best_and_the_first_attempt_are_found(bank: Bank, honest: list[Line]) -> None:
+    found = marked(bank, honest)
+    assert found.best is not None
+    assert found.first is not None
+    assert (found.best.paper.attempt, found.best.score) == (2, 4.0)
+    assert (found.first.paper.attempt, found.first.score) == (1, 1.0)
+    assert (found.students, found.problems, found.damaged) == (("ada",), (), 0)
+
+
+def test_a_forged_score_changes_nothing(bank: Bank, honest: list[Line]) -> None:
+    before = marked(bank, honest)
+    for line in honest:
+        line.update(score=5.0, right=5, passed=True)
+    assert marked(bank, honest) == before
+
+
+def other_variant(line: Line) -> None:
+    given = line["answers"]["predict"]
+    given["variant"] = "predict-1" if given["variant"] != "predict-1" else "predict-2"
+
+
+def no_such_variant(line: Line) -> None:
+    line["answers"]["predict"]["variant"] = "predict-99"
+
+
+def no_answer(line: Line) -> None:
+    del line["answers"]["predict"]
+
+
+def impossible_answer(line: Line) -> None:
+    line["answers"]["predict"]["answer"] = "z"
+
+
+def number_for_letters(line: Line) -> None:
+    line["answers"]["predict"]["answer"] = 1.0
+
+
+def other_number(line: Line) -> None:
+    line["attempt"] = 3
+
+
+def far_number(line: Line) -> None:
+    line["attempt"] = 999_999
+
+
+@pytest.mark.parametrize(
+    "forge",
+    [
+        other_variant, no_such_variant, no_answer, impossible_answer, number_for_letters,
+        other_number, far_number,
+    ],
+)  # fmt: skip
+def test_an_attempt_that_was_never_dealt_does_not_count(
+    bank: Bank, honest: list[Line], forge: Callable[[Line], None]
+) -> None:
+    forge(honest[1])
+    found = marked(bank, honest[:2])
+    assert found.best is not None
+    assert found.best.score == 1.0
+    assert "answers questions that were not asked in it" in found.problems[0]
+
+
+def test_another_name_on_a_copied_attempt_makes_guesses_of_its_letters(
+    bank: Bank, honest: list[Line]
+) -> None:
+    counted = []
+    for number in range(200):
+        found = marked(bank, [{**honest[1], "student": f"forger-{number}"}])
+        counted += [result.score for result in found.results]
+    # Four variants of five concepts: one deal in 1024 asks the same questions, even then the
+    # letters stand for other options.
+    assert len(counted) <= 3
+    assert all(score < 5 for score in counted)
+
+
+def test_of_two_attempts_with_one_number_the_first_counts(bank: Bank, honest: list[Line]) -> None:
+    better = json.loads(json.dumps(honest[1]))
+    honest[1]["answers"]["predict"]["answer"] = "abcd".replace(
+        honest[1]["answers"]["predict"]["answer"], ""
+    )[0]
+    found = marked(bank, [honest[1], better])
+    assert found.best is not None
+    assert found.best.score == 3.0
+    assert "is there more than once" in found.problems[0]
+
+
+def test_attempts_on_another_edition_are_counted_but_not_marked(
+    bank: Bank, honest: list[Line]
+) -> None:
+    found = marked(bank, [{**line, "edition": "another"} for line in honest])
+    assert (found.results, found.other_edition) == ((), 3)
+
+
+def test_attempts_on_another_quiz_do_not_count(bank: Bank, honest: list[Line]) -> None:
+    found = marked(bank, [{**line, "quiz": "ch06"} for line in honest])
+    assert found.best is None
+    assert "belongs to the quiz 'ch06'" in found.problems[0]
+
+
+@pytest.mark.parametrize("content", [b"", b"\n\n", b"\x00" * 1000, b"null\n3\n", b"{}" * 9])
+def test_rubbish_is_no_attempt(bank: Bank, content: bytes) -> None:
+    found = regrade.mark_file(bank, content)
+    assert (found.best, found.first, found.students) == (None, None, ())
