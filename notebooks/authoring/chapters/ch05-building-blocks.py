@@ -412,6 +412,19 @@ with course.Session() as bench:
 # > HISTORY and 2.2.3.19 RESOURCE_LIMITS; Fast DDS, `ResourceLimitsQosPolicy`.
 
 # %% [markdown]
+# #### Your own experiments: the QoS lab
+#
+# Choose two profiles, say what you expect, then run it: two real processes, a reader that is slow
+# or late if you like, and a link that loses packets where your machine allows it. The rules of DDS
+# stand beside what happened.
+
+# %% tags=["notebook-only"]
+session.qos_lab(
+    offered=QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT),
+    requested=QoSProfile(depth=5),
+)
+
+# %% [markdown]
 # ## Real-world examples and analogies
 #
 # **A hospital.** Patient monitors broadcast vital signs all day, to whoever needs to see them:
@@ -742,6 +755,17 @@ assert processed_qos.reliability is ReliabilityPolicy.RELIABLE
 assert processed_qos.durability is DurabilityPolicy.VOLATILE
 
 # %% [markdown]
+# Here is your session's graph, live: run the cells below, and watch it grow. Point at a box or an
+# arrow for its QoS, or unfold "In words". The timeline beneath it has a lane for publications,
+# receptions and callbacks of two topics.
+
+# %% tags=["notebook-only"]
+session.graph()
+
+# %% tags=["notebook-only"]
+session.timeline("camera/data", "processed/data")
+
+# %% [markdown]
 # ### ServiceNode: answers on request
 #
 # Two services, both of type `SetBool`: a boolean goes in as `data`; `success` and `message` come
@@ -798,6 +822,16 @@ assert state.success
 assert state.message == "Robot is operational - Mode: True"
 assert active.message == "Robot mode set to: ACTIVE"
 assert standby.message == "Robot mode set to: STANDBY"
+
+# %% [markdown]
+# The same by hand: the console's form is made from the type `SetBool`. On the ROS 2 command line it
+# would be `ros2 service call`; in this notebook it is the second line, with the Tab key for names.
+
+# %% tags=["notebook-only"]
+session.service("set_robot_mode")
+
+# %% tags=["notebook-only"]
+# %ros service call /set_robot_mode "{data: true}"
 
 # %% [markdown]
 # #### The trap: a blocking call inside a callback
@@ -950,6 +984,13 @@ assert goal.accepted
 assert goal.status == GoalStatus.STATUS_SUCCEEDED
 assert list(goal.result.sequence) == [0, 1, 1, 2, 3, 5]
 assert [len(feedback.sequence) for feedback in goal.feedback] == [3, 4, 5, 6]
+
+# %% [markdown]
+# Watch the next goals here while you send them: each one's way through its states, its feedback,
+# and a button that cancels it.
+
+# %% tags=["notebook-only"]
+session.action("fibonacci_sequence")
 
 # %% [markdown]
 # Now a long goal, canceled after its second feedback. Its result is what had been computed so far.
@@ -1268,22 +1309,20 @@ if __name__ == "__main__" and "get_ipython" not in globals():
 # %% [markdown]
 # ## Exercises
 #
-# **1. QoS profile design** (graded). Your mobile robot has a camera, a LIDAR, an IMU and an
-# emergency stop button. Design the QoS profile of each of the four, and explain why you chose its
-# reliability, its durability and its history. You do this in the notebook
-# **`ch05/qos-design.ipynb`**, in the assignment folder beside the chapters: your publishers are
-# tried out on real DDS, with a late joiner, a slow reader, and consumers of both kinds; your
-# explanation is read by a person.
+# Each exercise is a notebook of its own in the folder `ch05` beside the chapters. You build
+# something, and an examiner watches on real DDS what it does; then you explain your reasons, and a
+# person reads them. Each is worth 20 points.
 #
-# Write your answers to the next four in a cell of your own below each question, or on paper.
+# **1. QoS profile design** (`ch05/qos-design.ipynb`). Your mobile robot has a camera, a LIDAR, an
+# IMU and an emergency stop button. Design the QoS profile of each of the four, and explain why you
+# chose its reliability, its durability and its history.
 #
-# **2. Node architecture design.** A robot has to drive through waypoints and avoid obstacles on its
-# way. Which nodes will you give it? Which communication patterns does each of them use? How do they
-# work together? A sketch with one box per node and one arrow per topic, service or action is a good
-# answer.
+# **2. Node architecture design** (`ch05/architecture.ipynb`). A robot has to drive through
+# waypoints and avoid obstacles on its way. Which nodes will you give it? Which communication
+# patterns does each of them use? How do they work together?
 #
-# **3. Communication pattern selection.** Topic, service or action? Choose one for each line, and
-# give your reason in a sentence:
+# **3. Communication pattern selection** (`ch05/patterns.ipynb`). Topic, service or action? Choose
+# one for each line, give your reason, and build it:
 #
 # - a display asks where the robot is right now
 # - the camera publishes its images
@@ -1291,13 +1330,14 @@ if __name__ == "__main__" and "get_ipython" not in globals():
 # - a tool updates some of the robot's parameters
 # - the battery broadcasts its level
 #
-# **4. Resource management.** How does a ROS 2 node manage its resources properly? Say what has to
-# be done during initialization, while it runs, and during cleanup. ActionNode above is a good
-# example to start from.
+# **4. Resource management** (`ch05/resources.ipynb`). How does a ROS 2 node manage its resources
+# properly? What has to be done during initialization, while it runs, and during cleanup?
 #
-# **5. Error handling.** Your robot is safety-critical. How do its services and its actions deal
-# with errors? Describe the strategies you would implement, and what the robot does while it waits
-# for an answer that does not come.
+# **5. Error handling** (`ch05/error-handling.ipynb`). Your robot is safety-critical. How do its
+# services and its actions deal with errors, and what does the robot do while it waits for an answer
+# that does not come?
+#
+# Stuck? `session.diagnose()` says why nothing arrives.
 
 # %% [markdown] tags=["solutions"]
 # ## Exercise solutions
@@ -1379,8 +1419,10 @@ if __name__ == "__main__" and "get_ipython" not in globals():
 # ## Part 2 Quiz
 #
 # Five questions to check what stayed. To pass you need **4 of 5**: the mark is 70 %, and 70 % of 5
-# is 3.5. For now, choose an answer to each and say *why the other three are wrong*; that is the
-# better half of the exercise.
+# is 3.5. The quiz itself is in **`ch05-quiz/quiz.ipynb`**: it asks about the same five things in
+# other words each time, and tells you afterwards why a wrong answer tempts, with a cell that shows
+# it. Here is a first round: choose an answer to each and say *why the other three are wrong*; that
+# is the better half of the exercise.
 #
 # **Question 1. What are QoS (Quality of Service) profiles in ROS 2 mainly for?**
 #
