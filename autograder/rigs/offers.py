@@ -14,6 +14,9 @@ from autograder.rigs.scenarios import NAMES, SCENARIOS, Scenario, would_mean
 SET_PARAMETERS = "rcl_interfaces/srv/SetParameters"
 SPEED = "max_speed"
 
+SETTLE_OTHER = 3.0
+"""Seconds for a pattern to come up beside another one of the same name."""
+
 Patterns = dict[str, str]
 """{pattern: type on the graph} of one name."""
 
@@ -49,18 +52,19 @@ def settle(rig: RobotRig, wanted: dict[Scenario, tuple[str, ...]]) -> dict[Scena
 
     What never came the last time is not waited for again while the notebook has not moved on.
     """
-    missing: set[Scenario] = rig.memory.setdefault("missing", set())
+    known: set[Scenario] = rig.memory.setdefault("missing", set())
     found: dict[Scenario, Patterns] = {}
 
-    def complete() -> bool:
+    def missing() -> list[Scenario]:
         for scenario in SCENARIOS:
             if not set(found.get(scenario, ())) & set(wanted[scenario]):
                 found[scenario] = seen(rig, scenario)
-        here = {s for s in SCENARIOS if set(found[s]) & set(wanted[s])}
-        return here >= set(SCENARIOS) - missing
+        return [s for s in SCENARIOS if not set(found[s]) & set(wanted[s])]
 
-    rig.wait(complete, SETTLE)
-    missing |= {s for s in SCENARIOS if not set(found[s]) & set(wanted[s])}
+    if not rig.wait(lambda: known.issuperset(missing()), SETTLE_OTHER):
+        # Where something else is offered under the name, the wanted one has had its time.
+        rig.wait(lambda: all(found[s] for s in missing()), SETTLE - SETTLE_OTHER)
+    known.update(missing())
     return found
 
 

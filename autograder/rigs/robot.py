@@ -89,6 +89,7 @@ class RobotRig:
         node = bench.session.run(ExaminerNode)
         assert isinstance(node, ExaminerNode)
         self.node = node
+        self.still = (0.0, 0)
         self._clients: dict[str, Any] = {}
 
     # Time.
@@ -101,6 +102,11 @@ class RobotRig:
         """
         self.subject.open(threads=THREADS, sim_time=True)
         self.subject.start(NODE)
+        self._stands_still()
+
+    def _stands_still(self) -> None:
+        """Note since when (monotonic, s) the student's clock stands still, and what came before."""
+        self.still = (time.monotonic(), len(self.node.pictures))
 
     def step(self, seconds: float = STEP) -> None:
         """Move the student's clock on; everything that this sets off has then run."""
@@ -111,6 +117,7 @@ class RobotRig:
                 expected="Your callbacks end, sleep or await, so that the others get their turn.",
                 actual=f"The node did not follow its clock: {error}.",
             ) from None
+        self._stands_still()
 
     def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
         """Wait until ``condition`` holds, the student's clock standing still; return whether."""
@@ -158,10 +165,13 @@ class RobotRig:
 
     def report(self, what: str, value: float) -> None:
         """Have the hardware report a value once, and the student's node take it in."""
-        publisher = self.node.hardware[what]
-        publisher.publish(Float64(data=value))
-        publisher.wait_for_all_acked(Duration(seconds=SETTLE))
+        self.publish(what, value)
+        self.node.hardware[what].wait_for_all_acked(Duration(seconds=SETTLE))
         self.step(0.01)
+
+    def publish(self, what: str, value: float) -> None:
+        """Have the hardware report a value, and let it find its way."""
+        self.node.hardware[what].publish(Float64(data=value))
 
     def listens_to(self, what: str) -> bool:
         """Return whether the student's node subscribes to ``hardware/<what>``."""

@@ -52,7 +52,7 @@ class RobotInterface(Robot):
                 goal.canceled()
                 return Fibonacci.Result(sequence=passed)
             self.drive(self.get_parameter("max_speed").get_parameter_value().double_value)
-            clock.sleep_for(Duration(seconds=0.05))
+            clock.sleep_for(Duration(seconds=0.05), context=self.context)
             passed = list(range(start + 1, int(self.position) + 1))
             goal.publish_feedback(Fibonacci.Feedback(sequence=passed))
         self.drive(0)
