@@ -9,6 +9,7 @@ cell.
 from __future__ import annotations
 
 import time
+from functools import partial
 
 from sensor_msgs.msg import BatteryState
 from std_msgs.msg import Float64
@@ -30,14 +31,13 @@ FROZEN = 0.6  # s on the wall
 POSITIONS = (2.5, 3.7, 1.2)  # m
 POSITION_AGE = 0.5  # s
 LEVEL_AGE = 1.0  # s
-SPEEDS = (0.3, 0.8)  # m/s
+SPEEDS, SPEED_MARGIN = (0.3, 0.8), 0.011  # m/s
 BAD_SPEEDS = (-0.5, 5.0)  # m/s
 START, GOAL, FAR = 0, 3, 50  # stations
 
 READ_TOPICS = "Chapter 5, “Topics: continuous data sharing (publish-subscribe)”"
 READ_SERVICES = "Chapter 5, “Services: synchronous request-response”"
 READ_ACTIONS = "Chapter 5, “Actions: long-running operations with feedback”"
-READ_WHEN = "Chapter 5, “When to use what”"
 
 WORKING: dict[Scenario, dict[str, str]] = {
     "position": {"service": "std_srvs/srv/Trigger", "topic": "std_msgs/msg/Float64"},
@@ -71,6 +71,7 @@ def node_starts(rig: RobotRig) -> str:
         ) from None
     found = offers.settle(rig, {scenario: tuple(WORKING[scenario]) for scenario in SCENARIOS})
     rig.memory["offers"] = found
+    rig.stands_still()
     kinds = [f"{scenario}: {' and '.join(found[scenario]) or 'nothing'}" for scenario in SCENARIOS]
     return f"Seen on the ROS graph: {'; '.join(kinds)}."
 
@@ -81,7 +82,7 @@ def node_starts(rig: RobotRig) -> str:
         'Each value is one of three texts: "topic", "service" or "action".',
         "Keep the five keys as they are, replace each None by your word, and run the cell again.",
     ),
-    read=READ_WHEN,
+    read=choosing.READ,
 )
 def choices_made(rig: RobotRig) -> None:
     """A pattern is chosen for each of the five scenarios.
@@ -223,6 +224,7 @@ def parameter_changes(rig: RobotRig) -> None:
     for bad in BAD_SPEEDS:
         taken, reason = offers.set_speed_limit(rig, bad)
         if taken:
+            offers.set_speed_limit(rig, good)  # with this one no robot can drive on
             raise Failed(
                 expected="Values of max_speed that are not between 0.1 and 1.0 are refused.",
                 actual=f"{bad:g} m/s was accepted.",
@@ -339,21 +341,9 @@ def navigation_drives(rig: RobotRig) -> None:
     """
     needed = "Somebody names a station, hears of each one that is passed, and learns how it ended."
     offers.require(rig, "navigation", WORKING["navigation"], needed)
-    drive = Drive(rig, START, GOAL)
-    try:
-        _drive_to_the_end(drive)
+    with Drive(rig, START, GOAL) as drive:
+        drive.to_the_end()
         drive.require_result()
-    finally:
-        drive.close()
-
-
-def _drive_to_the_end(drive: Drive) -> None:
-    while drive.station < drive.goal:
-        drive.require_driving()
-        drive.roll_on()
-        if drive.station < drive.goal:
-            drive.require_report()
-    drive.require_end(GoalState.SUCCEEDED, "At the station named the robot has arrived.")
 
 
 @EXAM.check(
@@ -373,18 +363,19 @@ def speed_takes_effect(rig: RobotRig) -> None:
     """
     for station, limit in enumerate(SPEEDS):
         offers.set_speed_limit(rig, limit)
-        drive = Drive(rig, station, station + 1)
-        try:
-            rig.wait_stepping(lambda: rig.speed >= limit - 0.01 or drive.run.done)  # noqa: B023
+        with Drive(rig, station, station + 1) as drive:
+            rig.wait_stepping(partial(_as_fast, rig, drive, limit))
             top = max(rig.node.speeds, default=0.0)
-            if abs(top - limit) > 0.011:
+            if abs(top - limit) > SPEED_MARGIN:
                 raise Failed(
                     expected=f"With max_speed at {limit:g} m/s the robot drives at {limit:g} m/s.",
                     actual=f"hardware/speed went up to {top:g} m/s.",
                 )
-            _drive_to_the_end(drive)
-        finally:
-            drive.close()
+            drive.to_the_end()
+
+
+def _as_fast(rig: RobotRig, drive: Drive, limit: float) -> bool:
+    return rig.speed >= limit - SPEED_MARGIN or drive.run.done
 
 
 @EXAM.check(
@@ -403,8 +394,7 @@ def navigation_cancel(rig: RobotRig) -> None:
     Somebody steps into the aisle and the goal is cancelled: a robot that drives on to the next
     station first has not understood.
     """
-    drive = Drive(rig, START, FAR)
-    try:
+    with Drive(rig, START, FAR) as drive:
         drive.require_driving()
         drive.roll_on()
         drive.require_report()
@@ -415,66 +405,6 @@ def navigation_cancel(rig: RobotRig) -> None:
                 actual=f"It was refused, {drive.where}{rig.because()}.",
             )
         drive.require_end(GoalState.CANCELED, "A drive that is called off ends there and then.")
-    finally:
-        drive.close()
 
 
-def _choice(scenario: Scenario, hints: tuple[str, str, str], title: str, why: str) -> None:
-    def check(rig: RobotRig) -> str:
-        return choosing.compare(rig, scenario)
-
-    check.__name__ = f"{scenario}_choice"
-    check.__doc__ = f"{title}\n\n{why}"
-    EXAM.check(needs=("choices_made",), hints=hints, read=READ_WHEN)(check)
-
-
-_choice(
-    "position",
-    (
-        "Who begins the exchange, and how many are interested in this answer?",
-        "How long does it take until the answer is there?",
-        "There is nothing to wait for, no progress to hear of, and nothing to call off.",
-    ),
-    "Requesting the robot's position: the pattern fits.",
-    "Whoever asks goes on with the answer, so it has to be there at once.",
-)
-_choice(
-    "camera",
-    (
-        "Who begins: the one who looks, or the one who has the pictures?",
-        "How many may look at the same time, and does the camera have to know them?",
-        "The data come all the time, several look, and nobody should wait for anybody.",
-    ),
-    "Publishing camera images: the pattern fits.",
-    "Pictures come all the time, whether anybody looks or not.",
-)
-_choice(
-    "navigation",
-    (
-        "How long does it take until the robot is there?",
-        "What would you like to hear, and to be able to do, while it is on its way?",
-        "It takes long, has a beginning and an end, reports on the way, and can be called off.",
-    ),
-    "Sending a navigation goal: the pattern fits.",
-    "A drive takes minutes, and a lot can happen on the way.",
-)
-_choice(
-    "parameters",
-    (
-        "What do you have to know after you have changed a value?",
-        "How long does a change take, and how many are asked to make it?",
-        "It is quick, it is between two, and it needs a yes or a no.",
-    ),
-    "Updating robot parameters: the pattern fits.",
-    "A change that nobody confirms may not have happened.",
-)
-_choice(
-    "battery",
-    (
-        "How many want to know the level, and do they have to ask?",
-        "Who knows first that the level has changed?",
-        "One tells, many listen, and it goes on for as long as the robot is on.",
-    ),
-    "Broadcasting the battery level: the pattern fits.",
-    "Displays, loggers and planners come and go; the robot should not have to know them.",
-)
+choosing.add_checks(EXAM, needs=("choices_made",))

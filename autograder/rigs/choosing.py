@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import partial
+
 from autograder.bench import StudentError
-from autograder.exam import Failed
+from autograder.exam import Exam, Failed
 from autograder.rigs.robot import RobotRig
 from autograder.rigs.scenarios import PATTERNS, SCENARIOS, Scenario, would_mean
 
 VARIABLE = "choices"
+READ = "Chapter 5, “When to use what”"
 WORDS = ", ".join(f'"{pattern}"' for pattern in PATTERNS)
 
 
@@ -67,3 +71,69 @@ def compare(rig: RobotRig, scenario: Scenario) -> str:
 def _few(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:60]}…"
+
+
+@dataclass(frozen=True)
+class _Question:
+    title: str
+    why: str
+    hints: tuple[str, str, str]
+
+
+# No text names a pattern: whoever reads all of them still has to think.
+_QUESTIONS: dict[Scenario, _Question] = {
+    "position": _Question(
+        "Requesting the robot's position: the pattern fits.",
+        "Whoever asks goes on with the answer, so it has to be there at once.",
+        (
+            "Who begins the exchange, and how many are interested in this answer?",
+            "How long does it take until the answer is there?",
+            "There is nothing to wait for, no progress to hear of, and nothing to call off.",
+        ),
+    ),
+    "camera": _Question(
+        "Publishing camera images: the pattern fits.",
+        "Pictures come all the time, whether anybody looks or not.",
+        (
+            "Who begins: the one who looks, or the one who has the pictures?",
+            "How many may look at the same time, and does the camera have to know them?",
+            "The data come all the time, several look, and nobody should wait for anybody.",
+        ),
+    ),
+    "navigation": _Question(
+        "Sending a navigation goal: the pattern fits.",
+        "A drive takes minutes, and a lot can happen on the way.",
+        (
+            "How long does it take until the robot is there?",
+            "What would you like to hear, and to be able to do, while it is on its way?",
+            "It takes long, reports on the way, comes to an end, and can be called off.",
+        ),
+    ),
+    "parameters": _Question(
+        "Updating robot parameters: the pattern fits.",
+        "A change that nobody confirms may not have happened.",
+        (
+            "What do you have to know after you have changed a value?",
+            "How long does a change take, and how many are asked to make it?",
+            "It is quick, it is between two, and it needs a yes or a no.",
+        ),
+    ),
+    "battery": _Question(
+        "Broadcasting the battery level: the pattern fits.",
+        "Displays, loggers and planners come and go; the robot should not have to know them.",
+        (
+            "How many want to know the level, and do they have to ask?",
+            "Who knows first that the level has changed?",
+            "One tells, many listen, and it goes on for as long as the robot is on.",
+        ),
+    ),
+}
+
+
+def add_checks(exam: Exam[RobotRig], needs: tuple[str, ...]) -> None:
+    """Give ``exam`` a check for each scenario, called ``<scenario>_choice``."""
+    for scenario, question in _QUESTIONS.items():
+        check = partial(compare, scenario=scenario)
+        check.__name__ = f"{scenario}_choice"  # type: ignore[attr-defined]
+        check.__doc__ = f"{question.title}\n\n{question.why}"
+        exam.check(needs=needs, hints=question.hints, read=READ)(check)

@@ -5,10 +5,12 @@
 from __future__ import annotations
 
 import importlib
+from contextlib import suppress
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters
 
+from autograder.bench import SubjectGone
 from autograder.exam import Failed
 from autograder.rigs.robot import SETTLE, RobotRig
 from autograder.rigs.scenarios import NAMES
@@ -17,6 +19,8 @@ from course import GoalRun, GoalState, WaitTimeout
 NAME = NAMES["navigation"]
 ACTIONS = "example_interfaces/action/Fibonacci or test_msgs/action/Fibonacci"
 """The chapter's Fibonacci, and what stands in for it on a machine without a compiler."""
+CLEARING = 2.0
+"""Seconds of wall time that a goal gets to end after its check has failed."""
 
 
 class Drive:
@@ -58,8 +62,16 @@ class Drive:
     def _hear(self, message: Any) -> None:
         self.heard.append([int(number) for number in message.feedback.sequence])
 
-    def close(self) -> None:
-        """Listen no longer."""
+    def __enter__(self) -> Drive:
+        """Return the drive, which the end of the block brings to an end if it goes on."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Leave nothing behind that the next drive would stumble over."""
+        with suppress(Failed, SubjectGone):
+            if not self.run.done:
+                self._rig.report("position", float(self.goal))
+                self._rig.wait_stepping(lambda: self.run.done, 1.0, CLEARING)
         self._rig.node.destroy_subscription(self._listener)
 
     @property
@@ -166,6 +178,19 @@ class Drive:
     @property
     def _place(self) -> str:
         return f"with the robot at station {self.station}"
+
+    def to_the_end(self) -> None:
+        """Let the robot drive to its goal, with a report at each station on the way.
+
+        Raises:
+            Failed: it does not drive, does not report, or does not end as it should.
+        """
+        while self.station < self.goal:
+            self.require_driving()
+            self.roll_on()
+            if self.station < self.goal:
+                self.require_report()
+        self.require_end(GoalState.SUCCEEDED, "At the station named the robot has arrived.")
 
     def require_result(self) -> None:
         """Fail unless the result has the stations of the whole drive, in order."""

@@ -14,7 +14,7 @@ from sensor_msgs.msg import Image
 
 from autograder.rigs.robot import STEP, RobotRig
 
-PATIENCE = 3.0
+PATIENCE = 1.0
 """Seconds of wall time that a stream may lag behind its clock in all, while it is counted."""
 
 

@@ -102,9 +102,9 @@ class RobotRig:
         """
         self.subject.open(threads=THREADS, sim_time=True)
         self.subject.start(NODE)
-        self._stands_still()
+        self.stands_still()
 
-    def _stands_still(self) -> None:
+    def stands_still(self) -> None:
         """Note since when (monotonic, s) the student's clock stands still, and what came before."""
         self.still = (time.monotonic(), len(self.node.pictures))
 
@@ -117,7 +117,7 @@ class RobotRig:
                 expected="Your callbacks end, sleep or await, so that the others get their turn.",
                 actual=f"The node did not follow its clock: {error}.",
             ) from None
-        self._stands_still()
+        self.stands_still()
 
     def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
         """Wait until ``condition`` holds, the student's clock standing still; return whether."""
@@ -126,15 +126,17 @@ class RobotRig:
             return True
         return False
 
-    def wait_stepping(self, condition: Callable[[], Any], seconds: float | None = None) -> bool:
+    def wait_stepping(
+        self, condition: Callable[[], Any], seconds: float | None = None, timeout: float = SETTLE
+    ) -> bool:
         """Let the student's clock run until ``condition`` holds; return whether it did.
 
         Args:
             condition: a function without arguments.
-            seconds: of simulated time that there are; None is as many as it takes. Either way it
-                has `SETTLE` seconds of wall time to become visible here.
+            seconds: of simulated time that there are; None is as many as it takes.
+            timeout: seconds of wall time that it has to become visible here.
         """
-        deadline = time.monotonic() + SETTLE
+        deadline = time.monotonic() + timeout
         left = seconds
         while not condition():
             if time.monotonic() >= deadline:
