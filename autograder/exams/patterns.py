@@ -8,6 +8,7 @@ cell.
 
 from __future__ import annotations
 
+import secrets
 import time
 from functools import partial
 
@@ -28,7 +29,7 @@ EXAM: Exam[RobotRig] = Exam("patterns", robot_rig)
 
 RATE, RATE_WINDOW = (9.0, 11.0), 2.0  # Hz, s
 FROZEN = 0.6  # s on the wall
-POSITIONS = (2.5, 3.7, 1.2)  # m
+POSITION, FURTHER = 2.5, 90  # m, and how many tenths of a metre there are to draw from
 POSITION_AGE = 0.5  # s
 LEVEL_AGE = 1.0  # s
 SPEEDS, SPEED_MARGIN = (0.3, 0.8), 0.011  # m/s
@@ -152,7 +153,8 @@ def position_answered(rig: RobotRig) -> str:
     if not rig.listens_to("position"):
         raise Failed(expected=needed, actual="Your node does not listen to hardware/position.")
     asker = _ask_position if pattern == "service" else _overhear_position(rig)
-    for position in POSITIONS:
+    # Nobody can know the later ones beforehand.
+    for position in (POSITION, *(3 + secrets.randbelow(FURTHER) / 10 for _ in range(2))):
         answer = ""
 
         def right(position: float = position) -> bool:

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import importlib
 from contextlib import suppress
-from typing import Any
+from typing import Any, NoReturn
 
 from rcl_interfaces.srv import GetParameters
 
@@ -19,6 +19,8 @@ from course import GoalRun, GoalState, WaitTimeout
 NAME = NAMES["navigation"]
 ACTIONS = "example_interfaces/action/Fibonacci or test_msgs/action/Fibonacci"
 """The chapter's Fibonacci, and what stands in for it on a machine without a compiler."""
+BLOCKED, BLOCKED_WALL = 30, 0.3
+"""Steps of the node's clock, and then seconds on the wall, for which the robot cannot get on."""
 CLEARING = 2.0
 """Seconds of wall time that a goal gets to end after its check has failed."""
 
@@ -134,9 +136,24 @@ class Drive:
         if self._latest == self.station and self.heard == sorted(self.heard, key=_last):
             self._require_going_on()
             return
+        self._require_going_on()
+        self._complain()
+
+    def hold(self) -> None:
+        """Let the aisle be blocked for a while: the robot does not get on, whatever it is told.
+
+        Raises:
+            Failed: the feedback goes on, so it counts time and does not look where the robot is.
+        """
+        for _ in range(BLOCKED):
+            self._rig.step()
+        if self._rig.wait(lambda: self._latest > self.station, BLOCKED_WALL):
+            self._complain()
+        self._require_going_on()
+
+    def _complain(self) -> NoReturn:
         lists = ", ".join(str(stations) for stations in self.heard[-4:])
         said = f"The feedback so far was {lists}" if lists else "There was no feedback at all"
-        self._require_going_on()
         raise Failed(
             expected="At each station the feedback tells which ones the robot has passed so far: "
             "the list grows, and its last number is that station.",
@@ -190,6 +207,8 @@ class Drive:
             self.roll_on()
             if self.station < self.goal:
                 self.require_report()
+            if self.station == self.start + 1 < self.goal:
+                self.hold()
         self.require_end(GoalState.SUCCEEDED, "At the station named the robot has arrived.")
 
     def require_result(self) -> None:

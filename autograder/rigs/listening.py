@@ -14,6 +14,8 @@ from sensor_msgs.msg import Image
 
 from autograder.rigs.robot import STEP, RobotRig
 
+MOST_NUMBERS = 4
+"""In an answer that says where the robot is: a position has three, and perhaps a station."""
 PATIENCE = 1.0
 """Seconds of wall time that a stream may lag behind its clock in all, while it is counted."""
 
@@ -67,5 +69,6 @@ def picture_fault(picture: Image) -> str:
 
 
 def numbers(text: str) -> list[float]:
-    """Return the numbers that stand in a text."""
-    return [float(found) for found in re.findall(r"-?\d+(?:\.\d+)?", text[:1000])]
+    """Return the numbers that stand in a text; none of a text that is a whole list of them."""
+    found = re.findall(r"-?\d+(?:\.\d+)?", text[:1000])
+    return [float(number) for number in found] if len(found) <= MOST_NUMBERS else []

@@ -91,6 +91,7 @@ class RobotRig:
         self.node = node
         self.still = (0.0, 0)
         self._clients: dict[str, Any] = {}
+        self._told: set[str] = set()
 
     # Time.
 
@@ -111,7 +112,7 @@ class RobotRig:
     def step(self, seconds: float = STEP) -> None:
         """Move the student's clock on; everything that this sets off has then run."""
         try:
-            self.subject.advance(seconds)
+            self.subject.advance(seconds, min(seconds, STEP))
         except StudentError as error:
             raise Failed(
                 expected="Your callbacks end, sleep or await, so that the others get their turn.",
@@ -185,11 +186,15 @@ class RobotRig:
         return self.node.speeds[-1] if self.node.speeds else 0.0
 
     def because(self) -> str:
-        """Return what a callback of the student's raised, as the end of a sentence."""
+        """Return what a callback of the student's raised, as the end of a sentence.
+
+        Once each: what one check has told is not the next one's cause.
+        """
         try:
-            raised = self.subject.errors()
+            raised = [error for error in self.subject.errors() if error not in self._told]
         except StudentError:
             return ""
+        self._told.update(raised)
         return f" (a callback raised {raised[-1]})" if raised else ""
 
 
