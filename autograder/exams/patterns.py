@@ -127,7 +127,7 @@ def camera_streams(rig: RobotRig) -> None:
     if not RATE[0] <= hertz <= RATE[1]:
         raise Failed(
             expected=f"{RATE[0]:g} to {RATE[1]:g} pictures a second, by the node's clock.",
-            actual=f"There were {hertz:g} pictures a second.",
+            actual=f"They came at {hertz:g} a second.",
         )
     if fault := picture_fault(pictures[-1][1]):
         raise Failed(expected="A message on robot/camera holds a picture.", actual=fault)

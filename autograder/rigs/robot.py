@@ -112,7 +112,7 @@ class RobotRig:
     def step(self, seconds: float = STEP) -> None:
         """Move the student's clock on; everything that this sets off has then run."""
         try:
-            self.subject.advance(seconds, min(seconds, STEP))
+            self.subject.advance(seconds)
         except StudentError as error:
             raise Failed(
                 expected="Your callbacks end, sleep or await, so that the others get their turn.",
