@@ -19,7 +19,7 @@ from course import GoalRun, GoalState, WaitTimeout
 NAME = NAMES["navigation"]
 ACTIONS = "example_interfaces/action/Fibonacci or test_msgs/action/Fibonacci"
 """The chapter's Fibonacci, and what stands in for it on a machine without a compiler."""
-BLOCKED, BLOCKED_WALL = 30, 0.3
+BLOCKED, BLOCKED_WALL = 12, 0.3
 """Steps of the node's clock, and then seconds on the wall, for which the robot cannot get on."""
 CLEARING = 2.0
 """Seconds of wall time that a goal gets to end after its check has failed."""
