@@ -8,6 +8,7 @@ import contextlib
 import functools
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -74,6 +75,8 @@ class BackgroundExecutor(Executor):
         self.gate = Gate(self.wake)
         self.finished = 0  # callbacks; told apart only from what it was
         self._created = CreatedTasks()
+        self._awaiting: weakref.WeakSet[Task] = weakref.WeakSet()
+        self._returned = False  # a coroutine has ended since the last round
         self._interrupted = self.gate.new_interrupt()
         self._round = _fresh_false()
         self._workers = Workers(threads, self._run, name) if threads > 1 else None
@@ -119,11 +122,12 @@ class BackgroundExecutor(Executor):
     def run_ready(self) -> bool:
         """Run one round of what is ready, and return whether there was anything.
 
-        To be called while `held`. Without workers the callbacks run in the calling thread.
+        To be called while `held`. Without workers the callbacks run in the calling thread. rclpy
+        resumes a coroutine in every round, whatever it awaits: that alone is not anything.
         """
         if self._workers is None and self.running:
             return False  # the one thread has a callback to run, and the others wait for it
-        busy = False
+        busy, self._returned = self._returned, False
         while True:
             if self.gate.stale:  # a callback removed a node under this round
                 self._round, self.gate.stale = _fresh_false(), False
@@ -133,8 +137,13 @@ class BackgroundExecutor(Executor):
                 return busy
             if self._workers is not None and self._workers.job_of(ready[0]) is not None:
                 return busy  # no worker is free: nothing else can begin either
-            busy = True
+            busy = busy or ready[0] not in self._awaiting
             self._execute(self._job(*ready))
+
+    @property
+    def awaiting(self) -> int:
+        """How many callbacks have begun, and await something."""
+        return len(self._awaiting)
 
     def busy_since(self, moment: float) -> bool:
         """Return whether callbacks run that are neither done nor blocked.
@@ -287,6 +296,11 @@ class BackgroundExecutor(Executor):
         self.gate.notify_watchers()
         streams.install()
         failure = job()
+        if not job.task.done():
+            self._awaiting.add(job.task)
+        elif job.task in self._awaiting:
+            self._awaiting.discard(job.task)
+            self._returned = True
         if job.unfinished is not None:
             streams.finish_lines(job)
         if failure is not None:

@@ -1,0 +1,412 @@
+"""Exercise 3: which communication pattern fits, chosen and built; judged by use.
+
+Every bound below is a sentence of the task. What is right in more than one way: the position as a
+service or as a topic, a parameter of the node or a service of its own, a battery level that is
+durable or published again and again. The key of the choices is not here: it comes from the hidden
+cell.
+"""
+
+from __future__ import annotations
+
+import secrets
+import time
+from functools import partial
+
+from sensor_msgs.msg import BatteryState
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from autograder.bench import StudentError
+from autograder.exam import Exam, Failed
+from autograder.rigs import choosing, offers
+from autograder.rigs.driving import ACTIONS, Drive
+from autograder.rigs.listening import LateJoiner, numbers, picture_fault, rate
+from autograder.rigs.robot import NODE, RobotRig, robot_rig
+from autograder.rigs.scenarios import NAMES, SCENARIOS, Scenario
+from course import GoalState
+
+EXAM: Exam[RobotRig] = Exam("patterns", robot_rig)
+
+RATE, RATE_WINDOW = (9.0, 11.0), 2.0  # Hz, s
+FROZEN = 0.6  # s on the wall
+POSITION, FURTHER = 2.5, 90  # m, and how many tenths of a metre there are to draw from
+POSITION_AGE = 0.5  # s
+LEVEL_AGE = 1.0  # s
+SPEEDS, SPEED_MARGIN = (0.3, 0.8), 0.011  # m/s
+BAD_SPEEDS = (-0.5, 5.0)  # m/s
+START, GOAL, FAR = 0, 3, 50  # stations
+
+READ_TOPICS = "Chapter 5, “Topics: continuous data sharing (publish-subscribe)”"
+READ_SERVICES = "Chapter 5, “Services: synchronous request-response”"
+READ_ACTIONS = "Chapter 5, “Actions: long-running operations with feedback”"
+
+WORKING: dict[Scenario, dict[str, str]] = {
+    "position": {"service": "std_srvs/srv/Trigger", "topic": "std_msgs/msg/Float64"},
+    "camera": {"topic": "sensor_msgs/msg/Image"},
+    "navigation": {"action": ACTIONS},
+    "parameters": {"service": offers.SET_PARAMETERS},
+    "battery": {"topic": "sensor_msgs/msg/BatteryState"},
+}
+
+
+@EXAM.check(
+    hints=(
+        "Run the cell with your class again: does it end without an error?",
+        "Try it beside the check: `course.run(RobotInterface)`.",
+        "The class must be called RobotInterface, be a node, and need no arguments.",
+    ),
+    read="Chapter 5, “Nodes: the processing units”",
+)
+def node_starts(rig: RobotRig) -> str:
+    """The node starts.
+
+    Whoever wants to know or command anything finds nobody if the robot's interface is not there.
+    """
+    try:
+        rig.start()
+    except StudentError as error:
+        where = f" It happened here:\n{error.trace}" if error.trace else ""
+        raise Failed(
+            expected=f"{NODE}() makes a node without an error.",
+            actual=f"It raised {error}.{where}",
+        ) from None
+    found = offers.settle(rig, {scenario: tuple(WORKING[scenario]) for scenario in SCENARIOS})
+    rig.memory["offers"] = found
+    rig.stands_still()
+    kinds = [f"{scenario}: {' and '.join(found[scenario]) or 'nothing'}" for scenario in SCENARIOS]
+    return f"Seen on the ROS graph: {'; '.join(kinds)}."
+
+
+@EXAM.check(
+    hints=(
+        "Look at the cell with `choices`: has every scenario its word?",
+        'Each value is one of three texts: "topic", "service" or "action".',
+        "Keep the five keys as they are, replace each None by your word, and run the cell again.",
+    ),
+    read=choosing.READ,
+)
+def choices_made(rig: RobotRig) -> None:
+    """A pattern is chosen for each of the five scenarios.
+
+    A designer who leaves it open has others decide, usually for a topic.
+    """
+    rig.memory["choices"] = choosing.read(rig)
+
+
+@EXAM.check(
+    needs=("node_starts",),
+    hints=(
+        "Who produces the pictures, who looks at them, and who should wait for whom?",
+        "What the driver publishes by a timer reaches everybody who subscribes.",
+        "Publish an Image on robot/camera in a timer callback every 0.1 s.",
+    ),
+    read=READ_TOPICS,
+)
+def camera_streams(rig: RobotRig) -> None:
+    """Camera images come ten times a second, for everybody who looks.
+
+    A remote driver steers by them: too few and the robot is already elsewhere, too many and the
+    Wi-Fi is full.
+    """
+    needed = "Pictures come by themselves, 10 a second, for any number of viewers."
+    offers.require(rig, "camera", WORKING["camera"], needed)
+    pictures = rig.node.pictures
+    since, before = rig.still
+    # One may have been on its way. A publisher that goes by the wall's clock sends more.
+    if rig.wait(lambda: len(pictures) > before + 1, since + FROZEN - time.monotonic()):
+        raise Failed(
+            expected=f"{needed} The node's clock sets the pace, as a timer of the node does.",
+            actual="Pictures were published while the node's clock stood still.",
+        )
+    if not rig.wait_stepping(lambda: len(pictures) > before, 2.0):
+        raise Failed(
+            expected=needed,
+            actual=f"Not one picture came in 2 s of the node's time{rig.because()}.",
+        )
+    hertz = rate(rig, RATE_WINDOW, sum(RATE) / 2)
+    if not RATE[0] <= hertz <= RATE[1]:
+        raise Failed(
+            expected=f"{RATE[0]:g} to {RATE[1]:g} pictures a second, by the node's clock.",
+            actual=f"They came at {hertz:g} a second.",
+        )
+    if fault := picture_fault(pictures[-1][1]):
+        raise Failed(expected="A message on robot/camera holds a picture.", actual=fault)
+
+
+@EXAM.check(
+    needs=("node_starts",),
+    hints=(
+        "Where is the robot: at the start, or now?",
+        "Read `self.position` at the moment when somebody asks, not before.",
+        "A Trigger service on robot/position whose callback sets success to True and message to "
+        "str(self.position).",
+    ),
+    read=READ_SERVICES,
+)
+def position_answered(rig: RobotRig) -> str:
+    """Whoever wants to know the robot's position gets the present one.
+
+    A planner that starts from where the robot was a while ago plans through the shelf beside it.
+    """
+    needed = f"Whoever wants to know the position gets it, at most {POSITION_AGE:g} s old."
+    pattern = offers.require(rig, "position", WORKING["position"], needed)
+    if not rig.listens_to("position"):
+        raise Failed(expected=needed, actual="Your node does not listen to hardware/position.")
+    asker = _ask_position if pattern == "service" else _overhear_position(rig)
+    # Nobody can know the later ones beforehand.
+    for position in (POSITION, *(3 + secrets.randbelow(FURTHER) / 10 for _ in range(2))):
+        answer = ""
+
+        def right(position: float = position) -> bool:
+            nonlocal answer
+            # Odometry repeats itself: what came before the two had found each other is made good.
+            rig.publish("position", position)
+            answer, found = asker(rig)
+            return any(abs(number - position) < 0.011 for number in found)
+
+        rig.report("position", position)
+        if not rig.wait_stepping(right, POSITION_AGE):
+            raise Failed(
+                expected=needed,
+                actual=f"With the robot at {position:g} m, {answer}{rig.because()}.",
+            )
+    if pattern == "topic":
+        return (
+            "As a topic: that is how most robots do it (odometry), and whoever listens always "
+            "knows. The chapter asks for it by a service, which suits those who need it once."
+        )
+    return (
+        "As a service, the chapter's answer. Most robots offer the position as a topic, too "
+        "(odometry), for those who need it all the time; both are right here."
+    )
+
+
+def _ask_position(rig: RobotRig) -> tuple[str, list[float]]:
+    answer = rig.call(Trigger, NAMES["position"], Trigger.Request())
+    if answer is None:
+        return "nobody answered", []
+    said = f"the answer was success={answer.success}, message={answer.message[:60]!r}"
+    return said, numbers(answer.message) if answer.success else []
+
+
+class _overhear_position:  # noqa: N801 - used as a function with a memory
+    def __init__(self, rig: RobotRig) -> None:
+        self._late = LateJoiner(rig, Float64, NAMES["position"])
+
+    def __call__(self, rig: RobotRig) -> tuple[str, list[float]]:
+        heard = [message.data for message in self._late.heard[-1:]]
+        said = f"the newest message was {heard[0]:g}" if heard else "no message came"
+        return f"{said} within {POSITION_AGE:g} s", heard
+
+
+@EXAM.check(
+    needs=("node_starts",),
+    hints=(
+        "What does whoever changes a parameter need to hear back?",
+        "declare_parameter gives your node the services for it; a range or a callback refuses.",
+        "declare_parameter('max_speed', 0.5, ParameterDescriptor(floating_point_range=[...])) with "
+        "a FloatingPointRange from 0.1 to 1.0.",
+    ),
+    read="ROS 2 documentation, “Concepts: Parameters”",
+)
+def parameter_changes(rig: RobotRig) -> None:
+    """A parameter can be changed, and a bad value is refused with a reason.
+
+    Somebody mistypes 5 for 0.5 m/s: the robot has to say no, and say why.
+    """
+    needed = "Whoever changes max_speed hears whether the new value holds, or why it does not."
+    offers.require(rig, "parameters", WORKING["parameters"], needed)
+    good = SPEEDS[0]
+    taken, reason = offers.set_speed_limit(rig, good)
+    if not taken:
+        raise Failed(
+            expected=f"{needed} {good:g} m/s is a good value.",
+            actual=f"It was refused, with the reason {reason[:200]!r}.",
+        )
+    for bad in BAD_SPEEDS:
+        taken, reason = offers.set_speed_limit(rig, bad)
+        if taken:
+            offers.set_speed_limit(rig, good)  # with this one no robot can drive on
+            raise Failed(
+                expected="Values of max_speed that are not between 0.1 and 1.0 are refused.",
+                actual=f"{bad:g} m/s was accepted.",
+            )
+        if not reason.strip():
+            raise Failed(
+                expected="A value that is refused is refused with a reason.",
+                actual=f"{bad:g} m/s was refused, and the reason was left empty.",
+            )
+    prefix = offers.parameter_node(rig)
+    if prefix is not None and (now := offers.speed_limit(rig, prefix)) != good:
+        raise Failed(
+            expected=f"The value that was set, {good:g} m/s, can be read back.",
+            actual=f"Read back, max_speed is {now}.",
+        )
+
+
+@EXAM.check(
+    needs=("node_starts",),
+    hints=(
+        "Who needs the battery level, and does each of them have to ask?",
+        "Publish the level when it changes, or every second; BatteryState has a field for it.",
+        "In charge_changed, publish BatteryState(percentage=self.charge) on robot/battery.",
+    ),
+    read=READ_TOPICS,
+)
+def battery_broadcast(rig: RobotRig) -> None:
+    """A new battery level reaches everybody who listens.
+
+    The planner, the display and the log all need it; whoever is forgotten strands the robot.
+    """
+    needed = f"Whoever listens to robot/battery knows a new level within {LEVEL_AGE:g} s."
+    offers.require(rig, "battery", WORKING["battery"], needed)
+    if not rig.listens_to("charge"):
+        raise Failed(expected=needed, actual="Your node does not listen to hardware/charge.")
+    levels = rig.node.levels
+
+    def first() -> bool:
+        rig.publish("charge", 0.9)
+        return _is_level(0.9, levels)
+
+    rig.wait_stepping(first, LEVEL_AGE)  # the two find each other
+    for level in (0.6, 0.4):
+        rig.report("charge", level)
+        if not rig.wait_stepping(lambda level=level: _is_level(level, levels), LEVEL_AGE):  # type: ignore[misc]
+            said = f"the last percentage was {levels[-1]:.4g}" if levels else "nothing was heard"
+            raise Failed(
+                expected=f"{needed} Its percentage is 0.0 to 1.0.",
+                actual=f"{LEVEL_AGE:g} s after the level had become {level:g}, {said}"
+                f"{rig.because()}.",
+            )
+
+
+def _is_level(level: float, heard: list[float]) -> bool:
+    return bool(heard) and abs(heard[-1] - level) < 1e-3
+
+
+@EXAM.check(
+    needs=("battery_broadcast",),
+    hints=(
+        "What does a display see that is switched on an hour after the last change?",
+        "Either the publisher keeps its last message for late joiners, or it repeats it.",
+        "QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL), or a timer of 1 s.",
+    ),
+    read="Chapter 5, “QoS profiles: durability”",
+)
+def battery_late_joiner(rig: RobotRig) -> str:
+    """A listener that joins late learns the battery level, too.
+
+    A display that is switched on later shows an empty field until the level changes next: perhaps
+    too late.
+    """
+    level = 0.7
+    rig.report("charge", level)
+    needed = f"Whoever joins late knows the level within {LEVEL_AGE:g} s, without a change."
+    # Everything that this change set off is over before anyone joins.
+    rig.wait_stepping(lambda: _is_level(level, rig.node.levels), LEVEL_AGE)
+    rig.step(LEVEL_AGE)
+    late = LateJoiner(rig, BatteryState, NAMES["battery"])
+    if late.durable:
+        rig.wait_stepping(lambda: late.heard)
+        how = "Transient local"
+    else:
+        count = len(rig.node.levels)
+        if not rig.wait_stepping(lambda: len(rig.node.levels) > count, LEVEL_AGE):
+            raise Failed(
+                expected=needed,
+                actual=f"The level was not published again within {LEVEL_AGE:g} s, and its "
+                "publisher (VOLATILE) keeps nothing for late joiners.",
+            )
+        rig.wait_stepping(lambda: late.heard)
+        how = "Published again and again"
+    said = [message.percentage for message in late.heard]
+    if not _is_level(level, said):
+        actual = f"it was told {said[-1]:.4g}" if said else "it was told nothing"
+        raise Failed(expected=needed, actual=f"With the level at {level:g}, {actual}.")
+    return f"{how}: right. A durable publisher and one that repeats itself both serve late joiners."
+
+
+@EXAM.check(
+    needs=("node_starts",),
+    hints=(
+        "Which pattern has a goal, reports on the way, and an end?",
+        "In a loop: drive, see at which station the robot is, publish feedback, sleep a little.",
+        "An ActionServer for Fibonacci on robot/navigate whose callback ends with drive(0.0), "
+        "goal_handle.succeed() and a Result with the stations passed.",
+    ),
+    read=READ_ACTIONS,
+)
+def navigation_drives(rig: RobotRig) -> None:
+    """A navigation goal is driven to, with a report at each station and at the end.
+
+    A drive takes minutes: whoever sent the robot wants to know how far it is, and that it is there.
+    """
+    needed = "Somebody names a station, hears of each one that is passed, and learns how it ended."
+    offers.require(rig, "navigation", WORKING["navigation"], needed)
+    with Drive(rig, START, GOAL) as drive:
+        drive.to_the_end()
+        drive.require_result()
+
+
+@EXAM.check(
+    needs=("navigation_drives", "parameter_changes"),
+    hints=(
+        "When does your node look at max_speed: when it starts, or when it drives?",
+        "Ask for the parameter's value anew for every goal.",
+        "self.drive(self.get_parameter('max_speed').value) where the drive begins.",
+    ),
+    read="ROS 2 documentation, “Concepts: Parameters”",
+)
+def speed_takes_effect(rig: RobotRig) -> None:
+    """A new speed limit is the speed of the next drive.
+
+    A parameter that is accepted and then ignored is worse than one that is refused: everybody
+    believes that the robot has slowed down.
+    """
+    for station, limit in enumerate(SPEEDS):
+        offers.set_speed_limit(rig, limit)
+        with Drive(rig, station, station + 1) as drive:
+            rig.wait_stepping(partial(_as_fast, rig, drive, limit))
+            top = max(rig.node.speeds, default=0.0)
+            if abs(top - limit) > SPEED_MARGIN:
+                raise Failed(
+                    expected=f"With max_speed at {limit:g} m/s the robot drives at {limit:g} m/s.",
+                    actual=f"hardware/speed went up to {top:g} m/s.",
+                )
+            drive.to_the_end()
+
+
+def _as_fast(rig: RobotRig, drive: Drive, limit: float) -> bool:
+    return rig.speed >= limit - SPEED_MARGIN or drive.run.done
+
+
+@EXAM.check(
+    needs=("navigation_drives",),
+    hints=(
+        "Who decides in an action server whether a goal may be cancelled?",
+        "The default cancel callback rejects; and the loop has to look at is_cancel_requested.",
+        "cancel_callback=lambda _: CancelResponse.ACCEPT; in the loop, when is_cancel_requested: "
+        "drive(0.0), goal_handle.canceled(), return the result.",
+    ),
+    read=READ_ACTIONS,
+)
+def navigation_cancel(rig: RobotRig) -> None:
+    """A goal that is called off stops the robot.
+
+    Somebody steps into the aisle and the goal is cancelled: a robot that drives on to the next
+    station first has not understood.
+    """
+    with Drive(rig, START, FAR) as drive:
+        drive.require_driving()
+        drive.roll_on()
+        drive.require_report()
+        drive.require_driving()
+        if not drive.cancel():
+            raise Failed(
+                expected="A request to cancel a drive is accepted.",
+                actual=f"It was refused, {drive.where}{rig.because()}.",
+            )
+        drive.require_end(GoalState.CANCELED, "A drive that is called off ends there and then.")
+
+
+choosing.add_checks(EXAM, needs=("choices_made",))

@@ -1,0 +1,208 @@
+"""The rig of the pattern exam: plays the robot's hardware, and the rest of the robot's system.
+
+The robot's wheels are patient: it moves only while the student's node commands a speed, and only
+when a check has it roll on. So a drive takes as long as the student's code needs, on simulated time
+or on the wall's, and what comes before what is known for certain.
+"""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+import secrets
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import BatteryState, Image
+from std_msgs.msg import Float64
+
+from autograder.bench import Bench, StudentError
+from autograder.exam import Failed
+from course import WaitTimeout
+
+NODE = "RobotInterface"
+THREADS = 4
+SETTLE = 8.0
+"""Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
+STEP = 0.1
+"""Seconds of simulated time in one step."""
+
+
+class ExaminerNode(Node):
+    """The examiner's endpoints: the hardware, and listeners on what the robot tells everybody."""
+
+    def __init__(self) -> None:
+        """Create what does not depend on the student."""
+        super().__init__(
+            f"examiner_{secrets.randbelow(2**24)}",
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
+        # It serves every subscription, and one that asks for the last value gets it.
+        qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.hardware = {
+            what: self.create_publisher(Float64, f"hardware/{what}", qos)
+            for what in ("position", "charge")
+        }
+        self.speeds: list[float] = []
+        self.levels: list[float] = []
+        self.pictures: list[tuple[int, Image]] = []  # published at (ns), picture
+        self.listen(Float64, "hardware/speed", lambda msg: self.speeds.append(msg.data))
+        self.listen(BatteryState, "robot/battery", lambda msg: self.levels.append(msg.percentage))
+        self.listen(Image, "robot/camera", self._see)
+
+    def _see(self, picture: Image, info: dict[str, Any]) -> None:
+        self.pictures.append((int(info["source_timestamp"]), picture))
+
+    def listen(
+        self, msg_type: Any, topic: str, heard: Callable[..., None], *, durable: bool = False
+    ) -> Any:
+        """Subscribe so that every writer matches (every durable one) and nothing is dropped."""
+        qos = QoSProfile(
+            history=HistoryPolicy.KEEP_ALL,
+            reliability=ReliabilityPolicy.RELIABLE if durable else ReliabilityPolicy.BEST_EFFORT,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if durable else DurabilityPolicy.VOLATILE,
+        )
+        # Without a handler of ours rclpy would log an incompatible profile as a warning.
+        events = SubscriptionEventCallbacks(
+            incompatible_qos=lambda _: None, use_default_callbacks=False
+        )
+        return self.create_subscription(msg_type, topic, heard, qos, event_callbacks=events)
+
+
+class RobotRig:
+    """The examiner's view of one subject during the pattern exam."""
+
+    def __init__(self, bench: Bench) -> None:
+        """Bring up the examiner's endpoints on the subject's domain."""
+        self.subject = bench.subject
+        self.session = bench.session
+        self.key = bench.key
+        self.memory = bench.memory
+        node = bench.session.run(ExaminerNode)
+        assert isinstance(node, ExaminerNode)
+        self.node = node
+        self.still = (0.0, 0)
+        self._clients: dict[str, Any] = {}
+        self._told: set[str] = set()
+
+    # Time.
+
+    def start(self) -> None:
+        """Have the student's node made, on simulated time.
+
+        Raises:
+            StudentError: it could not be made.
+        """
+        self.subject.open(threads=THREADS, sim_time=True)
+        self.subject.start(NODE)
+        self.stands_still()
+
+    def stands_still(self) -> None:
+        """Note since when (monotonic, s) the student's clock stands still, and what came before."""
+        self.still = (time.monotonic(), len(self.node.pictures))
+
+    def step(self, seconds: float = STEP) -> None:
+        """Move the student's clock on; everything that this sets off has then run."""
+        try:
+            self.subject.advance(seconds)
+        except StudentError as error:
+            raise Failed(
+                expected="Your callbacks end, sleep or await, so that the others get their turn.",
+                actual=f"The node did not follow its clock: {error}.",
+            ) from None
+        self.stands_still()
+
+    def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
+        """Wait until ``condition`` holds, the student's clock standing still; return whether."""
+        with suppress(WaitTimeout):
+            self.session.until(condition, timeout=max(0.0, timeout), what="an observation")
+            return True
+        return False
+
+    def wait_stepping(
+        self, condition: Callable[[], Any], seconds: float | None = None, timeout: float = SETTLE
+    ) -> bool:
+        """Let the student's clock run until ``condition`` holds; return whether it did.
+
+        Args:
+            condition: a function without arguments.
+            seconds: of simulated time that there are; None is as many as it takes.
+            timeout: seconds of wall time that it has to become visible here.
+        """
+        deadline = time.monotonic() + timeout
+        left = seconds
+        while not condition():
+            if time.monotonic() >= deadline:
+                return False
+            if left is not None and left <= STEP / 2:
+                return self.wait(condition, deadline - time.monotonic())
+            self.step()
+            left = None if left is None else left - STEP
+            self.wait(condition, 0.01)
+        return True
+
+    # Asking.
+
+    def call(self, srv_type: Any, name: str, request: Any) -> Any | None:
+        """Call a service of the subject's; return its answer, or None if there was none in time."""
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(srv_type, name)
+        client = self._clients[name]
+        if not self.wait(client.service_is_ready):
+            return None
+        future = client.call_async(request)
+        if self.wait(future.done):
+            return future.result()
+        client.remove_pending_request(future)
+        return None
+
+    # The hardware.
+
+    def report(self, what: str, value: float) -> None:
+        """Have the hardware report a value once, and the student's node take it in."""
+        self.publish(what, value)
+        self.node.hardware[what].wait_for_all_acked(Duration(seconds=SETTLE))
+        self.step(0.01)
+
+    def publish(self, what: str, value: float) -> None:
+        """Have the hardware report a value, and let it find its way."""
+        self.node.hardware[what].publish(Float64(data=value))
+
+    def listens_to(self, what: str) -> bool:
+        """Return whether the student's node subscribes to ``hardware/<what>``."""
+        return self.wait(lambda: self.node.hardware[what].get_subscription_count())
+
+    @property
+    def speed(self) -> float:
+        """The last commanded speed in m/s."""
+        return self.node.speeds[-1] if self.node.speeds else 0.0
+
+    def because(self) -> str:
+        """Return what a callback of the student's raised, as the end of a sentence.
+
+        Once each: what one check has told is not the next one's cause.
+        """
+        try:
+            raised = [error for error in self.subject.errors() if error not in self._told]
+        except StudentError:
+            return ""
+        self._told.update(raised)
+        return f" (a callback raised {raised[-1]})" if raised else ""
+
+
+@contextmanager
+def robot_rig(bench: Bench) -> Iterator[RobotRig]:
+    """Give a rig, and take the examiner's endpoints down afterwards."""
+    rig = RobotRig(bench)
+    try:
+        yield rig
+    finally:
+        bench.session.stop(rig.node)

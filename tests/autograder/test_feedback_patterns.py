@@ -1,0 +1,44 @@
+"""Whole reports of Exercise 3 as a student reads them, compared with texts a person has read."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from autograder import corpus, runner, submission
+from autograder.corpus import trials
+from autograder.report import Report
+
+from .conftest import SUBMISSIONS
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+@cache
+def _notebooks() -> trials.Notebooks:
+    return trials.notebooks("patterns")
+
+
+def report(name: str, part: str) -> str:
+    """Return what the student of a corpus case reads about one part, with all hints."""
+    case = next(case for case in corpus.load(SUBMISSIONS, "patterns") if case.name == name)
+    source, released = _notebooks()
+    notebook, _ = submission.restore(case.submission(source, released), source, released)
+    outcome = runner.run(submission.program(notebook))
+    return repr(Report(outcome.verdicts[f"patterns-{part}"], hints=3)) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "part"),
+    [
+        ("wrong-stub", "visible"),
+        ("wrong-navigation-no-stop", "visible"),
+        ("wrong-cancel-drives-on", "hidden"),
+        ("wrong-choices-all-topics", "choices"),
+    ],
+)
+def test_the_report_reads_as_it_should(name: str, part: str) -> None:
+    golden = GOLDEN / f"patterns-{name.removeprefix('wrong-')}-{part}.txt"
+    assert report(name, part) == golden.read_text(encoding="utf-8")

@@ -1,0 +1,6 @@
+# title: The stub as it was handed out: everything is a topic
+# fails: choices_made, camera_streams, position_answered, parameter_changes, navigation_drives
+# says: choices_made: position is still open
+# says: navigation_drives: On the ROS graph robot/navigate is a topic. Whoever sends the robot off
+# says: parameter_changes: would never hear whether it holds
+# in: the stub
