@@ -216,7 +216,13 @@ class Asking(Hosting):
                     "while it spins; executor.remove_node(node) gives a node back."
                 )
             hints += [str(blocked) for blocked in self._held_up_by()[:2]]
+            if not self.closed:
+                hints += [hint for hint in self._further_hints() if hint not in hints[0]]
             raise WaitTimeout(" ".join(hints)) from None
+
+    def _further_hints(self) -> list[str]:
+        """Return what else may be the reason that a wait was in vain, a sentence or two each."""
+        return []
 
     def _held_up_by(self) -> list[BlockedCallback]:
         me = current_job()

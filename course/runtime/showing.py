@@ -18,6 +18,7 @@ from course.runtime.asking import Asking
 from course.runtime.offers import load_type
 
 if TYPE_CHECKING:
+    from course.diagnosis import Diagnosis
     from course.runtime.session import Session
     from course.views.action import ActionView
     from course.views.graph import GraphView
@@ -162,6 +163,40 @@ class Showing(Asking):
 
         self._require_open()
         return QoSLab(self._me, offered, requested)
+
+    def diagnose(self) -> Diagnosis:
+        """Return what is wrong, or may be, with the nodes here: in plain words, with the mend.
+
+        It looks for callbacks that do not return, nodes that nobody spins or that were taken away,
+        endpoints that do not fit or have nobody on the other side, names that two nodes bear,
+        nodes that do not answer, and domains that differ. A wait that times out says the same.
+
+        Raises:
+            SessionError: the session is closed.
+        """
+        from course.diagnosis import diagnose
+
+        self._require_open()
+        return diagnose(self._me)
+
+    def moved_nodes(self) -> list[str]:
+        """Return the names of nodes that are in an executor of the learner's own."""
+        return self._residents.moved()
+
+    def paused_nodes(self) -> list[str]:
+        """Return the names of paused nodes."""
+        return [resident.name for resident in self._residents.all() if resident.paused]
+
+    def _further_hints(self) -> list[str]:
+        from course.diagnosis import quick
+
+        # A wait tells of stuck callbacks and nodes taken away by itself: this is what is left.
+        telling = [
+            finding
+            for finding in quick(self._me)
+            if finding.name in ("QoS", "type", "name") or "nobody spins it" in finding.message
+        ]
+        return [f"{finding.message} {finding.mend}" for finding in telling[:2]]
 
     @property
     def _me(self) -> Session:

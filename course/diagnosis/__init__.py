@@ -1,0 +1,70 @@
+"""Why does nothing arrive? Findings about a session's nodes, in plain words, with the mend."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator, Sequence
+from typing import overload
+
+from course.diagnosis import graph, nodes
+from course.doctor.finding import Finding
+from course.runtime.session import Session
+
+__all__ = ["Diagnosis", "diagnose", "quick"]
+
+
+class Diagnosis(Sequence[Finding]):
+    """Findings, those that keep something from working first; prints as a list."""
+
+    def __init__(self, findings: Sequence[Finding]) -> None:
+        """Show ``findings``."""
+        self.findings = sorted(findings, key=lambda finding: finding.status != "problem")
+
+    def __len__(self) -> int:
+        """Return the number of findings."""
+        return len(self.findings)
+
+    @overload
+    def __getitem__(self, index: int) -> Finding: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Finding]: ...
+    def __getitem__(self, index: int | slice) -> Finding | list[Finding]:
+        """Return a finding, or several."""
+        return self.findings[index]
+
+    def __iter__(self) -> Iterator[Finding]:
+        """Iterate over the findings."""
+        return iter(self.findings)
+
+    def __repr__(self) -> str:
+        """Return the findings as text."""
+        if not self.findings:
+            return "Nothing is wrong that can be seen from here."
+        return "\n".join(finding.text() for finding in self.findings)
+
+    def _repr_html_(self) -> str:
+        if not self.findings:
+            return f"<p>{html.escape(repr(self))}</p>"
+        items = "".join(
+            f"<li><b>{html.escape(f.name)}</b>: {html.escape(f.message)}<br>"
+            f"<i>{html.escape(f.mend)}</i></li>"
+            for f in self.findings
+        )
+        return f"<ul>{items}</ul>"
+
+
+def diagnose(session: Session) -> Diagnosis:
+    """Return what is wrong, or may be, with a session's nodes and what they talk to.
+
+    Nodes of other processes are asked whether they answer, which takes up to a second each.
+    """
+    return Diagnosis([*quick(session), *nodes.silent(session)])
+
+
+def quick(session: Session) -> list[Finding]:
+    """Return what can be found without waiting for anybody."""
+    checks = (
+        nodes.stuck, nodes.stolen, nodes.paused, nodes.unspun, nodes.on_another_domain,
+        graph.mismatches, graph.twins, graph.lonely_topics, graph.lonely_clients,
+    )  # fmt: skip
+    return [finding for check in checks for finding in check(session)]

@@ -1,0 +1,82 @@
+"""What the ROS graph shows: endpoints that do not fit, or that nobody answers."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+
+from course.doctor.finding import Finding, problem, warning
+from course.graph import reader, words
+from course.graph.model import Graph
+from course.runtime.session import Session
+
+_MENDS = {
+    "RELIABILITY": "Offer RELIABLE, or request BEST_EFFORT.",
+    "DURABILITY": "Offer TRANSIENT_LOCAL, or request VOLATILE.",
+    "DEADLINE": "Offer a deadline that is no longer than the requested one.",
+    "LIVELINESS": "Offer MANUAL_BY_TOPIC or a shorter lease, or request less.",
+    "TYPE": "One topic carries one type: correct the type or the name on one side.",
+}
+
+
+def mismatches(session: Session) -> Iterator[Finding]:
+    """Find publishers and subscriptions that DDS does not connect."""
+    for topic, pair in _graph(session).mismatches:
+        mends = [_MENDS[policy] for policy in pair.policies if policy in _MENDS]
+        what = "type" if "TYPE" in pair.policies else "QoS"
+        yield problem(what, words.mismatch(topic, pair), " ".join(mends))
+
+
+def twins(session: Session) -> Iterator[Finding]:
+    """Find names that several nodes bear: one may be a ghost of an earlier run."""
+    for name in _graph(session).twins:
+        where = "One is in this session" if name in session.nodes else "None is in this session"
+        yield problem(
+            "name", f"Several nodes are called {name}. {where}; another may be left from an "
+            "earlier run, of a cell that made it with rclpy or of another program.",
+            "Rename one, or end the other: restart the kernel that made it, or destroy_node() it.",
+        )  # fmt: skip
+
+
+def lonely_topics(session: Session) -> Iterator[Finding]:
+    """Find endpoints of the session's nodes that have nobody on the other side."""
+    graph, own = _graph(session), set(session.nodes)
+    published = [topic.name for topic in graph.topics if topic.publishers]
+    read = [topic.name for topic in graph.topics if topic.subscriptions]
+    for topic in graph.topics:
+        readers = sorted({end.node for end in topic.subscriptions} & own)
+        writers = sorted({end.node for end in topic.publishers} & own)
+        if readers and not topic.publishers:
+            yield warning(
+                "topic", f"{', '.join(readers)} reads {topic.name}, and nobody publishes on it"
+                f"{_alike(topic.name, published)}.", "Start the publisher, or correct the name.",
+            )  # fmt: skip
+        elif writers and not topic.subscriptions and (near := _alike(topic.name, read)):
+            yield warning(
+                "topic", f"{', '.join(writers)} publishes on {topic.name}, and nobody reads it"
+                f"{near}.", "Correct the name on one side.",
+            )  # fmt: skip
+
+
+def lonely_clients(session: Session) -> Iterator[Finding]:
+    """Find clients of the session's nodes that have no server."""
+    graph, own = _graph(session), set(session.nodes)
+    for kind, exchanges in (("service", graph.services), ("action", graph.actions)):
+        offered = [exchange.name for exchange in exchanges if exchange.servers]
+        for exchange in exchanges:
+            clients = sorted(set(exchange.clients) & own)
+            if clients and not exchange.servers:
+                yield warning(
+                    kind, f"{', '.join(clients)} uses the {kind} {exchange.name}, and nobody "
+                    f"offers it{_alike(exchange.name, offered)}.",
+                    "Start its server, or correct the name.",
+                )  # fmt: skip
+
+
+def _graph(session: Session) -> Graph:
+    return reader.read(session.observer, own=list(session.nodes.values()))
+
+
+def _alike(name: str, names: list[str]) -> str:
+    close = difflib.get_close_matches(name, [other for other in names if other != name], n=1)
+    return f" (is it {close[0]}?)" if close else ""

@@ -1,0 +1,121 @@
+"""What can be seen of nodes themselves: stuck, stolen, paused, never spun, silent, elsewhere."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import gc
+import os
+import time
+from collections.abc import Iterator
+
+from rcl_interfaces.srv import ListParameters
+from rclpy.node import Node
+
+from course.doctor.finding import Finding, problem, warning
+from course.errors import CourseError
+from course.graph import reader
+from course.runtime import closing
+from course.runtime.names import node_name
+from course.runtime.session import Session
+
+ANSWER = 1.0
+"""Seconds within which a node answers to a parameter service, unless it is stuck."""
+
+MOST_ASKED = 8
+
+
+def stuck(session: Session) -> Iterator[Finding]:
+    """Find callbacks that do not return, deadlocks among them."""
+    for blocked in session.blocked_callbacks():
+        held = " No other callback can run meanwhile." if blocked.holds_up else ""
+        reason = f" {blocked.reason}" if blocked.reason else ""
+        message = f"{blocked.what} has been running for {blocked.seconds:.0f} s.{reason}{held}"
+        yield problem("callback", message, blocked.advice)
+
+
+def stolen(session: Session) -> Iterator[Finding]:
+    """Find nodes that another executor took away, and take back those that it has dropped."""
+    told = len(session.notices)
+    session.take_back_stolen_nodes()
+    for notice in session.notices[told:]:
+        yield problem("executor", notice, "Leave rclpy.spin_once and its relatives out.")
+    for name in session.moved_nodes():
+        yield problem(
+            "executor", f"{name} is in an executor of your own, so its callbacks run only while "
+            "that one spins.", "executor.remove_node(node) gives it back to the session.",
+        )  # fmt: skip
+
+
+def paused(session: Session) -> Iterator[Finding]:
+    """Find nodes that were paused and forgotten."""
+    for name in session.paused_nodes():
+        yield warning("pause", f"{name} is paused: its callbacks do not run.", "course.resume(…).")
+
+
+def unspun(session: Session) -> Iterator[Finding]:
+    """Find nodes of this process that were made and never given to an executor."""
+    own = {id(node) for node in session.nodes.values()}
+    alive = set(reader.read(session.observer).nodes)
+    for thing in gc.get_objects():
+        if not isinstance(thing, Node) or id(thing) in own or thing is session.observer:
+            continue
+        name = _name(thing)
+        if thing.executor is None and thing.context is session.context and name in alive:
+            yield problem(
+                "executor", f"{name} was made, and nobody spins it: none of its callbacks will "
+                "ever run.", "Run it with course.run(YourNode) in place of making it yourself.",
+            )  # fmt: skip
+
+
+def on_another_domain(session: Session) -> Iterator[Finding]:
+    """Find sessions of this process that cannot hear each other, and a domain set in vain."""
+    others = [
+        other
+        for other in closing.known()
+        if isinstance(other, Session) and not other.closed and other.nodes
+    ]
+    for other in others:
+        if other.domain_id != session.domain_id:
+            yield warning(
+                "domain", f"This session is on domain {session.domain_id}; another one of this "
+                f"kernel, with {', '.join(other.nodes)}, is on {other.domain_id}, and DDS domains "
+                "never hear each other.",
+                f"Open one of them with course.Session(domain_id={session.domain_id}).",
+            )  # fmt: skip
+    asked = os.environ.get("ROS_DOMAIN_ID", "")
+    if asked and asked != str(session.domain_id):
+        yield warning(
+            "domain", f"ROS_DOMAIN_ID is {asked}, but a session leases a domain of its own: this "
+            f"one is on {session.domain_id}, so it does not hear nodes on {asked}.",
+            f"Join that domain with course.session(domain_id={asked}).",
+        )  # fmt: skip
+
+
+def silent(session: Session) -> Iterator[Finding]:
+    """Find nodes of other processes that are on the graph and do not answer."""
+    services = dict(session.observer.get_service_names_and_types())
+    asked = 0
+    for name in reader.read(session.observer).nodes:
+        service = f"{name}/list_parameters"
+        if name in session.nodes or service not in services or asked >= MOST_ASKED:
+            continue
+        asked += 1
+        started = time.monotonic()
+        try:
+            session.call(ListParameters, service, ListParameters.Request(), ANSWER)
+        except CourseError:
+            seconds = time.monotonic() - started
+            yield problem(
+                "node", f"{name} is on the graph, but did not answer within {seconds:.0f} s: its "
+                "services are dead. Its program hangs, is stopped, or does not spin it; or it has "
+                "died, and DDS has not noticed yet (that takes up to 20 s).",
+                "Look at the program that runs it, or restart it.",
+            )  # fmt: skip
+
+
+def _name(node: Node) -> str:
+    try:
+        return node_name(node)
+    except Exception:  # noqa: BLE001 - destroyed, or half made: rclpy has no one error for it
+        return ""
