@@ -20,9 +20,8 @@ def no_rig(_bench: Any) -> Iterator[list[str]]:
 
 @pytest.fixture
 def exam(monkeypatch: pytest.MonkeyPatch) -> Exam[list[str]]:
-    table = {
-        "toy": {"visible": {"first": 1.0, "second": 2.0, "third": 4.0}, "hidden": {"last": 8.0}}
-    }
+    parts = {"visible": {"first": 1.0, "second": 2.0, "third": 4.0}, "hidden": {"last": 8.0}}
+    table = {"toy": points.Entry("Toy", "ch00", "toy", parts, manual={})}
     monkeypatch.setattr(points, "table", lambda: table)
     exam: Exam[list[str]] = Exam("toy", no_rig)
 

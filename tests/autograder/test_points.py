@@ -1,0 +1,31 @@
+"""The table of points: one place, and sums that a course can rely on."""
+
+from __future__ import annotations
+
+import pytest
+
+from autograder import points
+
+EXERCISES = {exam: entry for exam, entry in points.table().items() if entry.assignment == "ch05"}
+
+
+def test_the_five_exercises_total_100() -> None:
+    assert len(EXERCISES) == 5
+    totals = [
+        sum(sum(part.values()) for part in entry.parts.values()) + sum(entry.manual.values())
+        for entry in EXERCISES.values()
+    ]
+    assert sum(totals) == 100
+
+
+@pytest.mark.parametrize("exam", EXERCISES)
+def test_each_exercise_has_a_written_answer_and_its_own_notebook(exam: str) -> None:
+    entry = EXERCISES[exam]
+    assert set(entry.manual) == {f"{exam}-explanation"}
+    assert [other.notebook for other in EXERCISES.values()].count(entry.notebook) == 1
+
+
+def test_grade_cells_are_named_by_exam_and_part() -> None:
+    assert points.grade_cells()["qos-visible"] == ("qos", "visible")
+    assert points.of_grade_cells()["qos-visible"] == sum(points.of_part("qos", "visible").values())
+    assert points.of_part("nothing", "visible") == {}
