@@ -9,7 +9,11 @@ from __future__ import annotations
 import json
 import traceback
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import String
 
 from autograder.wire import Channel, ChannelClosed
 from course import Session
@@ -49,9 +53,9 @@ class Harness:
         try:
             operation = {
                 "open": self._open, "start": self._start, "start_all": self._start_all,
-                "stop": self._stop, "pause": self._pause, "resume": self._resume,
-                "advance": self._advance, "call": self._call, "value": self._value,
-                "errors": self._errors,
+                "mark": self._mark, "stop": self._stop, "pause": self._pause,
+                "resume": self._resume, "advance": self._advance, "call": self._call,
+                "value": self._value, "errors": self._errors,
             }[request["op"]]  # fmt: skip
             return {"ok": True, **operation(request)}
         except Exception as error:  # noqa: BLE001 - a student's code may raise anything
@@ -104,6 +108,10 @@ class Harness:
         self._nodes[name] = node
         return str(node.get_fully_qualified_name())
 
+    def _mark(self, request: dict[str, Any]) -> dict[str, Any]:
+        self._hosting.run_beside(partial(_marker, request["name"]))
+        return {}
+
     def _stop(self, request: dict[str, Any]) -> dict[str, Any]:
         node = self._nodes.pop(request["name"], None)
         if node is not None:
@@ -150,6 +158,13 @@ class Harness:
                 for e in recent
             ]
         }
+
+
+def _marker(name: str) -> Node:
+    node = Node(name, start_parameter_services=False, enable_rosout=False)
+    node.create_publisher(String, name, 1)
+    node.create_subscription(String, name, lambda _: None, 1)
+    return node
 
 
 def _as_json(value: Any) -> Any:
