@@ -7,8 +7,6 @@ the task allows; only the robot's boundary has fixed names.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from autograder.bench import StudentError
 from autograder.exam import Exam, Failed
 from autograder.rigs.architecture import (
@@ -17,7 +15,6 @@ from autograder.rigs.architecture import (
     architecture_rig,
     load_type,
 )
-from autograder.rigs.robot_graph import Topic
 from autograder.rigs.robot_jobs import ACTION, MOTORS, MOTORS_TYPE, SENSORS, STREAMS
 from autograder.rigs.robot_reasons import (
     alike,
@@ -235,7 +232,7 @@ def motors_driven(rig: ArchitectureRig) -> None:
         raise Failed(expected=expected, actual=f"It is published as {listed(sorted(types))}.")
     if len(drivers) > 1:
         raise Failed(expected=expected, actual=f"{nodes(drivers)} all command the motors.")
-    if rig.jobs.navigators and not drivers & rig.jobs.goal_reaches:
+    if not drivers & rig.jobs.goal_reaches:
         raise Failed(
             expected=expected,
             actual=f"{nodes(drivers)} drives the motors, but nothing leads there from the server "
@@ -286,20 +283,11 @@ def streams_are_topics(rig: ArchitectureRig) -> None:
     questions, and if the answer is late it stands still or, worse, drives on.
     """
     if not any(rig.jobs.leads_to_motors(topic, STREAMS) for topic in rig.jobs.obstacle_topics):
-        between = {
-            by
-            for source, target, by in rig.graph.flows(("request", "response"))
-            if {source, target} & rig.graph.reached(_readers(rig.jobs.obstacle_topics), STREAMS)
-        }
         raise Failed(
             expected=f"From the obstacle information to {MOTORS} there are topics all the way.",
             actual=f"{listed([t.name for t in rig.jobs.obstacle_topics])} gets there only by "
-            f"way of the service {listed(sorted(between), 'or')}.",
+            f"way of the service {listed(rig.jobs.services_on_the_way(), 'or')}.",
         )
-
-
-def _readers(topics: Iterable[Topic]) -> set[str]:
-    return {node for topic in topics for node in topic.read_by}
 
 
 @EXAM.check(

@@ -35,6 +35,8 @@ SETTLE = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
 POURS = 8
 """How often dye is poured in before it counts as lost, each time with another tag."""
+ARRIVALS = 2
+"""How many of the tags must arrive: one could be a lucky guess of somebody who makes tags up."""
 
 NAVIGATE_TO = "robot_msgs/action/NavigateTo"
 NAVIGATE_TO_TEXT = """\
@@ -173,13 +175,19 @@ class ArchitectureRig:
     def _colour(self, pour: Callable[[int], None], arrived_on: Collection[str]) -> bool:
         # A link may still be about to connect: what it loses does not come back, so pour again.
         tags: set[int] = set()
+        arrived: set[int] = set()
         for _ in range(POURS):
             tags.add(tag := dye.fresh_tag())
             pour(tag)
-            if self.wait(lambda: any(tags & self.seen[n] for n in arrived_on), SETTLE / POURS):
+            self.wait(lambda new=tag: self._at(arrived_on, {new}), SETTLE / POURS)  # type: ignore[misc]
+            arrived = self._at(arrived_on, tags)
+            if len(arrived) >= ARRIVALS:
                 return True
-        self._lost = tags
+        self._lost = tags - arrived
         return False
+
+    def _at(self, topics: Collection[str], tags: set[int]) -> set[int]:
+        return {tag for name in topics for tag in tags & self.seen[name]}
 
     def got_to(self) -> list[str]:
         """Return the topics on which the dye that did not arrive was seen."""

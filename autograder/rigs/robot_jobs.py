@@ -116,9 +116,24 @@ class Jobs:
         ]
 
     def leads_to_motors(self, topic: Topic, kinds: Collection[str]) -> bool:
-        """Whether what is on a topic can get to the node that drives the motors."""
+        """Whether what is on a topic can get to the motors' node, or anywhere if there is none."""
         reached = self.graph.reached(topic.read_by - topic.written_by, kinds)
-        return bool(reached & self.controllers)
+        return bool(reached & (self.controllers or reached))
+
+    def services_on_the_way(self) -> list[str]:
+        """Return the services without which no obstacle information gets to the motors."""
+        streamed = self.graph.reached(
+            {node for topic in self.obstacle_topics for node in topic.read_by}, STREAMS
+        )
+        return sorted(
+            {
+                name
+                for source, target, name in self.graph.flows(("request", "response"))
+                if source in streamed
+                and target not in streamed
+                and self.graph.reached({target}, ("topic", "request", "goal")) & self.controllers
+            }
+        )
 
     @cached_property
     def pose_topics(self) -> list[Topic]:
@@ -146,7 +161,12 @@ class Jobs:
 
     @cached_property
     def goal_reaches(self) -> set[str]:
-        """The nodes that a navigation goal can get to from the action's server."""
+        """The nodes that a goal can get to from the action's server; all of them without one.
+
+        A design without that server fails the check that asks for it, and no other for its sake.
+        """
+        if not self.navigators:
+            return set(self.graph.nodes)
         return self.graph.reached(self.navigators, ONWARD)
 
     @cached_property

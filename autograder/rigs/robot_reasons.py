@@ -55,22 +55,25 @@ def why_no_obstacles(jobs: Jobs) -> str:
         return "No node subscribes to /scan or /camera/image."
     if not jobs.detectors:
         return (
-            f"Only {nodes(jobs.seeing)} reads /scan or /camera/image: navigation or control does "
+            f"Only {does(jobs.seeing, 'read')} /scan or /camera/image: navigation or control does "
             "the detection as well."
         )
-    served = [o for o in graph.services.values() if o.servers & jobs.detectors and o.clients]
-    outputs = [t for node in sorted(jobs.detectors) for t in graph.writes(node)]
-    outputs = [t for t in outputs if t.name not in SENSORS]
-    reasons = [f"{topic.name} {_why_no_obstacle(topic, jobs)}" for topic in _unique(outputs)]
-    if not reasons and served:
-        offer = served[0]
-        return (
-            f"{nodes(offer.servers)} hands it out by the service {offer.name} to "
-            f"{nodes(offer.clients)}: it comes all the time, so it is a stream, not an answer."
-        )
-    if not reasons:
-        return f"{nodes(jobs.detectors)} reads the sensors, but publishes nothing."
-    return f"{nodes(jobs.detectors)} reads the sensors, but {'; '.join(reasons[:3])}."
+    outputs = {t.name: t for node in sorted(jobs.detectors) for t in graph.writes(node)}
+    tried = [t for t in outputs.values() if t.name not in SENSORS and not set(t.types) & POSES]
+    if tried:
+        reasons = [f"{topic.name} {_why_no_obstacle(topic, jobs)}" for topic in tried[:3]]
+        return f"{does(jobs.detectors, 'read')} the sensors, but {'; '.join(reasons)}."
+    for offer in graph.services.values():
+        if (
+            offer.servers & jobs.detectors
+            and offer.clients
+            and not offer.servers & jobs.map_readers
+        ):
+            return (
+                f"{nodes(offer.servers)} hands it out by the service {offer.name} to "
+                f"{nodes(offer.clients)}: it comes all the time, so it is a stream, not an answer."
+            )
+    return f"{does(jobs.detectors, 'read')} the sensors, but nothing of the kind is published."
 
 
 def _why_no_obstacle(topic: Topic, jobs: Jobs) -> str:
@@ -92,10 +95,10 @@ def why_no_pose(jobs: Jobs) -> str:
     for topic in poses:
         if topic.written_by <= jobs.navigators:
             return f"{topic.name} comes from {nodes(topic.written_by)}, the navigation node."
-        return f"{nodes(topic.written_by)} publishes {topic.name} without reading any sensor."
+        return f"{does(topic.written_by, 'publish')} {topic.name} without reading any sensor."
     asked = [
         o for o in graph.services.values()
-        if "pose" in o.type.lower() and o.servers & jobs.sensing and o.clients
+        if "pose" in f"{o.name} {o.type}".lower() and o.servers & jobs.sensing and o.clients
     ]  # fmt: skip
     if asked:
         return f"The pose can only be asked for, by the service {asked[0].name}: it is a stream."
@@ -119,15 +122,15 @@ def why_no_planner(jobs: Jobs) -> str:
         return f"No node reads {MAP}."
     known = [offer for offer in services if offer.servers & readers]
     if not known and actions:
-        return f"{nodes(readers)} plans by the action {actions[0].name}: the task is a service."
+        return f"{does(readers, 'plan')} by the action {actions[0].name}: the task is a service."
     if not known:
         serving = f" ({listed([o.name for o in services])} does not know it)" if services else ""
-        return f"{nodes(readers)} reads the map, but serves nothing{serving}."
+        return f"{does(readers, 'read')} the map, but no service comes from there{serving}."
     offer = known[0]
     if not offer.clients - offer.servers:
-        return f"{nodes(offer.servers)} serves {offer.name}, but no other node calls it."
+        return f"{does(offer.servers, 'serve')} {offer.name}, but no other node calls it."
     return (
-        f"{nodes(offer.clients)} calls {offer.name}, but no navigation goal gets there: "
+        f"{does(offer.clients, 'call')} {offer.name}, but no navigation goal gets there: "
         f"nothing leads to it from {ACTION}."
     )
 
@@ -147,9 +150,9 @@ def topic_faults(graph: RobotGraph) -> Iterator[str]:
         if len(topic.types) > 1:
             yield f"{topic.name} has more than one type: {listed(topic.types)}."
         elif not topic.writers:
-            yield f"{nodes(topic.read_by)} reads {topic.name}, but nobody publishes on it."
+            yield f"{does(topic.read_by, 'read')} {topic.name}, but nobody publishes on it."
         elif not topic.readers and topic.name != MOTORS:
-            yield f"{nodes(topic.written_by)} publishes {topic.name}, but nobody reads it."
+            yield f"{does(topic.written_by, 'publish')} {topic.name}, but nobody reads it."
         else:
             yield from _refusals(topic)
 
@@ -169,11 +172,12 @@ def _refusals(topic: Topic) -> Iterator[str]:
 
 def offer_faults(graph: RobotGraph) -> Iterator[str]:
     """Yield what is wrong with services and actions, a sentence each."""
-    for offers, does in ((graph.services, "calls"), (graph.actions, "sends goals to")):
+    for offers, verb in ((graph.services, "call"), (graph.actions, "send")):
         for offer in offers.values():
             if not offer.servers:
-                yield f"{nodes(offer.clients)} {does} {offer.name}, but no node is its server."
-            elif len(offer.servers) > 1:
+                goals = "goals to " if verb == "send" else ""
+                yield f"{does(offer.clients, verb)} {goals}{offer.name}, but no node is its server."
+            elif len(offer.servers) > 1 and offer.name != ACTION:
                 yield f"{nodes(offer.servers)} are all servers of {offer.name}: one is right."
 
 
@@ -188,5 +192,8 @@ def listed(names: Iterable[str], last: str = "and") -> str:
     return f"{', '.join(first)} {last} {end}" if first else end
 
 
-def _unique(topics: Iterable[Topic]) -> list[Topic]:
-    return list({topic.name: topic for topic in topics}.values())
+def does(names: Iterable[str], verb: str) -> str:
+    """Return who does it, with the verb in singular or plural."""
+    doers = list(names)
+    ending = ("es" if verb.endswith("sh") else "s") if len(doers) == 1 else ""
+    return f"{nodes(doers)} {verb}{ending}"
