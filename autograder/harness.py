@@ -94,7 +94,11 @@ class Harness:
 
     def _start_all(self, request: dict[str, Any]) -> dict[str, Any]:
         name = request["name"]
-        factories = self._find(name, "design").node_factories()
+        design = self._find(name, "design")
+        if not hasattr(design, "node_factories"):
+            kind = type(design).__name__
+            raise TypeError(f"{name} is of type {kind}, which has no nodes; a course.Design has")
+        factories = design.node_factories()
         return {
             "nodes": {
                 str(label): self._run(f"{name}.{label}", factory)

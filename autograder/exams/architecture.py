@@ -7,6 +7,8 @@ the task allows; only the robot's boundary has fixed names.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from autograder.bench import StudentError
 from autograder.exam import Exam, Failed
 from autograder.rigs.architecture import (
@@ -284,7 +286,8 @@ def streams_are_topics(rig: ArchitectureRig) -> None:
     """
     if not any(rig.jobs.leads_to_motors(topic, STREAMS) for topic in rig.jobs.obstacle_topics):
         raise Failed(
-            expected=f"From the obstacle information to {MOTORS} there are topics all the way.",
+            expected=f"From the obstacle information to {MOTORS} there are topics (or action goals) "
+            "all the way.",
             actual=f"{listed([t.name for t in rig.jobs.obstacle_topics])} gets there only by "
             f"way of the service {listed(rig.jobs.services_on_the_way(), 'or')}.",
         )
@@ -351,14 +354,21 @@ def goal_reaches_motors(rig: ArchitectureRig) -> None:
     except WaitTimeout as timeout:
         raise Failed(expected=expected, actual=str(timeout)) from None
     if not arrived:
-        raise Failed(expected=expected, actual=_stranded(rig))
+        raise Failed(expected=expected, actual=_stranded(rig, [MOTORS]))
 
 
-def _stranded(rig: ArchitectureRig) -> str:
+def _stranded(rig: ArchitectureRig, wanted: Iterable[str]) -> str:
+    """Return how far the dye got instead, and what the student's callbacks raised."""
+    never = f"never on {listed(wanted, 'or')}"
     got_to = rig.got_to()
-    where = f"seen on {listed(got_to)}, and nowhere further" if got_to else "seen on no topic"
+    where = (
+        f"It was seen on {listed(got_to)}, but {never}"
+        if got_to
+        else f"It was seen on no topic, and so {never}"
+    )
     raised = rig.subject.errors()
-    return f"It was {where}{f' (a callback raised {raised[-1]})' if raised else ''}."
+    why = f"; a callback raised {raised[-1]}" if raised else ""
+    return f"{where}{why}."
 
 
 @EXAM.check(
@@ -385,10 +395,10 @@ def scan_reaches_motors(rig: ArchitectureRig) -> None:
     if not rig.colour_topic(rig.graph.topic("/scan"), topics):
         raise Failed(
             expected=f"The mark of a scan on /scan is seen on {listed(topics, 'or')}.",
-            actual=_stranded(rig),
+            actual=_stranded(rig, topics),
         )
     if not any(rig.colour_topic(topic, [MOTORS]) for topic in topics.values()):
         raise Failed(
             expected=f"The mark of a message on {listed(topics, 'or')} is seen on {MOTORS}.",
-            actual=_stranded(rig),
+            actual=_stranded(rig, [MOTORS]),
         )

@@ -181,14 +181,31 @@ class Jobs:
         ]
 
     def of_each_node(self) -> dict[str, list[str]]:
-        """Return {node: the jobs that it does}."""
-        doing = {
-            "drives sensors": self.drivers,
-            "estimates the state": {n for t in self.pose_topics for n in t.written_by},
-            "detects obstacles": {n for t in self.obstacle_topics for n in t.written_by},
+        """Return {node: the jobs that it does}.
+
+        Several nodes may publish what looks like a pose or like obstacle information (a target, a
+        debugging view): these two jobs count for those of them that have the least else to do.
+        """
+        certain = {
+            "drives sensors": set(self.drivers),
             "plans paths": {n for offer in self.planning_services for n in offer.servers},
-            "navigates": self.navigators,
-            "controls the motors": self.controllers,
+            "navigates": set(self.navigators),
+            "controls the motors": set(self.controllers),
+        }
+
+        def least_busy(topics: list[Topic], who: set[str]) -> set[str]:
+            load = {
+                node: sum(node in nodes for nodes in certain.values())
+                for topic in topics
+                for node in topic.written_by & who
+            }
+            return {node for node in load if load[node] == min(load.values())}
+
+        doing = {
+            "drives sensors": certain["drives sensors"],
+            "estimates the state": least_busy(self.pose_topics, self.sensing - self.navigators),
+            "detects obstacles": least_busy(self.obstacle_topics, self.detectors),
+            **certain,
         }
         return {
             node: [job for job, nodes in doing.items() if node in nodes]

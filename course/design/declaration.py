@@ -148,11 +148,13 @@ class Design:
         Raises:
             DesignError: it is no name for a node, or `factory` cannot be called.
         """
+        if not isinstance(name, str) or not isinstance(namespace, str):
+            raise DesignError(f"{name!r} is not a name for a node: names are texts.")
         new = NodeDeclaration(name, namespace, factory)
         try:
             validate_node_name(name)
             validate_namespace("/" + namespace.strip("/"))
-        except (InvalidNodeNameException, InvalidNamespaceException, TypeError) as error:
+        except (InvalidNodeNameException, InvalidNamespaceException) as error:
             reason = str(error).splitlines()[0]
             raise DesignError(f"{name!r} is not a name for a node: {reason}.") from None
         if factory is not None and not callable(factory):

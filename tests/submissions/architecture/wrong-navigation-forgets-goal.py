@@ -1,6 +1,6 @@
 # title: A navigation node that accepts goals and goes on as before
 # fails: goal_reaches_motors
-# says: goal_reaches_motors: It was seen on no topic.
+# says: goal_reaches_motors: It was seen on no topic
 
 from rclpy.action import ActionServer
 from rclpy.node import Node
