@@ -13,6 +13,7 @@ from autograder.bench import StudentError
 from autograder.exam import Exam, Failed
 from autograder.rigs.architecture import (
     ArchitectureRig,
+    GoalRejectedError,
     UnknownTypeError,
     architecture_rig,
     load_type,
@@ -354,6 +355,8 @@ def goal_reaches_motors(rig: ArchitectureRig) -> None:
         arrived = rig.colour_goal(ACTION, action_type, [MOTORS])
     except WaitTimeout as timeout:
         raise Failed(expected=expected, actual=str(timeout)) from None
+    except GoalRejectedError:
+        raise Failed(expected=expected, actual=f"The server of {ACTION} rejected it.") from None
     if not arrived:
         raise Failed(expected=expected, actual=_stranded(rig, [MOTORS]))
 
@@ -393,12 +396,12 @@ def scan_reaches_motors(rig: ArchitectureRig) -> None:
             expected="Obstacle information has a message type that is installed.",
             actual=f"{topic.name} is of type {listed(topic.types)}, unknown to the examiner.",
         )
-    if not rig.colour_topic(rig.graph.topic("/scan"), topics):
+    if not rig.colour_topics([rig.graph.topic("/scan")], topics):
         raise Failed(
             expected=f"The mark of a scan on /scan is seen on {listed(topics, 'or')}.",
             actual=_stranded(rig, topics),
         )
-    if not any(rig.colour_topic(topic, [MOTORS]) for topic in topics.values()):
+    if not rig.colour_topics(topics.values(), [MOTORS]):
         raise Failed(
             expected=f"The mark of a message on {listed(topics, 'or')} is seen on {MOTORS}.",
             actual=_stranded(rig, [MOTORS]),

@@ -25,7 +25,7 @@ from rclpy.qos import (
 
 from autograder.bench import Bench
 from autograder.rigs.robot_graph import RobotGraph, Topic, read_graph
-from autograder.rigs.robot_jobs import Jobs
+from autograder.rigs.robot_jobs import SENSORS, Jobs
 from course import WaitTimeout
 from course.design import dye
 from course.interfaces import define
@@ -52,6 +52,10 @@ float32 distance_left
 
 class UnknownTypeError(Exception):
     """A type on the graph that is not installed where the examiner runs."""
+
+
+class GoalRejectedError(Exception):
+    """The action server did not take a goal."""
 
 
 def load_type(name: str) -> Any:
@@ -146,29 +150,44 @@ class ArchitectureRig:
 
     # Dye.
 
-    def colour_topic(self, topic: Topic, arrived_on: Collection[str]) -> bool:
-        """Publish tagged messages on a topic until a tag is seen on one of ``arrived_on``.
+    def colour_topics(self, topics: Collection[Topic], arrived_on: Collection[str]) -> bool:
+        """Publish tagged messages on topics until tags are seen on one of ``arrived_on``.
 
         Returns:
-            Whether one was, in time.
+            Whether they were, in time.
 
         Raises:
-            UnknownTypeError: the topic's type is not installed here.
+            UnknownTypeError: a topic's type is not installed here.
         """
-        inlet = self._inlet(topic)
-        self.wait(lambda: inlet.get_subscription_count() >= len(topic.readers))
-        return self._colour(lambda tag: inlet.publish(_marked(inlet.msg_type, tag)), arrived_on)
+        inlets = [(self._inlet(topic), topic) for topic in topics]
+        # The examiner's own tap is a subscription, too. Who is late all the same gets a later pour.
+        self.wait(
+            lambda: all(i.get_subscription_count() > len(t.readers) for i, t in inlets), SETTLE / 4
+        )
+
+        def publish(tag: int) -> None:
+            for inlet, _ in inlets:
+                inlet.publish(_marked(inlet.msg_type, tag))
+
+        return self._colour(publish, arrived_on)
 
     def colour_goal(self, action: str, action_type: Any, arrived_on: Collection[str]) -> bool:
-        """Do the same with navigation goals.
+        """Do the same with navigation goals, while the sensors go on as on a robot.
+
+        A node may have to be woken by a reading before it asks for what a goal has changed.
 
         Raises:
             WaitTimeout: the action server did not answer; says why.
+            GoalRejectedError: it did not take the goal.
         """
+        sensors = [self._inlet(topic) for topic in map(self.graph.topic, SENSORS) if topic.readers]
 
         def send(tag: int) -> None:
             goal = _marked(action_type.Goal, tag)
-            self._session.send_goal(action_type, action, goal, timeout=SETTLE)
+            if not self._session.send_goal(action_type, action, goal, timeout=SETTLE).accepted:
+                raise GoalRejectedError
+            for sensor in sensors:
+                sensor.publish(_marked(sensor.msg_type, dye.fresh_tag()))
 
         return self._colour(send, arrived_on)
 

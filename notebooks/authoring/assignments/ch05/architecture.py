@@ -39,10 +39,10 @@
 #    `Bool` is not). Another node reads it. Navigation and control do not do the detection.
 # 4. **Path planning** is a service. Its node knows the map; another node, which has the goal, calls
 #    it, and the request (or a topic) brings the goal.
-# 5. **Navigation** is the server of the action `navigate_to`. Topics bring it what the sensors see:
-#    readings, obstacle information, or the pose.
-# 6. **Control**: exactly one node publishes `motors/command`. The navigation goal leads to it, over
-#    links of whichever kind.
+# 5. **Navigation** is the server of the action `navigate_to` and accepts its goals. Topics bring it
+#    what the sensors see: readings, obstacle information, or the pose.
+# 6. **Control**: exactly one node publishes `motors/command`. From the navigation node links lead to
+#    it, of whichever kind.
 #
 # And four rules for the whole:
 #
