@@ -180,7 +180,8 @@ class ArchitectureRig:
             WaitTimeout: the action server did not answer; says why.
             GoalRejectedError: it did not take the goal.
         """
-        sensors = [self._inlet(topic) for topic in map(self.graph.topic, SENSORS) if topic.readers]
+        topics = [self.graph.topic(name) for name in SENSORS]
+        sensors = [self._inlet(topic) for topic in topics if topic.readers and self.knows(topic)]
 
         def send(tag: int) -> None:
             goal = _marked(action_type.Goal, tag)
@@ -210,7 +211,8 @@ class ArchitectureRig:
 
     def got_to(self) -> list[str]:
         """Return the topics on which the dye that did not arrive was seen."""
-        return sorted(name for name, tags in self.seen.items() if tags & self._lost)
+        seen = list(self.seen.items())  # at once: another thread adds to it
+        return sorted(name for name, tags in seen if tags & self._lost)
 
     def _inlet(self, topic: Topic) -> Any:
         if topic.name not in self._inlets:
