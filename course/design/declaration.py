@@ -17,7 +17,7 @@ from rclpy.validate_node_name import validate_node_name
 
 from course import ambient
 from course.design import drawing, findings
-from course.design.endpoints import DesignError, Endpoint, Role, endpoint
+from course.design.endpoints import DesignError, Endpoint, Role, endpoint, reason
 from course.design.node import DesignNode
 from course.runtime.session import Session
 
@@ -155,8 +155,7 @@ class Design:
             validate_node_name(name)
             validate_namespace("/" + namespace.strip("/"))
         except (InvalidNodeNameException, InvalidNamespaceException) as error:
-            reason = str(error).splitlines()[0]
-            raise DesignError(f"{name!r} is not a name for a node: {reason}.") from None
+            raise DesignError(f"{name!r} is not a name for a node: {reason(error)}.") from None
         if factory is not None and not callable(factory):
             raise DesignError(f"{name}: factory is a node class or a function, not {factory!r}.")
         known = self.nodes.setdefault(new.label, new)

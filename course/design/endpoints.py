@@ -88,13 +88,20 @@ def endpoint(
     )
 
 
+def reason(error: Exception) -> str:
+    """Return what rclpy says about a name, without the place in its own source."""
+    first = str(error).splitlines()[0].partition(", at /")[0]
+    return (first.partition(": ")[2] or first).rstrip(": ")
+
+
 def _full_name(where: str, node: str, namespace: str, name: str) -> str:
     try:
         full = str(expand_topic_name(name, node, "/" + namespace.strip("/")))
         validate_full_topic_name(full)
     except (InvalidTopicNameException, InvalidServiceNameException, ValueError) as error:
-        reason = str(error).splitlines()[0].partition(": ")[2] or str(error)
-        raise DesignError(f"{where}: {name!r} is not a name on the ROS graph: {reason}.") from None
+        raise DesignError(
+            f"{where}: {name!r} is not a name on the ROS graph: {reason(error)}."
+        ) from None
     return full
 
 
