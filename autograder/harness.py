@@ -9,7 +9,11 @@ from __future__ import annotations
 import json
 import traceback
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
+
+from rclpy.node import Node
+from std_msgs.msg import String
 
 from autograder.wire import Channel, ChannelClosed
 from course import Session
@@ -49,9 +53,9 @@ class Harness:
         try:
             operation = {
                 "open": self._open, "start": self._start, "start_all": self._start_all,
-                "stop": self._stop, "pause": self._pause, "resume": self._resume,
-                "advance": self._advance, "call": self._call, "value": self._value,
-                "errors": self._errors,
+                "mark": self._mark, "stop": self._stop, "pause": self._pause,
+                "resume": self._resume, "advance": self._advance, "call": self._call,
+                "value": self._value, "errors": self._errors,
             }[request["op"]]  # fmt: skip
             return {"ok": True, **operation(request)}
         except Exception as error:  # noqa: BLE001 - a student's code may raise anything
@@ -90,7 +94,11 @@ class Harness:
 
     def _start_all(self, request: dict[str, Any]) -> dict[str, Any]:
         name = request["name"]
-        factories = self._find(name, "design").node_factories()
+        design = self._find(name, "design")
+        if not hasattr(design, "node_factories"):
+            kind = type(design).__name__
+            raise TypeError(f"{name} is of type {kind}, which has no nodes; a course.Design has")
+        factories = design.node_factories()
         return {
             "nodes": {
                 str(label): self._run(f"{name}.{label}", factory)
@@ -103,6 +111,10 @@ class Harness:
         node = self._hosting.run_beside(factory)
         self._nodes[name] = node
         return str(node.get_fully_qualified_name())
+
+    def _mark(self, request: dict[str, Any]) -> dict[str, Any]:
+        self._hosting.run_beside(partial(_marker, request["name"]))
+        return {}
 
     def _stop(self, request: dict[str, Any]) -> dict[str, Any]:
         node = self._nodes.pop(request["name"], None)
@@ -150,6 +162,13 @@ class Harness:
                 for e in recent
             ]
         }
+
+
+def _marker(name: str) -> Node:
+    node = Node(name, start_parameter_services=False, enable_rosout=False)
+    node.create_publisher(String, name, 1)
+    node.create_subscription(String, name, lambda _: None, 1)
+    return node
 
 
 def _as_json(value: Any) -> Any:

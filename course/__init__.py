@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from course.ambient import stop as stop
     from course.ambient import until as until
     from course.ambient import wait_for_service as wait_for_service
+    from course.design.declaration import Design as Design
+    from course.design.endpoints import DesignError as DesignError
     from course.errors import CourseError as CourseError
     from course.errors import DomainError as DomainError
     from course.errors import SessionError as SessionError
@@ -63,6 +65,8 @@ _HOMES = {
     "stop": "course.ambient",
     "until": "course.ambient",
     "wait_for_service": "course.ambient",
+    "Design": "course.design.declaration",
+    "DesignError": "course.design.endpoints",
     "CourseError": "course.errors",
     "DomainError": "course.errors",
     "SessionError": "course.errors",
@@ -87,6 +91,8 @@ def __getattr__(name: str) -> Any:
     Raises:
         UnsupportedPlatformError: there are no ROS 2 wheels for this machine.
     """
+    if name == "design":  # `course.design.carry(...)` needs no import of its own
+        return importlib.import_module("course.design")
     if name not in _HOMES:
         raise AttributeError(f"module 'course' has no attribute {name!r}")
     if _HOMES[name] != "course.errors":

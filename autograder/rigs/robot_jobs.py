@@ -1,0 +1,213 @@
+"""Who does which of the robot's jobs: read off the graph by what goes in and what comes out.
+
+Nodes and topics inside the robot have whatever names the student likes. Only the boundary is fixed:
+the sensors' topics, the map, the motors' topic and the action.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from functools import cached_property
+
+from autograder.rigs.robot_graph import Offer, RobotGraph, Topic
+
+ACTION = "/navigate_to"
+MAP, MAP_TYPE = "/map", "nav_msgs/msg/OccupancyGrid"
+MOTORS, MOTORS_TYPE = "/motors/command", "geometry_msgs/msg/Twist"
+SENSORS = {
+    "/scan": "sensor_msgs/msg/LaserScan",
+    "/camera/image": "sensor_msgs/msg/Image",
+    "/wheel/odometry": "nav_msgs/msg/Odometry",
+}
+EYES = ("/scan", "/camera/image")
+GET_MAP = "nav_msgs/srv/GetMap"
+
+POSES = frozenset(
+    ["nav_msgs/msg/Odometry"]
+    + [
+        f"geometry_msgs/msg/{name}"
+        for name in ("PoseStamped", "PoseWithCovarianceStamped", "Pose", "PoseWithCovariance")
+    ]
+)
+VELOCITIES = frozenset(
+    f"geometry_msgs/msg/{name}"
+    for name in ("Twist", "TwistStamped", "TwistWithCovariance", "TwistWithCovarianceStamped")
+)
+IMAGES = frozenset(
+    f"sensor_msgs/msg/{name}" for name in ("LaserScan", "Image", "CompressedImage", "CameraInfo")
+)
+CLOUDS = frozenset(["sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/PointCloud"])
+OTHER_READINGS = frozenset(["sensor_msgs/msg/Imu", "nav_msgs/msg/Odometry"])
+NO_PLACE = frozenset(f"std_msgs/msg/{name}" for name in ("Bool", "Empty"))
+"""Types that cannot say where something is."""
+NOT_OBSTACLES = (
+    POSES | VELOCITIES | IMAGES | OTHER_READINGS | NO_PLACE
+    | {"nav_msgs/msg/Path", "diagnostic_msgs/msg/DiagnosticArray"}
+)  # fmt: skip
+
+STREAMS = ("topic", "goal")
+"""What can carry information that comes all the time: a new goal replaces the one before."""
+ONWARD = ("topic", "request", "response", "goal")
+"""The ways in which a goal can get from the action server to the motors."""
+
+
+class Jobs:
+    """The robot's jobs in one graph."""
+
+    def __init__(self, graph: RobotGraph) -> None:
+        """Look at ``graph``."""
+        self.graph = graph
+
+    @cached_property
+    def navigators(self) -> set[str]:
+        """The nodes that are the action's server."""
+        return self.graph.action(ACTION).servers
+
+    @cached_property
+    def controllers(self) -> frozenset[str]:
+        """The nodes that publish on the motors' topic."""
+        return self.graph.topic(MOTORS).written_by
+
+    @cached_property
+    def drivers(self) -> set[str]:
+        """The nodes that publish a sensor's readings."""
+        return {node for name in SENSORS for node in self.graph.topic(name).written_by}
+
+    @cached_property
+    def seeing(self) -> set[str]:
+        """The nodes that read the LIDAR or the camera."""
+        return self.reading(EYES, IMAGES | CLOUDS)
+
+    @cached_property
+    def sensing(self) -> set[str]:
+        """The nodes that read some sensor."""
+        return self.reading(SENSORS, IMAGES | CLOUDS | OTHER_READINGS)
+
+    def reading(self, topics: Collection[str], readings: Collection[str]) -> set[str]:
+        """Return who reads ``topics``, also where a node filters and hands on raw readings."""
+        found: set[str] = set()
+        names = set(topics)
+        while new := {n for name in names for n in self.graph.topic(name).read_by} - found:
+            found |= new
+            names = {
+                topic.name
+                for node in new
+                for topic in self.graph.writes(node)
+                if set(topic.types) & set(readings)
+            }
+        return found
+
+    @cached_property
+    def detectors(self) -> set[str]:
+        """The nodes that read LIDAR or camera and are neither navigation nor control."""
+        return self.seeing - self.navigators - self.controllers
+
+    @cached_property
+    def obstacle_topics(self) -> list[Topic]:
+        """The topics that carry obstacle information from a detector to another node."""
+        return [
+            topic
+            for topic in self.graph.topics.values()
+            if topic.written_by & self.detectors
+            and topic.name not in {*SENSORS, MAP, MOTORS}
+            and not set(topic.types) & NOT_OBSTACLES
+            and topic.read_by - topic.written_by
+            and self.leads_to_motors(topic, ONWARD)
+        ]
+
+    def leads_to_motors(self, topic: Topic, kinds: Collection[str]) -> bool:
+        """Whether what is on a topic can get to the motors' node, or anywhere if there is none."""
+        reached = self.graph.reached(topic.read_by - topic.written_by, kinds)
+        return bool(reached & (self.controllers or reached))
+
+    def services_on_the_way(self) -> list[str]:
+        """Return the services without which no obstacle information gets to the motors."""
+        streamed = self.graph.reached(
+            {node for topic in self.obstacle_topics for node in topic.read_by}, STREAMS
+        )
+        return sorted(
+            {
+                name
+                for source, target, name in self.graph.flows(("request", "response"))
+                if source in streamed
+                and target not in streamed
+                and self.graph.reached({target}, ("topic", "request", "goal")) & self.controllers
+            }
+        )
+
+    @cached_property
+    def pose_topics(self) -> list[Topic]:
+        """The topics on which a node that reads sensors publishes the pose."""
+        return [
+            topic
+            for topic in self.graph.topics.values()
+            if set(topic.types) & POSES
+            and topic.name not in SENSORS
+            and topic.written_by & (self.sensing - self.navigators)
+        ]
+
+    @cached_property
+    def map_readers(self) -> set[str]:
+        """The nodes that know the map: from its topic, from its service, or from a costmap."""
+        asking = {
+            node
+            for offer in self.graph.services.values()
+            if offer.type == GET_MAP and offer.servers
+            for node in offer.clients
+        }
+        topic = self.graph.topic(MAP)
+        readers = self.reading([MAP], [MAP_TYPE]) if MAP_TYPE in topic.types else set()
+        return readers | asking
+
+    @cached_property
+    def goal_reaches(self) -> set[str]:
+        """The nodes that a goal can get to from the action's server; all of them without one.
+
+        A design without that server fails the check that asks for it, and no other for its sake.
+        """
+        if not self.navigators:
+            return set(self.graph.nodes)
+        return self.graph.reached(self.navigators, ONWARD)
+
+    @cached_property
+    def planning_services(self) -> list[Offer]:
+        """The services that know the map and are called, elsewhere, by a node that has the goal."""
+        return [
+            offer
+            for offer in self.graph.services.values()
+            if offer.servers & self.map_readers
+            and offer.type != GET_MAP
+            and (offer.clients - offer.servers) & self.goal_reaches
+        ]
+
+    def of_each_node(self) -> dict[str, list[str]]:
+        """Return {node: the jobs that it does}.
+
+        Several nodes may publish what looks like a pose or like obstacle information (a target, a
+        debugging view): these two jobs count for those of them that have the least else to do.
+        """
+        certain = {
+            "drives sensors": set(self.drivers),
+            "plans paths": {n for offer in self.planning_services for n in offer.servers},
+            "navigates": set(self.navigators),
+            "controls the motors": set(self.controllers),
+        }
+
+        def least_busy(topics: list[Topic], who: set[str]) -> set[str]:
+            load = {
+                node: sum(node in nodes for nodes in certain.values())
+                for topic in topics
+                for node in topic.written_by & who
+            }
+            return {node for node in load if load[node] == min(load.values())}
+
+        doing = {
+            "drives sensors": certain["drives sensors"],
+            "estimates the state": least_busy(self.pose_topics, self.sensing - self.navigators),
+            "detects obstacles": least_busy(self.obstacle_topics, self.detectors),
+            **certain,
+        }
+        return {
+            node: [job for job, nodes in doing.items() if node in nodes]
+            for node in sorted(self.graph.nodes)
+        }

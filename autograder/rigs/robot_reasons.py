@@ -1,0 +1,199 @@
+"""Why a job is not done or a link does not connect: sentences for the student, from the graph."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from rclpy.qos import QoSCompatibility, qos_check_compatible
+
+from autograder.rigs.architecture import UnknownTypeError, load_type
+from autograder.rigs.robot_graph import Offer, RobotGraph, Topic
+from autograder.rigs.robot_jobs import (
+    ACTION,
+    MAP,
+    MAP_TYPE,
+    MOTORS,
+    NO_PLACE,
+    NOT_OBSTACLES,
+    POSES,
+    SENSORS,
+    Jobs,
+)
+from course.design import dye
+
+
+def alike(name: str, graph: RobotGraph) -> str:
+    """Return a remark on a topic whose name is nearly ``name``, or nothing."""
+    last = name.rsplit("/", 1)[-1]
+    close = [other for other in graph.topics if other != name and other.endswith(f"/{last}")]
+    return f" (there is {close[0]}, but the name is {name})" if close else ""
+
+
+def instead(graph: RobotGraph) -> str:
+    """Return a remark on what stands in the place of the navigation action, or nothing."""
+    if service := graph.services.get(ACTION):
+        return f"; {nodes(service.servers) or 'nobody'} serves {ACTION} as a service"
+    if ACTION in graph.topics:
+        return f"; {ACTION} is a topic"
+    if others := [name for name, offer in graph.actions.items() if offer.servers]:
+        return f"; there is an action {listed(others)}"
+    return ""
+
+
+def is_carried(topic: Topic) -> str:
+    """Say where obstacle information is."""
+    short = listed([name.rsplit("/", 1)[-1] for name in topic.types])
+    return f"It is on {topic.name} ({short}), from {nodes(topic.written_by)}."
+
+
+def why_no_obstacles(jobs: Jobs) -> str:
+    """Return why no topic counts as obstacle information."""
+    graph = jobs.graph
+    if not jobs.seeing:
+        return "No node subscribes to /scan or /camera/image."
+    if not jobs.detectors:
+        return (
+            f"Only {does(jobs.seeing, 'read')} /scan or /camera/image: navigation or control does "
+            "the detection as well."
+        )
+    outputs = {t.name: t for node in sorted(jobs.detectors) for t in graph.writes(node)}
+    tried = [t for t in outputs.values() if t.name not in SENSORS and not set(t.types) & POSES]
+    if tried:
+        reasons = [f"{topic.name} {_why_no_obstacle(topic, jobs)}" for topic in tried[:3]]
+        return f"{does(jobs.detectors, 'read')} the sensors, but {'; '.join(reasons)}."
+    for offer in graph.services.values():
+        if (
+            offer.servers & jobs.detectors
+            and offer.clients
+            and not offer.servers & jobs.map_readers
+        ):
+            return (
+                f"{nodes(offer.servers)} hands it out by the service {offer.name} to "
+                f"{nodes(offer.clients)}: it comes all the time, so it is a stream, not an answer."
+            )
+    return f"{does(jobs.detectors, 'read')} the sensors, but nothing of the kind is published."
+
+
+def _why_no_obstacle(topic: Topic, jobs: Jobs) -> str:
+    types = set(topic.types)
+    if types & NO_PLACE:
+        return f"({listed(topic.types)}) cannot say where the obstacle is"
+    if types & NOT_OBSTACLES or topic.name in (MAP, MOTORS):
+        return f"({listed(topic.types)}) is no obstacle information"
+    if not topic.read_by - topic.written_by:
+        return "is read by no other node"
+    return f"ends at {nodes(topic.read_by)}, from where nothing leads to {MOTORS}"
+
+
+def why_no_pose(jobs: Jobs) -> str:
+    """Return why no topic counts as the robot's pose."""
+    graph = jobs.graph
+    poses = [t for t in graph.topics.values() if set(t.types) & POSES and t.name not in SENSORS]
+    poses = [t for t in poses if t.writers]
+    for topic in poses:
+        if topic.written_by <= jobs.navigators:
+            return f"{topic.name} comes from {nodes(topic.written_by)}, the navigation node."
+        return f"{does(topic.written_by, 'publish')} {topic.name} without reading any sensor."
+    asked = [
+        o for o in graph.services.values()
+        if "pose" in f"{o.name} {o.type}".lower() and o.servers & jobs.sensing and o.clients
+    ]  # fmt: skip
+    if asked:
+        return f"The pose can only be asked for, by the service {asked[0].name}: it is a stream."
+    return "No node publishes a topic with a pose type."
+
+
+def why_no_planner(jobs: Jobs) -> str:
+    """Return why no service counts as path planning; empty if one does."""
+    if any(_gets_goal(offer, jobs) for offer in jobs.planning_services):
+        return ""
+    if jobs.planning_services:
+        offer = jobs.planning_services[0]
+        return f"{offer.name} ({offer.type}): its request has no room for a goal."
+    graph, readers = jobs.graph, jobs.map_readers
+    services = [o for o in graph.services.values() if o.servers]
+    actions = [o for o in graph.actions.values() if o.servers & readers and o.name != ACTION]
+    if not readers:
+        types = graph.topic(MAP).types
+        if types and MAP_TYPE not in types:
+            return f"{MAP} has type {listed(types)}, not {MAP_TYPE}."
+        return f"No node reads {MAP}."
+    known = [offer for offer in services if offer.servers & readers]
+    if not known and actions:
+        return f"{does(readers, 'plan')} by the action {actions[0].name}: the task is a service."
+    if not known:
+        serving = f" ({listed([o.name for o in services])} does not know it)" if services else ""
+        return f"{does(readers, 'read')} the map, but no service comes from there{serving}."
+    offer = known[0]
+    if not offer.clients - offer.servers:
+        return f"{does(offer.servers, 'serve')} {offer.name}, but no other node calls it."
+    return (
+        f"{does(offer.clients, 'call')} {offer.name}, but no navigation goal gets there: "
+        f"nothing leads to it from {ACTION}."
+    )
+
+
+def _gets_goal(offer: Offer, jobs: Jobs) -> bool:
+    """Whether the goal can come with the request, or has come to the server by a topic before."""
+    try:
+        in_request = dye.has_room(load_type(offer.type).Request)
+    except UnknownTypeError:
+        in_request = True  # a type of the student's own: what it holds cannot be seen from here
+    return in_request or bool(offer.servers & jobs.graph.reached(jobs.navigators, ("topic",)))
+
+
+def topic_faults(graph: RobotGraph) -> Iterator[str]:
+    """Yield what is wrong with the links of topics, a sentence each."""
+    for topic in graph.topics.values():
+        if len(topic.types) > 1:
+            yield f"{topic.name} has more than one type: {listed(topic.types)}."
+        elif not topic.writers:
+            yield f"{does(topic.read_by, 'read')} {topic.name}, but nobody publishes on it."
+        elif not topic.readers and topic.name != MOTORS:
+            yield f"{does(topic.written_by, 'publish')} {topic.name}, but nobody reads it."
+        else:
+            yield from _refusals(topic)
+
+
+def _refusals(topic: Topic) -> Iterator[str]:
+    for writer in topic.writers:
+        for reader in topic.readers:
+            verdict, reason = qos_check_compatible(writer.qos, reader.qos)
+            if verdict == QoSCompatibility.ERROR:
+                parts = [part.strip() for part in str(reason).split(";")]
+                why = [p.removeprefix("ERROR: ") for p in parts if p.startswith("ERROR:")]
+                yield (
+                    f"{nodes([writer.node])} and {nodes([reader.node])} do not connect on "
+                    f"{topic.name}: {', '.join(why)}."
+                )
+
+
+def offer_faults(graph: RobotGraph) -> Iterator[str]:
+    """Yield what is wrong with services and actions, a sentence each."""
+    for offers, verb in ((graph.services, "call"), (graph.actions, "send")):
+        for offer in offers.values():
+            if not offer.servers:
+                goals = "goals to " if verb == "send" else ""
+                yield f"{does(offer.clients, verb)} {goals}{offer.name}, but no node is its server."
+            elif len(offer.servers) > 1 and offer.name != ACTION:
+                yield f"{nodes(offer.servers)} are all servers of {offer.name}: one is right."
+
+
+def nodes(names: Iterable[str]) -> str:
+    """Return the names of nodes as a phrase."""
+    return listed(sorted(name.removeprefix("/") for name in names))
+
+
+def listed(names: Iterable[str], last: str = "and") -> str:
+    """Return names as a phrase."""
+    *first, end = [*names] or ["none"]
+    return f"{', '.join(first)} {last} {end}" if first else end
+
+
+def does(names: Iterable[str], verb: str) -> str:
+    """Return who does it, with the verb in singular or plural."""
+    doers = list(names)
+    ending = ("es" if verb.endswith("sh") else "s") if len(doers) == 1 else ""
+    return f"{nodes(doers)} {verb}{ending}"

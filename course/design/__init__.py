@@ -1,0 +1,10 @@
+"""Designs: declare a robot's nodes and what connects them; they come up as real ROS 2 nodes.
+
+``course.Design`` is the way in. What travels between the nodes of a design is dye: see `dye`.
+"""
+
+from course.design.declaration import Design, NodeDeclaration
+from course.design.dye import carry
+from course.design.endpoints import DesignError
+
+__all__ = ["Design", "DesignError", "NodeDeclaration", "carry"]

@@ -1,0 +1,84 @@
+"""A design as a graph (Mermaid, which JupyterLab draws) and as text that says the same."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from course.design.endpoints import Endpoint
+from course.design.findings import Link, links
+
+if TYPE_CHECKING:
+    from course.design.declaration import Design, NodeDeclaration
+
+_SHAPES = {"msg": ('(["', '"])'), "srv": ('{{"', '"}}'), "action": ('[["', '"]]')}
+_WORDS = {"msg": "topic", "srv": "service", "action": "action"}
+
+
+def mermaid(design: Design) -> str:
+    """Return the graph: nodes are boxes, topics round, services hexagons, actions framed."""
+    nodes = {label: f"n{number}" for number, label in enumerate(design.nodes)}
+    lines = ["flowchart LR"]
+    lines += [f'  {key}["<b>{label}</b>"]' for label, key in nodes.items()]
+    for number, link in enumerate(links(design.nodes.values())):
+        lines += _drawn(link, f"l{number}", nodes, link.name in design.outside)
+    return "\n".join(lines)
+
+
+def _drawn(link: Link, key: str, nodes: dict[str, str], outside: bool) -> Iterator[str]:
+    begin, end = _SHAPES[link.kind]
+    types = ", ".join(dict.fromkeys(e.type_name.split("/")[-1] for _, e in link.ends))
+    yield f"  {key}{begin}{link.name}<br/><small>{types}</small>{end}"
+    arrow = "-->" if link.kind == "msg" else "-.->"
+    yield from (f"  {nodes[label]} {arrow} {key}" for label, _ in link.writers)
+    yield from (f"  {key} {arrow} {nodes[label]}" for label, _ in link.readers)
+    if outside:
+        if not link.writers:
+            yield f"  o{key}((outside)) {arrow} {key}"
+        if not link.readers:
+            yield f"  {key} {arrow} o{key}((outside))"
+
+
+def text(design: Design) -> str:
+    """Return the same as text: nodes, links, and what is worth another look."""
+    if not design.nodes:
+        return "A design without nodes: begin with design.node('name')."
+    connections = links(design.nodes.values())
+    lines = [f"A design of {len(design.nodes)} nodes and {len(connections)} links", "", "Nodes"]
+    for node in design.nodes.values():
+        lines += [f"  {line}" for line in node_lines(node)]
+    lines += ["", "Links"]
+    lines += [f"  {_in_words(link, link.name in design.outside)}" for link in connections]
+    if found := design.findings():
+        lines += ["", "Look again", *(f"  {sentence}" for sentence in found)]
+    return "\n".join(lines)
+
+
+def node_lines(node: NodeDeclaration) -> list[str]:
+    """Return a node and its endpoints, a line each."""
+    own = " (a node of your own)" if node.factory is not None else ""
+    return [f"{node.label}{own}", *(f"    {_end_in_words(end)}" for end in node.endpoints)]
+
+
+def _end_in_words(end: Endpoint) -> str:
+    what = f"{end.role.replace('_', ' ')} {end.full_name} ({end.type_name}"
+    return f"{what}; {qos_in_words(end.qos)})" if end.role.kind == "msg" else f"{what})"
+
+
+def qos_in_words(qos: QoSProfile) -> str:
+    """Return reliability, durability and history of a profile as a phrase."""
+    words = [
+        "best effort" if qos.reliability == ReliabilityPolicy.BEST_EFFORT else "reliable",
+        "transient local" if qos.durability == DurabilityPolicy.TRANSIENT_LOCAL else "volatile",
+        "keep all" if qos.history == HistoryPolicy.KEEP_ALL else f"keep last {qos.depth}",
+    ]
+    return ", ".join(words)
+
+
+def _in_words(link: Link, outside: bool) -> str:
+    nobody = "(outside the design)" if outside else "(nobody)"
+    writers = ", ".join(label for label, _ in link.writers) or nobody
+    readers = ", ".join(label for label, _ in link.readers) or nobody
+    return f"{_WORDS[link.kind]} {link.name}: {writers} -> {readers}"

@@ -1,0 +1,143 @@
+"""What a node of a design is connected to: endpoints, their names, types and QoS."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from rclpy.exceptions import InvalidServiceNameException, InvalidTopicNameException
+from rclpy.expand_topic_name import expand_topic_name
+from rclpy.qos import QoSProfile, qos_profile_services_default
+from rclpy.validate_full_topic_name import validate_full_topic_name
+
+from course.errors import CourseError
+from course.runtime.names import type_name
+
+
+class DesignError(CourseError):
+    """A design that cannot be brought up; the message says which node, what, and the mend."""
+
+
+class Role(StrEnum):
+    """What a node does at an endpoint. The values are the methods that declare it."""
+
+    PUBLISHES = "publishes"
+    SUBSCRIBES = "subscribes"
+    SERVES = "serves"
+    CALLS = "calls"
+    ACTION_SERVER = "action_server"
+    ACTION_CLIENT = "action_client"
+
+    @property
+    def kind(self) -> str:
+        """``"msg"``, ``"srv"`` or ``"action"``: the kind of its type."""
+        if self in (Role.PUBLISHES, Role.SUBSCRIBES):
+            return "msg"
+        return "srv" if self in (Role.SERVES, Role.CALLS) else "action"
+
+    @property
+    def writes(self) -> bool:
+        """Whether it is the side that publishes, calls or sends goals."""
+        return self in (Role.PUBLISHES, Role.CALLS, Role.ACTION_CLIENT)
+
+
+_KINDS = {
+    "msg": ("get_fields_and_field_types", "a message type, such as LaserScan"),
+    "srv": ("Request", "a service type, such as GetPlan"),
+    "action": ("Goal", "an action type, such as NavigateTo"),
+}
+
+
+@dataclass(frozen=True)
+class Endpoint:
+    """One endpoint of a node. `full_name` is its name as the ROS graph spells it."""
+
+    role: Role
+    name: str
+    full_name: str
+    type: Any
+    qos: QoSProfile
+
+    @property
+    def type_name(self) -> str:
+        """The type's name as on the graph, such as ``sensor_msgs/msg/LaserScan``."""
+        return type_name(self.type)
+
+
+def endpoint(
+    role: Role, node: str, namespace: str, name: object, ros_type: object, qos: object
+) -> Endpoint:
+    """Return the endpoint that a node declares.
+
+    Raises:
+        DesignError: the name, the type or the QoS is none.
+    """
+    where = f"{node}.{role}({_shown(name)}, …)"
+    if not isinstance(name, str):
+        raise DesignError(f"{where}: the name comes first and is a text, then the type.")
+    return Endpoint(
+        role,
+        name,
+        _full_name(where, node, namespace, name),
+        _type(where, role, ros_type),
+        _qos(where, role, qos),
+    )
+
+
+def reason(error: Exception) -> str:
+    """Return what rclpy says about a name, without the place in its own source."""
+    first = str(error).splitlines()[0].partition(", at /")[0]
+    return (first.partition(": ")[2] or first).rstrip(": ")
+
+
+def _full_name(where: str, node: str, namespace: str, name: str) -> str:
+    try:
+        full = str(expand_topic_name(name, node, "/" + namespace.strip("/")))
+        validate_full_topic_name(full)
+    except (InvalidTopicNameException, InvalidServiceNameException, ValueError) as error:
+        raise DesignError(
+            f"{where}: {name!r} is not a name on the ROS graph: {reason(error)}."
+        ) from None
+    return full
+
+
+def _type(where: str, role: Role, ros_type: object) -> Any:
+    mark, wanted = _KINDS[role.kind]
+    if isinstance(ros_type, str):
+        ros_type = _load(where, ros_type)
+    if not isinstance(ros_type, type) and hasattr(ros_type, "get_fields_and_field_types"):
+        name = type(ros_type).__name__
+        raise DesignError(f"{where}: write the type {name}, not the message {name}().")
+    if not isinstance(ros_type, type) or not hasattr(ros_type, mark):
+        raise DesignError(f"{where} needs {wanted}, not {_shown(ros_type)}.")
+    return ros_type
+
+
+def _load(where: str, name: str) -> Any:
+    package, _, rest = name.partition("/")
+    kind, _, cls = rest.partition("/")
+    try:
+        return getattr(importlib.import_module(f"{package}.{kind}"), cls)
+    except (ImportError, AttributeError, ValueError):
+        raise DesignError(
+            f"{where}: there is no type {name!r} here; a type is written like "
+            "'sensor_msgs/msg/LaserScan'."
+        ) from None
+
+
+def _qos(where: str, role: Role, qos: object) -> QoSProfile:
+    if isinstance(qos, QoSProfile):
+        return qos
+    if qos is None:
+        return qos_profile_services_default if role.kind == "srv" else QoSProfile(depth=10)
+    if isinstance(qos, int) and not isinstance(qos, bool) and qos > 0:
+        return QoSProfile(depth=qos)
+    raise DesignError(f"{where}: qos is a QoSProfile or a depth of 1 or more, not {_shown(qos)}.")
+
+
+def _shown(value: object) -> str:
+    return value.__name__ if isinstance(value, type) else repr(value)[:60]

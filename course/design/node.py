@@ -1,0 +1,151 @@
+"""The real node behind a declaration: it passes dye from what it reads to what it writes."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from rclpy.action.client import ActionClient
+from rclpy.action.server import ActionServer, ServerGoalHandle
+from rclpy.client import Client
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.task import Future
+
+from course.design import dye
+from course.design.endpoints import Endpoint, Role
+
+REMEMBERED = 1000
+"""How many tags a node knows again; so many can be on their way at a time."""
+
+
+class DesignNode(Node):
+    """A node with the endpoints of a declaration.
+
+    A tag that comes in for the first time, by whatever endpoint, goes out by all of them: as a
+    message, a request or a goal. Each tag passes a node once, so a cycle in the graph is no loop.
+    """
+
+    def __init__(self, name: str, namespace: str, endpoints: Sequence[Endpoint]) -> None:
+        """Make the node; its outlets first, so that nothing comes in before there is a way out."""
+        super().__init__(name, namespace=namespace)
+        self._lock = threading.Lock()
+        self._known: deque[int] = deque(maxlen=REMEMBERED)
+        self._outlets: list[Callable[[int], None]] = []
+        self._unanswered: list[deque[int]] = []
+        for end in sorted(endpoints, key=lambda end: not end.role.writes):
+            _MAKERS[end.role](self, end)
+
+    def take(self, tag: int | None) -> None:
+        """Pass a tag on, unless it is none or has been here before."""
+        if tag is None:
+            return
+        with self._lock:
+            if tag in self._known:
+                return
+            self._known.append(tag)
+            for queue in self._unanswered:
+                queue.append(tag)
+        for let_out in self._outlets:
+            let_out(tag)
+
+    # Topics.
+
+    def _publish(self, end: Endpoint) -> None:
+        publisher = self.create_publisher(end.type, end.full_name, end.qos)
+        self._outlets.append(partial(self._send_message, publisher, end.type))
+
+    def _send_message(self, publisher: Publisher, msg_type: Any, tag: int) -> None:
+        message = msg_type()
+        if dye.mark(message, tag):
+            publisher.publish(message)
+
+    def _subscribe(self, end: Endpoint) -> None:
+        self.create_subscription(
+            end.type, end.full_name, lambda message: self.take(dye.read(message)), end.qos
+        )
+
+    # Services.
+
+    def _call(self, end: Endpoint) -> None:
+        client = self.create_client(end.type, end.full_name, qos_profile=end.qos)
+        self._outlets.append(partial(self._send_request, client, end.type))
+
+    def _send_request(self, client: Client, srv_type: Any, tag: int) -> None:
+        if client.service_is_ready():
+            request = srv_type.Request()
+            dye.mark(request, tag)
+            client.call_async(request).add_done_callback(self._take_outcome)
+
+    def _take_outcome(self, future: Future) -> None:
+        if not future.cancelled() and future.exception() is None:
+            self.take(dye.read(future.result()))
+
+    def _serve(self, end: Endpoint) -> None:
+        unanswered: deque[int] = deque(maxlen=REMEMBERED)
+        self._unanswered.append(unanswered)
+
+        def answer(request: Any, response: Any) -> Any:
+            asked = dye.read(request)
+            self.take(asked)
+            with self._lock:
+                # The client knows its own tag: it is told what else came in here.
+                others = [tag for tag in unanswered if tag != asked]
+                unanswered.clear()
+                unanswered.extend(others[1:])
+            if tag := (others[0] if others else asked):
+                dye.mark(response, tag)
+            return response
+
+        self.create_service(end.type, end.full_name, answer, qos_profile=end.qos)
+
+    # Actions.
+
+    def _send_goals(self, end: Endpoint) -> None:
+        client = ActionClient(self, end.type, end.full_name)
+        self._outlets.append(partial(self._send_goal, client, end.type))
+
+    def _send_goal(self, client: ActionClient, action_type: Any, tag: int) -> None:
+        goal = action_type.Goal()
+        if client.server_is_ready() and dye.mark(goal, tag):
+            client.send_goal_async(
+                goal, feedback_callback=lambda message: self.take(dye.read(message.feedback))
+            ).add_done_callback(self._follow_goal)
+
+    def _follow_goal(self, future: Future) -> None:
+        handle = None if future.exception() is not None else future.result()
+        if handle is not None and handle.accepted:
+            handle.get_result_async().add_done_callback(self._take_result)
+
+    def _take_result(self, future: Future) -> None:
+        if future.exception() is None and (answer := future.result()) is not None:
+            self.take(dye.read(answer.result))
+
+    def _carry_out_goals(self, end: Endpoint) -> None:
+        ActionServer(self, end.type, end.full_name, partial(self._execute, end.type))
+
+    def _execute(self, action_type: Any, goal: ServerGoalHandle) -> Any:
+        tag = dye.read(goal.request)
+        self.take(tag)
+        feedback, result = action_type.Feedback(), action_type.Result()
+        if tag is not None:
+            if dye.mark(feedback, tag):
+                goal.publish_feedback(feedback)
+            dye.mark(result, tag)
+        goal.succeed()
+        return result
+
+
+_MAKERS: dict[Role, Callable[[DesignNode, Endpoint], None]] = {
+    Role.PUBLISHES: DesignNode._publish,
+    Role.SUBSCRIBES: DesignNode._subscribe,
+    Role.CALLS: DesignNode._call,
+    Role.SERVES: DesignNode._serve,
+    Role.ACTION_CLIENT: DesignNode._send_goals,
+    Role.ACTION_SERVER: DesignNode._carry_out_goals,
+}

@@ -1,0 +1,188 @@
+"""The robot's graph: read off real nodes whole, and reasoned about as data."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import Twist
+from nav_msgs.srv import GetPlan
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import LaserScan
+from std_msgs.msg import Bool
+from test_msgs.action import Fibonacci
+
+from autograder.harness import Harness
+from autograder.rigs.robot_graph import End, Offer, RobotGraph, Topic, read_graph
+from autograder.rigs.robot_jobs import Jobs
+from course import Design, Session
+
+QOS = QoSProfile(depth=1)
+
+
+def topic(name: str, kind: str, writers: str, readers: str) -> Topic:
+    def ends(nodes: str) -> tuple[End, ...]:
+        return tuple(End(f"/{node}", kind, QOS) for node in nodes.split())
+
+    return Topic(name, ends(writers), ends(readers))
+
+
+def graph(*topics: Topic, services: Any = (), actions: Any = ()) -> RobotGraph:
+    nodes = {end.node for t in topics for end in (*t.writers, *t.readers)}
+    for offer in (*services, *actions):
+        nodes |= offer.servers | offer.clients
+    return RobotGraph(
+        frozenset(nodes),
+        {t.name: t for t in topics},
+        {o.name: o for o in services},
+        {o.name: o for o in actions},
+    )
+
+
+SCAN, ARRAY, TWIST = (
+    "sensor_msgs/msg/LaserScan",
+    "geometry_msgs/msg/PoseArray",
+    "geometry_msgs/msg/Twist",
+)
+
+
+def test_everything_of_a_design_is_read_and_nothing_of_the_infrastructure() -> None:
+    with Session() as subject, Session(domain_id=subject.domain_id) as examiner:
+        design = Design()
+        design.node("lidar", namespace="front").publishes("/scan", LaserScan)
+        design.node("navigation").subscribes("scan", LaserScan).action_server(
+            "go", Fibonacci
+        ).calls("plan", GetPlan)
+        design.node("planner").serves("plan", GetPlan).action_client("go", Fibonacci)
+        subject.run(Node, "with_parameters_and_a_log")
+        design.run(subject)
+        reader = examiner.run(Node, "examiner")
+        harness = Harness(lambda *_: subject, {})
+        assert harness._answer({"op": "mark", "name": "_mark_1"})["ok"]
+        examiner.until(
+            lambda: reader.count_publishers("/_mark_1") and reader.count_subscribers("/_mark_1"),
+            timeout=20,
+        )
+        examiner.until(partial(complete, reader), timeout=20)
+        seen = read_graph(reader)
+        assert seen.nodes == {
+            "/front/lidar", "/navigation", "/planner", "/with_parameters_and_a_log"
+        }  # fmt: skip
+        assert seen.topics == {"/scan": topic("/scan", SCAN, "front/lidar", "navigation")}
+        assert seen.services == {
+            "/plan": Offer("/plan", "nav_msgs/srv/GetPlan", {"/planner"}, {"/navigation"})
+        }
+        assert seen.actions == {
+            "/go": Offer("/go", "test_msgs/action/Fibonacci", {"/navigation"}, {"/planner"})
+        }
+
+
+def complete(reader: Node) -> bool:
+    """Whether the marker's endpoints are known by their node's name."""
+    ends = reader.get_publishers_info_by_topic("/_mark_1")
+    ends += reader.get_subscriptions_info_by_topic("/_mark_1")
+    return [end.node_name for end in ends] == ["_mark_1"] * 2
+
+
+def test_information_flows_along_the_kinds_that_are_asked_for() -> None:
+    seen = graph(
+        topic("/scan", SCAN, "lidar", "navigation"),
+        services=[Offer("/plan", "", {"/planner"}, {"/navigation"})],
+        actions=[Offer("/follow", "", {"/controller"}, {"/navigation"})],
+    )
+    assert seen.reached({"/lidar"}, ("topic",)) == {"/lidar", "/navigation"}
+    assert "/planner" in seen.reached({"/lidar"}, ("topic", "request"))
+    assert "/controller" in seen.reached({"/lidar"}, ("topic", "goal"))
+    assert seen.reached({"/planner"}, ("topic", "request")) == {"/planner"}
+    assert "/navigation" in seen.reached({"/planner"}, ("response",))
+    assert "/navigation" in seen.reached({"/controller"}, ("feedback",))
+
+
+def test_a_cycle_ends() -> None:
+    seen = graph(topic("/a", TWIST, "x", "y"), topic("/b", TWIST, "y", "x"))
+    assert seen.reached({"/x"}, ("topic",)) == {"/x", "/y"}
+
+
+def test_a_filtered_scan_is_still_a_scan() -> None:
+    jobs = Jobs(
+        graph(
+            topic("/scan", SCAN, "lidar", "filter"),
+            topic("/scan/filtered", SCAN, "filter", "detector"),
+            topic("/obstacles", ARRAY, "detector", "controller"),
+            topic("/motors/command", TWIST, "controller", ""),
+        )
+    )
+    assert [t.name for t in jobs.obstacle_topics] == ["/obstacles"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "readers"),
+    [
+        (SCAN, "controller"),
+        (TWIST, "controller"),
+        ("geometry_msgs/msg/PoseStamped", "controller"),
+        (f"std_msgs/msg/{Bool.__name__}", "controller"),
+        (ARRAY, "display"),
+        (ARRAY, "detector"),
+        (ARRAY, ""),
+    ],
+)
+def test_not_everything_that_a_detector_publishes_is_obstacle_information(
+    kind: str, readers: str
+) -> None:
+    jobs = Jobs(
+        graph(
+            topic("/scan", SCAN, "lidar", "detector"),
+            topic("/obstacles", kind, "detector", readers),
+            topic("/motors/command", TWIST, "controller", ""),
+        )
+    )
+    assert jobs.obstacle_topics == []
+
+
+def test_a_map_is_known_by_topic_by_service_and_by_costmap() -> None:
+    grid = "nav_msgs/msg/OccupancyGrid"
+    jobs = Jobs(
+        graph(
+            topic("/map", grid, "server", "costmap localization"),
+            topic("/costmap", grid, "costmap", "planner"),
+            topic("/pose", "geometry_msgs/msg/PoseStamped", "localization", "display"),
+            services=[Offer("/map/get", "nav_msgs/srv/GetMap", {"/server"}, {"/other"})],
+        )
+    )
+    assert jobs.map_readers == {"/costmap", "/localization", "/planner", "/other"}
+
+
+def test_only_services_on_the_way_to_the_motors_are_named() -> None:
+    jobs = Jobs(
+        graph(
+            topic("/scan", SCAN, "lidar", "detector"),
+            topic("/obstacles", ARRAY, "detector", "navigation"),
+            topic("/motors/command", Twist.__name__, "controller", ""),
+            services=[
+                Offer("/plan", "", {"/planner"}, {"/navigation"}),
+                Offer("/set_velocity", "", {"/controller"}, {"/navigation"}),
+            ],
+        )
+    )
+    assert jobs.services_on_the_way() == ["/set_velocity"]
+    assert not jobs.leads_to_motors(jobs.obstacle_topics[0], ("topic", "goal"))
+
+
+def test_a_debugging_pose_is_not_held_against_a_busy_node() -> None:
+    pose, odometry = "geometry_msgs/msg/PoseStamped", "nav_msgs/msg/Odometry"
+    topics = [
+        topic("/wheel/odometry", odometry, "driver", "estimator pilot"),
+        topic("/pose", pose, "estimator", "pilot"),
+        topic("/target", pose, "pilot", "display"),
+        topic("/map", "nav_msgs/msg/OccupancyGrid", "server", "pilot"),
+        topic("/motors/command", TWIST, "pilot", ""),
+    ]
+    services = [Offer("/plan", "", {"/pilot"}, {"/navigation"})]
+    jobs = Jobs(graph(*topics, services=services)).of_each_node()
+    assert jobs["/pilot"] == ["plans paths", "controls the motors"]
+    assert jobs["/estimator"] == ["estimates the state"]
+    alone = Jobs(graph(topics[0], *topics[2:], services=services)).of_each_node()
+    assert alone["/pilot"] == ["estimates the state", "plans paths", "controls the motors"]

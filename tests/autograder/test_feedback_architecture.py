@@ -1,0 +1,61 @@
+"""What a student reads about an architecture: whole reports, compared with golden texts."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from autograder import corpus, exams, points
+from autograder.corpus import trials
+from autograder.report import Report
+from autograder.rigs.architecture import NAVIGATE_TO, NAVIGATE_TO_TEXT
+
+from .conftest import SUBMISSIONS
+
+EXAM = "architecture"
+GOLDEN = Path(__file__).parent / "golden"
+CASES = {case.name: case for case in corpus.load(SUBMISSIONS, EXAM)}
+
+
+@pytest.fixture(scope="module")
+def notebooks() -> trials.Notebooks:
+    return trials.notebooks(EXAM)
+
+
+@pytest.mark.parametrize(
+    ("name", "hints"),
+    [
+        ("wrong-stub", 1),
+        ("wrong-obstacles-on-request", 3),
+        ("wrong-velocity-by-service", 2),
+        ("wrong-detector-mute", 1),
+    ],
+)
+def test_the_whole_report_is_the_golden_one(
+    name: str, hints: int, notebooks: trials.Notebooks
+) -> None:
+    (trial,) = trials.run([CASES[name]], *notebooks, jobs=1)
+    verdicts = trial.outcome.verdicts
+    text = "\n\n".join(
+        repr(Report(verdicts[f"{EXAM}-{part}"], hints=hints)) for part in points.table()[EXAM].parts
+    )
+    golden = GOLDEN / f"{EXAM}-{name}.txt"
+    if "WRITE_GOLDEN" in os.environ:
+        golden.write_text(text + "\n", encoding="utf-8")
+    assert text + "\n" == golden.read_text(encoding="utf-8")
+
+
+def test_the_examiner_has_the_action_that_the_notebook_gives(notebooks: trials.Notebooks) -> None:
+    source, _ = notebooks
+    given = next(cell for cell in source.cells if cell.id == f"{EXAM}-given")
+    assert f"'{NAVIGATE_TO}'" in given.source
+    assert NAVIGATE_TO_TEXT in given.source
+
+
+def test_nothing_of_the_grader_is_in_what_a_student_reads() -> None:
+    for check in exams.load(EXAM).checks.values():
+        for text in (check.title, check.rationale, *check.hints, check.read):
+            assert "autograder" not in text
+            assert "rig" not in text.split()

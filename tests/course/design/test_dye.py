@@ -1,0 +1,111 @@
+"""Dye: a tag goes into messages of any type that has room for it, and comes out again."""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from geometry_msgs.msg import PoseStamped, Twist
+from nav_msgs.msg import Path
+from nav_msgs.srv import GetPlan
+from sensor_msgs.msg import Image, LaserScan
+from std_msgs.msg import (
+    Bool,
+    ByteMultiArray,
+    Empty,
+    Float32,
+    Float32MultiArray,
+    String,
+    UInt8,
+    UInt8MultiArray,
+)
+from std_srvs.srv import Trigger
+from test_msgs.action import Fibonacci
+from test_msgs.msg import Arrays, BoundedSequences, MultiNested, UnboundedSequences
+
+from course.design import carry, dye
+
+PACKAGES = ("std_msgs", "sensor_msgs", "geometry_msgs", "nav_msgs", "diagnostic_msgs", "test_msgs")
+
+
+def message_types() -> Iterator[Any]:
+    for package in PACKAGES:
+        for cls in vars(importlib.import_module(f"{package}.msg")).values():
+            if inspect.isclass(cls) and hasattr(cls, "get_fields_and_field_types"):
+                yield cls
+
+
+@pytest.mark.parametrize("tag", [dye.TAGS[0], dye.TAGS[-1], 8_388_609])
+def test_every_installed_type_with_room_gives_back_what_it_was_marked_with(tag: int) -> None:
+    marked = 0
+    for msg_type in message_types():
+        message = msg_type()
+        assert dye.read(message) is None, msg_type
+        if dye.mark(message, tag):
+            assert dye.read(message) == tag, msg_type
+            assert isinstance(message, msg_type)
+            marked += 1
+    assert marked >= 90
+
+
+@pytest.mark.parametrize(
+    "msg_type",
+    [Arrays, BoundedSequences, ByteMultiArray, Float32MultiArray, Image, LaserScan, MultiNested,
+     Path, Twist, UInt8MultiArray, UnboundedSequences, GetPlan.Request, Fibonacci.Goal,
+     Fibonacci.Feedback, Trigger.Response],
+    ids=lambda cls: cls.__name__,
+)  # fmt: skip
+def test_messages_requests_goals_and_feedback_have_room(msg_type: Any) -> None:
+    assert dye.has_room(msg_type)
+
+
+@pytest.mark.parametrize("msg_type", [Bool, Empty, UInt8, Trigger.Request])
+def test_a_type_that_is_too_narrow_says_so_and_stays_as_it_was(msg_type: Any) -> None:
+    message = msg_type()
+    assert not dye.mark(message, dye.TAGS[0])
+    assert message == msg_type()
+
+
+def test_frame_ids_come_first_and_readings_stay_untouched() -> None:
+    scan = LaserScan(ranges=[1.0, 2.0])
+    dye.mark(scan, 2_000_000)
+    assert scan.header.frame_id == "dye-2000000"
+    assert list(scan.ranges) == [1.0, 2.0]
+    image = Image(encoding="rgb8")
+    dye.mark(image, 2_000_000)
+    assert image.encoding == "rgb8"
+
+
+@pytest.mark.parametrize(
+    "message",
+    [String(data="no dye-12 here"), Float32(data=float("nan")), Float32(data=float("inf")),
+     Float32(data=2_000_000.5), Twist(), Float32(data=-2_000_000.0)],
+)  # fmt: skip
+def test_an_ordinary_reading_is_no_tag(message: Any) -> None:
+    assert dye.read(message) is None
+
+
+def test_a_tag_survives_text_around_it() -> None:
+    assert dye.read(String(data="seen: dye-2000000 (left)")) == 2_000_000
+
+
+def test_carry_copies_a_tag_and_says_if_there_was_none() -> None:
+    pose, command = PoseStamped(), Twist()
+    assert not carry(pose, command)
+    dye.mark(pose, 3_000_000)
+    assert carry(pose, command)
+    assert dye.read(command) == 3_000_000
+    assert not carry(pose, Bool())
+
+
+@pytest.mark.parametrize("tag", [0, 7, 2**24])
+def test_only_tags_can_be_written(tag: int) -> None:
+    with pytest.raises(ValueError, match="A tag is a number from"):
+        dye.mark(Twist(), tag)
+
+
+def test_fresh_tags_are_tags() -> None:
+    assert all(dye.fresh_tag() in dye.TAGS for _ in range(100))
