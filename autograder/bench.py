@@ -40,6 +40,8 @@ class Subject:
     def open(self, *, threads: int = 1, sim_time: bool = False) -> None:
         """Begin a new session on the subject's side; nodes of an earlier one are stopped.
 
+        What these left in memory is collected, so that what is still there is really held.
+
         Without it, the first `start` begins one with a single thread and wall-clock time.
 
         Args:
@@ -48,14 +50,20 @@ class Subject:
         """
         self._ask("open", "a session", threads=threads, sim_time=sim_time)
 
-    def start(self, name: str) -> str:
+    def start(self, name: str, *args: Any, bare: bool = False) -> str:
         """Make a node of a class of the notebook and spin it; return its fully qualified name.
+
+        Args:
+            name: the class.
+            args: what its constructor is given, as JSON.
+            bare: if the constructor raises, nobody tidies up after it, as in a program without a
+                session: what is then left is the class's own doing.
 
         Raises:
             StudentError: the class is missing or its constructor raised.
             SubjectGone: the process ended or hangs.
         """
-        return str(self._ask("start", name)["node"])
+        return str(self._ask("start", name, args=args, bare=bare)["node"])
 
     def start_all(self, name: str) -> dict[str, str]:
         """Make every node that an object of the notebook declares; return {label: node name}.

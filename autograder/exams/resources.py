@@ -1,0 +1,579 @@
+"""Exercise 4: a camera driver that gives back what it takes, as a plain and as a managed node.
+
+Every bound below is a sentence of the task, so any design that keeps to the task passes: with a
+worker thread or without, with callbacks in one executor thread or in several, with inheritance,
+composition or a context manager behind ``destroy_node()``.
+"""
+
+from __future__ import annotations
+
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+from autograder.exam import Exam, Failed
+from autograder.rigs.camera import (
+    IMAGE,
+    PERIOD,
+    SETTLE,
+    SNAPSHOT,
+    CameraRig,
+    camera_rig,
+    phrase,
+)
+from autograder.rigs.lives import DRIVER, LIVES, MEMORY, attempt, failing_starts, growth, leaks
+from autograder.rigs.managed import Managed
+
+EXAM: Exam[CameraRig] = Exam("resources", camera_rig)
+
+MANAGED = "ManagedCamera"
+STEPS = 10
+FAILING_STARTS = 10
+
+READ_NODES = "Chapter 5, “Lifecycle management” and “Resource management” of nodes"
+READ_MANAGED = "ROS 2 design, “Managed nodes”"
+
+
+def _picture(rig: CameraRig, device: str) -> None:
+    """Fail unless a picture of ``device`` comes over the topic."""
+    if not rig.see(device):
+        raise Failed(
+            expected=f"Pictures of the camera {device!r} come on {IMAGE}.",
+            actual=f"In {SETTLE / PERIOD * PERIOD:.0f} s of the robot's time none came"
+            f"{rig.raised()}.",
+        )
+
+
+def _rate(rig: CameraRig, device: str, rate: float) -> None:
+    """Fail unless in a second of simulated time about ``rate`` pictures of ``device`` come."""
+    before = len(rig.pictures(device))
+    for step in range(1, STEPS + 1):
+        rig.advance(1 / STEPS)
+        # A thread may publish a moment after the timer: let it keep up.
+        rig.wait(lambda n=step: len(rig.pictures(device)) - before >= int(rate / STEPS * n) - 1)  # type: ignore[misc]
+    came = len(rig.pictures(device)) - before
+    if abs(came - rate) > 1:
+        raise Failed(
+            expected=f"In one second {rate:.0f} pictures come.",
+            actual=f"In one second of the robot's time {came} came{rig.raised()}.",
+        )
+
+
+def _held(rig: CameraRig, device: str) -> None:
+    """Fail unless the camera of ``device`` is open."""
+    if not rig.wait(lambda: rig.cameras(device)):
+        raise Failed(
+            expected=f"The node opens the camera it is told: {device!r}.",
+            actual="Your process has not opened that camera.",
+        )
+
+
+def _given_back(rig: CameraRig, device: str, when: str) -> None:
+    """Fail if the camera of ``device`` is not closed."""
+    if not rig.wait(lambda: not rig.cameras(device)):
+        raise Failed(
+            expected=f"{when} the camera is closed.",
+            actual=f"Your process still had the camera {device!r} open {SETTLE:.0f} s later.",
+        )
+
+
+def _nothing_on_graph(rig: CameraRig, when: str, node: str = "") -> None:
+    """Fail if an endpoint of the driver is on the graph."""
+    if rig.wait(lambda: not rig.endpoints(node)):
+        return
+    left = rig.endpoints(node)
+    before = len(rig.node.pictures)
+    rig.advance(1.0)
+    sent = len(rig.node.pictures) - before
+    more = f" In one more second it sent {sent} pictures." if sent else ""
+    raise Failed(
+        expected=f"{when} no endpoint of the driver is on the graph.",
+        actual=f"{SETTLE:.0f} s later there still was {phrase(left)}.{more}",
+    )
+
+
+def _snapshot(rig: CameraRig, device: str, when: str) -> None:
+    """Fail unless a snapshot is answered, and its picture comes without time passing."""
+    if not rig.wait(rig.node.snapshot.service_is_ready):
+        raise Failed(expected=f"There is a service {SNAPSHOT}.", actual="It is not on the graph.")
+    before = len(rig.pictures(device))
+    reply = rig.node.snapshot.call_async(Trigger.Request())
+    if not rig.wait(reply.done):
+        raise Failed(
+            expected=f"{when} {SNAPSHOT} answers.",
+            actual=f"No answer came within {SETTLE:.0f} s{rig.raised()}.",
+        )
+    if not reply.result().success:
+        raise Failed(
+            expected=f"{when} {SNAPSHOT} succeeds.", actual="It answered with success=False."
+        )
+    if not rig.wait(lambda: len(rig.pictures(device)) > before):
+        raise Failed(
+            expected=f"{when} {SNAPSHOT} publishes a picture on {IMAGE} at once.",
+            actual="It answered, but no picture came.",
+        )
+
+
+def _zoom(rig: CameraRig, device: str, factor: int, when: str) -> None:
+    """Fail unless pictures come with the zoom ``factor`` soon after it was sent."""
+    for _ in range(int(SETTLE / PERIOD)):
+        rig.node.zoom.publish(Int32(data=factor))
+        _snapshot(rig, device, when)
+        if rig.wait(lambda: rig.pictures(device)[-1].zoom == factor, PERIOD):
+            return
+    raise Failed(
+        expected=f"{when} a zoom of {factor} on camera/zoom is followed.",
+        actual=f"The pictures went on with a zoom of {rig.pictures(device)[-1].zoom}"
+        f"{rig.raised()}.",
+    )
+
+
+@EXAM.check(
+    hints=(
+        "Try it beside the check: `course.run(CameraDriver)`, and then `course.logs()`.",
+        "Compare names and types of the four endpoints with the row “Running” of the table.",
+        "Open Camera(device), start() it, publish read() from a 0.1 s timer; zoom() and a second "
+        "read() belong into the callbacks of camera/zoom and camera/snapshot.",
+    ),
+    read="Chapter 5, “Nodes: the processing units”",
+)
+def driver_runs(rig: CameraRig) -> None:
+    """The driver opens its camera, sends ten pictures a second, zooms, and takes snapshots.
+
+    Only a node that does its work has something to clean up.
+    """
+    device = rig.device()
+    with rig.life(DRIVER, device):
+        _held(rig, device)
+        _picture(rig, device)
+        _rate(rig, device, 1 / PERIOD)
+        _zoom(rig, device, 3, "While the driver runs")
+
+
+@EXAM.check(
+    needs=("driver_runs",),
+    hints=(
+        "Which method of rclpy's Node takes its publishers, subscriptions and services down?",
+        "If you override destroy_node(), the inherited one is not called by itself.",
+        "End your own destroy_node() with super().destroy_node(), whatever happened before.",
+    ),
+    read=READ_NODES,
+)
+def endpoints_gone(rig: CameraRig) -> None:
+    """After destroy_node() nothing of the driver is on the graph any more.
+
+    An endpoint that is left is a ghost: others wait for its answers, or take an old picture for a
+    new one.
+    """
+    device = rig.device()
+    with rig.life(DRIVER, device) as node:
+        _picture(rig, device)
+        rig.destroy(DRIVER)
+        _nothing_on_graph(rig, "After destroy_node()", node)
+
+
+@EXAM.check(
+    needs=("driver_runs",),
+    hints=(
+        "Who closes the camera in your code, and when?",
+        "rclpy destroys what it made: endpoints and timers. The camera is not one of them.",
+        "Override destroy_node(): end the thread, call self.camera.close(), then "
+        "super().destroy_node().",
+    ),
+    read=READ_NODES,
+)
+def camera_given_back(rig: CameraRig) -> None:
+    """After destroy_node() the camera is closed, and the driver can be started again.
+
+    A device can be open once. If a driver dies with it open, no restart helps: “device is busy”.
+    """
+    device = rig.device()
+    for _ in range(2):
+        with rig.life(DRIVER, device):
+            _picture(rig, device)
+            rig.stop(DRIVER)
+            _given_back(rig, device, "After destroy_node()")
+
+
+@EXAM.check(
+    needs=("endpoints_gone", "camera_given_back"),
+    hints=(
+        "Write down what your constructor makes. What of it does destroy_node() not end?",
+        "A thread that waits for ever in queue.get() never ends; a list of the class, or a function "
+        "registered with atexit, keeps a whole node alive.",
+        "Wake your thread in destroy_node() (put an end mark into its queue) and join() it; keep "
+        "what belongs to one life in attributes that are set in __init__.",
+    ),
+    read=READ_NODES,
+)
+def lives_are_flat(rig: CameraRig) -> str:
+    """Over 50 lives the driver's process keeps its threads, files and memory.
+
+    A robot is switched on for weeks. What one life leaves behind, however little, adds up until a
+    thread or a file cannot be made any more, and it then fails in a node that did nothing wrong.
+    """
+    with rig.trying():
+        grown = growth(rig)
+    if leaked := leaks(grown):
+        raise Failed(
+            expected=f"50 lives leave no thread and no file behind, and less than {MEMORY} KiB a "
+            "life.",
+            actual=f"Each life of the driver left {phrase(leaked)} behind.",
+        )
+    return ""
+
+
+@EXAM.check(
+    needs=("camera_given_back",),
+    hints=(
+        "Who may call destroy_node() besides you? A session does, and a test, and a `finally:`.",
+        "Look at each line of your destroy_node(): what does it find when it runs again?",
+        "Set what you have given back to None, and ask `is not None` before you give it back.",
+    ),
+    read=READ_NODES,
+)
+def cleanup_twice(rig: CameraRig) -> None:
+    """Calling destroy_node() twice does no harm.
+
+    Cleanup is called from several places: an error handler, a signal, the end of the program. The
+    one that comes second must not turn an orderly end into a crash.
+    """
+    device = rig.device()
+    with rig.life(DRIVER, device):
+        rig.destroy(DRIVER)
+        rig.destroy(DRIVER)
+        _given_back(rig, device, "After destroy_node()")
+
+
+@EXAM.check(
+    needs=("endpoints_gone", "camera_given_back"),
+    hints=(
+        "Let each line of your constructor raise in your mind. What is open at that moment?",
+        "The camera 'stuck' opens, but its stream does not start. Try CameraDriver('stuck') twice: "
+        "does the second try say that it is in use?",
+        "Set every attribute that destroy_node() looks at to None first, put the rest of the "
+        "constructor into try, and in `except BaseException:` call self.destroy_node() and raise.",
+    ),
+    read=READ_NODES,
+)
+def failed_start(rig: CameraRig) -> None:
+    """A driver that cannot start says so, and leaves nothing behind.
+
+    A supervisor tries again every few seconds while the cable is unplugged. If each try leaves a
+    half-made node on the graph, the robot is full of ghosts when the camera is back.
+    """
+    for kind in ("unplugged", "stuck"):
+        with rig.trying():
+            before = rig.nodes()
+            device = rig.device(kind)
+            attempt(rig, device)
+            when = f"After CameraDriver({device!r}) has raised"
+            _given_back(rig, device, when)
+            _nothing_on_graph(rig, when)
+            if not rig.wait(lambda known=before: set(rig.nodes()) <= set(known)):  # type: ignore[misc]
+                left = sorted(set(rig.nodes()) - set(before))
+                raise Failed(
+                    expected=f"{when} the graph has no node of it.",
+                    actual=f"{SETTLE:.0f} s later there still was {phrase(left)}.",
+                )
+            failing_starts(rig, kind, FAILING_STARTS)
+
+
+@EXAM.check(
+    hints=(
+        "Try it beside the check: `course.run(ManagedCamera)`; which of its on_…() methods run?",
+        "on_configure opens the camera and makes a lifecycle publisher, on_activate starts stream "
+        "and timer, on_deactivate stops both.",
+        "Each on_…() returns TransitionCallbackReturn.SUCCESS; a lifecycle publisher sends only if "
+        "your on_activate ends with `return super().on_activate(state)`.",
+    ),
+    read=READ_MANAGED,
+)
+def managed_runs(rig: CameraRig) -> None:
+    """The managed camera goes through its states, and sends pictures when it is active.
+
+    A supervisor brings a robot up in step: all devices are opened and found in order before the
+    first one moves.
+    """
+    device = rig.device()
+    with rig.life(MANAGED) as name:
+        node = Managed(rig, name)
+        node.require(device=device)
+        node.go("configure")
+        _held(rig, device)
+        node.go("activate")
+        _picture(rig, device)
+        _rate(rig, device, 10)
+        node.go("deactivate", "cleanup", "shutdown")
+
+
+@EXAM.check(
+    needs=("managed_runs",),
+    hints=(
+        "What still runs in your node between deactivate and activate?",
+        "A lifecycle publisher drops what is published while it is inactive: you do not see a timer "
+        "that goes on, the camera does.",
+        "Make the timer in on_activate; in on_deactivate destroy_timer() it and stop() the camera, "
+        "then return super().on_deactivate(state).",
+    ),
+    read=READ_MANAGED,
+)
+def silent_when_inactive(rig: CameraRig) -> None:
+    """While it is inactive the camera's stream stands still and nothing is sent.
+
+    “Inactive” is a promise: the supervisor may now move the camera's arm, or give the bandwidth to
+    somebody else.
+    """
+    device = rig.device()
+    with rig.life(MANAGED) as name:
+        node = Managed(rig, name)
+        node.require(device=device)
+        node.go("configure")
+        _still(rig, device, "configure")
+        node.go("activate")
+        _picture(rig, device)
+        # What was read is on its way: let it arrive.
+        rig.wait(lambda: rig.pictures(device)[-1].number == max(rig.cameras(device)) - 1, 1.0)
+        node.go("deactivate")
+        sent = len(rig.pictures(device))
+        _still(rig, device, "deactivate")
+        asked = max(rig.cameras(device), default=0)
+        node.go("activate")
+        # Pictures of one publisher arrive in order: what was sent earlier is here by then.
+        fresh = rig.see(device, lambda: rig.pictures(device)[-1].number >= asked)
+        if not fresh:
+            raise Failed(
+                expected="After a second “activate” pictures come again.",
+                actual=f"None came{rig.raised()}.",
+            )
+        if old := [p for p in rig.pictures(device)[sent:] if p.number < asked]:
+            raise Failed(
+                expected="An inactive node publishes nothing.",
+                actual=f"It published {len(old)} pictures between deactivate and activate.",
+            )
+
+
+def _still(rig: CameraRig, device: str, transition: str) -> None:
+    """Fail if the camera is streaming or is asked for pictures while time passes."""
+    if not rig.wait(lambda: not rig.streams(device)):
+        raise Failed(
+            expected=f"After “{transition}” the camera's stream is stopped.",
+            actual="The stream went on: nobody called stop().",
+        )
+    before = list(rig.node.pictures), sum(rig.cameras(device))
+    rig.advance(1.0)
+    asked = sum(rig.cameras(device)) - before[1]
+    if asked:
+        raise Failed(
+            expected="An inactive node asks its camera for no picture: it has no timer.",
+            actual=f"In one second after “{transition}” it asked {asked} times.",
+        )
+
+
+@EXAM.check(
+    needs=("managed_runs",),
+    hints=(
+        "Compare what your on_configure makes with what your on_cleanup gives back.",
+        "Configured a second time, does your node use the new parameters, or those of the first?",
+        "In on_cleanup close() the camera, destroy_lifecycle_publisher() the publisher, and set "
+        "both to None; read the parameters in on_configure.",
+    ),
+    read=READ_MANAGED,
+)
+def managed_gives_back(rig: CameraRig) -> None:
+    """After “cleanup” the managed camera holds nothing, and can be configured anew.
+
+    This is how a driver gets new parameters without ending its process: what it still held from
+    its first configuration would be in the way of the second.
+    """
+    with rig.life(MANAGED) as name:
+        node = Managed(rig, name)
+        for rate in (10.0, 20.0):
+            device = rig.device()
+            node.require(device=device, rate=rate)
+            node.go("configure")
+            _held(rig, device)
+            if not rig.wait(lambda: rig.publishers() == 1):
+                raise Failed(
+                    expected=f"A configured node has one publisher on {IMAGE}.",
+                    actual=f"It had {rig.publishers()}.",
+                )
+            node.go("activate")
+            _picture(rig, device)
+            _rate(rig, device, rate)
+            node.go("deactivate", "cleanup")
+            _holds_nothing(rig, device, "After “cleanup”")
+
+
+def _holds_nothing(rig: CameraRig, device: str, when: str) -> None:
+    """Fail if a managed node holds a camera or a publisher."""
+    _given_back(rig, device, when)
+    if not rig.wait(lambda: not rig.publishers()):
+        raise Failed(
+            expected=f"{when} there is no publisher on {IMAGE}.",
+            actual=f"{SETTLE:.0f} s later there were {rig.publishers()}.",
+        )
+
+
+@EXAM.check(
+    needs=("managed_gives_back",),
+    hints=(
+        "What does your on_configure return for a rate of 0 Hz, and for a camera that is not there?",
+        "FAILURE leads back to unconfigured. What had you opened by then?",
+        "Check the rate first (return FAILURE), open the camera in try (return FAILURE on OSError), "
+        "and make the publisher last.",
+    ),
+    read=READ_MANAGED,
+)
+def configure_refused(rig: CameraRig) -> None:
+    """A configuration that is not possible leaves the node unconfigured, and it can try again.
+
+    A wrong parameter file must be found before the robot drives. A node that takes it as it is, or
+    that is stuck half way, is found out when the first picture is missing.
+    """
+    with rig.life(MANAGED) as name:
+        node = Managed(rig, name)
+        for rate, kind in ((0.0, "front"), (-5.0, "front"), (1000.0, "front"), (10.0, "unplugged")):
+            device = rig.device(kind)
+            what = f"a camera {kind!r}" if kind != "front" else f"a rate of {rate:g} Hz"
+            if not node.set(device=device, rate=rate):
+                continue  # refused even earlier: a parameter callback is as good
+            if (state := node.attempt("configure")) != "unconfigured":
+                raise Failed(
+                    expected=f"Configured with {what}, your node stays unconfigured.",
+                    actual=f"It is {state}.",
+                )
+            _holds_nothing(rig, device, f"After a “configure” with {what}")
+        device = rig.device()
+        node.require(device=device, rate=10.0)
+        node.go("configure", "activate")
+        _picture(rig, device)
+
+
+@EXAM.check(
+    needs=("managed_gives_back",),
+    hints=(
+        "Which of your methods runs after an exception in on_activate?",
+        "on_error. The one that you inherit returns SUCCESS and gives nothing back.",
+        "Give everything back in on_error as in on_cleanup, and return SUCCESS: the node is then "
+        "unconfigured. In on_activate let the exception of start() out, or return ERROR.",
+    ),
+    read=READ_MANAGED,
+)
+def activation_error(rig: CameraRig) -> None:
+    """A stream that does not start is an error, after which the node holds nothing.
+
+    The state machine has a place for what goes wrong. A node that pretends to be active sends no
+    picture; one that keeps the broken camera open cannot be repaired by a second “configure”.
+    """
+    with rig.life(MANAGED) as name:
+        node = Managed(rig, name)
+        device = rig.device("stuck")
+        node.require(device=device)
+        node.go("configure")
+        state = node.attempt("activate")
+        if state not in ("unconfigured", "finalized"):
+            raise Failed(
+                expected="If the stream does not start, your node ends unconfigured or finalized.",
+                actual=f"It is {state}.",
+            )
+        _holds_nothing(rig, device, "After the error")
+        if state == "unconfigured":
+            device = rig.device()
+            node.require(device=device)
+            node.go("configure", "activate")
+            _picture(rig, device)
+
+
+@EXAM.check(
+    needs=("managed_gives_back",),
+    hints=(
+        "From which states can a node be shut down? Which of your methods runs then?",
+        "on_shutdown, and neither on_deactivate nor on_cleanup before it.",
+        "Give everything back in on_shutdown as in on_cleanup, and in destroy_node() as well: look "
+        "whether each thing is there before you give it back.",
+    ),
+    read=READ_MANAGED,
+)
+def managed_shutdown(rig: CameraRig) -> None:
+    """A shutdown from any state, and destroy_node() in any state, gives everything back.
+
+    An emergency does not wait for deactivate and cleanup: whoever ends the node in the middle of
+    its work must find the camera closed.
+    """
+    paths = {"unconfigured": (), "inactive": ("configure",), "active": ("configure", "activate")}
+    for end in ("shutdown", "destroy_node()"):
+        for state, path in paths.items():
+            device = rig.device()
+            with rig.life(MANAGED) as name:
+                node = Managed(rig, name)
+                node.require(device=device)
+                node.go(*path)
+                if end == "shutdown":
+                    node.go("shutdown")
+                else:
+                    rig.stop(MANAGED)
+                _holds_nothing(rig, device, f"After {end} in the state {state}")
+
+
+@EXAM.check(
+    needs=("endpoints_gone", "camera_given_back"),
+    hints=(
+        "What had your zoom callback already done when camera.zoom(99) raised?",
+        "A lock that was acquired and not released stops whoever wants it next, in silence.",
+        "Hold locks with `with self.lock:`, which releases them on an exception, too.",
+    ),
+    read=READ_NODES,
+)
+def callback_raises(rig: CameraRig) -> None:
+    """A zoom that the camera refuses costs that one message, and nothing else.
+
+    Somebody will send a wrong value. The driver may refuse it, but it must go on working, and it
+    must still end cleanly.
+    """
+    device = rig.device()
+    with rig.life(DRIVER, device) as node:
+        _zoom(rig, device, 2, "While the driver runs")
+        rig.node.zoom.publish(Int32(data=99))
+        _zoom(rig, device, 5, "After a zoom of 99")
+        rig.stop(DRIVER)
+        _given_back(rig, device, "After destroy_node()")
+        _nothing_on_graph(rig, "After destroy_node()", node)
+
+
+@EXAM.check(
+    needs=("endpoints_gone", "camera_given_back"),
+    hints=(
+        "A callback waits for a picture, and destroy_node() runs in another thread. Who waits for "
+        "whom?",
+        "camera.close() ends every read() that waits with an OSError; an answer that your worker "
+        "will never give does not end.",
+        "Do not wait without end in a callback: let the read() itself be what it waits for, or give "
+        "the wait a timeout and look whether the driver is ending.",
+    ),
+    read=READ_NODES,
+)
+def cleanup_when_busy(rig: CameraRig) -> None:
+    """Cleanup while a callback still waits for the camera ends well, and a restart works.
+
+    Nobody stops a robot between two callbacks. If cleanup and callback wait for each other, the
+    process hangs with the camera open, and only the power switch helps.
+    """
+    device = rig.device("slow")
+    with rig.life(DRIVER, device) as node:
+        if not rig.wait(rig.node.snapshot.service_is_ready):
+            raise Failed(
+                expected=f"There is a service {SNAPSHOT}.", actual="It is not on the graph."
+            )
+        # When the first answer is here, the second picture is being exposed.
+        replies = [rig.node.snapshot.call_async(Trigger.Request()) for _ in range(4)]
+        if not rig.wait(lambda: any(reply.done() for reply in replies)):
+            raise Failed(
+                expected=f"{SNAPSHOT} answers when the picture is there.",
+                actual=f"No answer came within {SETTLE:.0f} s{rig.raised()}.",
+            )
+        rig.destroy(DRIVER)
+        _given_back(rig, device, "After destroy_node() during a snapshot")
+        _nothing_on_graph(rig, "After destroy_node() during a snapshot", node)
+        again = rig.device()
+        rig.start(DRIVER, again)
+        _zoom(rig, again, 4, "After a restart")

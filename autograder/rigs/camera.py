@@ -1,0 +1,232 @@
+"""The rig of the resources exam: looks at a camera driver on the graph, on the wire, in /proc.
+
+The library ``Camera`` that the notebook gives opens a memory file ``camera:<device>`` for a device
+and ``camera-stream:<device>`` for its stream, and moves the position in the first by one whenever
+somebody asks for a picture. So what a node does with its camera is seen from outside.
+"""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, NamedTuple
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import Image
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+from autograder.bench import Bench, StudentError
+from autograder.exam import Failed
+from autograder.rigs.process import Process
+from course import WaitTimeout
+
+IMAGE, ZOOM, SNAPSHOT = "camera/image", "camera/zoom", "camera/snapshot"
+
+SETTLE = 8.0
+"""Seconds that something expected may take: it takes milliseconds, on a busy machine a few s."""
+PERIOD = 0.1
+"""Seconds of simulated time between two pictures, and of wall time between two probes."""
+
+
+class Picture(NamedTuple):
+    """What a picture's pixels say: its device, its number since the device was opened, its zoom."""
+
+    device: str
+    number: int
+    zoom: int
+
+
+def _picture(message: Any) -> Picture | None:
+    label = bytes(message.data[:200]).split(b"\n")[0].decode(errors="replace")
+    found = re.fullmatch(r"([\w-]{1,100}) (\d{1,9}) (\d{1,3})", label)
+    return Picture(found[1], int(found[2]), int(found[3])) if found else None
+
+
+class ExaminerNode(Node):
+    """The examiner's endpoints; ``pictures`` come in the order of their arrival, each once."""
+
+    def __init__(self) -> None:
+        """Listen on the image topic, whichever reliability is offered."""
+        super().__init__(
+            f"examiner_{secrets.token_hex(4)}", start_parameter_services=False, enable_rosout=False
+        )
+        self.pictures: dict[Picture, None] = {}
+        # Without a handler of ours rclpy would log an incompatible profile as a warning.
+        events = SubscriptionEventCallbacks(
+            incompatible_qos=lambda _: None, use_default_callbacks=False
+        )
+        for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
+            qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=reliability)
+            self.create_subscription(Image, IMAGE, self._note, qos, event_callbacks=events)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.zoom = self.create_publisher(Int32, ZOOM, latched)
+        self.snapshot = self.create_client(Trigger, SNAPSHOT)
+
+    def _note(self, message: Any) -> None:
+        if (picture := _picture(message)) is not None:
+            self.pictures.setdefault(picture)
+
+
+class CameraRig:
+    """The examiner's view of one subject during the resources exam."""
+
+    def __init__(self, bench: Bench) -> None:
+        """Bring up the examiner's endpoints on the subject's domain."""
+        self.subject = bench.subject
+        self.session = bench.session
+        self.process = Process(bench.subject.pid)
+        node = bench.session.run(ExaminerNode)
+        assert isinstance(node, ExaminerNode)
+        self.node = node
+        self._clean = False
+
+    # The subject.
+
+    def fresh(self) -> None:
+        """Begin a new session on simulated time; nothing of an earlier one goes on."""
+        self.subject.open(sim_time=True)
+        self._clean = True
+
+    @contextmanager
+    def life(self, name: str, *args: Any) -> Iterator[str]:
+        """Give the full name of a node of the class ``name`` for one life.
+
+        It is stopped at the end, unless it is destroyed by then.
+        """
+        with self.trying():
+            node = self.start(name, *args)
+            yield node
+            self.stop(name)
+
+    @contextmanager
+    def trying(self) -> Iterator[None]:
+        """Begin with a clean session, and leave none to the next check if this one fails."""
+        if not self._clean:
+            self.fresh()
+        self._clean = False
+        yield
+        self._clean = True
+
+    def start(self, name: str, *args: Any) -> str:
+        """Make a node; return its fully qualified name."""
+        try:
+            return self.subject.start(name, *args)
+        except StudentError as error:
+            shown = ", ".join(repr(arg) for arg in args)
+            where = f" It happened here:\n{error.trace}" if error.trace else ""
+            raise Failed(
+                expected=f"{name}({shown}) makes a node without an error.",
+                actual=f"It raised {error}.{where}",
+            ) from None
+
+    def stop(self, name: str) -> None:
+        """Have the node taken out of its executor and destroyed."""
+        self._cleanup(name, lambda: self.subject.stop(name))
+
+    def destroy(self, name: str) -> None:
+        """Have ``destroy_node()`` called while the node spins."""
+        self._cleanup(name, lambda: self.subject.call(name, "destroy_node"))
+
+    def _cleanup(self, name: str, act: Callable[[], object]) -> None:
+        try:
+            act()
+        except StudentError as error:
+            where = f" It happened here:\n{error.trace}" if error.trace else ""
+            raise Failed(
+                expected=f"destroy_node() of {name} ends without an error.",
+                actual=f"It raised {error}.{where}",
+            ) from None
+
+    def advance(self, seconds: float) -> None:
+        """Move simulated time on."""
+        try:
+            self.subject.advance(seconds)
+        except StudentError as error:
+            raise Failed(
+                expected="Your callbacks return, so that the next one can run.",
+                actual=f"{error}{self.raised()}",
+            ) from None
+
+    def raised(self) -> str:
+        """Return what the student's callbacks raised, as the end of a sentence."""
+        errors = self.subject.errors()
+        return f" (a callback raised: {errors[-1]})" if errors else ""
+
+    # What is seen.
+
+    def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
+        """Wait until ``condition`` holds; return whether it did before the deadline."""
+        with suppress(WaitTimeout):
+            self.session.until(condition, timeout=timeout, what="an observation")
+            return True
+        return False
+
+    def device(self, kind: str = "front") -> str:
+        """Return a device that nobody else uses; ``kind`` is its name's beginning."""
+        return f"{kind}-{secrets.token_hex(4)}"
+
+    def cameras(self, device: str) -> list[int]:
+        """Return how often each open camera of ``device`` was asked for a picture."""
+        return self.process.positions(f"camera:{device}")
+
+    def streams(self, device: str) -> bool:
+        """Whether the stream of ``device`` runs."""
+        return bool(self.process.positions(f"camera-stream:{device}"))
+
+    def pictures(self, device: str) -> list[Picture]:
+        """Return the pictures of ``device`` that went over the topic, in order of arrival."""
+        return [picture for picture in list(self.node.pictures) if picture.device == device]
+
+    def see(self, device: str, condition: Callable[[], Any] | None = None) -> bool:
+        """Let time pass until ``condition`` (by default: that there is a picture) holds.
+
+        Endpoints find each other in their own time, and what is sent before is lost.
+        """
+        condition = condition or (lambda: self.pictures(device))
+        for _ in range(int(SETTLE / PERIOD)):
+            self.advance(PERIOD)
+            if self.wait(condition, PERIOD):
+                return True
+        return False
+
+    def publishers(self) -> int:
+        """Return how many publishers there are on the image topic."""
+        return int(self.node.count_publishers(IMAGE))
+
+    def endpoints(self, node: str = "") -> list[str]:
+        """Return the driver's endpoints that are on the graph, and whether ``node`` is."""
+        found = {
+            f"a publisher on {IMAGE}": self.publishers(),
+            f"a subscription to {ZOOM}": self.node.count_subscribers(ZOOM),
+            f"the service {SNAPSHOT}": self.node.count_services(SNAPSHOT),
+            f"the node {node}": node in self.nodes(),
+        }
+        return [what for what, count in found.items() if count]
+
+    def nodes(self) -> list[str]:
+        """Return the fully qualified names of the nodes on the graph."""
+        found = self.node.get_node_names_and_namespaces()
+        return [f"{namespace.rstrip('/')}/{name}" for name, namespace in found]
+
+
+@contextmanager
+def camera_rig(bench: Bench) -> Iterator[CameraRig]:
+    """Give a rig, and take the examiner's endpoints down afterwards."""
+    rig = CameraRig(bench)
+    try:
+        yield rig
+    finally:
+        bench.session.stop(rig.node)
+
+
+def phrase(items: list[str]) -> str:
+    """Return a list as a phrase: "a, b and c"."""
+    return " and ".join(part for part in (", ".join(items[:-1]), *items[-1:]) if part)
