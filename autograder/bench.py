@@ -40,7 +40,7 @@ class Subject:
     def open(self, *, threads: int = 1, sim_time: bool = False) -> None:
         """Begin a new session on the subject's side; nodes of an earlier one are stopped.
 
-        What these left in memory is collected, so that what is still there is really held.
+        These are collected as garbage, too, as `collect` does.
 
         Without it, the first `start` begins one with a single thread and wall-clock time.
 
@@ -79,6 +79,14 @@ class Subject:
     def stop(self, name: str) -> None:
         """Destroy the node made of a class, as a session does: its ``destroy_node`` is called."""
         self._ask("stop", name)
+
+    def collect(self) -> None:
+        """Have Python free what nobody refers to any more.
+
+        A node and its callbacks refer to each other: without it a destroyed node stays in memory,
+        and a lifecycle node's own services on the graph, until Python happens to look.
+        """
+        self._ask("collect", "garbage")
 
     def pause(self, name: str) -> None:
         """Stop executing the node's callbacks while its endpoints go on receiving."""
@@ -139,7 +147,7 @@ class Subject:
         except ChannelTimeout:
             self._gone = (
                 f"Your program did not answer within {timeout:.0f} s when it was asked to "
-                f"{doing}: does a constructor or a callback wait for ever?"
+                f"{doing}: does a constructor, a callback or a cleanup wait for ever?"
             )
             raise SubjectGone(self._gone) from None
         if not reply.get("ok"):

@@ -59,8 +59,8 @@ class Harness:
             operation = {
                 "open": self._open, "start": self._start, "start_all": self._start_all,
                 "stop": self._stop, "pause": self._pause, "resume": self._resume,
-                "advance": self._advance, "call": self._call, "value": self._value,
-                "errors": self._errors,
+                "collect": self._collect, "advance": self._advance, "call": self._call,
+                "value": self._value, "errors": self._errors,
             }[request["op"]]  # fmt: skip
             return {"ok": True, **operation(request)}
         except Exception as error:  # noqa: BLE001 - a student's code may raise anything
@@ -82,7 +82,7 @@ class Harness:
         session, self._session = self._session, None
         if session is not None:
             _close(session)
-            gc.collect()  # nodes are in cycles with their callbacks: nothing else frees them
+            gc.collect()
 
     def _open(self, request: dict[str, Any]) -> dict[str, Any]:
         self._close()
@@ -128,6 +128,10 @@ class Harness:
         node = self._nodes.pop(request["name"], None)
         if node is not None:
             self._hosting.stop(node)
+        return {}
+
+    def _collect(self, request: dict[str, Any]) -> dict[str, Any]:
+        gc.collect()
         return {}
 
     def _pause(self, request: dict[str, Any]) -> dict[str, Any]:

@@ -21,17 +21,19 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32
-from std_srvs.srv import Trigger
 
 from autograder.bench import Bench, StudentError
 from autograder.exam import Failed
 from autograder.rigs.process import Process
 from course import WaitTimeout
+from course.runtime.waiting import Deadline
 
 IMAGE, ZOOM, SNAPSHOT = "camera/image", "camera/zoom", "camera/snapshot"
 
 SETTLE = 8.0
 """Seconds that something expected may take: it takes milliseconds, on a busy machine a few s."""
+RESEND = 1.0
+"""Seconds after which a request that has no response is made again."""
 PERIOD = 0.1
 """Seconds of simulated time between two pictures, and of wall time between two probes."""
 
@@ -68,7 +70,6 @@ class ExaminerNode(Node):
             self.create_subscription(Image, IMAGE, self._note, qos, event_callbacks=events)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.zoom = self.create_publisher(Int32, ZOOM, latched)
-        self.snapshot = self.create_client(Trigger, SNAPSHOT)
 
     def _note(self, message: Any) -> None:
         if (picture := _picture(message)) is not None:
@@ -86,7 +87,9 @@ class CameraRig:
         node = bench.session.run(ExaminerNode)
         assert isinstance(node, ExaminerNode)
         self.node = node
+        self.memory = bench.memory
         self._clean = False
+        self._clients: dict[str, Any] = {}
 
     # The subject.
 
@@ -99,12 +102,28 @@ class CameraRig:
     def life(self, name: str, *args: Any) -> Iterator[str]:
         """Give the full name of a node of the class ``name`` for one life.
 
-        It is stopped at the end, unless it is destroyed by then.
+        It is stopped at the end, unless it is destroyed by then. What its cleanup raises then is
+        for another check to find.
         """
         with self.trying():
             node = self.start(name, *args)
             yield node
-            self.stop(name)
+        try:
+            self.subject.stop(name)
+            self._clean = self._vanishes(node)
+        except StudentError:
+            self._clean = False
+
+    def _vanishes(self, node: str) -> bool:
+        """Whether a node that was stopped goes off the graph.
+
+        rclpy 7.1 leaves the services of a destroyed lifecycle node there until it is collected; the
+        next node of that name must not be taken for it.
+        """
+        service = f"{node}/get_state"
+        if self.node.count_services(service):
+            self.subject.collect()
+        return self.wait(lambda: not self.node.count_services(service))
 
     @contextmanager
     def trying(self) -> Iterator[None]:
@@ -159,6 +178,30 @@ class CameraRig:
         """Return what the student's callbacks raised, as the end of a sentence."""
         errors = self.subject.errors()
         return f" (a callback raised: {errors[-1]})" if errors else ""
+
+    def ask(self, service: Any, name: str, request: Any, patience: float = SETTLE) -> Any:
+        """Call a service; return its response, or None if none came in ``patience`` seconds.
+
+        A response that goes out before its way back is known is lost: it is asked for again, so
+        this is for requests that may be made twice.
+        """
+        deadline = Deadline(patience)
+        client = self.client(service, name)
+        self.wait(client.service_is_ready, deadline.left)
+        replies: list[Any] = []
+        while deadline.left:
+            replies.append(client.call_async(request))
+            self.wait(lambda: any(reply.done() for reply in replies), min(RESEND, deadline.left))
+            for reply in replies:
+                if reply.done():
+                    return reply.result()
+        return None
+
+    def client(self, service: Any, name: str) -> Any:
+        """Return the client of a service, one for all lives of its server."""
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(service, name)
+        return self._clients[name]
 
     # What is seen.
 

@@ -6,6 +6,7 @@ threads of its own. What grows with each of 50 lives, in both halves of them, is
 
 from __future__ import annotations
 
+from autograder.bench import StudentError
 from autograder.exam import Failed
 from autograder.rigs.camera import CameraRig
 from autograder.rigs.process import Usage
@@ -25,7 +26,7 @@ def live(rig: CameraRig, lives: int) -> None:
         rig.stop(DRIVER)
         # A thread of the driver may close the camera a moment later.
         rig.wait(lambda: not rig.cameras(device))
-    rig.fresh()
+    rig.subject.collect()
 
 
 def growth(rig: CameraRig) -> Usage:
@@ -77,8 +78,6 @@ def failing_starts(rig: CameraRig, kind: str, times: int) -> None:
 
 def attempt(rig: CameraRig, device: str) -> None:
     """Start the driver on a ``device`` that has something wrong with it, as bare rclpy would."""
-    from autograder.bench import StudentError
-
     try:
         rig.subject.start(DRIVER, device, bare=True)
     except StudentError:

@@ -13,8 +13,8 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
 from autograder.exam import Failed
-from autograder.rigs.camera import SETTLE, CameraRig
-from course import WaitTimeout
+from autograder.rigs.camera import IMAGE, RESEND, SETTLE, CameraRig
+from autograder.rigs.driving import require_closed
 
 TRANSITIONS = {
     "configure": (Transition.TRANSITION_CONFIGURE, "inactive"),
@@ -22,6 +22,7 @@ TRANSITIONS = {
     "deactivate": (Transition.TRANSITION_DEACTIVATE, "inactive"),
     "cleanup": (Transition.TRANSITION_CLEANUP, "unconfigured"),
 }
+STATES = ("unconfigured", "inactive", "active", "finalized")
 SHUTDOWNS = {
     "unconfigured": Transition.TRANSITION_UNCONFIGURED_SHUTDOWN,
     "inactive": Transition.TRANSITION_INACTIVE_SHUTDOWN,
@@ -41,7 +42,7 @@ class Managed:
         """Set parameters; return whether the node took them all."""
         parameters = [Parameter(name=name, value=_value(value)) for name, value in values.items()]
         request = SetParameters.Request(parameters=parameters)
-        reply = self._call(SetParameters, "set_parameters", request)
+        reply = self._ask(SetParameters, "set_parameters", request)
         return all(result.successful for result in reply.results)
 
     def require(self, **values: str | float) -> None:
@@ -54,16 +55,27 @@ class Managed:
 
     def state(self) -> str:
         """Return the label of the node's state."""
-        return str(self._call(GetState, "get_state", GetState.Request()).current_state.label)
+        return str(self._ask(GetState, "get_state", GetState.Request()).current_state.label)
 
     def attempt(self, transition: str) -> str:
         """Ask for a transition; return the state that came of it."""
-        number = TRANSITIONS[transition][0] if transition in TRANSITIONS else None
-        if number is None:
+        if transition in TRANSITIONS:
+            number = TRANSITIONS[transition][0]
+        else:
             number = SHUTDOWNS[self.state()]
-        request = ChangeState.Request(transition=Transition(id=number))
-        self._call(ChangeState, "change_state", request)
-        return self.state()
+        client = self._rig.client(ChangeState, f"{self._node}/change_state")
+        self._rig.wait(client.service_is_ready)
+        reply = client.call_async(ChangeState.Request(transition=Transition(id=number)))
+        # The state says what came of it, even if the response is lost.
+        self._rig.wait(reply.done, RESEND)
+        states: list[str] = []
+        if not self._rig.wait(lambda: states.append(self.state()) or states[-1] in STATES):  # type: ignore[func-returns-value]
+            raise Failed(
+                expected=f"A “{transition}” comes to its end.",
+                actual=f"Your node is stuck in “{states[-1]}”{self._rig.raised()}. Each on_…() "
+                "method must return, and return a TransitionCallbackReturn.",
+            )
+        return states[-1]
 
     def go(self, *transitions: str) -> None:
         """Make transitions that must all succeed."""
@@ -75,15 +87,13 @@ class Managed:
                     actual=f"It is {state}{self._rig.raised()}.",
                 )
 
-    def _call(self, service: Any, name: str, request: Any) -> Any:
-        try:
-            reply = self._rig.session.call(service, f"{self._node}/{name}", request, SETTLE)
-        except WaitTimeout:
+    def _ask(self, service: Any, name: str, request: Any) -> Any:
+        reply = self._rig.ask(service, f"{self._node}/{name}", request)
+        if reply is None:
             raise Failed(
                 expected=f"Your node answers its service {self._node}/{name}.",
-                actual=f"No answer came within {SETTLE:.0f} s{self._rig.raised()}. Each of your "
-                "on_…() methods must return, and return a TransitionCallbackReturn.",
-            ) from None
+                actual=f"No answer came within {SETTLE:.0f} s{self._rig.raised()}.",
+            )
         return reply
 
 
@@ -91,3 +101,30 @@ def _value(value: str | float) -> ParameterValue:
     if isinstance(value, str):
         return ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
     return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+
+
+def require_still(rig: CameraRig, device: str, transition: str) -> None:
+    """Fail if the camera is streaming or is asked for pictures while time passes."""
+    if not rig.wait(lambda: not rig.streams(device)):
+        raise Failed(
+            expected=f"After “{transition}” the camera's stream is stopped.",
+            actual="The stream went on: nobody called stop().",
+        )
+    before = sum(rig.cameras(device))
+    rig.advance(1.0)
+    asked = sum(rig.cameras(device)) - before
+    if asked:
+        raise Failed(
+            expected="An inactive node asks its camera for no picture: it has no timer.",
+            actual=f"In one second after “{transition}” it asked {asked} times.",
+        )
+
+
+def require_nothing_held(rig: CameraRig, device: str, when: str) -> None:
+    """Fail if a managed node holds a camera or a publisher."""
+    require_closed(rig, device, when)
+    if not rig.wait(lambda: not rig.publishers()):
+        raise Failed(
+            expected=f"{when} there is no publisher on {IMAGE}.",
+            actual=f"{SETTLE:.0f} s later there were {rig.publishers()}.",
+        )
