@@ -12,8 +12,10 @@ from __future__ import annotations
 
 import re
 import secrets
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any, NamedTuple
 
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -30,8 +32,19 @@ from course.runtime.waiting import Deadline
 
 IMAGE, ZOOM, SNAPSHOT = "camera/image", "camera/zoom", "camera/snapshot"
 
+PUBLISHER = f"a publisher on {IMAGE}"
+SUBSCRIPTION = f"a subscription to {ZOOM}"
+SERVICE = f"a service {SNAPSHOT}"
+TYPES = {
+    PUBLISHER: "sensor_msgs/msg/Image",
+    SUBSCRIPTION: "std_msgs/msg/Int32",
+    SERVICE: "std_srvs/srv/Trigger",
+}
+
 SETTLE = 8.0
 """Seconds that something expected may take: it takes milliseconds, on a busy machine a few s."""
+GHOSTS = 1.0
+"""Seconds that endpoints of an earlier life are given to go off the graph."""
 RESEND = 1.0
 """Seconds after which a request that has no response is made again."""
 PERIOD = 0.1
@@ -53,27 +66,37 @@ def _picture(message: Any) -> Picture | None:
 
 
 class ExaminerNode(Node):
-    """The examiner's endpoints; ``pictures`` come in the order of their arrival, each once."""
+    """The examiner's endpoints, and what each of two readers got, in the order of its arrival."""
 
     def __init__(self) -> None:
         """Listen on the image topic, whichever reliability is offered."""
         super().__init__(
             f"examiner_{secrets.token_hex(4)}", start_parameter_services=False, enable_rosout=False
         )
-        self.pictures: dict[Picture, None] = {}
+        self.heard: dict[ReliabilityPolicy, list[Picture]] = {}
         # Without a handler of ours rclpy would log an incompatible profile as a warning.
         events = SubscriptionEventCallbacks(
             incompatible_qos=lambda _: None, use_default_callbacks=False
         )
         for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
             qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=reliability)
-            self.create_subscription(Image, IMAGE, self._note, qos, event_callbacks=events)
+            heard = self.heard[reliability] = []
+            note = partial(self._note, heard)
+            self.create_subscription(Image, IMAGE, note, qos, event_callbacks=events)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.zoom = self.create_publisher(Int32, ZOOM, latched)
 
-    def _note(self, message: Any) -> None:
+    def _note(self, heard: list[Picture], message: Any) -> None:
         if (picture := _picture(message)) is not None:
-            self.pictures.setdefault(picture)
+            heard.append(picture)
+
+    def of(self, device: str) -> list[Picture]:
+        """Return the pictures of ``device``, from the reliable reader if it gets any."""
+        reliable, any_offer = (
+            [picture for picture in list(heard) if picture.device == device]
+            for heard in self.heard.values()
+        )
+        return reliable or any_offer
 
 
 class CameraRig:
@@ -88,6 +111,8 @@ class CameraRig:
         assert isinstance(node, ExaminerNode)
         self.node = node
         self.memory = bench.memory
+        self._ghosts: set[bytes] = set()
+        self._ghost_nodes: Counter[str] = Counter()
         self._clean = False
         self._clients: dict[str, Any] = {}
 
@@ -127,9 +152,15 @@ class CameraRig:
 
     @contextmanager
     def trying(self) -> Iterator[None]:
-        """Begin with a clean session, and leave none to the next check if this one fails."""
+        """Begin with a clean session, and leave none to the next check if this one fails.
+
+        What a wrong design has left on the graph by now is not held against it again.
+        """
         if not self._clean:
             self.fresh()
+        self.wait(lambda: not self.endpoints(), GHOSTS)
+        self._ghosts = {end for _, end in self._endpoints()}
+        self._ghost_nodes = Counter(self.nodes())
         self._clean = False
         yield
         self._clean = True
@@ -153,6 +184,11 @@ class CameraRig:
     def destroy(self, name: str) -> None:
         """Have ``destroy_node()`` called while the node spins."""
         self._cleanup(name, lambda: self.subject.call(name, "destroy_node"))
+
+    def drop(self, name: str) -> None:
+        """Have the session let go of a node that is destroyed; it destroys it once more."""
+        with suppress(StudentError):
+            self.subject.stop(name)
 
     def _cleanup(self, name: str, act: Callable[[], object]) -> None:
         try:
@@ -226,7 +262,7 @@ class CameraRig:
 
     def pictures(self, device: str) -> list[Picture]:
         """Return the pictures of ``device`` that went over the topic, in order of arrival."""
-        return [picture for picture in list(self.node.pictures) if picture.device == device]
+        return self.node.of(device)
 
     def see(self, device: str, condition: Callable[[], Any] | None = None) -> bool:
         """Let time pass until ``condition`` (by default: that there is a picture) holds.
@@ -242,17 +278,41 @@ class CameraRig:
 
     def publishers(self) -> int:
         """Return how many publishers there are on the image topic."""
-        return int(self.node.count_publishers(IMAGE))
+        return sum(what == PUBLISHER and end not in self._ghosts for what, end in self._endpoints())
 
     def endpoints(self, node: str = "") -> list[str]:
         """Return the driver's endpoints that are on the graph, and whether ``node`` is."""
-        found = {
-            f"a publisher on {IMAGE}": self.publishers(),
-            f"a subscription to {ZOOM}": self.node.count_subscribers(ZOOM),
-            f"the service {SNAPSHOT}": self.node.count_services(SNAPSHOT),
-            f"the node {node}": node in self.nodes(),
+        there = [what for what, end in self._endpoints() if end not in self._ghosts]
+        more = self.nodes().count(node) > self._ghost_nodes[node]
+        return sorted(set(there)) + ([f"the node {node}"] if more else [])
+
+    def missing(self, node: str) -> list[str]:
+        """Return what the driver ``node`` lacks on the graph, or has with another type."""
+        services = dict(self.node.get_service_names_and_types())
+        types = {
+            PUBLISHER: {e.topic_type for e in self.node.get_publishers_info_by_topic(IMAGE)},
+            SUBSCRIPTION: {e.topic_type for e in self.node.get_subscriptions_info_by_topic(ZOOM)},
+            SERVICE: set(services.get(f"/{SNAPSHOT}", [])),
         }
-        return [what for what, count in found.items() if count]
+        there = self.endpoints(node)
+        found = [f"There is no {what[2:]} on the graph." for what in TYPES if what not in there]
+        found += [
+            f"There is {what} of the type {phrase(sorted(types[what]))}, not {wanted}."
+            for what, wanted in TYPES.items()
+            if what in there and wanted not in types[what]
+        ]
+        if not found and f"the node {node}" not in there:
+            found = [f"The node {node} is not on the graph."]
+        return found
+
+    def _endpoints(self) -> list[tuple[str, bytes]]:
+        found = {
+            PUBLISHER: self.node.get_publishers_info_by_topic(IMAGE),
+            SUBSCRIPTION: self.node.get_subscriptions_info_by_topic(ZOOM),
+            # A service has no endpoints in ROS's eyes; in DDS it reads its requests.
+            SERVICE: self.node.get_subscriptions_info_by_topic(f"rq/{SNAPSHOT}Request", True),
+        }
+        return [(what, bytes(end.endpoint_gid)) for what, ends in found.items() for end in ends]
 
     def nodes(self) -> list[str]:
         """Return the fully qualified names of the nodes on the graph."""

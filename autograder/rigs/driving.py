@@ -10,8 +10,21 @@ from std_srvs.srv import Trigger
 
 from autograder.exam import Failed
 from autograder.rigs.camera import IMAGE, PERIOD, SETTLE, SNAPSHOT, ZOOM, CameraRig, phrase
+from course.runtime.waiting import Deadline
 
 STEPS = 10
+
+
+def require_endpoints(rig: CameraRig, node: str) -> None:
+    """Fail unless the driver's endpoints are all on the graph, with their types.
+
+    Only what was seen to be there can be seen to go.
+    """
+    if rig.wait(lambda: not rig.missing(node)):
+        return
+    raise Failed(
+        expected="The driver has the endpoints of the task.", actual=" ".join(rig.missing(node))
+    )
 
 
 def require_picture(rig: CameraRig, device: str) -> None:
@@ -27,10 +40,12 @@ def require_picture(rig: CameraRig, device: str) -> None:
 def require_rate(rig: CameraRig, device: str, rate: float) -> None:
     """Fail unless in a second of simulated time about ``rate`` pictures of ``device`` come."""
     before = len(rig.pictures(device))
+    deadline = Deadline(SETTLE)
     for step in range(1, STEPS + 1):
         rig.advance(1 / STEPS)
         # A thread may publish a moment after the timer: let it keep up.
-        rig.wait(lambda n=step: len(rig.pictures(device)) - before >= int(rate / STEPS * n) - 1)  # type: ignore[misc]
+        due = before + int(rate / STEPS * step) - 1
+        rig.wait(lambda due=due: len(rig.pictures(device)) >= due, deadline.left)  # type: ignore[misc]
     came = len(rig.pictures(device)) - before
     if abs(came - rate) > 1:
         raise Failed(
@@ -57,14 +72,14 @@ def require_closed(rig: CameraRig, device: str, when: str) -> None:
         )
 
 
-def require_gone(rig: CameraRig, when: str, node: str = "") -> None:
+def require_gone(rig: CameraRig, device: str, when: str, node: str = "") -> None:
     """Fail if an endpoint of the driver is on the graph."""
     if rig.wait(lambda: not rig.endpoints(node)):
         return
     left = rig.endpoints(node)
-    before = len(rig.node.pictures)
+    before = len(rig.pictures(device))
     rig.advance(1.0)
-    sent = len(rig.node.pictures) - before
+    sent = len(rig.pictures(device)) - before
     more = f" In one more second it sent {sent} pictures." if sent else ""
     raise Failed(
         expected=f"{when} no endpoint of the driver is on the graph.",

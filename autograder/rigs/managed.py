@@ -128,3 +128,12 @@ def require_nothing_held(rig: CameraRig, device: str, when: str) -> None:
             expected=f"{when} there is no publisher on {IMAGE}.",
             actual=f"{SETTLE:.0f} s later there were {rig.publishers()}.",
         )
+
+
+def require_one_publisher(rig: CameraRig) -> None:
+    """Fail unless a node that is configured has exactly one publisher on the image topic."""
+    if not rig.wait(lambda: rig.publishers() == 1):
+        raise Failed(
+            expected=f"A configured node has one publisher on {IMAGE}.",
+            actual=f"It had {rig.publishers()}.",
+        )
