@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -103,16 +102,20 @@ class CameraRig:
     """The examiner's view of one subject during the resources exam."""
 
     def __init__(self, bench: Bench) -> None:
-        """Bring up the examiner's endpoints on the subject's domain."""
+        """Bring up the examiner's endpoints on the subject's domain, or go on with them.
+
+        They stay from one part of the exam to the next. New ones would have to find out anew what
+        is on the graph, and take what an earlier check left there for the next one's.
+        """
         self.subject = bench.subject
         self.session = bench.session
         self.process = Process(bench.subject.pid)
-        node = bench.session.run(ExaminerNode)
+        node = bench.memory.get(ExaminerNode.__name__) or bench.session.run(ExaminerNode)
         assert isinstance(node, ExaminerNode)
+        bench.memory[ExaminerNode.__name__] = node
         self.node = node
         self.memory = bench.memory
         self._ghosts: set[bytes] = set()
-        self._ghost_nodes: Counter[str] = Counter()
         self._clean = False
         self._clients: dict[str, Any] = {}
 
@@ -160,7 +163,6 @@ class CameraRig:
             self.fresh()
         self.wait(lambda: not self.endpoints(), GHOSTS)
         self._ghosts = {end for _, end in self._endpoints()}
-        self._ghost_nodes = Counter(self.nodes())
         self._clean = False
         yield
         self._clean = True
@@ -282,9 +284,9 @@ class CameraRig:
 
     def endpoints(self, node: str = "") -> list[str]:
         """Return the driver's endpoints that are on the graph, and whether ``node`` is."""
-        there = [what for what, end in self._endpoints() if end not in self._ghosts]
-        more = self.nodes().count(node) > self._ghost_nodes[node]
-        return sorted(set(there)) + ([f"the node {node}"] if more else [])
+        ours = (*TYPES, f"the node {node}")
+        there = {what for what, end in self._endpoints() if end not in self._ghosts}
+        return [what for what in ours if what in there]
 
     def missing(self, node: str) -> list[str]:
         """Return what the driver ``node`` lacks on the graph, or has with another type."""
@@ -312,22 +314,17 @@ class CameraRig:
             # A service has no endpoints in ROS's eyes; in DDS it reads its requests.
             SERVICE: self.node.get_subscriptions_info_by_topic(f"rq/{SNAPSHOT}Request", True),
         }
+        # Every node announces changes of its parameters: a node itself has no endpoint.
+        for end in self.node.get_publishers_info_by_topic("/parameter_events"):
+            name = f"{end.node_namespace.rstrip('/')}/{end.node_name}"
+            found.setdefault(f"the node {name}", []).append(end)
         return [(what, bytes(end.endpoint_gid)) for what, ends in found.items() for end in ends]
-
-    def nodes(self) -> list[str]:
-        """Return the fully qualified names of the nodes on the graph."""
-        found = self.node.get_node_names_and_namespaces()
-        return [f"{namespace.rstrip('/')}/{name}" for name, namespace in found]
 
 
 @contextmanager
 def camera_rig(bench: Bench) -> Iterator[CameraRig]:
-    """Give a rig, and take the examiner's endpoints down afterwards."""
-    rig = CameraRig(bench)
-    try:
-        yield rig
-    finally:
-        bench.session.stop(rig.node)
+    """Give a rig; the examiner's session takes its endpoints down at its end."""
+    yield CameraRig(bench)
 
 
 def phrase(items: list[str]) -> str:
