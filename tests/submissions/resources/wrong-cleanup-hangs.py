@@ -1,7 +1,7 @@
 # title: Cleanup that waits for a thread which nobody tells to end
 # fails: endpoints_gone, camera_given_back, managed_runs
 # says: endpoints_gone: a cleanup wait for ever?
-# seconds: 4
+# seconds: 15
 
 
 class CameraDriver(Node):
