@@ -20,6 +20,7 @@ from autograder.rigs.driving import (
     require_endpoints,
     require_gone,
     require_open,
+    require_own_clock,
     require_picture,
     require_rate,
     require_snapshot,
@@ -74,6 +75,7 @@ def driver_runs(rig: CameraRig) -> None:
         require_open(rig, device)
         require_endpoints(rig, node)
         require_picture(rig, device)
+        require_own_clock(rig, device)
         require_rate(rig, device, 1 / PERIOD)
         require_zoom(rig, device, 3, "While the driver runs")
 

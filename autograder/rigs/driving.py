@@ -13,6 +13,7 @@ from autograder.rigs.camera import IMAGE, PERIOD, SETTLE, SNAPSHOT, ZOOM, Camera
 from course.runtime.waiting import Deadline
 
 STEPS = 10
+STANDSTILLS, STANDSTILL = 3, 0.5  # how often, and for how many seconds of wall time
 
 
 def require_endpoints(rig: CameraRig, node: str) -> None:
@@ -52,6 +53,18 @@ def require_rate(rig: CameraRig, device: str, rate: float) -> None:
             expected=f"In one second {rate:.0f} pictures come.",
             actual=f"In one second of the robot's time {came} came{rig.raised()}.",
         )
+
+
+def require_own_clock(rig: CameraRig, device: str) -> None:
+    """Fail if pictures of ``device`` are taken while the robot's time stands still."""
+    for _ in range(STANDSTILLS):
+        before = sum(rig.cameras(device))
+        if not rig.wait(lambda n=before: sum(rig.cameras(device)) >= n + 2, STANDSTILL):  # type: ignore[misc]
+            return  # it stands still: what came in an earlier round had been ordered before
+    raise Failed(
+        expected="The pictures are timed by a ROS timer, or by the node's clock.",
+        actual="Pictures were taken although the robot's time, which is simulated, stood still.",
+    )
 
 
 def require_open(rig: CameraRig, device: str) -> None:

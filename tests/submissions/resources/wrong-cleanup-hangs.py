@@ -1,6 +1,6 @@
 # title: Cleanup that waits for a thread which nobody tells to end
-# fails: endpoints_gone, camera_given_back, managed_runs
-# says: endpoints_gone: a cleanup wait for ever?
+# fails: driver_runs, managed_runs
+# says: driver_runs: a cleanup wait for ever?
 # seconds: 15
 
 
