@@ -40,6 +40,8 @@ class Subject:
     def open(self, *, threads: int = 1, sim_time: bool = False) -> None:
         """Begin a new session on the subject's side; nodes of an earlier one are stopped.
 
+        These are collected as garbage, too, as `collect` does.
+
         Without it, the first `start` begins one with a single thread and wall-clock time.
 
         Args:
@@ -48,14 +50,20 @@ class Subject:
         """
         self._ask("open", "a session", threads=threads, sim_time=sim_time)
 
-    def start(self, name: str) -> str:
+    def start(self, name: str, *args: Any, bare: bool = False) -> str:
         """Make a node of a class of the notebook and spin it; return its fully qualified name.
+
+        Args:
+            name: the class.
+            args: what its constructor is given, as JSON.
+            bare: if the constructor raises, nobody tidies up after it, as in a program without a
+                session: what is then left is the class's own doing.
 
         Raises:
             StudentError: the class is missing or its constructor raised.
             SubjectGone: the process ended or hangs.
         """
-        return str(self._ask("start", name)["node"])
+        return str(self._ask("start", name, args=args, bare=bare)["node"])
 
     def start_all(self, name: str) -> dict[str, str]:
         """Make every node that an object of the notebook declares; return {label: node name}.
@@ -79,6 +87,14 @@ class Subject:
     def stop(self, name: str) -> None:
         """Destroy the node made of a class, as a session does: its ``destroy_node`` is called."""
         self._ask("stop", name)
+
+    def collect(self) -> None:
+        """Have Python free what nobody refers to any more.
+
+        A node and its callbacks refer to each other: without it a destroyed node stays in memory,
+        and a lifecycle node's own services on the graph, until Python happens to look.
+        """
+        self._ask("collect", "garbage")
 
     def pause(self, name: str) -> None:
         """Stop executing the node's callbacks while its endpoints go on receiving."""
@@ -139,7 +155,7 @@ class Subject:
         except ChannelTimeout:
             self._gone = (
                 f"Your program did not answer within {timeout:.0f} s when it was asked to "
-                f"{doing}: does a constructor or a callback wait for ever?"
+                f"{doing}: does a constructor, a callback or a cleanup wait for ever?"
             )
             raise SubjectGone(self._gone) from None
         if not reply.get("ok"):

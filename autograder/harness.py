@@ -6,9 +6,11 @@ requests, and the examiner believes what it observes on DDS.
 
 from __future__ import annotations
 
+import gc
 import json
 import traceback
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -21,6 +23,9 @@ from course import Session
 TRACE_LINES = 6
 MAX_VALUE = 64 * 1024
 """Characters of JSON that a value or a returned object may have."""
+
+MOST_CLEANUPS = 100
+"""Nodes whose cleanup may raise while a session is closed."""
 
 SUBJECT_ENV = "AUTOGRADER_SUBJECT"
 """Set in a subject: `autograder.check` in a student's own cell then has nothing to do."""
@@ -38,6 +43,9 @@ class Harness:
         self._session: Session | None = None
         self._namespace = namespace
         self._nodes: dict[str, Any] = {}
+        # What a constructor raised is kept, as a notebook keeps it, and with it all that its
+        # frames refer to: what they leave behind does not go away by chance.
+        self._raised: list[Exception] = []
 
     def serve(self, channel: Channel) -> None:
         """Answer requests until the examiner says that it is done or goes away."""
@@ -54,8 +62,8 @@ class Harness:
             operation = {
                 "open": self._open, "start": self._start, "start_all": self._start_all,
                 "mark": self._mark, "stop": self._stop, "pause": self._pause,
-                "resume": self._resume, "advance": self._advance, "call": self._call,
-                "value": self._value, "errors": self._errors,
+                "resume": self._resume, "collect": self._collect, "advance": self._advance,
+                "call": self._call, "value": self._value, "errors": self._errors,
             }[request["op"]]  # fmt: skip
             return {"ok": True, **operation(request)}
         except Exception as error:  # noqa: BLE001 - a student's code may raise anything
@@ -73,9 +81,11 @@ class Harness:
 
     def _close(self) -> None:
         self._nodes.clear()
-        if self._session is not None:
-            self._session.close()
-            self._session = None
+        self._raised.clear()
+        session, self._session = self._session, None
+        if session is not None:
+            _close(session)
+            gc.collect()
 
     def _open(self, request: dict[str, Any]) -> dict[str, Any]:
         self._close()
@@ -90,7 +100,16 @@ class Harness:
 
     def _start(self, request: dict[str, Any]) -> dict[str, Any]:
         name = request["name"]
-        return {"node": self._run(name, self._find(name))}
+        factory = self._find(name)
+        if request["args"]:
+            factory = partial(factory, *request["args"])
+        if not request["bare"]:
+            return {"node": self._run(name, factory)}
+        try:
+            return {"node": self._run(name, _unaided(factory))}
+        except _RaisedUnaided as raised:
+            self._raised.append(raised.error)
+            raise raised.error from None
 
     def _start_all(self, request: dict[str, Any]) -> dict[str, Any]:
         name = request["name"]
@@ -120,6 +139,10 @@ class Harness:
         node = self._nodes.pop(request["name"], None)
         if node is not None:
             self._hosting.stop(node)
+        return {}
+
+    def _collect(self, request: dict[str, Any]) -> dict[str, Any]:
+        gc.collect()
         return {}
 
     def _pause(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -169,6 +192,38 @@ def _marker(name: str) -> Node:
     node.create_publisher(String, name, 1)
     node.create_subscription(String, name, lambda _: None, 1)
     return node
+
+
+class _RaisedUnaided(Exception):  # noqa: N818 - it wraps an error, and is none itself
+    """Carries what a constructor raised past a session, without the traceback."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__(str(error))
+        self.error = error
+
+
+def _unaided(factory: Callable[[], Any]) -> Callable[[], Any]:
+    """Return ``factory`` made such that a session does not tidy up after its constructor.
+
+    A session destroys what it finds in the traceback of a constructor that raised.
+    """
+
+    def make() -> Any:
+        try:
+            return factory()
+        except Exception as error:  # noqa: BLE001 - a student's code may raise anything
+            raised = _RaisedUnaided(error)
+        raise raised from None
+
+    return make
+
+
+def _close(session: Session) -> None:
+    """Close a session, whatever the student's cleanups raise."""
+    for _ in range(MOST_CLEANUPS):
+        with suppress(Exception):  # close() can be called again, and goes on where it was
+            session.close()
+            return
 
 
 def _as_json(value: Any) -> Any:

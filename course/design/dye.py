@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from rosidl_parser.definition import (  # type: ignore[import-untyped]
+from rosidl_parser.definition import (
     AbstractNestedType,
     AbstractSequence,
     AbstractString,

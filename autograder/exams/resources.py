@@ -1,0 +1,488 @@
+"""Exercise 4: a camera driver that gives back what it takes, as a plain and as a managed node.
+
+Every bound below is a sentence of the task, so any design that keeps to the task passes: with a
+worker thread or without, with callbacks in one executor thread or in several, with inheritance,
+composition or a context manager behind ``destroy_node()``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+from autograder.exam import Exam, Failed
+from autograder.rigs.camera import PERIOD, SETTLE, SNAPSHOT, CameraRig, camera_rig, phrase
+from autograder.rigs.camera_duties import (
+    require_closed,
+    require_endpoints,
+    require_gone,
+    require_open,
+    require_own_clock,
+    require_picture,
+    require_rate,
+    require_snapshot,
+    require_zoom,
+)
+from autograder.rigs.lives import DRIVER, MEMORY, attempt, failing_starts, growth, leaks
+from autograder.rigs.managed import (
+    Managed,
+    require_nothing_held,
+    require_one_publisher,
+    require_still,
+)
+
+EXAM: Exam[CameraRig] = Exam("resources", camera_rig)
+
+MANAGED = "ManagedCamera"
+FAILING_STARTS = 10
+
+READ_NODES = "Chapter 5, “Lifecycle management” and “Resource management” of nodes"
+READ_MANAGED = "ROS 2 design, “Managed nodes”"
+
+
+def needed(check: Callable[[CameraRig], None]) -> Callable[[CameraRig], None]:
+    """Run a check that others need once a notebook, not once a part of the exam."""
+
+    @wraps(check)
+    def run(rig: CameraRig) -> None:
+        if check.__name__ not in rig.memory:
+            check(rig)
+            rig.memory[check.__name__] = True
+
+    return run
+
+
+@EXAM.check(
+    hints=(
+        "Try it beside the check: `course.run(CameraDriver)`, and then `course.logs()`.",
+        "Compare names and types of the four endpoints with the row “Running” of the table.",
+        "Open Camera(device), start() it, publish read() from a 0.1 s timer; zoom() and a second "
+        "read() belong into the callbacks of camera/zoom and camera/snapshot.",
+    ),
+    read="Chapter 5, “Nodes: the processing units”",
+)
+@needed
+def driver_runs(rig: CameraRig) -> None:
+    """The driver opens its camera, sends ten pictures a second, zooms, and takes snapshots.
+
+    Only a node that does its work has something to clean up.
+    """
+    device = rig.device()
+    with rig.life(DRIVER, device) as node:
+        require_open(rig, device)
+        require_endpoints(rig, node)
+        require_picture(rig, device)
+        require_own_clock(rig, device)
+        require_rate(rig, device, 1 / PERIOD)
+        require_zoom(rig, device, 3, "While the driver runs")
+
+
+@EXAM.check(
+    needs=("driver_runs",),
+    hints=(
+        "Which method of rclpy's Node takes its publishers, subscriptions and services down?",
+        "If you override destroy_node(), the inherited one is not called by itself.",
+        "End your own destroy_node() with super().destroy_node(), whatever happened before.",
+    ),
+    read=READ_NODES,
+)
+@needed
+def endpoints_gone(rig: CameraRig) -> None:
+    """After destroy_node() nothing of the driver is on the graph any more.
+
+    An endpoint that is left is a ghost: others wait for its answers, or take an old picture for a
+    new one.
+    """
+    device = rig.device()
+    with rig.life(DRIVER, device) as node:
+        require_endpoints(rig, node)
+        rig.destroy(DRIVER)
+        require_gone(rig, device, "After destroy_node()", node)
+
+
+@EXAM.check(
+    needs=("driver_runs",),
+    hints=(
+        "Who closes the camera in your code, and when?",
+        "rclpy destroys what it made: endpoints and timers. The camera is not one of them.",
+        "Override destroy_node(): end the thread, call self.camera.close(), then "
+        "super().destroy_node().",
+    ),
+    read=READ_NODES,
+)
+@needed
+def camera_given_back(rig: CameraRig) -> None:
+    """After destroy_node() the camera is closed, and the driver can be started again.
+
+    A device can be open once. If a driver dies with it open, no restart helps: “device is busy”.
+    """
+    device = rig.device()
+    for _ in range(2):
+        with rig.life(DRIVER, device):
+            require_picture(rig, device)
+            rig.stop(DRIVER)
+            require_closed(rig, device, "After destroy_node()")
+
+
+@EXAM.check(
+    needs=("endpoints_gone", "camera_given_back"),
+    hints=(
+        "Write down what your constructor makes. What of it does destroy_node() not end?",
+        "A thread that waits for ever in queue.get() never ends; a list of the class, or a "
+        "function registered with atexit, keeps a whole node alive.",
+        "Wake your thread in destroy_node() (put an end mark into its queue) and join() it; keep "
+        "what belongs to one life in attributes that are set in __init__.",
+    ),
+    read=READ_NODES,
+)
+def lives_are_flat(rig: CameraRig) -> str:
+    """Over 50 lives the driver's process keeps its threads, files and memory.
+
+    A robot is switched on for weeks. What one life leaves behind, however little, adds up until a
+    thread or a file cannot be made any more, and it then fails in a node that did nothing wrong.
+    """
+    with rig.trying():
+        grown = growth(rig)
+    if leaked := leaks(grown):
+        raise Failed(
+            expected=f"50 lives leave no thread and no file behind, and less than {MEMORY} KiB a "
+            "life.",
+            actual=f"Each life of the driver left {phrase(leaked)} behind.",
+        )
+    return ""
+
+
+@EXAM.check(
+    needs=("camera_given_back",),
+    hints=(
+        "Who may call destroy_node() besides you? A session does, and a test, and a `finally:`.",
+        "Look at each line of your destroy_node(): what does it find when it runs again?",
+        "Set what you have given back to None, and ask `is not None` before you give it back.",
+    ),
+    read=READ_NODES,
+)
+def cleanup_twice(rig: CameraRig) -> None:
+    """Calling destroy_node() twice does no harm.
+
+    Cleanup is called from several places: an error handler, a signal, the end of the program. The
+    one that comes second must not turn an orderly end into a crash.
+    """
+    device = rig.device()
+    with rig.life(DRIVER, device):
+        rig.destroy(DRIVER)
+        rig.destroy(DRIVER)
+        require_closed(rig, device, "After destroy_node()")
+
+
+@EXAM.check(
+    needs=("endpoints_gone", "camera_given_back"),
+    hints=(
+        "Let each line of your constructor raise in your mind. What is open at that moment?",
+        "The camera 'stuck' opens, but its stream does not start. Try CameraDriver('stuck') twice: "
+        "does the second try say that it is in use?",
+        "Set every attribute that destroy_node() looks at to None first, put the rest of the "
+        "constructor into try, and in `except BaseException:` call self.destroy_node() and raise.",
+    ),
+    read=READ_NODES,
+)
+def failed_start(rig: CameraRig) -> None:
+    """A driver that cannot start says so, and leaves nothing behind.
+
+    A supervisor tries again every few seconds while the cable is unplugged. If each try leaves a
+    half-made node on the graph, the robot is full of ghosts when the camera is back.
+    """
+    with rig.trying():
+        for kind in ("unplugged", "stuck"):
+            device = rig.device(kind)
+            attempt(rig, device)
+            require_closed(rig, device, f"After CameraDriver({device!r}) has raised")
+            failing_starts(rig, kind, FAILING_STARTS)
+        # A participant's endpoints are told in order: when those of a driver that works are known,
+        # those of the failed starts before it are known, too.
+        device = rig.device()
+        node = rig.start(DRIVER, device)
+        require_picture(rig, device)
+        require_endpoints(rig, node)
+        rig.stop(DRIVER)
+        require_gone(rig, device, "After failed starts, one that worked, and its end,", node)
+
+
+@EXAM.check(
+    hints=(
+        "Try it beside the check: `course.run(ManagedCamera)`; which of its on_…() methods run?",
+        "on_configure opens the camera and makes a lifecycle publisher, on_activate starts stream "
+        "and timer, on_deactivate stops both.",
+        "Each on_…() returns TransitionCallbackReturn.SUCCESS; a lifecycle publisher sends only if "
+        "your on_activate ends with `return super().on_activate(state)`.",
+    ),
+    read=READ_MANAGED,
+)
+@needed
+def managed_runs(rig: CameraRig) -> None:
+    """The managed camera goes through its states, and sends pictures when it is active.
+
+    A supervisor brings a robot up in step: all devices are opened and found in order before the
+    first one moves.
+    """
+    device = rig.device()
+    with rig.life(MANAGED) as name:
+        node = Managed(rig, name)
+        node.require(device=device)
+        node.go("configure")
+        require_open(rig, device)
+        node.go("activate")
+        require_picture(rig, device)
+        require_rate(rig, device, 10)
+        node.go("deactivate", "cleanup", "shutdown")
+
+
+@EXAM.check(
+    needs=("managed_runs",),
+    hints=(
+        "What still runs in your node between deactivate and activate?",
+        "A lifecycle publisher drops what is published while it is inactive: you do not see a "
+        "timer that goes on, the camera does.",
+        "Make the timer in on_activate; in on_deactivate destroy_timer() it and stop() the camera, "
+        "then return super().on_deactivate(state).",
+    ),
+    read=READ_MANAGED,
+)
+def silent_when_inactive(rig: CameraRig) -> None:
+    """While it is inactive the camera's stream stands still and nothing is sent.
+
+    “Inactive” is a promise: the supervisor may now move the camera's arm, or give the bandwidth to
+    somebody else.
+    """
+    device = rig.device()
+    with rig.life(MANAGED) as name:
+        node = Managed(rig, name)
+        node.require(device=device)
+        node.go("configure")
+        require_still(rig, device, "configure")
+        node.go("activate")
+        require_picture(rig, device)
+        # What was read is on its way: let it arrive.
+        rig.wait(lambda: rig.pictures(device)[-1].number == max(rig.cameras(device)) - 1, 1.0)
+        node.go("deactivate")
+        sent = len(rig.pictures(device))
+        require_still(rig, device, "deactivate")
+        asked = max(rig.cameras(device), default=0)
+        node.go("activate")
+        # Pictures of one publisher arrive in order: what was sent earlier is here by then.
+        fresh = rig.see(device, lambda: rig.pictures(device)[-1].number >= asked)
+        if not fresh:
+            raise Failed(
+                expected="After a second “activate” pictures come again.",
+                actual=f"None came{rig.raised()}.",
+            )
+        if old := [p for p in rig.pictures(device)[sent:] if p.number < asked]:
+            raise Failed(
+                expected="An inactive node publishes nothing.",
+                actual=f"It published {len(old)} pictures between deactivate and activate.",
+            )
+
+
+@EXAM.check(
+    needs=("managed_runs",),
+    hints=(
+        "Compare what your on_configure makes with what your on_cleanup gives back.",
+        "Configured a second time, does your node use the new parameters, or those of the first?",
+        "In on_cleanup close() the camera, destroy_lifecycle_publisher() the publisher, and set "
+        "both to None; read the parameters in on_configure.",
+    ),
+    read=READ_MANAGED,
+)
+@needed
+def managed_gives_back(rig: CameraRig) -> None:
+    """After “cleanup” the managed camera holds nothing, and can be configured anew.
+
+    This is how a driver gets new parameters without ending its process: what it still held from
+    its first configuration would be in the way of the second.
+    """
+    with rig.life(MANAGED) as name:
+        node = Managed(rig, name)
+        for rate in (10.0, 20.0):
+            device = rig.device()
+            node.require(device=device, rate=rate)
+            node.go("configure")
+            require_open(rig, device)
+            require_one_publisher(rig)
+            node.go("activate")
+            require_picture(rig, device)
+            require_rate(rig, device, rate)
+            node.go("deactivate", "cleanup")
+            require_nothing_held(rig, device, "After “cleanup”")
+
+
+@EXAM.check(
+    needs=("managed_gives_back",),
+    hints=(
+        "What does your on_configure return for a rate of 0 Hz, and for a camera that is missing?",
+        "FAILURE leads back to unconfigured. What had you opened by then?",
+        "Check the rate first (return FAILURE), open the camera in try (return FAILURE on "
+        "OSError), and make the publisher last.",
+    ),
+    read=READ_MANAGED,
+)
+def configure_refused(rig: CameraRig) -> None:
+    """A configuration that is not possible leaves the node unconfigured, and it can try again.
+
+    A wrong parameter file must be found before the robot drives. A node that takes it as it is, or
+    that is stuck half way, is found out when the first picture is missing.
+    """
+    with rig.life(MANAGED) as name:
+        node = Managed(rig, name)
+        for rate, kind in ((0.0, "front"), (-5.0, "front"), (1000.0, "front"), (10.0, "unplugged")):
+            device = rig.device(kind)
+            what = f"a camera {kind!r}" if kind != "front" else f"a rate of {rate:g} Hz"
+            if not node.set(device=device, rate=rate):
+                continue  # refused even earlier: a parameter callback is as good
+            if (state := node.attempt("configure")) != "unconfigured":
+                raise Failed(
+                    expected=f"Configured with {what}, your node stays unconfigured.",
+                    actual=f"It is {state}.",
+                )
+            require_closed(rig, device, f"After a “configure” with {what}")
+        device = rig.device()
+        node.require(device=device, rate=10.0)
+        node.go("configure", "activate")
+        # A participant's endpoints are told in order: those of the failed attempts are known.
+        require_picture(rig, device)
+        require_one_publisher(rig)
+
+
+@EXAM.check(
+    needs=("managed_gives_back",),
+    hints=(
+        "Which of your methods runs after an exception in on_activate?",
+        "on_error. The one that you inherit returns SUCCESS and gives nothing back.",
+        "Give everything back in on_error as in on_cleanup, and return SUCCESS: the node is then "
+        "unconfigured. In on_activate let the exception of start() out, or return ERROR.",
+    ),
+    read=READ_MANAGED,
+)
+def activation_error(rig: CameraRig) -> None:
+    """A stream that does not start is an error, after which the node holds nothing.
+
+    The state machine has a place for what goes wrong. A node that pretends to be active sends no
+    picture; one that keeps the broken camera open cannot be repaired by a second “configure”.
+    """
+    with rig.life(MANAGED) as name:
+        node = Managed(rig, name)
+        device = rig.device("stuck")
+        node.require(device=device)
+        node.go("configure")
+        require_one_publisher(rig)
+        state = node.attempt("activate")
+        if state not in ("unconfigured", "finalized"):
+            raise Failed(
+                expected="If the stream does not start, your node ends unconfigured or finalized.",
+                actual=f"It is {state}.",
+            )
+        require_nothing_held(rig, device, "After the error")
+        if state == "unconfigured":
+            device = rig.device()
+            node.require(device=device)
+            node.go("configure", "activate")
+            require_picture(rig, device)
+
+
+@EXAM.check(
+    needs=("managed_gives_back",),
+    hints=(
+        "From which states can a node be shut down? Which of your methods runs then?",
+        "on_shutdown, and neither on_deactivate nor on_cleanup before it.",
+        "Give everything back in on_shutdown as in on_cleanup, and in destroy_node() as well: look "
+        "whether each thing is there before you give it back.",
+    ),
+    read=READ_MANAGED,
+)
+def managed_shutdown(rig: CameraRig) -> None:
+    """A shutdown from any state, and destroy_node() in any state, gives everything back.
+
+    An emergency does not wait for deactivate and cleanup: whoever ends the node in the middle of
+    its work must find the camera closed.
+    """
+    paths = {"unconfigured": (), "inactive": ("configure",), "active": ("configure", "activate")}
+    for end in ("shutdown", "destroy_node()"):
+        for state, path in paths.items():
+            device = rig.device()
+            with rig.life(MANAGED) as name:
+                node = Managed(rig, name)
+                node.require(device=device)
+                node.go(*path)
+                if path:
+                    require_one_publisher(rig)
+                if end == "shutdown":
+                    node.go("shutdown")
+                else:
+                    rig.stop(MANAGED)
+                require_nothing_held(rig, device, f"After {end} in the state {state}")
+
+
+@EXAM.check(
+    needs=("endpoints_gone", "camera_given_back"),
+    hints=(
+        "What had your zoom callback already done when camera.zoom(99) raised?",
+        "A lock that was acquired and not released stops whoever wants it next, in silence.",
+        "Hold locks with `with self.lock:`, which releases them on an exception, too.",
+    ),
+    read=READ_NODES,
+)
+def callback_raises(rig: CameraRig) -> None:
+    """A zoom that the camera refuses costs that one message, and nothing else.
+
+    Somebody will send a wrong value. The driver may refuse it, but it must go on working, and it
+    must still end cleanly.
+    """
+    device = rig.device()
+    with rig.life(DRIVER, device) as node:
+        require_endpoints(rig, node)
+        require_zoom(rig, device, 2, "While the driver runs")
+        rig.node.zoom.publish(Int32(data=99))
+        require_zoom(rig, device, 5, "After a zoom of 99")
+        rig.stop(DRIVER)
+        require_closed(rig, device, "After destroy_node()")
+        require_gone(rig, device, "After destroy_node()", node)
+
+
+@EXAM.check(
+    needs=("endpoints_gone", "camera_given_back"),
+    hints=(
+        "A callback waits for a picture, and destroy_node() runs in another thread. Who waits for "
+        "whom?",
+        "camera.close() ends every read() that waits with an OSError; an answer that your worker "
+        "will never give does not end.",
+        "Do not wait without end in a callback: let the read() itself be what it waits for, or "
+        "give the wait a timeout and look whether the driver is ending.",
+    ),
+    read=READ_NODES,
+)
+def cleanup_when_busy(rig: CameraRig) -> None:
+    """Cleanup while a callback still waits for the camera ends well, and a restart works.
+
+    Nobody stops a robot between two callbacks. If cleanup and callback wait for each other, the
+    process hangs with the camera open, and only the power switch helps.
+    """
+    device = rig.device("slow")
+    with rig.life(DRIVER, device) as node:
+        require_endpoints(rig, node)
+        require_snapshot(rig, device, "While the driver runs")
+        snapshot = rig.client(Trigger, SNAPSHOT)
+        # When the first answer is here, the second picture is being exposed.
+        replies = [snapshot.call_async(Trigger.Request()) for _ in range(4)]
+        if not rig.wait(lambda: any(reply.done() for reply in replies)):
+            raise Failed(
+                expected=f"The service {SNAPSHOT} answers when the picture is there.",
+                actual=f"No answer came within {SETTLE:.0f} s{rig.raised()}.",
+            )
+        rig.destroy(DRIVER)
+        require_closed(rig, device, "After destroy_node() during a snapshot")
+        require_gone(rig, device, "After destroy_node() during a snapshot", node)
+        rig.drop(DRIVER)
+        again = rig.device()
+        rig.start(DRIVER, again)
+        require_zoom(rig, again, 4, "After a restart")

@@ -1,0 +1,134 @@
+"""What a camera driver must do, and must not leave behind: observations that several checks share.
+
+Each ``require_…`` returns if it was seen, and raises `Failed` with what was seen instead.
+"""
+
+from __future__ import annotations
+
+from std_msgs.msg import Int32
+from std_srvs.srv import Trigger
+
+from autograder.exam import Failed
+from autograder.rigs.camera import IMAGE, PERIOD, SETTLE, SNAPSHOT, ZOOM, CameraRig, phrase
+from course.runtime.waiting import Deadline
+
+STEPS = 10
+STANDSTILLS, STANDSTILL = 3, 0.5  # how often, and for how many seconds of wall time
+
+
+def require_endpoints(rig: CameraRig, node: str) -> None:
+    """Fail unless the driver's endpoints are all on the graph, with their types.
+
+    Only what was seen to be there can be seen to go.
+    """
+    if rig.wait(lambda: not rig.missing(node)):
+        return
+    raise Failed(
+        expected="The driver has the endpoints of the task.", actual=" ".join(rig.missing(node))
+    )
+
+
+def require_picture(rig: CameraRig, device: str) -> None:
+    """Fail unless a picture of ``device`` comes over the topic."""
+    if not rig.see(device):
+        raise Failed(
+            expected=f"Pictures of the camera {device!r} come on {IMAGE}.",
+            actual=f"In {SETTLE / PERIOD * PERIOD:.0f} s of the robot's time none came"
+            f"{rig.raised()}.",
+        )
+
+
+def require_rate(rig: CameraRig, device: str, rate: float) -> None:
+    """Fail unless in a second of simulated time about ``rate`` pictures of ``device`` come."""
+    before = len(rig.pictures(device))
+    deadline = Deadline(SETTLE)
+    for step in range(1, STEPS + 1):
+        rig.advance(1 / STEPS)
+        # A thread may publish a moment after the timer: let it keep up.
+        due = before + int(rate / STEPS * step) - 1
+        rig.wait(lambda due=due: len(rig.pictures(device)) >= due, deadline.left)  # type: ignore[misc]
+    came = len(rig.pictures(device)) - before
+    if abs(came - rate) > 1:
+        raise Failed(
+            expected=f"In one second {rate:.0f} pictures come.",
+            actual=f"In one second of the robot's time {came} came{rig.raised()}.",
+        )
+
+
+def require_own_clock(rig: CameraRig, device: str) -> None:
+    """Fail if pictures of ``device`` are taken while the robot's time stands still."""
+    for _ in range(STANDSTILLS):
+        before = sum(rig.cameras(device))
+        if not rig.wait(lambda n=before: sum(rig.cameras(device)) >= n + 2, STANDSTILL):  # type: ignore[misc]
+            return  # it stands still: what came in an earlier round had been ordered before
+    raise Failed(
+        expected="The pictures are timed by a ROS timer, or by the node's clock.",
+        actual="Pictures were taken although the robot's time, which is simulated, stood still.",
+    )
+
+
+def require_open(rig: CameraRig, device: str) -> None:
+    """Fail unless the camera of ``device`` is open."""
+    if not rig.wait(lambda: rig.cameras(device)):
+        raise Failed(
+            expected=f"The node opens the camera it is told: {device!r}.",
+            actual="Your process has not opened that camera.",
+        )
+
+
+def require_closed(rig: CameraRig, device: str, when: str) -> None:
+    """Fail if the camera of ``device`` is not closed."""
+    if not rig.wait(lambda: not rig.cameras(device)):
+        raise Failed(
+            expected=f"{when} the camera is closed.",
+            actual=f"Your process still had the camera {device!r} open {SETTLE:.0f} s later.",
+        )
+
+
+def require_gone(rig: CameraRig, device: str, when: str, node: str = "") -> None:
+    """Fail if an endpoint of the driver is on the graph."""
+    if rig.wait(lambda: not rig.endpoints(node)):
+        return
+    left = rig.endpoints(node)
+    before = len(rig.pictures(device))
+    rig.advance(1.0)
+    sent = len(rig.pictures(device)) - before
+    more = f" In one more second it sent {sent} pictures." if sent else ""
+    raise Failed(
+        expected=f"{when} no endpoint of the driver is on the graph.",
+        actual=f"{SETTLE:.0f} s later there still was {phrase(left)}.{more}",
+    )
+
+
+def require_snapshot(rig: CameraRig, device: str, when: str) -> None:
+    """Fail unless a snapshot is answered, and its picture comes without time passing."""
+    before = len(rig.pictures(device))
+    reply = rig.ask(Trigger, SNAPSHOT, Trigger.Request())
+    if reply is None:
+        raise Failed(
+            expected=f"{when} the service {SNAPSHOT} answers.",
+            actual=f"No answer came within {SETTLE:.0f} s{rig.raised()}.",
+        )
+    if not reply.success:
+        raise Failed(
+            expected=f"{when} {SNAPSHOT} succeeds.", actual="It answered with success=False."
+        )
+    if not rig.wait(lambda: len(rig.pictures(device)) > before):
+        raise Failed(
+            expected=f"{when} {SNAPSHOT} publishes a picture on {IMAGE} at once.",
+            actual="It answered, but no picture came.",
+        )
+
+
+def require_zoom(rig: CameraRig, device: str, factor: int, when: str) -> None:
+    """Fail unless pictures come with the zoom ``factor`` soon after it was sent."""
+    for _ in range(int(SETTLE / PERIOD)):
+        rig.node.zoom.publish(Int32(data=factor))
+        require_snapshot(rig, device, when)
+        if rig.wait(lambda: rig.pictures(device)[-1].zoom == factor, PERIOD):
+            return
+    raise Failed(
+        expected=f"{when} a zoom of {factor} on {ZOOM} is followed.",
+        actual=f"The pictures went on with a zoom of {rig.pictures(device)[-1].zoom}"
+        f"{rig.raised()}.",
+    )

@@ -1,0 +1,139 @@
+"""Drives a lifecycle node through its states, over the services that every lifecycle node has.
+
+Sources: the ROS 2 design article "Managed nodes", and the interfaces of ``lifecycle_msgs``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+
+from autograder.exam import Failed
+from autograder.rigs.camera import IMAGE, RESEND, SETTLE, CameraRig
+from autograder.rigs.camera_duties import require_closed
+
+TRANSITIONS = {
+    "configure": (Transition.TRANSITION_CONFIGURE, "inactive"),
+    "activate": (Transition.TRANSITION_ACTIVATE, "active"),
+    "deactivate": (Transition.TRANSITION_DEACTIVATE, "inactive"),
+    "cleanup": (Transition.TRANSITION_CLEANUP, "unconfigured"),
+}
+STATES = ("unconfigured", "inactive", "active", "finalized")
+SHUTDOWNS = {
+    "unconfigured": Transition.TRANSITION_UNCONFIGURED_SHUTDOWN,
+    "inactive": Transition.TRANSITION_INACTIVE_SHUTDOWN,
+    "active": Transition.TRANSITION_ACTIVE_SHUTDOWN,
+}
+
+
+class Managed:
+    """One lifecycle node of the subject, by its fully qualified name."""
+
+    def __init__(self, rig: CameraRig, node: str) -> None:
+        """Drive ``node``; its services are looked for when they are needed."""
+        self._rig = rig
+        self._node = node
+
+    def set(self, **values: str | float) -> bool:
+        """Set parameters; return whether the node took them all."""
+        parameters = [Parameter(name=name, value=_value(value)) for name, value in values.items()]
+        request = SetParameters.Request(parameters=parameters)
+        reply = self._ask(SetParameters, "set_parameters", request)
+        return all(result.successful for result in reply.results)
+
+    def require(self, **values: str | float) -> None:
+        """Set parameters that the node must take."""
+        if not self.set(**values):
+            shown = ", ".join(f"{name}={value!r}" for name, value in values.items())
+            raise Failed(
+                expected=f"The parameters {shown} can be set.", actual="The node refused them."
+            )
+
+    def state(self) -> str:
+        """Return the label of the node's state."""
+        return str(self._ask(GetState, "get_state", GetState.Request()).current_state.label)
+
+    def attempt(self, transition: str) -> str:
+        """Ask for a transition; return the state that came of it."""
+        if transition in TRANSITIONS:
+            number = TRANSITIONS[transition][0]
+        else:
+            number = SHUTDOWNS[self.state()]
+        client = self._rig.client(ChangeState, f"{self._node}/change_state")
+        self._rig.wait(client.service_is_ready)
+        reply = client.call_async(ChangeState.Request(transition=Transition(id=number)))
+        # The state says what came of it, even if the response is lost.
+        self._rig.wait(reply.done, RESEND)
+        states: list[str] = []
+        if not self._rig.wait(lambda: states.append(self.state()) or states[-1] in STATES):  # type: ignore[func-returns-value]
+            raise Failed(
+                expected=f"A “{transition}” comes to its end.",
+                actual=f"Your node is stuck in “{states[-1]}”{self._rig.raised()}. Each on_…() "
+                "method must return, and return a TransitionCallbackReturn.",
+            )
+        return states[-1]
+
+    def go(self, *transitions: str) -> None:
+        """Make transitions that must all succeed."""
+        for transition in transitions:
+            goal = TRANSITIONS[transition][1] if transition in TRANSITIONS else "finalized"
+            if (state := self.attempt(transition)) != goal:
+                raise Failed(
+                    expected=f"After “{transition}” your node is {goal}.",
+                    actual=f"It is {state}{self._rig.raised()}.",
+                )
+
+    def _ask(self, service: Any, name: str, request: Any) -> Any:
+        reply = self._rig.ask(service, f"{self._node}/{name}", request)
+        if reply is None:
+            raise Failed(
+                expected=f"Your node answers its service {self._node}/{name}.",
+                actual=f"No answer came within {SETTLE:.0f} s{self._rig.raised()}.",
+            )
+        return reply
+
+
+def _value(value: str | float) -> ParameterValue:
+    if isinstance(value, str):
+        return ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
+    return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+
+
+def require_still(rig: CameraRig, device: str, transition: str) -> None:
+    """Fail if the camera is streaming or is asked for pictures while time passes."""
+    if not rig.wait(lambda: not rig.streams(device)):
+        raise Failed(
+            expected=f"After “{transition}” the camera's stream is stopped.",
+            actual="The stream went on: nobody called stop().",
+        )
+    before = sum(rig.cameras(device))
+    rig.advance(1.0)
+    asked = sum(rig.cameras(device)) - before
+    if asked:
+        raise Failed(
+            expected="An inactive node asks its camera for no picture: it has no timer.",
+            actual=f"In one second after “{transition}” it asked {asked} times.",
+        )
+
+
+def require_nothing_held(rig: CameraRig, device: str, when: str) -> None:
+    """Fail if a managed node holds a camera or a publisher."""
+    require_closed(rig, device, when)
+    if not rig.wait(lambda: not rig.publishers()):
+        raise Failed(
+            expected=f"{when} there is no publisher on {IMAGE}.",
+            actual=f"{SETTLE:.0f} s later there were {rig.publishers()}.",
+        )
+
+
+def require_one_publisher(rig: CameraRig) -> None:
+    """Fail unless a node that is configured has exactly one publisher on the image topic."""
+    if not rig.wait(lambda: rig.publishers() == 1):
+        raise Failed(
+            expected=f"A configured node has one publisher on {IMAGE}.",
+            actual=f"It had {rig.publishers()}.",
+        )

@@ -1,0 +1,55 @@
+"""The subject's process as anybody on the machine sees it: its threads, open files and memory.
+
+Linux keeps these under ``/proc/<pid>`` (proc(5)): ``task``, ``fd``, ``fdinfo`` and ``statm``.
+"""
+
+from __future__ import annotations
+
+import resource
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What a process holds: numbers of threads and open files, and resident memory in KiB."""
+
+    threads: int
+    files: int
+    memory: int
+
+    def grown(self, since: Usage) -> Usage:
+        """Return by how much it has grown since an earlier look."""
+        return Usage(
+            self.threads - since.threads, self.files - since.files, self.memory - since.memory
+        )
+
+
+class Process:
+    """A process, looked at from outside."""
+
+    def __init__(self, pid: int) -> None:
+        """Look at the process ``pid``."""
+        self._proc = Path("/proc") / str(pid)
+
+    def threads(self) -> int:
+        """Return how many threads it has."""
+        return sum(1 for _ in (self._proc / "task").iterdir())
+
+    def usage(self) -> Usage:
+        """Return what it holds now."""
+        pages = int((self._proc / "statm").read_text(encoding="ascii").split()[1])
+        files = sum(1 for _ in (self._proc / "fd").iterdir())
+        return Usage(self.threads(), files, pages * resource.getpagesize() // 1024)
+
+    def positions(self, name: str) -> list[int]:
+        """Return the file positions of its descriptors of a memory file (memfd_create(2))."""
+        found = []
+        for descriptor in (self._proc / "fd").iterdir():
+            # It may be closed while we look.
+            with suppress(FileNotFoundError, ProcessLookupError):
+                if str(descriptor.readlink()) == f"/memfd:{name} (deleted)":
+                    info = (self._proc / "fdinfo" / descriptor.name).read_text("ascii")
+                    found.append(int(info.split()[1]))  # "pos:  <number>" comes first
+        return found

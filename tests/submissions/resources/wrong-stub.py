@@ -1,0 +1,3 @@
+# title: The stub as it was handed out
+# fails: driver_runs, managed_runs
+# in: the stub
