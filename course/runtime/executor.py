@@ -62,6 +62,8 @@ class BackgroundExecutor(Executor):
         self.session_key = session_key
         self.running: set[Job] = set()
         self._scheduled: weakref.WeakSet[Task] = weakref.WeakSet()
+        self._awaiting: weakref.WeakSet[Task] = weakref.WeakSet()
+        self._returned = False
         self.report = report
         self._pulse = pulse
         self._gate = Gate(self.wake)
@@ -116,11 +118,12 @@ class BackgroundExecutor(Executor):
     def run_ready(self) -> bool:
         """Run one round of what is ready, and return whether there was anything.
 
-        To be called while `held`. Without workers the callbacks run in the calling thread.
+        To be called while `held`. Without workers the callbacks run in the calling thread. rclpy
+        resumes a coroutine in every round, whatever it awaits: that alone is not anything.
         """
         if self._workers is None and self.running:
             return False  # the one thread has a callback to run, and the others wait for it
-        busy = False
+        busy, self._returned = self._returned, False
         while True:
             if self._gate.stale:  # a callback removed a node under this round
                 self._round, self._gate.stale = _fresh_false(), False
@@ -130,8 +133,13 @@ class BackgroundExecutor(Executor):
                 return busy
             if self._workers is not None and self._workers.job_of(ready[0]) is not None:
                 return busy  # no worker is free: nothing else can begin either
-            busy = True
+            busy = busy or ready[0] not in self._awaiting
             self._execute(self._job(*ready))
+
+    @property
+    def awaiting(self) -> int:
+        """How many callbacks have begun, and await something."""
+        return len(self._awaiting)
 
     def busy_since(self, moment: float) -> bool:
         """Return whether callbacks run that are neither done nor blocked.
@@ -233,6 +241,11 @@ class BackgroundExecutor(Executor):
         self._gate.notify_watchers()
         streams.install()
         failure = job()
+        if not job.task.done():
+            self._awaiting.add(job.task)
+        elif job.task in self._awaiting:
+            self._awaiting.discard(job.task)
+            self._returned = True
         if job.unfinished is not None:
             streams.finish_lines(job)
         if failure is not None:

@@ -36,6 +36,7 @@ def settle(executors: Sequence[BackgroundExecutor], timeout: float = 5.0) -> boo
 def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> bool:
     """Do the work of `settle` on executors that are held already."""
     deadline = time.monotonic() + timeout
+    idle = 0
     while True:
         moment = time.monotonic() - _PATIENCE
         running = [executor for executor in executors if executor.busy_since(moment)]
@@ -43,7 +44,11 @@ def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> boo
             running[0].wait_for_a_job(_NAP)
         else:
             progress = [executor.run_ready() for executor in executors]
-            if not any(progress) and not any(e.busy_since(moment) for e in executors):
+            idle = 0 if any(progress) else idle + 1
+            # A coroutine that goes on may let another one go on, which only a further round shows.
+            if idle > sum(executor.awaiting for executor in executors) and not any(
+                executor.busy_since(moment) for executor in executors
+            ):
                 return True
         if time.monotonic() >= deadline:
             return False
