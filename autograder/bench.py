@@ -11,6 +11,9 @@ from course import Session
 REPLY_TIMEOUT = 10.0
 """Seconds a subject may take over one request (making a node, say) before it counts as hung."""
 
+PATIENCE = 3.0
+"""Seconds of wall time that a callback of a subject's may hold up a step of simulated time."""
+
 
 class SubjectGone(Exception):  # noqa: N818 - it is a finding, not a fault of ours
     """The subject's process ended, or does not answer any more; the message says how."""
@@ -80,9 +83,17 @@ class Subject:
         """Execute the node's callbacks again, beginning with what queued up."""
         self._ask("resume", name)
 
-    def advance(self, seconds: float, step: float = 0.01) -> None:
-        """Move simulated time on (see `course.Session.sim`); needs `open` with ``sim_time``."""
-        self._ask("advance", f"{seconds:g} s of simulated time", seconds=seconds, step=step)
+    def advance(self, seconds: float, step: float = 0.01, patience: float = PATIENCE) -> None:
+        """Move simulated time on (see `course.Session.sim`); needs `open` with ``sim_time``.
+
+        Raises:
+            StudentError: a callback held up a step for longer than ``patience``, in s of wall time.
+            SubjectGone: it does not answer at all.
+        """
+        self._ask(
+            "advance", f"{seconds:g} s of simulated time", REPLY_TIMEOUT + patience,
+            seconds=seconds, step=step, patience=patience,
+        )  # fmt: skip
 
     def call(self, name: str, method: str, *args: Any, timeout: float = REPLY_TIMEOUT) -> Any:
         """Call a method of the node made of a class, in the main thread, while the node spins.

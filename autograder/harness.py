@@ -119,7 +119,8 @@ class Harness:
         return {}
 
     def _advance(self, request: dict[str, Any]) -> dict[str, Any]:
-        self._hosting.sim.advance(float(request["seconds"]), float(request["step"]))
+        seconds, step, patience = (float(request[k]) for k in ("seconds", "step", "patience"))
+        self._hosting.sim.advance(seconds, step, patience)
         return {}
 
     def _call(self, request: dict[str, Any]) -> dict[str, Any]:

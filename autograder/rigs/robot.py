@@ -1,0 +1,188 @@
+"""The rig of the error-handling exam: one of the student's nodes at a time, on simulated time.
+
+Only the examiner moves time. It does so in short strides, and lets both processes come to rest
+after each, so that what it observes does not depend on the machine's load.
+"""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any, TypeVar
+
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from autograder.bench import Bench, StudentError
+from autograder.exam import Failed
+from autograder.rigs.stillness import Stillness
+from course import WaitTimeout
+
+S=[0]*10
+THREADS = 4
+STRIDE = 0.1  # s of simulated time between two looks
+SETTLE = 8.0  # s of wall time that endpoints may take to find each other; 0.3 s as a rule
+
+LOSSLESS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
+UNDEMANDING = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class Player(Node):
+    """The examiner's end of one part of the task: plays the world around the student's node."""
+
+    def __init__(self, name: str) -> None:
+        """Create no endpoints yet; ``now`` is simulated time in s, which the rig keeps."""
+        super().__init__(name, start_parameter_services=False, enable_rosout=False)
+        self.now = 0.0
+        self.heard: list[str] = []
+        self.spoken: list[str] = []
+        self.served: list[str] = []
+
+    def hear(self, msg_type: Any, topic: str, note: Callable[[Any], None]) -> None:
+        """Listen to a topic that the student's node publishes on."""
+        self.heard.append(topic)
+        self.create_subscription(msg_type, topic, note, UNDEMANDING)
+
+    def speak(self, msg_type: Any, topic: str) -> Any:
+        """Return a publisher on a topic that the student's node listens to."""
+        self.spoken.append(topic)
+        return self.create_publisher(msg_type, topic, LOSSLESS)
+
+    def missing(self) -> str:
+        """Return what the student's node lacks, a sentence each; empty if all is connected."""
+        lacking = [f"no publisher on {t}" for t in self.heard if not self.count_publishers(t)]
+        lacking += [f"no subscription to {t}" for t in self.spoken if not self.count_subscribers(t)]
+        lacking += self.missing_servers()
+        return "There is " + ", ".join(lacking) + "." if lacking else ""
+
+    def missing_servers(self) -> list[str]:
+        """Return which of the student's servers and clients are not there, a phrase each."""
+        return []
+
+
+PlayerT = TypeVar("PlayerT", bound=Player)
+
+
+class Robot:
+    """One of the student's nodes at work."""
+
+    def __init__(self, bench: Bench, name: str, player: Player, still: Stillness) -> None:
+        """Make the node of class ``name`` in a session of its own.
+
+        Raises:
+            Failed: it cannot be made, or lacks an endpoint of the task.
+        """
+        import time,sys
+        t=time.perf_counter()
+        self.name, self._bench, self._player, self._still = name, bench, player, still
+        bench.subject.open(threads=THREADS, sim_time=True)
+        try:
+            bench.subject.start(name)
+        except StudentError as error:
+            where = f" It happened here:\n{error.trace}" if error.trace else ""
+            raise Failed(
+                expected=f"{name}() makes a node without an error.",
+                actual=f"It raised {error}.{where}",
+            ) from None
+        self.wait(lambda: not player.missing())
+        if lacking := player.missing():
+            raise Failed(expected=f"{name} has every endpoint of the task.", actual=lacking)
+        S[5]+=1; S[6]+=time.perf_counter()-t
+        self.rest()
+
+    def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
+        """Wait for something of DDS's own: simulated time stands still."""
+        with suppress(WaitTimeout):
+            self._bench.session.until(condition, timeout=timeout, what="an observation")
+            return True
+        return False
+
+    def rest(self) -> None:
+        """Return when all that was sent has been dealt with, on both sides."""
+        import time,sys
+        t=time.perf_counter()
+        ok=self._still.reached()
+        S[0]+=1; S[1]+=time.perf_counter()-t; S[2]+=not ok
+
+    def run(self, until: Callable[[], Any], limit: float) -> bool:
+        """Let time pass until ``until`` holds, ``limit`` s at most; return whether it does."""
+        end = self._player.now + limit
+        self.rest()
+        while not until():
+            if self._player.now >= end - STRIDE / 2:
+                return False
+            self._stride()
+        return True
+
+    def spend(self, seconds: float) -> None:
+        """Let so much time pass."""
+        self.run(lambda: False, seconds)
+
+    def _stride(self) -> None:
+        try:
+            import time,sys
+            t=time.perf_counter()
+            self._bench.subject.advance(STRIDE)
+            S[3]+=1; S[4]+=time.perf_counter()-t
+        except StudentError:
+            raise Failed(
+                expected=f"No callback of {self.name} blocks while something is slow or broken.",
+                actual="A callback held up the node so that even its clock stood still."
+                + self.complaint(),
+            ) from None
+        self._player.now += STRIDE
+        self.rest()
+
+    def complaint(self) -> str:
+        """Return what a callback raised last, as a half-sentence to add; empty if none did."""
+        raised = self._bench.subject.errors()
+        return f" A callback raised {raised[-1]}." if raised else ""
+
+
+class RobotRig:
+    """Gives each check the node that it examines, and its counterpart."""
+
+    def __init__(self, bench: Bench) -> None:
+        """Nothing runs yet."""
+        self.bench = bench
+        self._robot: Robot | None = None
+        self._player: Player | None = None
+        self._still = Stillness(bench.subject.pid)
+
+    @contextmanager
+    def robot(self, name: str, player: type[PlayerT]) -> Iterator[tuple[Robot, PlayerT]]:
+        """Give the node of a class and its counterpart; after a failed check, fresh ones."""
+        try:
+            if self._robot is None or self._robot.name != name:
+                self.clear()
+                made = self.bench.session.run(player)
+                assert isinstance(made, player)
+                self._player = made
+                self._robot = Robot(self.bench, name, made, self._still)
+            assert isinstance(self._player, player)
+            yield self._robot, self._player
+        except BaseException:
+            self._robot = None
+            raise
+
+    def clear(self) -> None:
+        """Take the examiner's end down."""
+        self._robot = None
+        if self._player is not None:
+            self.bench.session.stop(self._player)
+            self._player = None
+
+
+@contextmanager
+def robot_rig(bench: Bench) -> Iterator[RobotRig]:
+    """Give a rig, and take the examiner's endpoints down afterwards."""
+    rig = RobotRig(bench)
+    try:
+        yield rig
+    finally:
+        rig.clear()
+        import sys
+        print("DEBUG", S, file=open('/tmp/ex5.log','a'))
