@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from autograder.wire import Channel, ChannelClosed, ChannelTimeout
@@ -13,6 +13,9 @@ REPLY_TIMEOUT = 10.0
 
 PATIENCE = 3.0
 """Seconds of wall time that a callback of a subject's may hold up a step of simulated time."""
+
+Endpoints = Mapping[str, Sequence[str]]
+"""Names of topics and services by kind: "publishers", "subscribers", "services", "clients"."""
 
 
 class SubjectGone(Exception):  # noqa: N818 - it is a finding, not a fault of ours
@@ -122,6 +125,21 @@ class Subject:
             StudentError: there is no such variable, or it is made of something else.
         """
         return self._ask("value", name)["value"]
+
+    def sees(self, name: str, endpoints: Endpoints) -> dict[str, dict[str, int]]:
+        """Return how many endpoints of a kind and name the node made of a class has discovered.
+
+        For waiting, never as evidence: DDS discovers in both directions, each in its own time, and
+        what is sent before the other side knows of it is lost.
+
+        Args:
+            name: the class.
+            endpoints: names of topics and services by kind: "publishers", "subscribers",
+                "services", "clients".
+        """
+        wanted = {kind: list(names) for kind, names in endpoints.items()}
+        counts = self._ask("sees", name, endpoints=wanted)["counts"]
+        return {kind: {n: int(counts[kind][n]) for n in names} for kind, names in wanted.items()}
 
     def errors(self) -> list[str]:
         """Return what the student's callbacks raised: for an explanation, never as evidence."""

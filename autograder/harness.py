@@ -51,7 +51,7 @@ class Harness:
                 "open": self._open, "start": self._start, "start_all": self._start_all,
                 "stop": self._stop, "pause": self._pause, "resume": self._resume,
                 "advance": self._advance, "call": self._call, "value": self._value,
-                "errors": self._errors,
+                "errors": self._errors, "sees": self._sees,
             }[request["op"]]  # fmt: skip
             return {"ok": True, **operation(request)}
         except Exception as error:  # noqa: BLE001 - a student's code may raise anything
@@ -142,6 +142,19 @@ class Harness:
             raise TypeError(
                 f"{request['name']} must be made of strings, numbers, lists and dictionaries"
             ) from None
+
+    def _sees(self, request: dict[str, Any]) -> dict[str, Any]:
+        node = self._nodes[request["name"]]
+        counts = {
+            "publishers": node.count_publishers, "subscribers": node.count_subscribers,
+            "services": node.count_services, "clients": node.count_clients,
+        }  # fmt: skip
+        return {
+            "counts": {
+                kind: {name: counts[kind](name) for name in names}
+                for kind, names in request["endpoints"].items()
+            }
+        }
 
     def _errors(self, request: dict[str, Any]) -> dict[str, Any]:
         recent = self._hosting.errors[-5:]

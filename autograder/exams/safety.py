@@ -33,7 +33,7 @@ def gripper_answers(rig: RobotRig) -> None:
 
     The rest of the robot waits for this word: the arm lifts only what is held.
     """
-    grips.carried_out(rig)
+    rig.once(grips.carried_out)
 
 
 @EXAM.check(
@@ -84,7 +84,7 @@ def speed_serves(rig: RobotRig) -> None:
 
     In a crowded ward operators slow the robot down, and have to know that it listened.
     """
-    speeds.good(rig)
+    rig.once(speeds.good)
 
 
 @EXAM.check(
@@ -119,7 +119,7 @@ def goals_end(rig: RobotRig) -> None:
     A result arrives for an aborted goal too. Whoever takes every result for success unloads the
     parcel in the corridor.
     """
-    goals.ended(rig)
+    rig.once(goals.ended)
 
 
 @EXAM.check(
@@ -152,7 +152,7 @@ def drive_arrives(rig: RobotRig) -> None:
 
     The wheels keep doing what they were told last: a drive that ends without a stop does not end.
     """
-    drives.arrives(rig)
+    rig.once(drives.arrives)
 
 
 @EXAM.check(
@@ -261,15 +261,16 @@ def goals_lost(rig: RobotRig) -> None:
 @EXAM.check(
     needs=("drive_arrives",),
     hints=(
-        "Which of your lines run when somebody calls `destroy_node()` in the middle of a drive?",
-        "Override `destroy_node`: stop first, while there still is a publisher, then the rest.",
-        "`def destroy_node(self): self.wheels.stop(); super().destroy_node()`",
+        "Which of your lines run when somebody calls `shutdown()` in the middle of a drive?",
+        "A stop alone does not last: the loop drives on. Tell the loop, too.",
+        "Set a flag, then stop the wheels; the loop looks at the flag, aborts the goal, and returns.",
     ),
     read="Chapter 5, “Nodes: the processing units”",
 )
 def drive_shutdown(rig: RobotRig) -> None:
-    """A node that is destroyed in the middle of a drive leaves the robot standing.
+    """A node that is shut down in the middle of a drive leaves the robot standing.
 
-    Updates, crashes of the launch file, Ctrl-C: nodes go down while the robot drives.
+    An update, Ctrl-C, a launch file that ends: nodes go down while the robot drives, and nobody
+    is left to tell the wheels.
     """
     drives.shutdown(rig)

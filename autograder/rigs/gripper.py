@@ -103,6 +103,7 @@ class Operator(Player):
         self._jam = self.speak(Bool, "hardware/jammed")
         self.hear(Twist, "wheels/limits", self._note)
         self._client = self.create_client(SetParametersAtomically, "speed/set")
+        self.uses("speed/set")
 
     def _note(self, message: Twist) -> None:
         self.limits.append((message.linear.x, message.angular.z))

@@ -119,6 +119,8 @@ class Dispatcher(Player):
         self.hear(Twist, "cmd_vel", lambda message: self.speeds.append(moves(message)))
         self.hear(String, "drive/fault", lambda message: self.faults.append(message.data))
         self._client = ActionClient(self, Drive, "drive")
+        for service in services_of("drive"):
+            self.uses(service)
 
     def jam(self, jammed: bool) -> None:
         """Jam the wheels, or free them."""
@@ -162,6 +164,11 @@ class Dispatcher(Player):
         """Take the client down, too: rclpy leaves it alive."""
         self._client.destroy()
         super().destroy_node()
+
+
+def services_of(action: str) -> list[str]:
+    """Return the services that an action is made of (ROS 2 design, "Actions")."""
+    return [f"{action}/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")]
 
 
 def moves(speed: Twist) -> bool:

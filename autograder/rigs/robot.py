@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from autograder.bench import Bench, StudentError
+from autograder.bench import Bench, Endpoints, StudentError
 from autograder.exam import Failed
 from autograder.rigs.stillness import Stillness
 from course import WaitTimeout
@@ -37,19 +37,34 @@ class Player(Node):
         """Create no endpoints yet; ``now`` is simulated time in s, which the rig keeps."""
         super().__init__(name, start_parameter_services=False, enable_rosout=False)
         self.now = 0.0
-        self.heard: list[str] = []
+        self._ears: dict[str, tuple[Any, Callable[[Any], None]]] = {}
         self.spoken: list[str] = []
-        self.served: list[str] = []
+        self.used: list[str] = []
 
     def hear(self, msg_type: Any, topic: str, note: Callable[[Any], None]) -> None:
-        """Listen to a topic that the student's node publishes on."""
-        self.heard.append(topic)
-        self.create_subscription(msg_type, topic, note, UNDEMANDING)
+        """Listen to a topic that the student's node publishes on, once it does."""
+        self._ears[topic] = (msg_type, note)
+
+    @property
+    def heard(self) -> list[str]:
+        """The topics that the student's node publishes on."""
+        return list(self._ears)
+
+    def attend(self) -> None:
+        """Subscribe, with what is offered: lossless wherever that is possible."""
+        for topic, (msg_type, note) in self._ears.items():
+            offers = [end.qos_profile for end in self.get_publishers_info_by_topic(topic)]
+            reliable = all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offers)
+            self.create_subscription(msg_type, topic, note, LOSSLESS if reliable else UNDEMANDING)
 
     def speak(self, msg_type: Any, topic: str) -> Any:
         """Return a publisher on a topic that the student's node listens to."""
         self.spoken.append(topic)
         return self.create_publisher(msg_type, topic, LOSSLESS)
+
+    def uses(self, service: str) -> None:
+        """Say that the examiner is a client of a service that the student's node serves."""
+        self.used.append(service)
 
     def missing(self) -> str:
         """Return what the student's node lacks, a sentence each; empty if all is connected."""
@@ -70,7 +85,7 @@ class Robot:
     """One of the student's nodes at work."""
 
     def __init__(self, bench: Bench, name: str, player: Player, still: Stillness) -> None:
-        """Make the node of class ``name`` in a session of its own.
+        """Make the node of class ``name`` in the subject's present session.
 
         Raises:
             Failed: it cannot be made, or lacks an endpoint of the task.
@@ -78,7 +93,6 @@ class Robot:
         import time,sys
         t=time.perf_counter()
         self.name, self._bench, self._player, self._still = name, bench, player, still
-        bench.subject.open(threads=THREADS, sim_time=True)
         try:
             bench.subject.start(name)
         except StudentError as error:
@@ -90,6 +104,10 @@ class Robot:
         self.wait(lambda: not player.missing())
         if lacking := player.missing():
             raise Failed(expected=f"{name} has every endpoint of the task.", actual=lacking)
+        player.attend()
+        self.sees(
+            {"publishers": player.spoken, "subscribers": player.heard, "clients": player.used}
+        )
         S[5]+=1; S[6]+=time.perf_counter()-t
         self.rest()
 
@@ -99,6 +117,15 @@ class Robot:
             self._bench.session.until(condition, timeout=timeout, what="an observation")
             return True
         return False
+
+    def sees(self, endpoints: Endpoints, there: bool = True) -> bool:
+        """Wait until the node has discovered each endpoint, or the loss of each; return if so."""
+
+        def all_seen() -> bool:
+            counts = self._bench.subject.sees(self.name, endpoints)
+            return all(bool(n) is there for kind in counts.values() for n in kind.values())
+
+        return self.wait(all_seen)
 
     def rest(self) -> None:
         """Return when all that was sent has been dealt with, on both sides."""
@@ -150,23 +177,43 @@ class RobotRig:
         self.bench = bench
         self._robot: Robot | None = None
         self._player: Player | None = None
+        self._fresh = False
         self._still = Stillness(bench.subject.pid)
 
     @contextmanager
     def robot(self, name: str, player: type[PlayerT]) -> Iterator[tuple[Robot, PlayerT]]:
-        """Give the node of a class and its counterpart; after a failed check, fresh ones."""
+        """Give the node of a class and its counterpart; after a failed check, fresh ones.
+
+        A check that passed leaves a subject that can go on: another session would have to be
+        discovered first. One that failed may have left callbacks that never end.
+        """
         try:
             if self._robot is None or self._robot.name != name:
-                self.clear()
-                made = self.bench.session.run(player)
-                assert isinstance(made, player)
-                self._player = made
-                self._robot = Robot(self.bench, name, made, self._still)
+                self._change_to(name, player)
+            assert self._robot is not None
             assert isinstance(self._player, player)
             yield self._robot, self._player
         except BaseException:
-            self._robot = None
+            self._robot, self._fresh = None, False
             raise
+
+    def _change_to(self, name: str, player: type[Player]) -> None:
+        if self._robot is not None:
+            self.bench.subject.stop(self._robot.name)
+        self.clear()
+        if not self._fresh:
+            self.bench.subject.open(threads=THREADS, sim_time=True)
+            self._fresh = True
+        made = self.bench.session.run(player)
+        assert isinstance(made, player)
+        self._player = made
+        self._robot = Robot(self.bench, name, made, self._still)
+
+    def once(self, trial: Callable[[RobotRig], None]) -> None:
+        """Run a trial that others build on, unless an earlier part of the exam has passed it."""
+        if trial.__name__ not in self.bench.memory:
+            trial(self)
+            self.bench.memory[trial.__name__] = True
 
     def clear(self) -> None:
         """Take the examiner's end down."""
@@ -174,6 +221,18 @@ class RobotRig:
         if self._player is not None:
             self.bench.session.stop(self._player)
             self._player = None
+
+
+@contextmanager
+def serving(rig: RobotRig, robot: Robot, make: Callable[[], Node], services: Endpoints) -> Iterator[None]:
+    """Run a server of the examiner's for the length of the block; the robot knows both ends."""
+    server = rig.bench.session.run(make)
+    try:
+        robot.sees(services)
+        robot.rest()
+        yield
+    finally:
+        rig.bench.session.stop(server)
 
 
 @contextmanager

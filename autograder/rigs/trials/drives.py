@@ -68,7 +68,7 @@ def canceled(rig: RobotRig) -> None:
                 else f"It was not answered.{robot.complaint()}",
             )
         _ends(robot, drive, "A canceled goal", "canceled", CANCEL + TOLERANCE)
-        _stands(robot, dispatcher, "canceled")
+        _stands(robot, dispatcher, "been canceled")
 
 
 def aborted(rig: RobotRig) -> None:
@@ -78,7 +78,7 @@ def aborted(rig: RobotRig) -> None:
         robot.spend(1.5)
         dispatcher.jam(True)
         _ends(robot, drive, "A goal whose wheels jam", "aborted", ABORT + TOLERANCE)
-        _stands(robot, dispatcher, "aborted")
+        _stands(robot, dispatcher, "been aborted")
         if not any(fault.strip() for fault in dispatcher.faults):
             raise Failed(
                 expected="The reason is published on drive/fault, in words.",
@@ -92,24 +92,25 @@ def aborted(rig: RobotRig) -> None:
 
 
 def shutdown(rig: RobotRig) -> None:
-    """The node is destroyed on the way."""
+    """The node is about to be taken down on the way."""
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
-        _driving(robot, dispatcher, LONG)
+        drive = _driving(robot, dispatcher, LONG)
         robot.spend(0.5)
         try:
-            rig.bench.subject.stop(Dispatcher.SERVER)
+            rig.bench.subject.call(Dispatcher.SERVER, "shutdown")
         except StudentError as error:
             raise Failed(
-                expected="destroy_node() does not raise.", actual=f"It raised {error}."
+                expected=f"{Dispatcher.SERVER} has a method shutdown() that does not raise.",
+                actual=f"The call raised {error}.",
             ) from None
         robot.rest()
-        if not dispatcher.speeds or dispatcher.speeds[-1]:
+        if dispatcher.speeds[-1]:
             raise Failed(
-                expected="When the node is destroyed, its last command is a stop.",
-                actual="It was destroyed in the middle of a drive, and the last Twist on cmd_vel "
-                "told the robot to drive.",
+                expected="shutdown() stops the robot at once.",
+                actual="After the call the last Twist on cmd_vel told the robot to drive.",
             )
-        rig.clear()
+        _ends(robot, drive, "A goal under way at shutdown()", "aborted", ABORT + TOLERANCE)
+        _stands(robot, dispatcher, "been aborted")
 
 
 def _driving(robot: Robot, dispatcher: Dispatcher, metres: int) -> Drives:
@@ -170,6 +171,6 @@ def _stands(robot: Robot, dispatcher: Dispatcher, how: str) -> None:
     robot.spend(STOP)
     if not dispatcher.speeds or dispatcher.speeds[-1]:
         raise Failed(
-            expected=f"When the drive has {how}, the last Twist on cmd_vel is zero.",
-            actual=f"It {how}, and the last Twist on cmd_vel told the robot to drive.",
+            expected=f"When the drive has {how}, the last Twist on cmd_vel is zero, within {STOP:g} s.",
+            actual="The last one told the robot to drive.",
         )

@@ -12,7 +12,10 @@ from rclpy.action.server import ServerGoalHandle
 
 from autograder.exam import Failed
 from autograder.rigs.navigation import NavigatorUser
-from autograder.rigs.robot import STRIDE, Robot, RobotRig
+from autograder.rigs.navigation import services_of
+from autograder.rigs.robot import STRIDE, Robot, RobotRig, serving
+
+NAVIGATOR = {"services": services_of("navigate")}
 
 PROMPT = 1.0  # s for an outcome that is clear; a node may look for it by a timer
 SILENCE = 2.0  # s without feedback after which a drive is canceled
@@ -21,21 +24,17 @@ BREATH = 1.5  # s between the feedbacks of a navigator that is slow, not dead
 TOLERANCE = 0.5  # s: what the task allows, strides, and a node that looks by a timer
 AFTER = 2.5  # s in which a second outcome would show
 METRES = 3
-PROBES = 5
 
 
 @contextmanager
 def _user(rig: RobotRig, navigator: bool = True) -> Iterator[tuple[Robot, NavigatorUser]]:
     with rig.robot(NavigatorUser.CLIENT, NavigatorUser) as (robot, user):
-        if not navigator:
+        if navigator:
+            with serving(rig, robot, user.navigator, NAVIGATOR):
+                yield robot, user
+        else:
+            robot.sees(NAVIGATOR, there=False)
             yield robot, user
-            return
-        server = rig.bench.session.run(user.navigator)
-        try:
-            robot.rest()
-            yield robot, user
-        finally:
-            rig.bench.session.stop(server)
 
 
 def _accepted(robot: Robot, user: NavigatorUser, *, obeys: bool = True) -> None:
@@ -86,7 +85,6 @@ def _once(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
 def ended(rig: RobotRig) -> None:
     """Goals that succeed, are rejected, are aborted."""
     with _user(rig) as (robot, user):
-        _probe(robot, user)
         _accepted(robot, user)
         user.feedback(1)
         user.end(ServerGoalHandle.succeed)
@@ -98,16 +96,6 @@ def ended(rig: RobotRig) -> None:
         user.feedback(1)
         user.end(ServerGoalHandle.abort)
         _outcome(robot, user, "When the navigator aborted the goal", "aborted")
-
-
-def _probe(robot: Robot, user: NavigatorUser) -> None:
-    """Make sure that the client has found the navigator: the first goal may come before that."""
-    for _ in range(PROBES):
-        user.request(METRES, accepts=False)
-        robot.run(lambda: user.orders or user.outcomes, PROMPT)
-        if user.orders:
-            robot.run(lambda: user.outcomes, PROMPT)
-            return
 
 
 def stalled(rig: RobotRig) -> None:

@@ -10,7 +10,9 @@ from contextlib import contextmanager
 
 from autograder.exam import Failed
 from autograder.rigs.gripper import GripUser
-from autograder.rigs.robot import STRIDE, Robot, RobotRig
+from autograder.rigs.robot import STRIDE, Robot, RobotRig, serving
+
+GRIPPER = {"services": ["gripper/set"]}
 
 PROMPT = 1.0  # s for an outcome that is clear; a node may look for it by a timer
 SLOW = 0.8  # s that a slow answer takes: within the 1 s that a try has
@@ -20,21 +22,17 @@ GROWTH = 0.5  # s by which the second pause is longer, at least
 TOLERANCE = 0.25  # s: what the task allows, and what the examiner's strides blur
 AFTER = 1.5  # s in which a second outcome would show
 BEAT = 0.5  # s between two heartbeats
-PROBES = 5
 
 
 @contextmanager
 def _user(rig: RobotRig, gripper: bool = True) -> Iterator[tuple[Robot, GripUser]]:
     with rig.robot(GripUser.CLIENT, GripUser) as (robot, user):
-        if not gripper:
+        if gripper:
+            with serving(rig, robot, user.gripper, GRIPPER):
+                yield robot, user
+        else:
+            robot.sees(GRIPPER, there=False)
             yield robot, user
-            return
-        server = rig.bench.session.run(user.gripper)
-        try:
-            robot.rest()
-            yield robot, user
-        finally:
-            rig.bench.session.stop(server)
 
 
 def _tried(robot: Robot, user: GripUser, close: bool) -> None:
@@ -84,7 +82,6 @@ def _said(user: GripUser) -> str:
 def carried_out(rig: RobotRig) -> None:
     """The gripper answers, at once and within the time of a try."""
     with _user(rig) as (robot, user):
-        _probe(robot, user)
         for close, delay in ((True, 0.0), (False, SLOW)):
             _tried(robot, user, close)
             robot.spend(delay)
@@ -97,19 +94,6 @@ def carried_out(rig: RobotRig) -> None:
                     expected=f"An answer after {delay:g} s is in time: one try is enough.",
                     actual=f"The gripper was called {len(user.tries)} times.",
                 )
-
-
-def _probe(robot: Robot, user: GripUser) -> None:
-    """Make sure that the client has found the gripper: the first call may come before that."""
-    for _ in range(PROBES):
-        user.request(True)
-        robot.run(lambda: user.tries or user.outcomes, PROMPT)
-        if user.tries:
-            user.tries[0].reply(True)
-            robot.run(lambda: user.outcomes, PROMPT)
-            return
-        if not user.outcomes:
-            robot.run(lambda: user.tries or user.outcomes, LONGEST)
 
 
 def refused(rig: RobotRig) -> None:

@@ -49,7 +49,8 @@
 # - `once(node, seconds, callback)` calls `callback` once, that many seconds later on the node's clock.
 #   It returns a timer: `timer.reset()` begins anew, `timer.cancel()` calls it off.
 # - `await sleep(node, seconds)` lets a coroutine wait. Other callbacks run meanwhile.
-# - `Wheels(node)` is the robot's motor controller. It raises `WheelError` while the wheels are jammed.
+# - `Wheels(node)` is the robot's motor controller. It raises `WheelError` while the wheels are jammed;
+#   only `stop()` always works.
 #
 # A pattern that you can use with any future, a service's answer or an action's: cancel the future
 # when time is up. Then `await future` ends too, and gives `None`; an answer that comes later is
@@ -356,9 +357,10 @@ class NavigationClient(Node):
 # - A request to cancel is accepted, and within 0.5 s the goal is **canceled**.
 # - If the wheels raise, the goal is **aborted** within 1 s, and the reason is published in words on
 #   `drive/fault` (`String`). The next goal is served as usual.
-# - **However it ends** (succeeded, canceled, aborted, or the node destroyed in the middle of a
-#   drive) the robot stands: the last message on `cmd_vel` is a zero `Twist`, within 0.5 s of the end.
-#   Whoever shuts a node down calls its `destroy_node()`.
+# - Whoever takes the node down calls its method `shutdown()` first, in a thread of their own. It does
+#   not wait: it stops the wheels, and the goal that is under way is **aborted** within 1 s.
+# - **However it ends** (succeeded, canceled, aborted, shut down) the robot stands: the last message
+#   on `cmd_vel` is a zero `Twist`, within 0.5 s of the end.
 
 # %% nbgrader={"grade": false, "grade_id": "safety-drive", "locked": false, "schema_version": 3, "solution": true}
 class NavigationServer(Node):
@@ -368,6 +370,7 @@ class NavigationServer(Node):
         super().__init__('navigation_server')
         self.group = ReentrantCallbackGroup()
         self.wheels = Wheels(self)
+        self.closing = False
         self.fault = self.create_publisher(String, 'drive/fault', 10)
         self.server = ActionServer(
             self,
@@ -406,6 +409,8 @@ class NavigationServer(Node):
                     if goal_handle.is_cancel_requested:
                         goal_handle.canceled()
                         return Drive.Result(sequence=passed)
+                    if self.closing:
+                        raise WheelError('the node is being shut down')
                     self.wheels.drive()
                     await sleep(self, 0.2)
                 passed.append(len(passed) + 1)
@@ -418,12 +423,12 @@ class NavigationServer(Node):
             self.wheels.stop()
         ### END SOLUTION
         return Drive.Result(sequence=passed)
-        ### BEGIN SOLUTION
 
-    def destroy_node(self):
-        """Stop first: afterwards there is no publisher left to say so."""
+    def shutdown(self):
+        """Stop the robot before the node is taken down."""
+        ### BEGIN SOLUTION
+        self.closing = True
         self.wheels.stop()
-        super().destroy_node()
         ### END SOLUTION
 
 
@@ -481,7 +486,7 @@ check("safety", part="hidden")
 # **Errors as answers:** if the callback raises, no response is sent: the operator waits for ever, and
 # under a plain `spin` the node dies. A half-applied request leaves limits that nobody asked for.
 #
-# **Stopping:** `finally` in the execute callback covers each end of a goal, `destroy_node` the
-# shutdown. A process that is killed says nothing any more: the motor controller itself needs a
+# **Stopping:** `finally` in the execute callback covers each end of a goal, the flag that the loop
+# looks at covers the shutdown. A process that is killed says nothing any more: the motor controller itself needs a
 # watchdog that stops the wheels when commands cease.
 # ### END SOLUTION
