@@ -13,7 +13,7 @@ from rclpy.action.server import ServerGoalHandle
 from autograder.exam import Failed
 from autograder.rigs.navigation import NavigatorUser
 from autograder.rigs.navigation import services_of
-from autograder.rigs.robot import STRIDE, Robot, RobotRig, serving
+from autograder.rigs.robot import COARSE, STRIDE, Robot, RobotRig, serving
 
 NAVIGATOR = {"services": services_of("navigate")}
 
@@ -61,10 +61,10 @@ def _outcome(
     """Require one outcome, and a stop unless it is good."""
     robot.run(lambda: user.outcomes, limit)
     if user.outcomes != [word]:
-        words = ", then ".join(f"“{said}”" for said in user.outcomes)
+        words = ", then ".join(f"“{said}”" for said in user.outcomes) or "nothing"
         raise Failed(
             expected=f"{when}, navigate/outcome says “{word}”, once.",
-            actual=f"It said {words}." if words else f"It said nothing.{robot.complaint()}",
+            actual=f"It said {words}.{robot.complaint()}",
         )
     if word == "arrived":
         return
@@ -78,7 +78,7 @@ def _outcome(
 
 
 def _once(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
-    robot.spend(AFTER)
+    robot.spend(AFTER, COARSE)
     _outcome(robot, user, when, word)
 
 
@@ -103,7 +103,7 @@ def stalled(rig: RobotRig) -> None:
     with _user(rig) as (robot, user):
         _accepted(robot, user)
         for metre in range(1, METRES + 1):
-            robot.spend(BREATH)
+            robot.spend(BREATH, COARSE)
             if user.cancels or user.outcomes:
                 raise Failed(
                     expected=f"A drive with feedback every {BREATH:g} s is left alone.",

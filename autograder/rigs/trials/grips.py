@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 from autograder.exam import Failed
 from autograder.rigs.gripper import GripUser
-from autograder.rigs.robot import STRIDE, Robot, RobotRig, serving
+from autograder.rigs.robot import COARSE, STRIDE, Robot, RobotRig, serving
 
 GRIPPER = {"services": ["gripper/set"]}
 
@@ -54,11 +54,11 @@ def _tried(robot: Robot, user: GripUser, close: bool) -> None:
 
 def _outcome(robot: Robot, user: GripUser, when: str, word: str, limit: float = PROMPT) -> None:
     """Require one outcome, and a held arm unless it is good."""
-    robot.run(lambda: user.outcomes, limit)
+    robot.run(lambda: user.outcomes, limit, STRIDE if limit == PROMPT else COARSE)
     if user.outcomes != [word]:
         raise Failed(
             expected=f"{when}, grip/outcome says “{word}”, once.",
-            actual=f"{_said(user)}{'' if user.outcomes else robot.complaint()}",
+            actual=_said(user) + robot.complaint(),
         )
     if word != "done" and not robot.run(lambda: user.holds, PROMPT):
         raise Failed(
@@ -69,7 +69,7 @@ def _outcome(robot: Robot, user: GripUser, when: str, word: str, limit: float = 
 
 def _once(robot: Robot, user: GripUser, when: str) -> None:
     """Require that the outcome stays the only one."""
-    robot.spend(AFTER)
+    robot.spend(AFTER, COARSE)
     if len(user.outcomes) != 1:
         raise Failed(expected=f"{when}, there is exactly one outcome.", actual=_said(user))
 
@@ -87,13 +87,14 @@ def carried_out(rig: RobotRig) -> None:
             robot.spend(delay)
             if user.tries and not user.outcomes:
                 user.tries[0].reply(True)
-            when = f"When the gripper answered success=True after {delay:g} s"
-            _outcome(robot, user, when, "done")
+            robot.run(lambda: user.outcomes or len(user.tries) > 1, PROMPT)
             if len(user.tries) > 1:
                 raise Failed(
                     expected=f"An answer after {delay:g} s is in time: one try is enough.",
                     actual=f"The gripper was called {len(user.tries)} times.",
                 )
+            when = f"When the gripper answered success=True after {delay:g} s"
+            _outcome(robot, user, when, "done")
 
 
 def refused(rig: RobotRig) -> None:

@@ -34,7 +34,9 @@
 # 1. **All waiting runs on the node's clock** (`self.create_timer`, `self.get_clock()`), never on the
 #    wall clock (`time.sleep`, `wait_for_service(timeout_sec=...)`, `call(timeout_sec=...)`): the
 #    examiner runs your robot on simulated time. Times in the task are in that time's seconds, and
-#    0.2 s more or less do no harm.
+#    0.2 s more or less do no harm. Timers fire when they are due; a thread of your own sees the
+#    clock move in steps of 0.1 s or more, and sleeps on it with
+#    `self.get_clock().sleep_for(duration, context=self.context)`.
 # 2. **Nothing blocks.** Each node runs in an executor with 4 threads. While a callback waits,
 #    everything else in its callback group waits too, and in the node's default group that is also
 #    the clock itself. The stubs therefore use a reentrant group, `self.group`.
