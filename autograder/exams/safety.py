@@ -126,8 +126,8 @@ def goals_end(rig: RobotRig) -> None:
     needs=("goals_end",),
     hints=(
         "What tells a slow navigator from one that hangs?",
-        "Feedback is the sign of life: start a timer of 2 s at acceptance, and anew with each one.",
-        "When it fires: `cancel_goal_async()`, a zero Twist, then `stalled`. Stop it at the result.",
+        "Feedback is the sign of life: start a timer of 2 s at acceptance, and again with each.",
+        "When it fires: `cancel_goal_async()`, a zero Twist, then `stalled`. Cancel it at the end.",
     ),
     read=READ_ACTIONS,
 )
@@ -143,7 +143,7 @@ def goals_stall(rig: RobotRig) -> None:
     hints=(
         "Send a goal of your own: `course.send_goal(Drive, 'drive', Drive.Goal(order=2))`.",
         "Reject bad orders in the goal callback: in `execute` it is too late, it was accepted.",
-        "A second a metre: command the wheels, `await sleep`, publish feedback; then succeed, stop.",
+        "A second a metre: command the wheels, `await sleep`, feedback; then succeed, and stop.",
     ),
     read=READ_ACTIONS,
 )
@@ -160,7 +160,7 @@ def drive_arrives(rig: RobotRig) -> None:
     hints=(
         "Who decides whether a request to cancel is accepted, and who has to act on it?",
         "Accept it in the cancel callback, and look at `goal_handle.is_cancel_requested` often.",
-        "In the loop: if requested, `goal_handle.canceled()` and return; `finally` stop the wheels.",
+        "In the loop: if requested, `goal_handle.canceled()` and return; `finally` stop wheels.",
     ),
     read=READ_ACTIONS,
 )
@@ -177,7 +177,7 @@ def drive_cancels(rig: RobotRig) -> None:
     hints=(
         "What happens to the robot between the exception and the end of `execute`?",
         "Catch WheelError around the whole loop: say why on drive/fault, then abort the goal.",
-        "`except WheelError as error:` publish `str(error)`, `goal_handle.abort()`; `finally:` stop.",
+        "`except WheelError as error:` publish it, `goal_handle.abort()`; `finally:` stop.",
     ),
     read=READ_ERRORS,
 )
@@ -192,7 +192,7 @@ def drive_aborts(rig: RobotRig) -> None:
 @EXAM.check(
     needs=("gripper_answers",),
     hints=(
-        "Your second try is out, and now the answer to the first one arrives. Where does it end up?",
+        "Your second try is out, and the answer to the first one arrives. Where does it end up?",
         "Each try has a future of its own. Forget the old one when its time is up.",
         "`future.cancel()` (or `client.remove_pending_request(future)`) when the 1 s is over.",
     ),
@@ -229,7 +229,7 @@ def gripper_absent(rig: RobotRig) -> None:
     hints=(
         "When do you store a new limit: before or after everything about the request is known?",
         "Work on a copy, and let it take the place of the limits after `set_limits` has returned.",
-        "`limits = dict(self.limits)`, check all, `try: self.wheels.set_limits(**limits)`, then store.",
+        "Copy `self.limits`, check all, `try: self.wheels.set_limits(**copy)`, and then store.",
     ),
     read=READ_ERRORS,
 )
@@ -263,7 +263,7 @@ def goals_lost(rig: RobotRig) -> None:
     hints=(
         "Which of your lines run when somebody calls `shutdown()` in the middle of a drive?",
         "A stop alone does not last: the loop drives on. Tell the loop, too.",
-        "Set a flag, then stop the wheels; the loop looks at the flag, aborts the goal, and returns.",
+        "Set a flag, and stop the wheels; the loop looks at the flag, aborts the goal, returns.",
     ),
     read="Chapter 5, “Nodes: the processing units”",
 )

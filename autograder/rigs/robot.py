@@ -215,7 +215,9 @@ class RobotRig:
 
 
 @contextmanager
-def serving(rig: RobotRig, robot: Robot, make: Callable[[], Node], services: Endpoints) -> Iterator[None]:
+def serving(
+    rig: RobotRig, robot: Robot, make: Callable[[], Node], services: Endpoints
+) -> Iterator[None]:
     """Run a server of the examiner's for the length of the block; the robot knows both ends."""
     server = rig.bench.session.run(make)
     try:

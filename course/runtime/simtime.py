@@ -55,9 +55,7 @@ class SimulatedTime:
         """Simulated time in nanoseconds."""
         return self._now_ns
 
-    def advance(
-        self, seconds: float, step: float = 0.01, patience: float | None = None
-    ) -> None:
+    def advance(self, seconds: float, step: float = 0.01, patience: float | None = None) -> None:
         """Move the clock on by `seconds`, in steps of `step` seconds.
 
         After each step, callbacks run until nothing is left to do. A callback that blocks (for

@@ -171,6 +171,7 @@ def _stands(robot: Robot, dispatcher: Dispatcher, how: str) -> None:
     robot.spend(STOP)
     if not dispatcher.speeds or dispatcher.speeds[-1]:
         raise Failed(
-            expected=f"When the drive has {how}, the last Twist on cmd_vel is zero, within {STOP:g} s.",
+            expected=f"Within {STOP:g} s after the drive has {how}, the last Twist on cmd_vel is "
+            "zero.",
             actual="The last one told the robot to drive.",
         )

@@ -11,8 +11,7 @@ from contextlib import contextmanager
 from rclpy.action.server import ServerGoalHandle
 
 from autograder.exam import Failed
-from autograder.rigs.navigation import NavigatorUser
-from autograder.rigs.navigation import services_of
+from autograder.rigs.navigation import NavigatorUser, services_of
 from autograder.rigs.robot import COARSE, STRIDE, Robot, RobotRig, serving
 
 NAVIGATOR = {"services": services_of("navigate")}

@@ -147,12 +147,12 @@ def _tries(count: int) -> str:
 def _require_pauses(first: float, second: float) -> None:
     if first < FIRST_GAP - TOLERANCE:
         raise Failed(
-            expected="The second try comes 1.5 s after the first: 1 s for an answer, 0.5 s of pause.",
+            expected="The second try comes 1.5 s after the first: 1 s for an answer, 0.5 s pause.",
             actual=f"It came {first:.1f} s after the first.",
         )
     if second - first < GROWTH - TOLERANCE:
         raise Failed(
-            expected="The pause before the third try is at least 0.5 s longer than the first pause.",
+            expected="The second pause is at least 0.5 s longer than the first one.",
             actual=f"The second try came {first:.1f} s after the first, and the third "
             f"{second:.1f} s after the second.",
         )
@@ -182,7 +182,9 @@ def stale(rig: RobotRig) -> None:
                 "while the second try was still open.",
             )
         user.tries[1].reply(True)
-        when = "When the second try was answered with success=True, after a late answer to the first"
+        when = (
+            "When the second try was answered with success=True, after a late answer to the first"
+        )
         _outcome(robot, user, when, "done")
         _once(robot, user, when)
 

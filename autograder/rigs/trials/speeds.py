@@ -34,7 +34,9 @@ NONSENSE: tuple[tuple[str, list[Parameter]], ...] = (
 def good(rig: RobotRig) -> None:
     """Two good requests: both limits, then one."""
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
-        _accepted(robot, operator, "linear = 0.3, angular = 0.6", (0.3, 0.6), linear=0.3, angular=0.6)
+        _accepted(
+            robot, operator, "linear = 0.3, angular = 0.6", (0.3, 0.6), linear=0.3, angular=0.6
+        )
         _accepted(robot, operator, "angular = 2.0 alone", (0.3, 2.0), angular=2.0)
         _accepted(robot, operator, "linear = 0.0 alone", (0.0, 2.0), linear=0.0)
 
@@ -59,7 +61,11 @@ def atomic(rig: RobotRig) -> None:
         halves = [double("linear", 0.2), double("angular", math.nan)]
         _refused(robot, operator, "linear = 0.2 together with angular = NaN", halves)
         _accepted(
-            robot, operator, "angular = 1.5 alone, after a half-good request", (0.5, 1.5), angular=1.5
+            robot,
+            operator,
+            "angular = 1.5 alone, after a half-good request",
+            (0.5, 1.5),
+            angular=1.5,
         )
         operator.jam(True)
         robot.rest()

@@ -222,10 +222,11 @@ class GripperClient(Node):
 # - Whatever came in, the next request is answered as if nothing had happened.
 
 # %% nbgrader={"grade": false, "grade_id": "safety-speed", "locked": false, "schema_version": 3, "solution": true}
+HIGHEST = {'linear': 1.0, 'angular': 2.0}  # m/s, rad/s
+
+
 class SpeedServer(Node):
     """Lets operators set speed limits, and believes none of them."""
-
-    HIGHEST = {'linear': 1.0, 'angular': 2.0}
 
     def __init__(self):
         super().__init__('speed_server')
@@ -255,13 +256,13 @@ class SpeedServer(Node):
         limits = {}
         for parameter in parameters:
             name, value = parameter.name, parameter.value
-            if name not in self.HIGHEST:
+            if name not in HIGHEST:
                 raise ValueError(f"there is no limit '{name}', only linear and angular")
             if value.type != ParameterType.PARAMETER_DOUBLE:
                 raise ValueError(f'{name} must be a double')
             # NaN compares false with everything, so this refuses it as well.
-            if not 0.0 <= value.double_value <= self.HIGHEST[name]:
-                raise ValueError(f'{name} must lie between 0.0 and {self.HIGHEST[name]}')
+            if not 0.0 <= value.double_value <= HIGHEST[name]:
+                raise ValueError(f'{name} must lie between 0.0 and {HIGHEST[name]}')
             limits[name] = value.double_value
         return limits
         ### END SOLUTION

@@ -1,0 +1,25 @@
+"""What a student of exercise 5 reads, word for word: three mistakes, with all hints."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from autograder import corpus, points
+from autograder.corpus import trials
+from autograder.report import Report
+
+from .conftest import SUBMISSIONS
+
+GOLDEN = Path(__file__).parent / "golden"
+CASES = {case.name: case for case in corpus.load(SUBMISSIONS, "safety")}
+MISTAKES = ("wrong-gripper-constant-pauses", "wrong-speed-nan", "wrong-drive-shutdown-drives-on")
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_the_report_reads_as_it_should(name: str) -> None:
+    (trial,) = corpus.run([CASES[name]], *trials.notebooks("safety"), jobs=1)
+    verdicts = trial.outcome.verdicts
+    shown = [repr(Report(verdicts[part], hints=3)) for part in points.table()["safety"].parts]
+    assert "\n".join(shown) + "\n" == (GOLDEN / f"safety-{name}.txt").read_text(encoding="utf-8")
