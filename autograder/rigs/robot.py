@@ -143,6 +143,7 @@ class Robot:
         self.run(lambda: False, seconds, stride)
 
     def _go_on(self, seconds: float) -> None:
+        self._player.now += seconds  # before: what comes in on the way bears the stride's end
         try:
             self._bench.subject.advance(seconds)
         except StudentError:
@@ -151,7 +152,6 @@ class Robot:
                 actual="A callback held up the node so that even its clock stood still."
                 + self.complaint(),
             ) from None
-        self._player.now += seconds
         self.rest()
 
     def complaint(self) -> str:

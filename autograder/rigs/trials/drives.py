@@ -67,7 +67,7 @@ def canceled(rig: RobotRig) -> None:
                 if drive.canceling is False
                 else f"It was not answered.{robot.complaint()}",
             )
-        _ends(robot, drive, "A canceled goal", "canceled", CANCEL + TOLERANCE)
+        _ends(robot, drive, "A canceled goal", "canceled", CANCEL)
         _stands(robot, dispatcher, "been canceled")
 
 
@@ -77,7 +77,7 @@ def aborted(rig: RobotRig) -> None:
         drive = _driving(robot, dispatcher, LONG)
         robot.spend(1.5)
         dispatcher.jam(True)
-        _ends(robot, drive, "A goal whose wheels jam", "aborted", ABORT + TOLERANCE)
+        _ends(robot, drive, "A goal whose wheels jam", "aborted", ABORT)
         _stands(robot, dispatcher, "been aborted")
         if not any(fault.strip() for fault in dispatcher.faults):
             raise Failed(
@@ -109,7 +109,7 @@ def shutdown(rig: RobotRig) -> None:
                 expected="shutdown() stops the robot at once.",
                 actual="After the call the last Twist on cmd_vel told the robot to drive.",
             )
-        _ends(robot, drive, "A goal under way at shutdown()", "aborted", ABORT + TOLERANCE)
+        _ends(robot, drive, "A goal under way at shutdown()", "aborted", ABORT)
         _stands(robot, dispatcher, "been aborted")
 
 
@@ -153,10 +153,10 @@ def _rejected(robot: Robot, dispatcher: Dispatcher, order: int) -> None:
 
 
 def _ends(robot: Robot, drive: Drives, what: str, how: str, limit: float) -> None:
-    if not robot.run(lambda: drive.status is not None, limit):
+    if not robot.run(lambda: drive.status is not None, limit + TOLERANCE):
         raise Failed(
             expected=f"{what} is over, and {how}, within {limit:g} s.",
-            actual=f"After {limit:g} s there was no result.{robot.complaint()}",
+            actual=f"After that time there was no result.{robot.complaint()}",
         )
     assert drive.status is not None
     if WORDS.get(drive.status) != how:
