@@ -40,17 +40,17 @@ def _accepted(robot: Robot, user: NavigatorUser, *, obeys: bool = True) -> None:
     """Ask for a drive, and wait until its goal has been accepted."""
     user.request(METRES, obeys=obeys)
     _sent(robot, user)
-    robot.run(lambda: user.goals, PROMPT)
+    if not robot.run(lambda: user.goals, PROMPT):
+        raise RuntimeError("the examiner's navigator did not accept a goal")
 
 
 def _sent(robot: Robot, user: NavigatorUser) -> None:
     robot.run(lambda: user.orders, PROMPT)
     if user.orders[:1] != [METRES]:
-        orders = f"with order={user.orders[0]}" if user.orders else "never"
+        order = f"a goal with order={user.orders[0]}" if user.orders else "no goal"
         raise Failed(
             expected=f"After navigate/request {METRES}, a goal with order={METRES} is sent.",
-            actual=f"The request was published, and the navigator got a goal {orders}."
-            + robot.complaint(),
+            actual=f"The request was published, and the navigator got {order}." + robot.complaint(),
         )
 
 
