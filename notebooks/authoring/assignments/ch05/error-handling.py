@@ -238,7 +238,19 @@ class SpeedServer(Node):
         """Check every parameter, then set the limits; answer in any case."""
         ### BEGIN SOLUTION
         try:
-            limits = {**self.limits, **self.checked(request.parameters)}
+            if not request.parameters:
+                raise ValueError('name at least one limit: linear or angular')
+            limits = dict(self.limits)
+            for parameter in request.parameters:
+                name, value = parameter.name, parameter.value
+                if name not in HIGHEST:
+                    raise ValueError(f"there is no limit '{name}', only linear and angular")
+                if value.type != ParameterType.PARAMETER_DOUBLE:
+                    raise ValueError(f'{name} must be a double')
+                # NaN compares false with everything, so this refuses it as well.
+                if not 0.0 <= value.double_value <= HIGHEST[name]:
+                    raise ValueError(f'{name} must lie between 0.0 and {HIGHEST[name]}')
+                limits[name] = value.double_value
             self.wheels.set_limits(**limits)
         except (ValueError, WheelError) as error:
             response.result.reason = str(error)
@@ -247,25 +259,6 @@ class SpeedServer(Node):
             response.result.successful = True
         ### END SOLUTION
         return response
-        ### BEGIN SOLUTION
-
-    def checked(self, parameters):
-        """Return the limits that `parameters` ask for; raises ValueError if one is bad."""
-        if not parameters:
-            raise ValueError('name at least one limit: linear or angular')
-        limits = {}
-        for parameter in parameters:
-            name, value = parameter.name, parameter.value
-            if name not in HIGHEST:
-                raise ValueError(f"there is no limit '{name}', only linear and angular")
-            if value.type != ParameterType.PARAMETER_DOUBLE:
-                raise ValueError(f'{name} must be a double')
-            # NaN compares false with everything, so this refuses it as well.
-            if not 0.0 <= value.double_value <= HIGHEST[name]:
-                raise ValueError(f'{name} must lie between 0.0 and {HIGHEST[name]}')
-            limits[name] = value.double_value
-        return limits
-        ### END SOLUTION
 
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "safety-about-goals", "locked": true, "schema_version": 3, "solution": false}
