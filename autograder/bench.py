@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from autograder.wire import Channel, ChannelClosed, ChannelTimeout
@@ -10,6 +10,12 @@ from course import Session
 
 REPLY_TIMEOUT = 10.0
 """Seconds a subject may take over one request (making a node, say) before it counts as hung."""
+
+PATIENCE = 3.0
+"""Seconds of wall time that a callback of a subject's may hold up a step of simulated time."""
+
+Endpoints = Mapping[str, Sequence[str]]
+"""Names of topics and services by kind: "publishers", "subscribers", "services", "clients"."""
 
 
 class SubjectGone(Exception):  # noqa: N818 - it is a finding, not a fault of ours
@@ -104,9 +110,17 @@ class Subject:
         """Execute the node's callbacks again, beginning with what queued up."""
         self._ask("resume", name)
 
-    def advance(self, seconds: float, step: float = 0.01) -> None:
-        """Move simulated time on (see `course.Session.sim`); needs `open` with ``sim_time``."""
-        self._ask("advance", f"{seconds:g} s of simulated time", seconds=seconds, step=step)
+    def advance(self, seconds: float, step: float = 0.01, patience: float = PATIENCE) -> None:
+        """Move simulated time on (see `course.Session.sim`); needs `open` with ``sim_time``.
+
+        Raises:
+            StudentError: a callback held up a step for longer than ``patience``, in s of wall time.
+            SubjectGone: it does not answer at all.
+        """
+        self._ask(
+            "advance", f"{seconds:g} s of simulated time", REPLY_TIMEOUT + patience,
+            seconds=seconds, step=step, patience=patience,
+        )  # fmt: skip
 
     def call(self, name: str, method: str, *args: Any, timeout: float = REPLY_TIMEOUT) -> Any:
         """Call a method of the node made of a class, in the main thread, while the node spins.
@@ -135,6 +149,21 @@ class Subject:
             StudentError: there is no such variable, or it is made of something else.
         """
         return self._ask("value", name)["value"]
+
+    def sees(self, name: str, endpoints: Endpoints) -> dict[str, dict[str, int]]:
+        """Return how many endpoints of a kind and name the node made of a class has discovered.
+
+        For waiting, never as evidence: DDS discovers in both directions, each in its own time, and
+        what is sent before the other side knows of it is lost.
+
+        Args:
+            name: the class.
+            endpoints: names of topics and services by kind: "publishers", "subscribers",
+                "services", "clients".
+        """
+        wanted = {kind: list(names) for kind, names in endpoints.items()}
+        counts = self._ask("sees", name, endpoints=wanted)["counts"]
+        return {kind: {n: int(counts[kind][n]) for n in names} for kind, names in wanted.items()}
 
     def errors(self) -> list[str]:
         """Return what the student's callbacks raised: for an explanation, never as evidence."""

@@ -64,6 +64,7 @@ class Harness:
                 "mark": self._mark, "stop": self._stop, "pause": self._pause,
                 "resume": self._resume, "collect": self._collect, "advance": self._advance,
                 "call": self._call, "value": self._value, "errors": self._errors,
+                "sees": self._sees,
             }[request["op"]]  # fmt: skip
             return {"ok": True, **operation(request)}
         except Exception as error:  # noqa: BLE001 - a student's code may raise anything
@@ -154,7 +155,8 @@ class Harness:
         return {}
 
     def _advance(self, request: dict[str, Any]) -> dict[str, Any]:
-        self._hosting.sim.advance(float(request["seconds"]), float(request["step"]))
+        seconds, step, patience = (float(request[k]) for k in ("seconds", "step", "patience"))
+        self._hosting.sim.advance(seconds, step, patience)
         return {}
 
     def _call(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -176,6 +178,19 @@ class Harness:
             raise TypeError(
                 f"{request['name']} must be made of strings, numbers, lists and dictionaries"
             ) from None
+
+    def _sees(self, request: dict[str, Any]) -> dict[str, Any]:
+        node = self._nodes[request["name"]]
+        counts = {
+            "publishers": node.count_publishers, "subscribers": node.count_subscribers,
+            "services": node.count_services, "clients": node.count_clients,
+        }  # fmt: skip
+        return {
+            "counts": {
+                kind: {name: counts[kind](name) for name in names}
+                for kind, names in request["endpoints"].items()
+            }
+        }
 
     def _errors(self, request: dict[str, Any]) -> dict[str, Any]:
         recent = self._hosting.errors[-5:]

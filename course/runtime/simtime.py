@@ -56,15 +56,20 @@ class SimulatedTime:
         """Simulated time in nanoseconds."""
         return self._now_ns
 
-    def advance(self, seconds: float, step: float = 0.01) -> None:
+    def advance(self, seconds: float, step: float = 0.01, patience: float | None = None) -> None:
         """Move the clock on by `seconds`, in steps of `step` seconds.
 
         After each step, callbacks run until nothing is left to do. A callback that blocks (for
         more than 0.2 s) is left behind in its thread, if the session has more than one.
 
+        Args:
+            seconds: of simulated time.
+            step: s between two times that nodes get to see, if a timer is due or anybody watches.
+            patience: s of wall time that a callback may hold up one step; None for 10.
+
         Raises:
             SessionError: called from a callback, or with a step or time that is not positive.
-            WaitTimeout: a callback kept its node from following for 10 s of wall time.
+            WaitTimeout: a callback kept its node from following for longer than `patience`.
         """
         if (
             any(isinstance(value, int | float) and value < 0 for value in (seconds, step))
@@ -80,7 +85,8 @@ class SimulatedTime:
         with self._moving, all_held(self._crew.all()):
             step_ns, target = round(step * _NS), self._now_ns + round(seconds * _NS)
             while self._now_ns < target:
-                self._move_to(min(self._now_ns + self._stride(step_ns), target))
+                moment = min(self._now_ns + self._stride(step_ns), target)
+                self._move_to(moment, _STEP_TIMEOUT if patience is None else patience)
 
     def welcome(self, node: Node) -> None:
         """Let a node that has just been made start from the present time.
@@ -114,12 +120,12 @@ class SimulatedTime:
         steps = -(-min(waits) // step_ns) if waits else _LONGEST_STRIDE
         return step_ns * min(max(1, steps), _LONGEST_STRIDE)
 
-    def _move_to(self, moment_ns: int) -> None:
+    def _move_to(self, moment_ns: int, patience: float) -> None:
         self._now_ns = moment_ns
         seconds, nanoseconds = divmod(moment_ns, _NS)
         message = Clock()
         message.clock.sec, message.clock.nanosec = seconds, nanoseconds
-        deadline = time.monotonic() + _STEP_TIMEOUT
+        deadline = time.monotonic() + patience
         executors = self._crew.all()
         while True:
             self._publisher.publish(message)
@@ -131,7 +137,7 @@ class SimulatedTime:
                 names = ", ".join(node_name(node) for node in late) or "the session"
                 raise WaitTimeout(
                     f"{names} did not follow simulated time to {self.now:g} s: "
-                    f"a callback has been running for {_STEP_TIMEOUT:g} s."
+                    f"a callback has been running for {patience:g} s."
                 )
             if late:  # blocked, or the message is on its way
                 executors[0].wait_for_a_job(0.001)

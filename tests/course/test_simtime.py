@@ -5,7 +5,9 @@ from __future__ import annotations
 import threading
 
 import pytest
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
+from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
@@ -150,3 +152,58 @@ def test_a_node_that_cannot_follow_is_named(monkeypatch):
         with pytest.raises(WaitTimeout, match=r"/stuck did not follow simulated time to 0\.01 s"):
             lab.sim.advance(1.0)
         release.set()
+
+
+class Dreamer(Node):
+    """Coroutines that wait for each other, and for a timer on the node's clock."""
+
+    def __init__(self):
+        super().__init__("dreamer")
+        self.group = ReentrantCallbackGroup()
+        self.woken = []
+        self.heard = []
+        self.publisher = self.create_publisher(String, "dreams", 10)
+        self.create_subscription(String, "dreams", self.heard.append, 10, callback_group=self.group)
+        self.create_timer(1.0, self.dream, callback_group=self.group)
+
+    async def dream(self):
+        first, second = Future(executor=self.executor), Future(executor=self.executor)
+        self.executor.create_task(self.pass_on, first, second)
+        timer = self.create_timer(0.3, lambda: first.set_result(None), callback_group=self.group)
+        await second
+        self.destroy_timer(timer)
+        self.woken.append(round(self.get_clock().now().nanoseconds / 1e9, 2))
+        self.publisher.publish(String())
+
+    async def pass_on(self, first, second):
+        await first
+        second.set_result(None)
+
+
+def test_coroutines_that_await_do_not_hold_up_time(lab):
+    dreamer = lab.run(Dreamer)
+    lab.sim.advance(3.5)
+    assert dreamer.woken == [1.3, 2.3, 3.3]
+    assert len(dreamer.heard) == 3
+
+
+def test_a_coroutine_that_awaits_for_ever_does_not_hold_up_time(lab):
+    node = lab.run(Sensors)
+
+    async def wait():
+        await Future(executor=node.executor)
+
+    node.executor.create_task(wait)
+    lab.sim.advance(1.0)
+    assert len(node.fired[10.0]) == 10
+
+
+def test_patience_bounds_what_a_callback_may_hold_up(lab):
+    node = lab.run(Sensors)
+    go_on = threading.Event()
+    node.create_timer(0.05, go_on.wait)
+    try:
+        with pytest.raises(WaitTimeout, match=r"has been running for 0\.3 s"):
+            lab.sim.advance(1.0, patience=0.3)
+    finally:
+        go_on.set()

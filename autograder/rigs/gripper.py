@@ -1,0 +1,140 @@
+"""A gripper that fails on demand, and speed limits' operators: the examiner's side of services."""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from geometry_msgs.msg import Twist
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import Executor
+from rclpy.node import Node
+from rclpy.task import Future
+from std_msgs.msg import Bool, Empty, String
+from std_srvs.srv import SetBool
+
+from autograder.rigs.safety import Player
+
+
+@dataclass
+class Try:
+    """One request that reached the gripper: when (simulated s), what, and its answer to come."""
+
+    at: float
+    close: bool
+    reply: Callable[[bool], None]
+
+
+class Gripper(Node):
+    """The server of `gripper/set`: notes each request, and answers when it is told to."""
+
+    def __init__(self, arrived: Callable[[bool, Callable[[bool], None]], None]) -> None:
+        """Tell ``arrived`` of each request: what it asks for, and how to answer it."""
+        super().__init__("gripper", start_parameter_services=False, enable_rosout=False)
+        self._arrived = arrived
+        group = ReentrantCallbackGroup()
+        self.create_service(SetBool, "gripper/set", self._serve, callback_group=group)
+
+    async def _serve(
+        self, request: SetBool.Request, response: SetBool.Response
+    ) -> SetBool.Response:
+        executor = self.executor
+        assert isinstance(executor, Executor)
+        answer = Future(executor=executor)
+
+        def reply(success: bool) -> None:
+            answer.set_result(success)
+            executor.wake()
+
+        self._arrived(request.data, reply)
+        response.success = await answer
+        return response
+
+
+class GripUser(Player):
+    """Asks for grips, plays the gripper, and listens to outcomes."""
+
+    CLIENT = "GripperClient"
+
+    def __init__(self) -> None:
+        """Create everything but the gripper."""
+        super().__init__("grip_user")
+        self.tries: list[Try] = []
+        self.outcomes: list[str] = []
+        self.beats: list[float] = []
+        self.holds = 0
+        self._request = self.speak(Bool, "grip/request")
+        self.hear(String, "grip/outcome", lambda message: self.outcomes.append(message.data))
+        self.hear(Empty, "arm/hold", self._held)
+        self.hear(Empty, "grip/heartbeat", lambda _: self.beats.append(self.now))
+
+    def _held(self, _message: Empty) -> None:
+        self.holds += 1
+
+    def gripper(self) -> Gripper:
+        """Return a gripper whose requests are noted here; it is for the session to run."""
+        return Gripper(lambda close, reply: self.tries.append(Try(self.now, close, reply)))
+
+    def request(self, close: bool) -> None:
+        """Ask for a grip, and forget what was before."""
+        self.tries, self.outcomes, self.beats, self.holds = [], [], [], 0
+        self._request.publish(Bool(data=close))
+
+    def missing_servers(self) -> list[str]:
+        """Return whether the client of the gripper is missing."""
+        return [] if self.count_clients("gripper/set") else ["no client of gripper/set"]
+
+
+class Operator(Player):
+    """Sets speed limits, jams the wheels, and sees what reaches them."""
+
+    SERVER = "SpeedServer"
+
+    def __init__(self) -> None:
+        """Create the operator's client and ends of topics."""
+        super().__init__("operator")
+        self.limits: list[tuple[float, float]] = []
+        self._jam = self.speak(Bool, "hardware/jammed")
+        self.hear(Twist, "wheels/limits", self._note)
+        self._client = self.create_client(SetParametersAtomically, "speed/set")
+        self.uses("speed/set")
+
+    def _note(self, message: Twist) -> None:
+        self.limits.append((message.linear.x, message.angular.z))
+
+    def jam(self, jammed: bool) -> None:
+        """Jam the wheels, or free them."""
+        self._jam.publish(Bool(data=jammed))
+
+    def ask(self, parameters: list[Parameter]) -> Future:
+        """Send a request; return the future of its answer. Forgets what was before."""
+        self.limits = []
+        request = SetParametersAtomically.Request(parameters=parameters)
+        return self._client.call_async(request)
+
+    def missing_servers(self) -> list[str]:
+        """Return whether the server is missing."""
+        return [] if self._client.service_is_ready() else ["no server of speed/set"]
+
+
+def double(name: str, value: float) -> Parameter:
+    """Return a parameter that is a double."""
+    kind = ParameterType.PARAMETER_DOUBLE
+    return Parameter(name=name, value=ParameterValue(type=kind, double_value=value))
+
+
+def text(name: str, value: str) -> Parameter:
+    """Return a parameter that is a string."""
+    kind = ParameterType.PARAMETER_STRING
+    return Parameter(name=name, value=ParameterValue(type=kind, string_value=value))
+
+
+def ready(future: Any) -> Callable[[], bool]:
+    """Return a condition: the future is done."""
+    return lambda: bool(future.done())

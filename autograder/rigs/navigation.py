@@ -1,0 +1,177 @@
+"""A navigator that fails on demand, and a dispatcher: the examiner's side of actions."""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from geometry_msgs.msg import Twist
+from rclpy.action.client import ActionClient
+from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
+from rclpy.task import Future
+from std_msgs.msg import Bool, Int32, String
+from test_msgs.action import Fibonacci as Drive
+
+from autograder.rigs.safety import Player
+
+
+class Navigator(Node):
+    """The server of `navigate`: takes goals and does with them what it is told to."""
+
+    def __init__(self, user: NavigatorUser) -> None:
+        """Serve; what arrives is noted with ``user``, who also decides what is accepted."""
+        super().__init__("navigator", start_parameter_services=False, enable_rosout=False)
+        self._user = user
+        self._server = ActionServer(
+            self, Drive, "navigate",
+            execute_callback=lambda _: Drive.Result(),
+            goal_callback=self._goal, handle_accepted_callback=user.goals.append,
+            cancel_callback=self._cancel, callback_group=ReentrantCallbackGroup(),
+        )  # fmt: skip
+
+    def _goal(self, goal: Drive.Goal) -> GoalResponse:
+        self._user.orders.append(goal.order)
+        return GoalResponse.ACCEPT if self._user.accepts else GoalResponse.REJECT
+
+    def _cancel(self, _goal: ServerGoalHandle) -> CancelResponse:
+        self._user.cancels.append(self._user.now)
+        return CancelResponse.ACCEPT if self._user.obeys else CancelResponse.REJECT
+
+    def destroy_node(self) -> None:
+        """Take the server down, too: rclpy leaves it alive."""
+        self._server.destroy()
+        super().destroy_node()
+
+
+class NavigatorUser(Player):
+    """Asks for drives, plays the navigator, and listens to outcomes."""
+
+    CLIENT = "NavigationClient"
+
+    def __init__(self) -> None:
+        """Create everything but the navigator."""
+        super().__init__("navigator_user")
+        self.accepts = self.obeys = True
+        self.orders: list[int] = []
+        self.goals: list[ServerGoalHandle] = []
+        self.cancels: list[float] = []
+        self.outcomes: list[str] = []
+        self.speeds: list[bool] = []
+        self._request = self.speak(Int32, "navigate/request")
+        self.hear(String, "navigate/outcome", lambda message: self.outcomes.append(message.data))
+        self.hear(Twist, "cmd_vel", lambda message: self.speeds.append(moves(message)))
+
+    def navigator(self) -> Navigator:
+        """Return a navigator; it is for the session to run."""
+        return Navigator(self)
+
+    def request(self, metres: int, *, accepts: bool = True, obeys: bool = True) -> None:
+        """Ask for a drive that is accepted or not, and that can be cancelled or not."""
+        self.accepts, self.obeys = accepts, obeys
+        for noted in (self.orders, self.goals, self.cancels, self.outcomes, self.speeds):
+            noted.clear()
+        self._request.publish(Int32(data=metres))
+
+    def feedback(self, metres: int) -> None:
+        """Tell how far the drive has come."""
+        marks = list(range(1, metres + 1))
+        self.goals[0].publish_feedback(Drive.Feedback(sequence=marks))
+
+    def end(self, how: Callable[[ServerGoalHandle], None]) -> None:
+        """End the goal with a method of its handle: succeed, abort or canceled."""
+
+        def ending(goal: ServerGoalHandle) -> Drive.Result:
+            how(goal)
+            return Drive.Result()
+
+        self.goals[0].execute(ending)
+
+
+class Drives:
+    """What became of one goal that was sent to the student's server."""
+
+    def __init__(self) -> None:
+        """Nothing yet."""
+        self.began = 0.0
+        self.handle: Any = None
+        self.feedback: list[list[int]] = []
+        self.canceling: bool | None = None
+        self.status: int | None = None
+        self.result: list[int] = []
+
+
+class Dispatcher(Player):
+    """Sends goals to the student's server, cancels them, jams the wheels, watches the speed."""
+
+    SERVER = "NavigationServer"
+
+    def __init__(self) -> None:
+        """Create the client and ends of topics."""
+        super().__init__("dispatcher")
+        self.speeds: list[bool] = []
+        self.faults: list[str] = []
+        self._jam = self.speak(Bool, "hardware/jammed")
+        self.hear(Twist, "cmd_vel", lambda message: self.speeds.append(moves(message)))
+        self.hear(String, "drive/fault", lambda message: self.faults.append(message.data))
+        self._client = ActionClient(self, Drive, "drive")
+        for service in services_of("drive"):
+            self.uses(service)
+
+    def jam(self, jammed: bool) -> None:
+        """Jam the wheels, or free them."""
+        self._jam.publish(Bool(data=jammed))
+
+    def send(self, metres: int) -> Drives:
+        """Send a goal; forgets what was before."""
+        self.speeds.clear()
+        self.faults.clear()
+        drive = Drives()
+
+        def answered(future: Future) -> None:
+            drive.handle = future.result()
+            if drive.handle.accepted:
+                drive.handle.get_result_async().add_done_callback(ended)
+
+        def ended(future: Future) -> None:
+            drive.result = list(future.result().result.sequence)
+            drive.status = future.result().status
+
+        def fed(message: Any) -> None:
+            drive.feedback.append(list(message.feedback.sequence))
+
+        goal = self._client.send_goal_async(Drive.Goal(order=metres), fed)
+        goal.add_done_callback(answered)
+        return drive
+
+    def cancel(self, drive: Drives) -> None:
+        """Ask the server to cancel."""
+
+        def answered(future: Future) -> None:
+            drive.canceling = bool(future.result().goals_canceling)
+
+        drive.handle.cancel_goal_async().add_done_callback(answered)
+
+    def missing_servers(self) -> list[str]:
+        """Return whether the server is missing."""
+        return [] if self._client.server_is_ready() else ["no action server of drive"]
+
+    def destroy_node(self) -> None:
+        """Take the client down, too: rclpy leaves it alive."""
+        self._client.destroy()
+        super().destroy_node()
+
+
+def services_of(action: str) -> list[str]:
+    """Return the services that an action is made of (ROS 2 design, "Actions")."""
+    return [f"{action}/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")]
+
+
+def moves(speed: Twist) -> bool:
+    """Whether a Twist is anything but a stop; NaN is no stop."""
+    parts = (speed.linear, speed.angular)
+    return any(value != 0.0 for part in parts for value in (part.x, part.y, part.z))

@@ -1,0 +1,1 @@
+"""What the error-handling exam puts each of the student's nodes through."""

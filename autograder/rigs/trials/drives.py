@@ -1,0 +1,177 @@
+"""Part D, the drive's server: good and bad goals, cancels, jams, a shutdown on the way."""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+from action_msgs.msg import GoalStatus
+
+from autograder.bench import StudentError
+from autograder.exam import Failed
+from autograder.rigs.navigation import Dispatcher, Drives
+from autograder.rigs.safety import Robot, RobotRig
+
+PROMPT = 1.0  # s for an answer
+STOP = 0.5  # s from the end of a drive to the stop
+CANCEL = 0.5  # s from a cancel to the end of the drive
+ABORT = 1.0  # s from a jam to the end of the drive
+TOLERANCE = 0.25  # s: what the task allows, and strides
+SLACK = 1.0  # s by which a drive of some seconds may be longer or shorter
+BAD = (0, -2, 11)
+LONG = 10  # m: what is still under way when something happens
+
+WORDS = {
+    GoalStatus.STATUS_SUCCEEDED: "succeeded",
+    GoalStatus.STATUS_CANCELED: "canceled",
+    GoalStatus.STATUS_ABORTED: "aborted",
+}
+
+
+def arrives(rig: RobotRig) -> None:
+    """Bad goals, then one of 2 m."""
+    with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
+        for order in BAD:
+            _rejected(robot, dispatcher, order)
+        drive = _driving(robot, dispatcher, 2)
+        _ends(robot, drive, "A goal of 2 m", "succeeded", 2.0 + SLACK)
+        if dispatcher.now - drive.began < 2.0 - SLACK:
+            raise Failed(
+                expected="A goal of 2 m takes 2 s, at 1 m/s.",
+                actual=f"It was over after {dispatcher.now - drive.began:.1f} s.",
+            )
+        if drive.result != [1, 2]:
+            raise Failed(
+                expected="The result of a goal of 2 m is [1, 2].",
+                actual=f"The result was {drive.result}.",
+            )
+        if drive.feedback != [[1], [1, 2]]:
+            raise Failed(
+                expected="After each metre there is feedback: [1], then [1, 2].",
+                actual=f"The feedback was {', then '.join(map(str, drive.feedback)) or 'nothing'}.",
+            )
+        _stands(robot, dispatcher, "succeeded")
+
+
+def canceled(rig: RobotRig) -> None:
+    """A drive that is canceled after 1.5 s."""
+    with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
+        drive = _driving(robot, dispatcher, LONG)
+        robot.spend(1.5)
+        dispatcher.cancel(drive)
+        robot.run(lambda: drive.canceling is not None, CANCEL)
+        if not drive.canceling:
+            raise Failed(
+                expected="A request to cancel is accepted.",
+                actual="It was refused."
+                if drive.canceling is False
+                else f"It was not answered.{robot.complaint()}",
+            )
+        _ends(robot, drive, "A canceled goal", "canceled", CANCEL)
+        _stands(robot, dispatcher, "been canceled")
+
+
+def aborted(rig: RobotRig) -> None:
+    """The wheels jam on the way, come loose, and are needed again."""
+    with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
+        drive = _driving(robot, dispatcher, LONG)
+        robot.spend(1.5)
+        dispatcher.jam(True)
+        _ends(robot, drive, "A goal whose wheels jam", "aborted", ABORT)
+        _stands(robot, dispatcher, "been aborted")
+        if not any(fault.strip() for fault in dispatcher.faults):
+            raise Failed(
+                expected="The reason is published on drive/fault, in words.",
+                actual="The goal was aborted, and nothing came on drive/fault.",
+            )
+        dispatcher.jam(False)
+        robot.rest()
+        drive = _driving(robot, dispatcher, 1)
+        _ends(robot, drive, "A goal of 1 m after the jam", "succeeded", 1.0 + SLACK)
+        _stands(robot, dispatcher, "succeeded")
+
+
+def shutdown(rig: RobotRig) -> None:
+    """The node is about to be taken down on the way."""
+    with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
+        drive = _driving(robot, dispatcher, LONG)
+        robot.spend(0.5)
+        try:
+            rig.bench.subject.call(Dispatcher.SERVER, "shutdown")
+        except StudentError as error:
+            raise Failed(
+                expected=f"{Dispatcher.SERVER} has a method shutdown() that does not raise.",
+                actual=f"The call raised {error}.",
+            ) from None
+        robot.rest()
+        if dispatcher.speeds[-1]:
+            raise Failed(
+                expected="shutdown() stops the robot at once.",
+                actual="After the call the last Twist on cmd_vel told the robot to drive.",
+            )
+        _ends(robot, drive, "A goal under way at shutdown()", "aborted", ABORT)
+        _stands(robot, dispatcher, "been aborted")
+
+
+def _driving(robot: Robot, dispatcher: Dispatcher, metres: int) -> Drives:
+    """Send a goal, and wait until it is accepted and the robot moves."""
+    drive = dispatcher.send(metres)
+    drive.began = dispatcher.now
+    robot.run(lambda: drive.handle is not None, PROMPT)
+    if drive.handle is None or not drive.handle.accepted:
+        raise Failed(
+            expected=f"A goal of {metres} m is accepted.",
+            actual=f"It was not answered.{robot.complaint()}"
+            if drive.handle is None
+            else "It was rejected.",
+        )
+    if not robot.run(lambda: any(dispatcher.speeds), PROMPT):
+        raise Failed(
+            expected=f"With a goal of {metres} m the robot drives: cmd_vel is not zero.",
+            actual=f"The goal was accepted, and the wheels were never told to drive."
+            f"{robot.complaint()}",
+        )
+    return drive
+
+
+def _rejected(robot: Robot, dispatcher: Dispatcher, order: int) -> None:
+    drive = dispatcher.send(order)
+    robot.run(lambda: drive.handle is not None, PROMPT)
+    if drive.handle is None or drive.handle.accepted:
+        raise Failed(
+            expected=f"A goal of {order} m is rejected.",
+            actual=f"It was not answered.{robot.complaint()}"
+            if drive.handle is None
+            else "It was accepted.",
+        )
+    robot.rest()
+    if any(dispatcher.speeds):
+        raise Failed(
+            expected=f"A goal of {order} m is rejected before anything moves.",
+            actual="The wheels were told to drive.",
+        )
+
+
+def _ends(robot: Robot, drive: Drives, what: str, how: str, limit: float) -> None:
+    if not robot.run(lambda: drive.status is not None, limit + TOLERANCE):
+        raise Failed(
+            expected=f"{what} is over, and {how}, within {limit:g} s.",
+            actual=f"After that time there was no result.{robot.complaint()}",
+        )
+    assert drive.status is not None
+    if WORDS.get(drive.status) != how:
+        raise Failed(
+            expected=f"{what} ends as {how}.",
+            actual=f"It ended as {WORDS.get(drive.status, 'unknown')}.{robot.complaint()}",
+        )
+
+
+def _stands(robot: Robot, dispatcher: Dispatcher, how: str) -> None:
+    """Require that the last command is a stop, and stays the last."""
+    robot.spend(STOP)
+    if not dispatcher.speeds or dispatcher.speeds[-1]:
+        raise Failed(
+            expected=f"Within {STOP:g} s after the drive has {how}, the last Twist on cmd_vel is "
+            "zero.",
+            actual="The last one told the robot to drive.",
+        )

@@ -1,0 +1,163 @@
+"""Part C, the navigator's client: goals that end, stall, cannot be stopped, or get lost."""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rclpy.action.server import ServerGoalHandle
+
+from autograder.exam import Failed
+from autograder.rigs.navigation import NavigatorUser, services_of
+from autograder.rigs.safety import COARSE, STRIDE, Robot, RobotRig, serving
+
+NAVIGATOR = {"services": services_of("navigate")}
+
+PROMPT = 1.0  # s for an outcome that is clear; a node may look for it by a timer
+SILENCE = 2.0  # s without feedback after which a drive is canceled
+ANSWER = 1.0  # s that an answer may take
+BREATH = 1.5  # s between the feedbacks of a navigator that is slow, not dead
+TOLERANCE = 0.5  # s: what the task allows, strides, and a node that looks by a timer
+AFTER = 2.5  # s in which a second outcome would show
+METRES = 3
+
+
+@contextmanager
+def _user(rig: RobotRig, navigator: bool = True) -> Iterator[tuple[Robot, NavigatorUser]]:
+    with rig.robot(NavigatorUser.CLIENT, NavigatorUser) as (robot, user):
+        if navigator:
+            with serving(rig, robot, user.navigator, NAVIGATOR):
+                yield robot, user
+        else:
+            robot.sees(NAVIGATOR, there=False)
+            yield robot, user
+
+
+def _accepted(robot: Robot, user: NavigatorUser, *, obeys: bool = True) -> None:
+    """Ask for a drive, and wait until its goal has been accepted."""
+    user.request(METRES, obeys=obeys)
+    _sent(robot, user)
+    if not robot.run(lambda: user.goals, PROMPT):
+        raise RuntimeError("the examiner's navigator did not accept a goal")
+
+
+def _sent(robot: Robot, user: NavigatorUser) -> None:
+    robot.run(lambda: user.orders, PROMPT)
+    if user.orders[:1] != [METRES]:
+        order = f"a goal with order={user.orders[0]}" if user.orders else "no goal"
+        raise Failed(
+            expected=f"After navigate/request {METRES}, a goal with order={METRES} is sent.",
+            actual=f"The request was published, and the navigator got {order}." + robot.complaint(),
+        )
+
+
+def _outcome(
+    robot: Robot, user: NavigatorUser, when: str, word: str, limit: float = PROMPT
+) -> None:
+    """Require one outcome, and a stop unless it is good."""
+    robot.run(lambda: user.outcomes, limit)
+    if user.outcomes != [word]:
+        words = ", then ".join(f"“{said}”" for said in user.outcomes) or "nothing"
+        raise Failed(
+            expected=f"{when}, navigate/outcome says “{word}”, once.",
+            actual=f"It said {words}.{robot.complaint()}",
+        )
+    if word == "arrived":
+        return
+    robot.run(lambda: user.speeds, PROMPT)
+    if not user.speeds or user.speeds[-1]:
+        last = "the last command was to drive" if user.speeds else "nothing came"
+        raise Failed(
+            expected=f"With “{word}” the robot is stopped: a zero Twist on cmd_vel.",
+            actual=f"It said “{word}”, but on cmd_vel {last}.",
+        )
+
+
+def _once(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
+    robot.spend(AFTER, COARSE)
+    _outcome(robot, user, when, word)
+
+
+def ended(rig: RobotRig) -> None:
+    """Goals that succeed, are rejected, are aborted."""
+    with _user(rig) as (robot, user):
+        _accepted(robot, user)
+        user.feedback(1)
+        user.end(ServerGoalHandle.succeed)
+        _outcome(robot, user, "When the goal succeeded", "arrived")
+        user.request(METRES, accepts=False)
+        _sent(robot, user)
+        _outcome(robot, user, "When the navigator rejected the goal", "rejected")
+        _accepted(robot, user)
+        user.feedback(1)
+        user.end(ServerGoalHandle.abort)
+        _outcome(robot, user, "When the navigator aborted the goal", "aborted")
+
+
+def stalled(rig: RobotRig) -> None:
+    """A slow drive that goes on, then one whose feedback ceases."""
+    with _user(rig) as (robot, user):
+        _accepted(robot, user)
+        for metre in range(1, METRES + 1):
+            robot.spend(BREATH, COARSE)
+            if user.cancels or user.outcomes:
+                raise Failed(
+                    expected=f"A drive with feedback every {BREATH:g} s is left alone.",
+                    actual="It was canceled." if user.cancels else f"It said “{user.outcomes[0]}”.",
+                )
+            user.feedback(metre)
+        user.end(ServerGoalHandle.succeed)
+        _outcome(robot, user, "When a slow drive succeeded", "arrived")
+
+        _accepted(robot, user)
+        robot.spend(1.0)
+        user.feedback(1)
+        _canceled(robot, user)
+        user.end(ServerGoalHandle.canceled)
+        when = f"When feedback ceased for {SILENCE:g} s, and the cancel was accepted"
+        _outcome(robot, user, when, "stalled")
+        _once(robot, user, when, "stalled")
+
+
+def _canceled(robot: Robot, user: NavigatorUser) -> None:
+    """Wait in silence until the goal is canceled, neither too early nor too late."""
+    robot.rest()
+    since = user.now
+    robot.run(lambda: user.cancels, SILENCE + TOLERANCE)
+    expected = f"{SILENCE:g} s after the last feedback the goal is canceled."
+    if not user.cancels:
+        said = f" It said “{user.outcomes[0]}”." if user.outcomes else ""
+        raise Failed(
+            expected=expected,
+            actual=f"After {SILENCE + TOLERANCE:g} s no request to cancel had come.{said}",
+        )
+    if user.cancels[0] - since < SILENCE - TOLERANCE:
+        raise Failed(expected=expected, actual=f"It came after {user.cancels[0] - since:.1f} s.")
+
+
+def lost(rig: RobotRig) -> None:
+    """A navigator that refuses to cancel, one that dies on the way, and none at all."""
+    with _user(rig) as (robot, user):
+        _accepted(robot, user, obeys=False)
+        _canceled(robot, user)
+        when = "When the navigator refused to cancel"
+        _outcome(robot, user, when, "runaway")
+        user.feedback(2)
+        user.end(ServerGoalHandle.succeed)
+        _once(robot, user, f"{when}, and reported success later", "runaway")
+        _accepted(robot, user)
+    with _user(rig, navigator=False) as (robot, user):
+        when = "When the navigator died on the way"
+        limit = SILENCE + ANSWER + TOLERANCE
+        _outcome(robot, user, when, "lost", limit)
+        _once(robot, user, when, "lost")
+        user.request(METRES)
+        when = "When there was no navigator"
+        _outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
+    with _user(rig) as (robot, user):
+        _accepted(robot, user)
+        user.end(ServerGoalHandle.succeed)
+        _outcome(robot, user, "When the navigator had come back, and the goal succeeded", "arrived")

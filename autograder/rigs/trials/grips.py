@@ -1,0 +1,214 @@
+"""Part A, the gripper's client: answers, refusals, silence, late answers, no gripper."""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from autograder.exam import Failed
+from autograder.rigs.gripper import GripUser
+from autograder.rigs.safety import COARSE, STRIDE, Robot, RobotRig, serving
+
+GRIPPER = {"services": ["gripper/set"]}
+
+PROMPT = 1.0  # s for an outcome that is clear; a node may look for it by a timer
+SLOW = 0.8  # s that a slow answer takes: within the 1 s that a try has
+LONGEST = 10.0  # s from a request to its outcome
+FIRST_GAP = 1.5  # s between the first two tries: 1 s without an answer, 0.5 s of pause
+GROWTH = 0.5  # s by which the second pause is longer, at least
+TOLERANCE = 0.25  # s: what the task allows, and what the examiner's strides blur
+AFTER = 1.5  # s in which a second outcome would show
+BEAT = 0.5  # s between two heartbeats
+
+
+@contextmanager
+def _user(rig: RobotRig, gripper: bool = True) -> Iterator[tuple[Robot, GripUser]]:
+    with rig.robot(GripUser.CLIENT, GripUser) as (robot, user):
+        if gripper:
+            with serving(rig, robot, user.gripper, GRIPPER):
+                yield robot, user
+        else:
+            robot.sees(GRIPPER, there=False)
+            yield robot, user
+
+
+def _tried(robot: Robot, user: GripUser, close: bool) -> None:
+    """Ask for a grip, and wait until the gripper is asked for it."""
+    user.request(close)
+    if not robot.run(lambda: user.tries, PROMPT):
+        raise Failed(
+            expected=f"After grip/request {str(close).lower()}, gripper/set is called.",
+            actual=f"The gripper was never called. {_said(user)}{robot.complaint()}",
+        )
+    if user.tries[0].close is not close:
+        asked = str(user.tries[0].close).lower()
+        raise Failed(
+            expected=f"The gripper is called with data={str(close).lower()}, as requested.",
+            actual=f"It was called with data={asked}.",
+        )
+
+
+def _outcome(robot: Robot, user: GripUser, when: str, word: str, limit: float = PROMPT) -> None:
+    """Require one outcome, and a held arm unless it is good."""
+    robot.run(lambda: user.outcomes, limit, STRIDE if limit == PROMPT else COARSE)
+    if user.outcomes != [word]:
+        raise Failed(
+            expected=f"{when}, grip/outcome says “{word}”, once.",
+            actual=_said(user) + robot.complaint(),
+        )
+    if word != "done" and not robot.run(lambda: user.holds, PROMPT):
+        raise Failed(
+            expected=f"With “{word}” the arm is told to hold still, on arm/hold.",
+            actual=f"It said “{word}”, and nothing came on arm/hold.",
+        )
+
+
+def _once(robot: Robot, user: GripUser, when: str) -> None:
+    """Require that the outcome stays the only one."""
+    robot.spend(AFTER, COARSE)
+    if len(user.outcomes) != 1:
+        raise Failed(expected=f"{when}, there is exactly one outcome.", actual=_said(user))
+
+
+def _said(user: GripUser) -> str:
+    words = ", then ".join(f"“{word}”" for word in user.outcomes)
+    return f"It said {words}." if words else "It said nothing."
+
+
+def carried_out(rig: RobotRig) -> None:
+    """The gripper answers, at once and within the time of a try."""
+    with _user(rig) as (robot, user):
+        for close, delay in ((True, 0.0), (False, SLOW)):
+            _tried(robot, user, close)
+            robot.spend(delay)
+            if not user.outcomes:
+                user.tries[0].reply(True)
+            robot.run(lambda: user.outcomes or len(user.tries) > 1, PROMPT)
+            if len(user.tries) > 1:
+                raise Failed(
+                    expected=f"An answer after {delay:g} s is in time: one try is enough.",
+                    actual=f"The gripper was called {len(user.tries)} times.",
+                )
+            when = f"When the gripper answered success=True after {delay:g} s"
+            _outcome(robot, user, when, "done")
+
+
+def refused(rig: RobotRig) -> None:
+    """The gripper answers that it will not."""
+    with _user(rig) as (robot, user):
+        _tried(robot, user, True)
+        user.tries[0].reply(False)
+        when = "When the gripper answered success=False"
+        _outcome(robot, user, when, "refused")
+        _once(robot, user, when)
+        if len(user.tries) > 1:
+            raise Failed(
+                expected="A refusal is an answer: the gripper is not asked again.",
+                actual=f"The gripper was called {len(user.tries)} times.",
+            )
+
+
+def unanswered(rig: RobotRig) -> None:
+    """The gripper takes every request and answers none."""
+    with _user(rig) as (robot, user):
+        _tried(robot, user, True)
+        if not robot.run(lambda: user.outcomes, LONGEST + STRIDE):
+            raise Failed(
+                expected=f"A gripper that never answers is given up within {LONGEST:g} s.",
+                actual=f"After {LONGEST:g} s of simulated time there {_tries(len(user.tries))} "
+                f"and no outcome.{_hint_of_clock(user)}{robot.complaint()}",
+            )
+        when = "After three tries without an answer"
+        times = [attempt.at for attempt in user.tries]
+        if len(times) != 3:
+            raise Failed(
+                expected="A gripper that never answers is tried three times.",
+                actual=f"There {_tries(len(times))} before the outcome “{user.outcomes[0]}”.",
+            )
+        _outcome(robot, user, when, "failed")
+        _require_pauses(times[1] - times[0], times[2] - times[1])
+        _once(robot, user, when)
+
+
+def _hint_of_clock(user: GripUser) -> str:
+    if len(user.tries) > 1:
+        return ""
+    return " A time-out on the wall clock does not run in simulated time."
+
+
+def _tries(count: int) -> str:
+    return "was 1 try" if count == 1 else f"were {count} tries"
+
+
+def _require_pauses(first: float, second: float) -> None:
+    if first < FIRST_GAP - TOLERANCE:
+        raise Failed(
+            expected="The second try comes 1.5 s after the first: 1 s for an answer, 0.5 s pause.",
+            actual=f"It came {first:.1f} s after the first.",
+        )
+    if second - first < GROWTH - TOLERANCE:
+        raise Failed(
+            expected="The second pause is at least 0.5 s longer than the first one.",
+            actual=f"The second try came {first:.1f} s after the first, and the third "
+            f"{second:.1f} s after the second.",
+        )
+
+
+def stale(rig: RobotRig) -> None:
+    """The answer to the first try comes while the second one is under way."""
+    with _user(rig) as (robot, user):
+        _tried(robot, user, True)
+        first = user.tries[0]
+        if not robot.run(lambda: len(user.tries) > 1 or user.outcomes, LONGEST):
+            raise Failed(
+                expected="After a try without an answer there is a second one.",
+                actual=f"There was no second try in {LONGEST:g} s.",
+            )
+        if len(user.tries) < 2:
+            raise Failed(
+                expected="After a try without an answer there is a second one.",
+                actual=f"After one try it said “{user.outcomes[0]}”.",
+            )
+        first.reply(False)
+        robot.spend(2 * STRIDE)
+        if user.outcomes:
+            raise Failed(
+                expected="The answer to the first try comes after its time, and is ignored.",
+                actual=f"It was taken for the answer to the second: it said “{user.outcomes[0]}” "
+                "while the second try was still open.",
+            )
+        user.tries[1].reply(True)
+        when = (
+            "When the second try was answered with success=True, after a late answer to the first"
+        )
+        _outcome(robot, user, when, "done")
+        _once(robot, user, when)
+
+
+def absent(rig: RobotRig) -> None:
+    """The gripper dies with a request in its hands and stays away, then comes back."""
+    with _user(rig) as (robot, user):
+        _tried(robot, user, True)
+    with _user(rig, gripper=False) as (robot, user):
+        began = user.now
+        _gone(robot, user, "When the gripper died in the middle of a call", began)
+        user.request(True)
+        _gone(robot, user, "When there was no gripper at all", user.now)
+    with _user(rig) as (robot, user):
+        _tried(robot, user, True)
+        user.tries[0].reply(True)
+        _outcome(robot, user, "When the gripper had come back and answered success=True", "done")
+
+
+def _gone(robot: Robot, user: GripUser, when: str, began: float) -> None:
+    _outcome(robot, user, when, "failed", LONGEST + STRIDE)
+    lasted = user.now - began
+    beats = [beat for beat in user.beats if beat >= began]
+    if len(beats) < int(lasted / BEAT) - 1:
+        raise Failed(
+            expected=f"{when}, the heartbeat goes on at one every {BEAT:g} s.",
+            actual=f"In {lasted:.1f} s there were {len(beats)} heartbeats.",
+        )

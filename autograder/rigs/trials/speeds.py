@@ -1,0 +1,132 @@
+"""Part B, the server of speed limits: good requests, nonsense, jammed wheels."""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rcl_interfaces.msg import Parameter
+
+from autograder.exam import Failed
+from autograder.rigs.gripper import Operator, double, ready, text
+from autograder.rigs.safety import Robot, RobotRig
+
+PATIENCE = 1.0  # s for an answer; a service callback may await something
+SAME = 1e-6  # limits that differ by less are equal
+
+NONSENSE: tuple[tuple[str, list[Parameter]], ...] = (
+    ("linear = NaN", [double("linear", math.nan)]),
+    ("angular = NaN", [double("angular", math.nan)]),
+    ("linear = infinity", [double("linear", math.inf)]),
+    ("angular = minus infinity", [double("angular", -math.inf)]),
+    ("linear = -0.1", [double("linear", -0.1)]),
+    ("linear = 1.5", [double("linear", 1.5)]),
+    ("angular = 2.5", [double("angular", 2.5)]),
+    ("linear = “fast”, a string", [text("linear", "fast")]),
+    ("a limit named “warp”", [double("warp", 0.5)]),
+    ("an empty list", []),
+)
+
+
+def good(rig: RobotRig) -> None:
+    """Two good requests: both limits, then one."""
+    with rig.robot(Operator.SERVER, Operator) as (robot, operator):
+        _accepted(
+            robot, operator, "linear = 0.3, angular = 0.6", (0.3, 0.6), linear=0.3, angular=0.6
+        )
+        _accepted(robot, operator, "angular = 2.0 alone", (0.3, 2.0), angular=2.0)
+        _accepted(robot, operator, "linear = 0.0 alone", (0.0, 2.0), linear=0.0)
+
+
+def bad(rig: RobotRig) -> None:
+    """Everything that can be wrong with a request, and a good one after each."""
+    with rig.robot(Operator.SERVER, Operator) as (robot, operator):
+        for what, parameters in NONSENSE:
+            _refused(robot, operator, what, parameters)
+        _accepted(
+            robot, operator, "linear = 0.4, angular = 0.8, after nonsense", (0.4, 0.8),
+            linear=0.4, angular=0.8,
+        )  # fmt: skip
+
+
+def atomic(rig: RobotRig) -> None:
+    """Requests that are good in part, and wheels that raise."""
+    with rig.robot(Operator.SERVER, Operator) as (robot, operator):
+        _accepted(
+            robot, operator, "linear = 0.5, angular = 1.0", (0.5, 1.0), linear=0.5, angular=1.0
+        )
+        halves = [double("linear", 0.2), double("angular", math.nan)]
+        _refused(robot, operator, "linear = 0.2 together with angular = NaN", halves)
+        _accepted(
+            robot,
+            operator,
+            "angular = 1.5 alone, after a half-good request",
+            (0.5, 1.5),
+            angular=1.5,
+        )
+        operator.jam(True)
+        robot.rest()
+        _refused(robot, operator, "linear = 0.9 with jammed wheels", [double("linear", 0.9)])
+        operator.jam(False)
+        robot.rest()
+        _accepted(robot, operator, "angular = 1.1, after the jam", (0.5, 1.1), angular=1.1)
+
+
+def _answer(robot: Robot, operator: Operator, what: str, parameters: list[Parameter]) -> Any:
+    future = operator.ask(parameters)
+    if not robot.run(ready(future), PATIENCE):
+        raise Failed(
+            expected=f"A request with {what} is answered.",
+            actual=f"No answer came.{robot.complaint()}",
+        )
+    robot.rest()
+    return future.result().result
+
+
+def _accepted(
+    robot: Robot, operator: Operator, what: str, due: tuple[float, float], **values: float
+) -> None:
+    parameters = [double(name, value) for name, value in values.items()]
+    result = _answer(robot, operator, what, parameters)
+    if not result.successful:
+        raise Failed(
+            expected=f"A request with {what} is good, and answered successful=True.",
+            actual=f"It was answered successful=False, “{result.reason}”.",
+        )
+    wanted = _limits([due])
+    reached = operator.limits
+    fits = len(reached) == 1 and all(
+        abs(seen - wish) < SAME for seen, wish in zip(reached[0], due, strict=True)
+    )
+    if not fits:
+        raise Failed(
+            expected=f"A request with {what} hands {wanted} to the wheels, once.",
+            actual=f"What reached the wheels: {_limits(reached)}.",
+        )
+
+
+def _refused(robot: Robot, operator: Operator, what: str, parameters: list[Parameter]) -> None:
+    result = _answer(robot, operator, what, parameters)
+    if operator.limits:
+        raise Failed(
+            expected=f"Nothing of a request with {what} reaches the wheels.",
+            actual=f"What reached the wheels: {_limits(operator.limits)}.",
+        )
+    if result.successful:
+        raise Failed(
+            expected=f"A request with {what} is answered successful=False.",
+            actual="It was answered successful=True.",
+        )
+    if not result.reason.strip():
+        raise Failed(
+            expected=f"A request with {what} is refused with a reason in words.",
+            actual="It was answered successful=False, and the reason was empty.",
+        )
+
+
+def _limits(reached: list[tuple[float, float]]) -> str:
+    words = [f"linear {linear:g} and angular {angular:g}" for linear, angular in reached[:3]]
+    return ", then ".join(words) or "nothing"

@@ -1,0 +1,4 @@
+# title: the stub as it is released
+# fails: the first
+# in: the stub
+
