@@ -192,7 +192,7 @@ class RobotInterface(Robot):
 
 
 ### BEGIN SOLUTION
-class RobotInterface(Robot):  # noqa: F811  in place of the one above
+class RobotInterface(Robot):
     """The robot as the rest of the system sees it: each thing by the pattern that fits it."""
 
     def __init__(self):
