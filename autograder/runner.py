@@ -45,9 +45,9 @@ class Outcome:
     unreadable: bool = False
 
     @property
-    def needs_human(self) -> bool:
+    def spoilt(self) -> bool:
         """Whether the grader itself failed somewhere."""
-        return any(verdict.needs_human for verdict in self.verdicts.values())
+        return any(verdict.spoilt for verdict in self.verdicts.values())
 
     def to_json(self) -> str:
         """Return the outcome as JSON."""

@@ -35,16 +35,14 @@ def _sources(folder: Traversable) -> Iterator[Traversable]:
     for entry in folder.iterdir():
         if entry.is_dir():
             yield from _sources(entry)
-        elif entry.name.endswith((".py", ".toml")):
+        elif entry.name.endswith((".py", ".toml", ".xml")):
             yield entry
 
 
 class OutcomeStore:
     """A folder of outcomes, one file a program, named by the program's digest."""
 
-    def __init__(
-        self, folder: Path, *, trust: bool = False, hidden: Iterable[Path] = ()
-    ) -> None:
+    def __init__(self, folder: Path, *, trust: bool = False, hidden: Iterable[Path] = ()) -> None:
         """Keep outcomes in ``folder``, which is made when the first one is written.
 
         ``trust`` and ``hidden`` are those of `runner.run`.
@@ -81,7 +79,7 @@ class OutcomeStore:
         Raises:
             StoreError: the folder cannot be written (a full disk, say).
         """
-        if outcome.needs_human:
+        if outcome.spoilt:
             return
         path = self._path(program, files)
         try:

@@ -15,7 +15,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, Self
@@ -24,6 +24,7 @@ from autograder.sandbox import network, seccomp, view
 from autograder.sandbox.host import fate_of, write_files
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.watch import Watch
+from course.interfaces import cache
 
 USER = 1000
 """The subject's user id as it sees it, where it has a user namespace."""
@@ -36,6 +37,7 @@ DDS = {
     "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
     "COURSE_DISCOVERY": "inherit",
+    "FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).with_name("fastdds.xml")),
 }
 KEPT = ("LANG", "LC_ALL", "LC_CTYPE", "TZ", "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE",
         "AMENT_PREFIX_PATH", "PYTHONWARNINGS")  # fmt: skip
@@ -67,7 +69,6 @@ class Box:
         """
         self._namespaces = network.make()
         options["env"] = {**(options.get("env") or os.environ), **DDS}
-        options["pass_fds"] = [*options.get("pass_fds", ()), *self._namespaces.values()]
         return network.start([*network.joining(self._namespaces), *command], **options)
 
     def start_subject(
@@ -86,41 +87,38 @@ class Box:
     ) -> BoxedSubject:
         """Start any command as `start_subject` does, without options for a subject."""
         with ExitStack() as stack:
-            handed_in = Path(tempfile.mkdtemp(prefix="ros2-course-handed-in-"))
-            stack.callback(shutil.rmtree, handed_in, ignore_errors=True)
-            handed_in.chmod(0o755)
-            write_files(handed_in, files)
-            root = os.getuid() == 0
-            user = UIDS[secrets.randbelow(len(UIDS))] if root else USER
-            arguments = [
-                *network.own_user(USER), "--unshare-pid", "--unshare-ipc", "--unshare-uts",
-                "--unshare-cgroup-try", "--hostname", "robot", "--die-with-parent", "--new-session",
-            ]  # fmt: skip
-            given = []
-            arguments += ["--perms", "0755", "--dir", "/etc"]
-            for path, text in view.account(user).items():
-                given.append(_file(text.encode(), stack))
-                arguments += ["--perms", "0644", "--ro-bind-data", str(given[-1]), path]
-            arguments += view.arguments(self._limits, handed_in, self._hidden)
-            for name, value in _environment().items():
-                arguments += ["--setenv", name, value]
-            given.append(_file(seccomp.program(), stack))
-            arguments += ["--seccomp", str(given[-1])]
+            user = UIDS[secrets.randbelow(len(UIDS))] if network.is_root() else USER
+            given = _Given(stack)
             # Through a descriptor, so that the sandbox's process 1 does not tell them.
-            given.append(_file("\0".join(arguments).encode(), stack))
+            arguments = given.file("\0".join(self._arguments(given, user, files)).encode())
             info, info_end = os.pipe()
+            sandbox = ["bwrap", "--args", arguments, "--info-fd", str(info_end), "--"]
+            command = [*sandbox, *(_as_user(user) if network.is_root() else []), *command]
             try:
                 process = network.start(
-                    [*network.joining(self._namespaces), "bwrap", "--args", str(given[-1]), "--info-fd", str(info_end),
-                     "--", *(_as_user(user) if root else []), *command],
+                    [*network.joining(self._namespaces), *command],
                     env={"PATH": os.environ.get("PATH", os.defpath)}, start_new_session=True,
-                    pass_fds=[*self._namespaces.values(), *given, info_end, *fds],
+                    pass_fds=[*given.descriptors, info_end, *fds],
                     stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                 )  # fmt: skip
             finally:
                 os.close(info_end)
-            init = network.child(info, process)
-            return BoxedSubject(process, init, self._limits, stack.pop_all())
+            return BoxedSubject(
+                process, network.child(info, process), self._limits, stack.pop_all()
+            )
+
+    def _arguments(self, given: _Given, user: int, files: Mapping[str, bytes]) -> Iterator[str]:
+        """Yield bwrap's arguments."""
+        yield from network.own_user(USER)
+        yield from ("--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try")
+        yield from ("--hostname", "robot", "--die-with-parent", "--new-session")
+        yield from ("--perms", "0755", "--dir", "/etc")
+        for path, text in view.written(user).items():
+            yield from ("--perms", "0644", "--ro-bind-data", given.file(text.encode()), path)
+        yield from view.arguments(self._limits, given.folder(files), self._hidden)
+        for name, value in _environment().items():
+            yield from ("--setenv", name, value)
+        yield from ("--seccomp", given.file(seccomp.program()))
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -130,6 +128,32 @@ class Box:
         """Let the network go; it ends with the last process in it."""
         while self._namespaces:
             os.close(self._namespaces.popitem()[1])
+
+
+class _Given:
+    """What a sandbox is given: descriptors to read from, and a folder; ``stack`` takes it back."""
+
+    def __init__(self, stack: ExitStack) -> None:
+        self._stack = stack
+        self.descriptors: list[int] = []
+
+    def file(self, content: bytes) -> str:
+        """Return the number of a descriptor to read ``content`` from."""
+        descriptor = os.memfd_create("sandbox", os.MFD_CLOEXEC)
+        self._stack.callback(os.close, descriptor)
+        os.write(descriptor, content)
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        self.descriptors.append(descriptor)
+        return str(descriptor)
+
+    def folder(self, files: Mapping[str, bytes]) -> Path:
+        """Return a folder with ``files`` that every user can read."""
+        folder = Path(tempfile.mkdtemp(prefix="ros2-course-handed-in-"))
+        self._stack.callback(shutil.rmtree, folder, ignore_errors=True)
+        write_files(folder, files)
+        for path in (folder, *folder.rglob("*")):
+            path.chmod(0o755 if path.is_dir() else 0o644)
+        return folder
 
 
 class BoxedSubject:
@@ -202,16 +226,7 @@ def _environment() -> dict[str, str]:
     return {
         **kept, **DDS, "PATH": programs, "HOME": home, "USER": "student", "LOGNAME": "student",
         "IPYTHONDIR": f"{home}/.ipython", "ROS_LOG_DIR": f"{home}/log", "MPLBACKEND": "Agg",
-        "COURSE_INTERFACES_CACHE": str(view.cache.root()), "TMPDIR": "/tmp",  # noqa: S108
+        "COURSE_INTERFACES_CACHE": str(cache.root()), "TMPDIR": "/tmp",
         # A numeric library's threads, one a processor of the machine, count as processes.
         "OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2", "PYTHONDONTWRITEBYTECODE": "1",
     }  # fmt: skip
-
-
-def _file(content: bytes, stack: ExitStack) -> int:
-    """Return a descriptor to read ``content`` from; ``stack`` closes it."""
-    fd = os.memfd_create("sandbox", os.MFD_CLOEXEC)
-    stack.callback(os.close, fd)
-    os.write(fd, content)
-    os.lseek(fd, 0, os.SEEK_SET)
-    return fd

@@ -51,8 +51,9 @@ def make() -> Namespaces:
 
 
 def joining(namespaces: Mapping[str, int]) -> list[str]:
-    """Return what goes before a command to run it in ``namespaces``, whose descriptors it needs."""
-    kinds = [f"--{kind}=/proc/self/fd/{fd}" for kind, fd in namespaces.items()]
+    """Return what goes before a command to run it in ``namespaces``, of this process's."""
+    # Not by inheritance: a submission must not find these descriptors among its own.
+    kinds = [f"--{kind}=/proc/{os.getpid()}/fd/{fd}" for kind, fd in namespaces.items()]
     return ["nsenter", *kinds, *([] if is_root() else ["--preserve-credentials"]), "--"]
 
 

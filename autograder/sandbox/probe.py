@@ -125,8 +125,8 @@ def _advice(said: str) -> str:
             f"turn them on with `sudo sysctl kernel.unprivileged_userns_clone=1`, {TRUST}."
         )
     return (
-        f"Submissions cannot be sandboxed here because bubblewrap fails ({reason}): in a container, "
-        "start it with the right to make namespaces (docker run --privileged, for instance), "
+        f"Submissions cannot be sandboxed here because bubblewrap fails ({reason}): start a "
+        "container with the right to make namespaces (docker run --privileged, for instance), "
         f"{TRUST}."
     )
 

@@ -37,7 +37,7 @@ def arguments(limits: Limits, handed_in: Path | None, hidden: Iterable[Path]) ->
         hidden: folders that must not be seen even if they lie within something that is.
     """
     yield from _system()
-    for scratch in (Path("/tmp"), HOME, Path("/dev/shm")):  # noqa: S108 - the sandbox's own
+    for scratch in (Path("/tmp"), HOME, Path("/dev/shm")):
         yield from _way_to(scratch)
         yield from ("--perms", "1777", "--size", str(limits.scratch), "--tmpfs", str(scratch))
     shown = list(python_folders())
@@ -48,7 +48,7 @@ def arguments(limits: Limits, handed_in: Path | None, hidden: Iterable[Path]) ->
     if handed_in is not None:
         yield from _way_to(HANDED_IN)
         yield from ("--ro-bind", str(handed_in), str(HANDED_IN))
-    for folder in (*hidden, Path(course.__file__).parent / "data"):
+    for folder in (*hidden, Path(course.__path__[0], "data")):
         if folder.is_dir() and _is_within(folder, [Path("/usr"), *shown]):
             yield from ("--tmpfs", str(folder), "--remount-ro", str(folder))
     yield from ("--remount-ro", "/dev", "--remount-ro", "/", "--chdir", str(HOME))
@@ -79,7 +79,7 @@ def python_folders() -> Iterator[Path]:
     named = [sys.base_prefix, sys.base_exec_prefix, sys.prefix, sys.exec_prefix]
     if site.ENABLE_USER_SITE:
         named.append(site.getusersitepackages())
-    packages = [Path(package.__file__).parent for package in (autograder, course, quizzes)]
+    packages = [Path(package.__path__[0]) for package in (autograder, course, quizzes)]
     wanted = [*(Path(os.path.abspath(name)) for name in named), *packages]  # noqa: PTH100 - links
     for folder in [variant for path in wanted for variant in (path, path.resolve())]:
         if folder.is_dir() and not _is_within(folder, seen):
@@ -91,8 +91,8 @@ def _is_within(folder: Path, others: Sequence[Path]) -> bool:
     return any(folder.is_relative_to(other) for other in others)
 
 
-def account(uid: int) -> dict[str, str]:
-    """Return {path: text} of the few files that say who is who in the sandbox."""
+def written(uid: int) -> dict[str, str]:
+    """Return {path: text} of the few files that are the sandbox's own: who is who in it."""
     return {
         "/etc/passwd": f"student:x:{uid}:{uid}:Student:{HOME}:/bin/sh\n",
         "/etc/group": f"student:x:{uid}:\n",
