@@ -18,7 +18,7 @@ from autograder.processes import ExaminerError, ExaminerProcess
 from autograder.sandbox import Place, RunningSubject
 from autograder.submission import Cell, Program
 from autograder.verdict import Status, Verdict
-from autograder.wire import Channel, ChannelClosed, ChannelTimeout
+from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 
 CELL_TIMEOUT = 30.0
 """Seconds one cell of a submission may run, as in nbgrader."""
@@ -148,6 +148,12 @@ def _follow(
             "after it was examined: a cell that never ends (rclpy.spin, an endless loop) blocks "
             "a notebook.",
         )
+    except ChannelBroken as error:
+        _give_up(
+            program,
+            outcome,
+            f"Something in the notebook wrote to the grader's own channel: {error}.",
+        )
     except ChannelClosed:
         _give_up(program, outcome, f"The notebook's process ended: {subject.fate()}.")
     except ExaminerError as error:
@@ -171,7 +177,7 @@ def _shown(cell: Cell) -> dict[str, str]:
 def _outputs(message: dict[str, Any], number: int) -> list[dict[str, Any]]:
     outputs = message.get("outputs")
     if message.get("ran") != number or not isinstance(outputs, list):
-        raise ChannelClosed("the subject broke the protocol")
+        raise ChannelBroken("it is no answer to what was asked")
     return outputs
 
 

@@ -22,14 +22,15 @@ from typing import Any, Self
 
 from autograder.sandbox import network, seccomp, view
 from autograder.sandbox.host import fate_of, write_files
-from autograder.sandbox.limits import Limits
+from autograder.sandbox.limits import MIB, Limits
 from autograder.sandbox.watch import Watch
 from course.interfaces import cache
 
 USER = 1000
 """The subject's user id as it sees it, where it has a user namespace."""
-UIDS = range(2**30, 2**31 - 2)
-"""Where root takes a subject's user id from: above all that systems and containers hand out."""
+
+EXAMINER_DATA = 3 * 1024 * MIB
+"""Bytes of writable memory that an examiner may reserve."""
 
 DDS = {
     # Two processes that share a network but not /dev/shm would find each other and then exchange
@@ -69,7 +70,9 @@ class Box:
         """
         self._namespaces = network.make()
         options["env"] = {**(options.get("env") or os.environ), **DDS}
-        return network.start([*network.joining(self._namespaces), *command], **options)
+        # A flood of messages ends the examiner, not the machine.
+        bound = ["prlimit", f"--data={EXAMINER_DATA}", "--"]
+        return network.start([*network.joining(self._namespaces), *bound, *command], **options)
 
     def start_subject(
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
@@ -87,7 +90,7 @@ class Box:
     ) -> BoxedSubject:
         """Start any command as `start_subject` does, without options for a subject."""
         with ExitStack() as stack:
-            user = UIDS[secrets.randbelow(len(UIDS))] if network.is_root() else USER
+            user = secrets.choice(network.UIDS) if network.is_root() else USER
             given = _Given(stack)
             # Through a descriptor, so that the sandbox's process 1 does not tell them.
             arguments = given.file("\0".join(self._arguments(given, user, files)).encode())

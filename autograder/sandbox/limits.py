@@ -22,7 +22,8 @@ class Limits:
     Attributes:
         memory: what all its processes together may hold.
         data: writable memory that one process may reserve; beyond it Python raises MemoryError.
-        processes: processes and threads at a time.
+        tasks: processes and threads at a time.
+        processes: processes at a time; a bomb is ended before it has slowed others down.
         cpu: processor time of all its processes together.
         file: largest file.
         open_files: open file descriptors of one process.
@@ -32,7 +33,8 @@ class Limits:
 
     memory: int = 1536 * MIB
     data: int = 2048 * MIB
-    processes: int = 400
+    tasks: int = 200
+    processes: int = 48
     cpu: int = 300
     file: int = 64 * MIB
     open_files: int = 2048
@@ -52,7 +54,7 @@ class Limits:
         """Limit this process and all that it starts, for good."""
         bounds = {
             resource.RLIMIT_DATA: self.data,
-            resource.RLIMIT_NPROC: self.processes,
+            resource.RLIMIT_NPROC: self.tasks,
             resource.RLIMIT_CPU: self.cpu,
             resource.RLIMIT_FSIZE: self.file,
             resource.RLIMIT_NOFILE: self.open_files,

@@ -18,7 +18,7 @@ from autograder.sandbox.place import Place
 from course.errors import CourseError
 
 TOOLS = {
-    "bwrap": "bubblewrap", "ip": "iproute2",
+    "bwrap": "bubblewrap", "ip": "iproute2", "prlimit": "util-linux",
     "unshare": "util-linux", "nsenter": "util-linux", "setpriv": "util-linux",
 }  # fmt: skip
 TRUST = "or, if you trust every submission, grade with --trust-submissions"

@@ -50,6 +50,8 @@ class Watch:
         if time.monotonic() - self._started > self._limits.wall:
             return f"it ran for more than {self._limits.wall} s"
         processes = [entry for entry in self._proc.iterdir() if entry.name.isdecimal()]
+        if len(processes) > self._limits.processes:
+            return f"it started more than {self._limits.processes} processes"
         if sum(map(_cpu_seconds, processes)) > self._limits.cpu:
             return f"it used more than {self._limits.cpu} s of processor time"
         # Cheap first: this counts what forked processes share once for each of them.
