@@ -48,7 +48,7 @@ def arguments(limits: Limits, handed_in: Path | None, hidden: Iterable[Path]) ->
     if handed_in is not None:
         yield from _way_to(HANDED_IN)
         yield from ("--ro-bind", str(handed_in), str(HANDED_IN))
-    for folder in (*hidden, Path(course.__path__[0], "data")):
+    for folder in (*hidden, *_bundled()):
         if folder.is_dir() and _is_within(folder, [Path("/usr"), *shown]):
             yield from ("--tmpfs", str(folder), "--remount-ro", str(folder))
     yield from ("--remount-ro", "/dev", "--remount-ro", "/", "--chdir", str(HOME))
@@ -85,6 +85,15 @@ def python_folders() -> Iterator[Path]:
         if folder.is_dir() and not _is_within(folder, seen):
             seen.append(folder)
             yield folder
+
+
+def _bundled() -> list[Path]:
+    """Return where notebooks, solutions and corpus may lie among installed packages.
+
+    An editable installation has them beside the other packages, not beside its own modules.
+    """
+    installed = [Path(entry, "course") for entry in sys.path]
+    return [package / "data" for package in {*installed, Path(course.__path__[0])}]
 
 
 def _is_within(folder: Path, others: Sequence[Path]) -> bool:

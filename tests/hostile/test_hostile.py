@@ -17,10 +17,11 @@ from __future__ import annotations
 import json
 import re
 import socket
+import subprocess
 import tempfile
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -36,13 +37,12 @@ from autograder.corpus.trials import one_notebook
 from autograder.gradebook import CourseGradebook
 from autograder.release import release
 from autograder.runner import CELL_TIMEOUT, Outcome
-from autograder.sandbox import abilities
+from autograder.sandbox import abilities, network
 from autograder.submission import Program
 
 HERE = Path(__file__).parent
 EMPTY = "broken-empty"
 FULL = 15.0
-MARK = b"IPYTHONDIR=/home/student/.ipython"  # in the environment of everything in a sandbox
 
 pytestmark = pytest.mark.skipif(bool(abilities().problem), reason=abilities().problem or "-")
 
@@ -121,23 +121,29 @@ def host() -> Iterator[tuple[int, list[socket.socket]]]:
         yield internet.getsockname()[1], [internet, local]
 
 
-def sandboxed() -> set[str]:
-    """Return the processes that run in a sandbox of ours now."""
-    found = set()
+@pytest.fixture
+def namespaces(monkeypatch: pytest.MonkeyPatch) -> set[int]:
+    """Collect the process namespaces of the sandboxes that are made from now on."""
+    made: set[int] = set()
+    find = network.child
+
+    def spy(info: int, process: subprocess.Popen[bytes]) -> int:
+        init = find(info, process)
+        made.add(Path(f"/proc/{init}/ns/pid").stat().st_ino)
+        return init
+
+    monkeypatch.setattr(network, "child", spy)
+    return made
+
+
+def running(namespaces: set[int]) -> list[str]:
+    """Return the processes that are in one of the process namespaces."""
+    found = []
     for process in Path("/proc").glob("[0-9]*"):
-        try:
-            if MARK in (process / "environ").read_bytes():
-                found.add(process.name)
-        except OSError:
-            continue
+        with suppress(OSError):
+            if (process / "ns/pid").stat().st_ino in namespaces:
+                found.append(process.name)
     return found
-
-
-def until_gone(processes: set[str], seconds: float = 10) -> set[str]:
-    deadline = time.monotonic() + seconds
-    while processes and time.monotonic() < deadline:
-        processes &= sandboxed()
-    return processes
 
 
 def score(outcome: Outcome) -> float:
@@ -151,11 +157,14 @@ def grade_text(outcome: Outcome) -> str:
 
 @pytest.mark.parametrize("attack", attacks(), ids=lambda attack: attack.name)
 def test_an_attack_is_contained_and_explained_and_hurts_nobody(
-    attack: Attack, class_: Class, scratch: Path, host: tuple[int, list[socket.socket]]
+    attack: Attack,
+    class_: Class,
+    scratch: Path,
+    host: tuple[int, list[socket.socket]],
+    namespaces: set[int],
 ) -> None:
     port, listeners = host
     text = attack.text.replace("PORT", str(port)).replace("ROOT", repr(str(class_.root)))
-    before = sandboxed()
     with ThreadPoolExecutor(2) as pool:
         neighbour = pool.submit(runner.run, class_.program("right-chapter"), hidden=[class_.root])
         hostile = pool.submit(
@@ -174,7 +183,8 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
         assert fragment in shown
     assert "Traceback" not in said
     assert len(shown) < 2_000_000
-    assert not until_gone(sandboxed() - before), "something is still running"
+    assert len(namespaces) == 2
+    assert not running(namespaces), "something is still running"
     assert list(scratch.iterdir()) == [], "something was left on disk"
     for listener in listeners:
         listener.setblocking(False)

@@ -1,5 +1,5 @@
 # title: A display of 100 MB, and an error of 100 MB
-# told: Code cell 1 of the notebook raised ValueError
+# told: Code cell 3 of the notebook raised ValueError
 
 from IPython.display import HTML, display
 

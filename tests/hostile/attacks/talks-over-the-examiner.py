@@ -1,5 +1,6 @@
 # title: Wrong profiles, and a node that answers the examiner on its own topics
-# told: never came out
+# told: It then worked through the last
+# score: 8
 
 import re
 
