@@ -208,14 +208,17 @@ class Bench:
         subject: Subject,
         memory: dict[str, Any],
         key: Mapping[str, Any] | None = None,
+        own_network: bool = False,
     ) -> None:
         """Put both within a check's reach.
 
         ``memory`` outlives this bench: what an experiment found in an earlier part of the exam,
         as long as the notebook has not moved on since. ``key`` is the answer key that the part's
-        hidden cell carries, if it has one: the subject never sees it.
+        hidden cell carries, if it has one: the subject never sees it. ``own_network`` says that
+        nobody but these two is on their network, so that a check may make it lose packets.
         """
         self.session = session
         self.subject = subject
         self.memory = memory
         self.key: Mapping[str, Any] = key or {}
+        self.own_network = own_network

@@ -91,6 +91,12 @@ def grade(
     root: Root = None,
     jobs: Jobs = 2,
     fresh: Annotated[bool, typer.Option("--fresh", help="Also run what did not change.")] = False,
+    trust: Annotated[
+        bool,
+        typer.Option(
+            "--trust-submissions", help="Run them without a sandbox, with your own rights."
+        ),
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Grade what is in ``submitted/`` into the gradebook, with feedback and grades.csv."""
@@ -99,8 +105,8 @@ def grade(
 
     where = _root(root)
     done = engine.grade(
-        where, assignment, jobs=jobs, fresh=fresh, progress=Progress(silent=as_json)
-    )
+        where, assignment, jobs=jobs, fresh=fresh, trust=trust, progress=Progress(silent=as_json),
+    )  # fmt: skip
     grades = CourseGradebook(where).grades(assignment)
     write_csv(grades, assignment, where / "grades.csv")
     problems = {

@@ -17,7 +17,7 @@ from nbformat import NotebookNode
 from nbgrader.utils import parse_utc
 
 from autograder import nbgrader_bridge as bridge
-from autograder import quiz_marks, runner, submission
+from autograder import quiz_marks, runner, sandbox, submission
 from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.runner import Outcome
 from autograder.store import OutcomeStore, StoreError
@@ -56,6 +56,7 @@ def grade(
     *,
     jobs: int = 2,
     fresh: bool = False,
+    trust: bool = False,
     feedback: bool = True,
     progress: Progress = lambda _student, _graded: None,
 ) -> list[Graded]:
@@ -66,17 +67,22 @@ def grade(
         assignment: its name.
         jobs: how many submissions are run at a time.
         fresh: run also what was run before and has not changed.
+        trust: run submissions outside of a sandbox, with the rights of this process.
         feedback: write HTML feedback, too.
         progress: is told about each submission.
 
     Raises:
         AssignmentError: no such assignment, not released, or nothing submitted.
         GradebookError: the gradebook itself cannot be used.
+        SandboxError: they are not trusted, and there is no working sandbox here.
     """
     gradebook = CourseGradebook(root, staged=STAGED)
     names = _notebooks(gradebook, assignment)
     students = _students(root, assignment)
-    class_ = _Class(gradebook, assignment, names, fresh)
+    if not trust:
+        sandbox.require()
+    store = OutcomeStore(root / bridge.WORK_FOLDER / "outcomes", trust=trust, hidden=[root])
+    class_ = _Class(gradebook, assignment, names, store, fresh)
     graded = [_unusable(student) for student in students if set(student) & set(GLOB)]
     students = [student for student in students if not set(student) & set(GLOB)]
     with ThreadPoolExecutor(max_workers=jobs) as pool:
@@ -95,12 +101,17 @@ class _Class:
     """The submissions of one assignment on their way into the gradebook."""
 
     def __init__(
-        self, gradebook: CourseGradebook, assignment: str, notebooks: list[str], fresh: bool
+        self,
+        gradebook: CourseGradebook,
+        assignment: str,
+        notebooks: list[str],
+        store: OutcomeStore,
+        fresh: bool,
     ) -> None:
         self._gradebook = gradebook
         self._assignment = assignment
         self._root = gradebook.root
-        self._store = OutcomeStore(self._root / bridge.WORK_FOLDER / "outcomes")
+        self._store = store
         self._fresh = fresh
         self._originals = {
             name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks

@@ -38,6 +38,10 @@ class Failed(Exception):  # noqa: N818 - it is a finding, not a fault
         self.actual = actual
 
 
+class NotExaminable(Exception):  # noqa: N818 - a limit of this machine, not a fault
+    """The check cannot be made on this machine; the message says why, for the student's grade."""
+
+
 @dataclass(frozen=True)
 class Check(Generic[RigT]):
     """One check: what it examines, what it needs, and how it helps."""
@@ -154,6 +158,8 @@ def _run(check: Check[RigT], rig: RigT) -> CheckResult:
             _result_of(check, "failed"), actual=str(gone),
             expected="Your program keeps running and answering while it is examined.",
         )  # fmt: skip
+    except NotExaminable as reason:
+        return replace(_result_of(check, "not_examined"), actual=str(reason))
     except Exception as error:  # noqa: BLE001 - whatever else goes wrong in here is our fault
         return replace(
             _result_of(check, "grader_error"),

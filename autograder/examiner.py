@@ -5,7 +5,8 @@ Started as ``python -m autograder.examiner --control FD --domain N``. It reads r
 JSON object a line, and writes one verdict a line to standard output. ``moved_on`` says that the
 notebook ran cells since, ``key`` is the answer key of the part's hidden cell, ``pid`` the subject's
 process.
-File descriptor ``FD`` is the control channel to the subject's harness.
+File descriptor ``FD`` is the control channel to the subject's harness. With ``--own-network`` the
+two are alone on their network.
 """
 
 from __future__ import annotations
@@ -37,26 +38,40 @@ class Sitting:
 Sittings = dict[str, Sitting]
 
 
-def sit(request: dict[str, Any], session: Session, subject: Subject, sittings: Sittings) -> str:
+def sit(
+    request: dict[str, Any],
+    session: Session,
+    subject: Subject,
+    sittings: Sittings,
+    *,
+    own_network: bool = False,
+) -> str:
     """Run one part of an exam, let the subject go on, and return the verdict as JSON."""
     sitting = sittings.setdefault(request["exam"], Sitting())
     subject.pid = int(request["pid"])
     try:
-        bench = Bench(session, subject, sitting.memory, request["key"])
+        bench = Bench(session, subject, sitting.memory, request["key"], own_network)
         exam = exams.load(request["exam"])
         return exam.sit(request["part"], bench, sitting.failed).to_json()
     finally:
         subject.release()
 
 
-def serve(requests: TextIO, verdicts: TextIO, session: Session, subject: Subject) -> None:
+def serve(
+    requests: TextIO,
+    verdicts: TextIO,
+    session: Session,
+    subject: Subject,
+    *,
+    own_network: bool = False,
+) -> None:
     """Answer requests until standard input ends."""
     sittings: Sittings = {}
     for line in requests:
         request = json.loads(line)
         if request["moved_on"]:
             sittings.clear()
-        verdict = sit(request, session, subject, sittings)
+        verdict = sit(request, session, subject, sittings, own_network=own_network)
         verdicts.write(verdict + "\n")
         verdicts.flush()
 
@@ -66,6 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="autograder.examiner")
     parser.add_argument("--control", type=int, required=True, help="file descriptor of the channel")
     parser.add_argument("--domain", type=int, required=True, help="the subject's domain id")
+    parser.add_argument("--own-network", action="store_true", help="the network may be disturbed")
     options = parser.parse_args(arguments)
     # Verdicts go out over a private copy of standard output: whatever a library prints must not
     # end up among them.
@@ -73,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     subject = Subject(Channel(socket.socket(fileno=options.control)))
     with Session(domain_id=options.domain) as session:
-        serve(sys.stdin, verdicts, session, subject)
+        serve(sys.stdin, verdicts, session, subject, own_network=options.own_network)
     return 0
 
 

@@ -15,6 +15,7 @@ from nbformat.v4 import new_output
 from nbgrader.api import Gradebook
 from nbgrader.coursedir import CourseDirectory
 from nbgrader.preprocessors import NbGraderPreprocessor
+from traitlets import Bool
 
 from autograder import cells, submission
 from autograder.report import Report
@@ -44,6 +45,10 @@ class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ship
 
 class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
     """Run the notebook in a subject, let the examiner watch, and write down what came of it."""
+
+    trust_submissions = Bool(
+        False, help="Run submissions outside of a sandbox, with your own rights."
+    ).tag(config=True)
 
     def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:
         """Fill in the outputs of every code cell, and each exam's report and points."""
@@ -76,7 +81,10 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         assignment, student, _ = _names(resources)
         folder = coursedir.format_path(coursedir.submitted_directory, student, assignment)
         program, files = submission.program(nb), submission.extras(Path(folder))
-        store = OutcomeStore(Path(coursedir.root) / WORK_FOLDER / "outcomes")
+        root = Path(coursedir.root)
+        store = OutcomeStore(
+            root / WORK_FOLDER / "outcomes", trust=self.trust_submissions, hidden=[root]
+        )
         outcome = store.outcome(program, files)
         return quiz_marks.with_quizzes(outcome, nb, Path(folder), student)
 

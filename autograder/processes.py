@@ -10,7 +10,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any
 
@@ -19,6 +19,8 @@ from course.errors import CourseError
 
 EXAM_TIMEOUT = 120.0
 """Seconds one part of an exam may take in all: its own deadlines end it long before."""
+
+Spawn = Callable[..., "subprocess.Popen[bytes]"]
 
 
 class ExaminerError(CourseError):
@@ -29,24 +31,42 @@ class ExaminerProcess:
     """A running examiner, bound to one subject by a control channel."""
 
     def __init__(
-        self, control: socket.socket, domain_id: int, *, env: Mapping[str, str] | None = None
+        self,
+        control: socket.socket,
+        domain_id: int,
+        *,
+        env: Mapping[str, str] | None = None,
+        own_network: bool = False,
+        spawn: Spawn = subprocess.Popen,
     ) -> None:
-        """Start the process; ``control`` is its end of the channel and is closed here."""
+        """Start the process.
+
+        Args:
+            control: its end of the channel to the subject; closed here.
+            domain_id: the subject's domain.
+            env: its environment; this process's if left out.
+            own_network: nobody but it and the subject is on its network, so that it may make the
+                network lose packets.
+            spawn: starts it, as `subprocess.Popen` does.
+        """
         command = [
             sys.executable, "-m", "autograder.examiner",
             "--control", str(control.fileno()), "--domain", str(domain_id),
+            *(["--own-network"] if own_network else []),
         ]  # fmt: skip
-        # What the examiner's libraries print on stderr must never reach a graded cell.
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            pass_fds=[control.fileno()],
-            start_new_session=True,
-            env=dict(os.environ if env is None else env),
-        )
-        control.close()
+        try:
+            # What the examiner's libraries print on stderr must never reach a graded cell.
+            self._process = spawn(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                pass_fds=[control.fileno()],
+                start_new_session=True,
+                env=dict(os.environ if env is None else env),
+            )
+        finally:
+            control.close()
         self._buffer = b""
 
     def request(

@@ -6,17 +6,19 @@ from html import escape
 
 from autograder.verdict import CheckResult, Verdict
 
-MARKS = {"passed": "✔", "failed": "✘", "not_checked": "-", "grader_error": "!"}
+MARKS = {"passed": "✔", "failed": "✘", "not_checked": "-", "not_examined": "?", "grader_error": "!"}
 WORDS = {
     "passed": "passed",
     "failed": "not yet",
     "not_checked": "not checked",
+    "not_examined": "not examined here",
     "grader_error": "the grader failed",
 }
 COLOURS = {
     "passed": "#1a7f37",
     "failed": "#b35900",
     "not_checked": "#6e7781",
+    "not_examined": "#8250df",
     "grader_error": "#8250df",
 }
 

@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
 import socket
-import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Mapping
-from contextlib import ExitStack, suppress
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from autograder import exams
+from autograder import exams, sandbox
 from autograder.exam import unexamined
 from autograder.processes import ExaminerError, ExaminerProcess
+from autograder.sandbox import Place, RunningSubject
 from autograder.submission import Cell, Program
 from autograder.verdict import Status, Verdict
-from autograder.wire import Channel, ChannelClosed, ChannelTimeout
-from course.domains import lease_domain
+from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 
 CELL_TIMEOUT = 30.0
 """Seconds one cell of a submission may run, as in nbgrader."""
 
+START_TIMEOUT = 60.0
+"""Seconds until a subject must have started: it takes half a second on a machine that is idle."""
 
 NO_FILES: Mapping[str, bytes] = {}
 
@@ -47,9 +45,9 @@ class Outcome:
     unreadable: bool = False
 
     @property
-    def needs_human(self) -> bool:
+    def spoilt(self) -> bool:
         """Whether the grader itself failed somewhere."""
-        return any(verdict.needs_human for verdict in self.verdicts.values())
+        return any(verdict.spoilt for verdict in self.verdicts.values())
 
     def to_json(self) -> str:
         """Return the outcome as JSON."""
@@ -67,41 +65,68 @@ class Outcome:
 
 
 def run(
-    program: Program, files: Mapping[str, bytes] = NO_FILES, *, cell_timeout: float = CELL_TIMEOUT
+    program: Program,
+    files: Mapping[str, bytes] = NO_FILES,
+    *,
+    cell_timeout: float = CELL_TIMEOUT,
+    trust: bool = False,
+    hidden: Iterable[Path] = (),
 ) -> Outcome:
     """Run a program in a subject of its own and have its exams sat; never raises for its sake.
 
-    ``files`` are put into the folder that it runs in, by relative path.
+    Args:
+        program: the cells.
+        files: what is put into the folder that it runs in, by relative path.
+        cell_timeout: seconds that one cell may run.
+        trust: run it outside of a sandbox, with the rights of this process.
+        hidden: folders that a sandboxed program must never see (the course root).
+
+    Raises:
+        SandboxError: the program is not trusted, and there is no working sandbox here.
     """
     started = time.monotonic()
     outcome = Outcome(outputs=[[] for _ in program])
     with ExitStack() as stack:
-        lease = lease_domain()
-        stack.callback(lease.release)
+        place = stack.enter_context(sandbox.place(trust=trust, hidden=hidden))
         engine, subject_engine = socket.socketpair()
-        control, subject_control = socket.socketpair()
-        examiner = stack.enter_context(ExaminerProcess(control, lease.domain_id))
-        subject = stack.enter_context(
-            _SubjectProcess(subject_engine, subject_control, lease.domain_id, files)
-        )
         channel = Channel(engine)
         stack.callback(channel.close)
+        control, subject_control = socket.socketpair()
+        examiner = stack.enter_context(
+            ExaminerProcess(
+                control, place.domain_id, own_network=place.own_network, spawn=place.spawn
+            )
+        )
+        subject = stack.enter_context(_start(place, subject_engine, subject_control, files))
         _follow(program, channel, examiner, subject, outcome, cell_timeout)
     outcome.seconds = round(time.monotonic() - started, 2)
     return outcome
+
+
+def _start(
+    place: Place, engine: socket.socket, control: socket.socket, files: Mapping[str, bytes]
+) -> RunningSubject:
+    fds = [engine.fileno(), control.fileno()]
+    command = [
+        sys.executable, "-m", "autograder.subject", "--engine", str(fds[0]),
+        "--control", str(fds[1]), "--domain", str(place.domain_id),
+    ]  # fmt: skip
+    with engine, control:
+        return place.start_subject(command, files, fds)
 
 
 def _follow(
     program: Program,
     channel: Channel,
     examiner: ExaminerProcess,
-    subject: _SubjectProcess,
+    subject: RunningSubject,
     outcome: Outcome,
     cell_timeout: float,
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
     moved_on, number = True, 0
     try:
+        _await(channel, subject)
         channel.send({"cells": [_shown(cell) for cell in program]})
         for number, cell in enumerate(program):
             message = channel.receive(cell_timeout)
@@ -123,10 +148,25 @@ def _follow(
             "after it was examined: a cell that never ends (rclpy.spin, an endless loop) blocks "
             "a notebook.",
         )
+    except ChannelBroken as error:
+        _give_up(
+            program,
+            outcome,
+            f"Something in the notebook wrote to the grader's own channel: {error}.",
+        )
     except ChannelClosed:
         _give_up(program, outcome, f"The notebook's process ended: {subject.fate()}.")
     except ExaminerError as error:
         _give_up(program, outcome, str(error), "grader_error")
+
+
+def _await(channel: Channel, subject: RunningSubject) -> None:
+    """Wait until the subject has started: nothing of the student's has run by then."""
+    try:
+        channel.receive(START_TIMEOUT)
+    except (ChannelTimeout, ChannelClosed):
+        raise ExaminerError(f"The notebook's process did not start: {subject.failed()}.") from None
+    subject.ready()
 
 
 def _shown(cell: Cell) -> dict[str, str]:
@@ -137,7 +177,7 @@ def _shown(cell: Cell) -> dict[str, str]:
 def _outputs(message: dict[str, Any], number: int) -> list[dict[str, Any]]:
     outputs = message.get("outputs")
     if message.get("ran") != number or not isinstance(outputs, list):
-        raise ChannelClosed("the subject broke the protocol")
+        raise ChannelBroken("it is no answer to what was asked")
     return outputs
 
 
@@ -170,74 +210,3 @@ def with_notes(outcome: Outcome, notes: list[str]) -> Outcome:
     said = (*notes, *outcome.notes)
     verdicts = {name: replace(v, notes=(*v.notes, *said)) for name, v in outcome.verdicts.items()}
     return replace(outcome, verdicts=verdicts)
-
-
-class _SubjectProcess:
-    """A running subject: started in a session of its own, and ended with all it started."""
-
-    def __init__(
-        self,
-        engine: socket.socket,
-        control: socket.socket,
-        domain_id: int,
-        files: Mapping[str, bytes],
-    ) -> None:
-        # What a subject leaves there that cannot be removed is no reason to stop.
-        self._home = tempfile.TemporaryDirectory(
-            prefix="ros2-course-subject-", ignore_cleanup_errors=True
-        )
-        home = self._home.name
-        for name, content in files.items():
-            path = Path(home) / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(content)
-        cache = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-        env = {
-            **os.environ, "HOME": home, "XDG_CACHE_HOME": cache, "IPYTHONDIR": f"{home}/.ipython",
-            "ROS_LOG_DIR": f"{home}/log", "MPLBACKEND": "Agg",
-        }  # fmt: skip
-        command = [
-            sys.executable, "-m", "autograder.subject", "--engine", str(engine.fileno()),
-            "--control", str(control.fileno()), "--domain", str(domain_id),
-        ]  # fmt: skip
-        self._process = subprocess.Popen(
-            command, cwd=home, env=env, start_new_session=True,
-            pass_fds=[engine.fileno(), control.fileno()],
-            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        engine.close()
-        control.close()
-        self.pid = self._process.pid
-
-    def fate(self) -> str:
-        """Return how the process ended, in words."""
-        with suppress(subprocess.TimeoutExpired):
-            code = self._process.wait(timeout=5)
-            if code >= 0:
-                return f"exit code {code}"
-            return f"killed by {signal.Signals(-code).name}"
-        return "it closed its connection to the grader"
-
-    def __enter__(self) -> _SubjectProcess:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        # A process that is killed cannot remove its DDS shared memory, so it is removed for it.
-        segments = _shared_memory(self._process.pid)
-        with suppress(ProcessLookupError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
-        for segment in segments:
-            segment.unlink(missing_ok=True)
-        self._home.cleanup()
-
-
-def _shared_memory(pid: int) -> set[Path]:
-    try:
-        maps = Path(f"/proc/{pid}/maps").read_text()
-    except OSError:
-        return set()
-    paths = (
-        line.split(maxsplit=5)[-1] for line in maps.splitlines() if "/dev/shm/fastrtps_" in line
-    )
-    return {Path(path) for path in paths}

@@ -1,19 +1,23 @@
 """The subject process: hosts one student's code while an examiner watches it from outside.
 
-Started as ``python -m autograder.subject --engine FD --control FD --domain N``. The engine sends
-the program over its channel, the examiner drives the harness over the control channel whenever
-the program comes to an exam. Nothing that this process says about itself earns a point.
+Started as ``python -m autograder.subject --engine FD --control FD --domain N``. It says that it is
+ready; the engine sends the program over its channel, the examiner drives the harness over the
+control channel whenever the program comes to an exam. Nothing that this process says about itself
+earns a point.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import socket
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from autograder.harness import SUBJECT_ENV, Harness
+from autograder.sandbox.limits import Limits
 from autograder.shell import make_shell, run_cell
 from autograder.wire import Channel, ChannelClosed
 from course import Session
@@ -22,6 +26,10 @@ from course import Session
 def run(engine: Channel, control: Channel, domain_id: int) -> None:
     """Run the engine's program cell by cell, and serve the examiner where it says so."""
     shell = make_shell()
+    # Up to here standard error told the grader why a subject does not start.
+    with Path(os.devnull).open("w") as nowhere:
+        os.dup2(nowhere.fileno(), sys.stderr.fileno())
+    engine.send({"ready": True})
 
     def open_session(threads: int, sim_time: bool) -> Session:
         return Session(domain_id=domain_id, threads=threads, sim_time=sim_time)
@@ -42,7 +50,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--control", type=int, required=True, help="file descriptor of the examiner"
     )
     parser.add_argument("--domain", type=int, required=True, help="domain id the exam is sat on")
+    parser.add_argument("--limits", help="what it may use of the machine, as JSON")
+    parser.add_argument("--files", type=Path, help="folder whose files it works with")
     options = parser.parse_args(arguments)
+    if options.files:
+        for entry in options.files.iterdir():
+            copy = shutil.copytree if entry.is_dir() else shutil.copyfile
+            copy(entry, entry.name)
+    if options.limits:
+        Limits.from_json(options.limits).apply()
     os.environ[SUBJECT_ENV] = "1"
     engine = Channel(socket.socket(fileno=options.engine))
     control = Channel(socket.socket(fileno=options.control))

@@ -88,7 +88,7 @@ def read(path: Path) -> NotebookNode:
 
 def _text(path: Path) -> str:
     try:
-        status = path.stat()
+        status = path.lstat()  # a link may lead to another student's work
         if not stat.S_ISREG(status.st_mode):
             raise SubmissionError(f"{path.name} is not a file: hand in the notebook itself.")
         if status.st_size > MAX_NOTEBOOK:

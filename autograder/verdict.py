@@ -1,23 +1,24 @@
 """What an exam found: versioned JSON, one result a check.
 
-Four outcomes are kept apart, because they mean different things to a student and an instructor:
+Five outcomes are kept apart, because they mean different things to a student and an instructor:
 a check *passed*, *failed* (the behaviour was seen and was wrong), was *not checked* (something it
-needs had failed), or ended in a *grader error* (our fault: never the student's).
+needs had failed), was *not examined* (this machine cannot: a person decides), or ended in a
+*grader error* (our fault: never the student's).
 """
 
 from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from course.errors import CourseError
 
 VERSION = 1
 MAX_BYTES = 1024 * 1024
 
-Status = Literal["passed", "failed", "not_checked", "grader_error"]
-STATUSES: tuple[Status, ...] = ("passed", "failed", "not_checked", "grader_error")
+Status = Literal["passed", "failed", "not_checked", "not_examined", "grader_error"]
+STATUSES: tuple[Status, ...] = get_args(Status)
 
 
 class VerdictError(CourseError):
@@ -73,8 +74,18 @@ class Verdict:
 
     @property
     def needs_human(self) -> bool:
-        """Whether a grader error left something that a person has to look at."""
+        """Whether a check was left to a person: it could not be examined, or the grader failed."""
+        return bool(self.unexamined) or self.spoilt
+
+    @property
+    def spoilt(self) -> bool:
+        """Whether the grader itself failed somewhere: another try may well succeed."""
         return any(check.status == "grader_error" for check in self.checks)
+
+    @property
+    def unexamined(self) -> float:
+        """Points of the checks that could not be examined on this machine."""
+        return sum(check.max_points for check in self.checks if check.status == "not_examined")
 
     def to_json(self) -> str:
         """Return the verdict as one line of JSON."""

@@ -19,6 +19,10 @@ class ChannelClosed(Exception):  # noqa: N818 - a state of the other side, not a
     """The other side closed the channel or its process ended."""
 
 
+class ChannelBroken(ChannelClosed):
+    """The other side sent what is no message: nothing that follows can be made sense of."""
+
+
 class ChannelTimeout(Exception):  # noqa: N818
     """The other side did not answer before the deadline."""
 
@@ -51,21 +55,22 @@ class Channel:
         """Return the next message, waiting at most ``timeout`` seconds (None: for ever).
 
         Raises:
-            ChannelClosed: end of stream, or something that is not a JSON object of bounded size.
+            ChannelClosed: end of stream.
+            ChannelBroken: something that is not a JSON object of bounded size.
             ChannelTimeout: nothing came in time.
         """
         deadline = None if timeout is None else time.monotonic() + timeout
         while b"\n" not in self._buffer:
             if len(self._buffer) > MAX_LINE:
-                raise ChannelClosed(f"a message of more than {MAX_LINE} bytes was sent")
+                raise ChannelBroken(f"a message of more than {MAX_LINE} bytes was sent")
             self._fill(deadline)
         line, self._buffer = self._buffer.split(b"\n", 1)
         try:
             message = json.loads(line)
         except (ValueError, RecursionError) as error:
-            raise ChannelClosed("a message that is not JSON was sent") from error
+            raise ChannelBroken("a message that is not JSON was sent") from error
         if not isinstance(message, dict):
-            raise ChannelClosed("a message that is not a JSON object was sent")
+            raise ChannelBroken("a message that is not a JSON object was sent")
         return message
 
     def _fill(self, deadline: float | None) -> None:

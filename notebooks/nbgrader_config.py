@@ -35,6 +35,10 @@ c.OverwriteCells.add_missing_cells = True
 # `nbgrader validate` runs the checks in a kernel: some need several seconds of simulated time.
 c.Execute.timeout = 300
 
+# Submissions run in a sandbox (bubblewrap), and are not graded without one. Set this to True only
+# if you trust every one of them: they then run with your own rights.
+c.GradeByBehaviour.trust_submissions = False
+
 # Our own steps among nbgrader's: first mend what a student did to the instructor's cells, then
 # watch the nodes instead of trusting what the notebook prints, and flag what a person must see.
 c.Autograde.sanitize_preprocessors = [

@@ -70,15 +70,19 @@ def run(
     *,
     jobs: int = 2,
     repeat: int = 1,
+    trust: bool = False,
     done: Callable[[Trial], None] = lambda _trial: None,
 ) -> list[Trial]:
-    """Run every case ``repeat`` times, ``jobs`` at a time, and compare."""
+    """Run every case ``repeat`` times, ``jobs`` at a time, and compare.
+
+    ``trust`` is that of `runner.run`.
+    """
 
     def one(case: Case) -> Trial:
         handed_in = case.submission(source, released)
         notebook, _ = submission.restore(handed_in, source, released)
         program = submission.program(notebook)
-        outcome = runner.run(program, cell_timeout=case.cell_timeout)
+        outcome = runner.run(program, cell_timeout=case.cell_timeout, trust=trust)
         trial = Trial(case, outcome, case.verdict_of(outcome))
         done(trial)
         return trial

@@ -14,6 +14,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import StudentError
 from autograder.exam import Exam, Failed
+from autograder.rigs.gap import Aftermath, radio_gap
 from autograder.rigs.sensors import (
     CAMERA,
     CONSUMERS,
@@ -336,3 +337,63 @@ def late_joiner(rig: SensorRig) -> None:
                 expected=f"A late reader of {sensor.topic} gets new readings only.",
                 actual=f"It was handed {len(old)} {sensor.name} readings from before it started.",
             )
+
+
+def _after_gap(rig: SensorRig, sensor: Sensor) -> Aftermath:
+    found: dict[str, Aftermath] = rig.once(radio_gap)
+    return found[sensor.name]
+
+
+@EXAM.check(
+    needs=("stop_reaches_all",),
+    hints=(
+        "Who still has an event that a consumer out of radio range did not get?",
+        "RELIABLE sends again what the publisher still has: KEEP_LAST(depth) keeps `depth` of it.",
+        "Give the publisher KEEP_ALL, or a depth of 100, not only the subscription.",
+    ),
+    read=READ_HISTORY,
+)
+def stop_repaired(rig: SensorRig) -> None:
+    """A consumer that was out of radio range gets every stop event it missed.
+
+    RELIABLE alone does not promise it: DDS can send again only what the publisher has kept.
+    """
+    found = _after_gap(rig, STOP)
+    expected = (
+        f"After a gap in the radio link all {found.count} stop events of the gap arrive, in order, "
+        "and then the next one."
+    )
+    if not found.heard:
+        raise Failed(expected=expected, actual="Not even the next one arrived.")
+    if found.heard != list(range(found.count + 1)):
+        missing = found.count + 1 - len(set(found.heard))
+        raise Failed(
+            expected=expected,
+            actual=f"{missing} of {found.count + 1} never came: it got {few(found.heard)}.",
+        )
+
+
+@EXAM.check(
+    needs=("readings_flow",),
+    hints=(
+        "What does a RELIABLE link do with the frames of the gap when it is up again?",
+        "It sends them again, oldest first, and the live picture has to wait for them.",
+        "Make either side of camera/image BEST_EFFORT: then a frame that is lost stays lost.",
+    ),
+    read=READ_RELIABILITY,
+)
+def camera_moves_on(rig: SensorRig) -> None:
+    """After a gap in the radio link the camera goes on with the live picture.
+
+    Frames of the past are of no use to who drives by the picture, and they cost the bandwidth that
+    the link has just got back.
+    """
+    found = _after_gap(rig, CAMERA)
+    expected = "After a gap in the radio link the next frame arrives, and none from the gap."
+    if not found.heard or found.heard[-1] != found.count:
+        raise Failed(expected=expected, actual="The next frame did not arrive.")
+    if old := [number for number in found.heard if number < found.count - 1]:
+        raise Failed(
+            expected=expected,
+            actual=f"{len(old)} frames that were lost in the gap were sent again before it.",
+        )

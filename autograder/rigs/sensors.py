@@ -160,8 +160,12 @@ class ExaminerNode(Node):
         qos: QoSProfile,
         heard: Heard,
         on_incompatible: Callable[[Any], None] | None = None,
+        on: Node | None = None,
     ) -> Any:
-        """Subscribe to ``topic`` and note the tags of this run's readings in ``heard``."""
+        """Subscribe to ``topic`` and note the tags of this run's readings in ``heard``.
+
+        ``on`` is the node that gets the subscription, if not this one.
+        """
 
         def note(message: Any) -> None:
             tag = sensor.tag(message)
@@ -172,7 +176,8 @@ class ExaminerNode(Node):
         events = SubscriptionEventCallbacks(
             incompatible_qos=on_incompatible or (lambda _: None), use_default_callbacks=False
         )
-        return self.create_subscription(sensor.type, topic, note, qos, event_callbacks=events)
+        node = on or self
+        return node.create_subscription(sensor.type, topic, note, qos, event_callbacks=events)
 
     def phase(self, name: str) -> int:
         """Return the number of a phase of the exam."""
@@ -215,6 +220,7 @@ class SensorRig:
 
     def __init__(self, bench: Bench) -> None:
         """Bring up the examiner's endpoints on the subject's domain."""
+        self.bench = bench
         self.subject = bench.subject
         self._session = bench.session
         node = bench.session.run(ExaminerNode)
@@ -232,7 +238,7 @@ class SensorRig:
         return self._others(self.node.get_subscriptions_info_by_topic(topic))
 
     def _others(self, endpoints: list[TopicEndpointInfo]) -> list[TopicEndpointInfo]:
-        return [e for e in endpoints if e.node_name != self.node.get_name()]
+        return [e for e in endpoints if not e.node_name.startswith(self.node.get_name())]
 
     def attend(self) -> None:
         """Listen to the consumers' ends, with what they offer: lossless wherever it is possible."""

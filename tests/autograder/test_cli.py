@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from autograder.sandbox import abilities
+
 from .conftest import Course
 
 
@@ -37,7 +39,8 @@ def test_the_demo_ends_with_grades(tmp_path: Path) -> None:
     assert demo["as_expected"] is True
     scores = {row["student"]: row["grade"]["score"] for row in demo["rows"]}
     assert len(scores) >= 8
-    assert scores["right-chapter"] == scores["right-two-sides"] == 15
+    full = 15 if abilities().loss else 13  # without a sandbox, two checks are left to a person
+    assert scores["right-chapter"] == scores["right-two-sides"] == full
     assert scores["broken-file"] == scores["broken-syntax"] == 0
     assert 0 < scores["wrong-stub"] < scores["wrong-imu-endless"] < 15
     root = tmp_path / "here"

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import nbformat
 import pytest
@@ -17,7 +18,9 @@ from autograder.corpus import Case
 from autograder.engine import AssignmentError
 from autograder.gradebook import CourseGradebook, Grade, GradebookError
 
-from .conftest import ASSIGNMENT, NOTEBOOK, Course
+from .conftest import ASSIGNMENT, NOTEBOOK, Course, needs_sandbox
+
+pytestmark = needs_sandbox
 
 Cases = dict[str, Case]
 
@@ -71,7 +74,7 @@ def test_a_class_is_graded_whatever_state_its_files_are_in(course: Course, cases
     full = {"qos-visible": 10.0, "qos-hidden": 5.0, "qos-explanation": None}
     for student in ("right", "deleted", "edited", "twice"):
         assert cells(found[student]) == full, student
-    assert cells(found["wrong"]) == {**full, "qos-hidden": 3.0}
+    assert cells(found["wrong"]) == {**full, "qos-hidden": 4.0}
     for student, reason in {"cut-off": "not valid JSON", "empty": "There is no"}.items():
         assert found[student].score == 0
         assert found[student].needs_manual_grade, "a person decides about an unreadable file"
@@ -132,9 +135,9 @@ def test_what_did_not_change_is_not_run_again(
     runs: list[submission.Program] = []
     really_run = runner.run
 
-    def spy(program: submission.Program, files: dict[str, bytes]) -> runner.Outcome:
+    def spy(program: submission.Program, files: dict[str, bytes], **options: Any) -> runner.Outcome:
         runs.append(program)
-        return really_run(program, files)
+        return really_run(program, files, **options)
 
     monkeypatch.setattr(runner, "run", spy)
     first = grade(course)
@@ -144,7 +147,7 @@ def test_what_did_not_change_is_not_run_again(
     grade(course, fresh=True)
     assert len(runs) == 2
     course.submit("right", cases["wrong-imu-single"].submission(course.source, course.released))
-    assert cells(grade(course)["right"])["qos-hidden"] == 3.0
+    assert cells(grade(course)["right"])["qos-hidden"] == 4.0
     assert len(runs) == 3
 
 

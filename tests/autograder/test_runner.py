@@ -11,6 +11,10 @@ from autograder.runner import Outcome
 from autograder.store import OutcomeStore
 from autograder.submission import Cell, Program
 
+from .conftest import needs_sandbox
+
+pytestmark = needs_sandbox
+
 EXAM = Cell("", "qos-visible", "qos", "visible")
 
 

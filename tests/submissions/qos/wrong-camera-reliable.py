@@ -1,5 +1,5 @@
 # title: A camera that re-sends lost frames
-# fails: camera_best_effort
+# fails: camera_best_effort, camera_moves_on
 # in: the stub
 
 camera_qos = QoSProfile(depth=5)

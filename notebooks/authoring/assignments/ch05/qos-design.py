@@ -19,10 +19,10 @@
 #
 # | Sensor | Topic | Type | What the robot needs |
 # |---|---|---|---|
-# | camera | `camera/image` | `sensor_msgs/Image`, 10 Hz | A live picture over Wi-Fi. A lost frame is gone: nothing newer may wait for it. After a pause a consumer goes on with the newest frames, at most the last 10 (1 s). |
+# | camera | `camera/image` | `sensor_msgs/Image`, 10 Hz | A live picture over Wi-Fi. A lost frame is gone: nothing newer may wait for it, and after a gap in the radio link none is sent again. After a pause a consumer goes on with the newest frames, at most the last 10 (1 s). |
 # | LIDAR | `scan` | `sensor_msgs/LaserScan`, 10 Hz | Obstacle avoidance wants the latest scan. After a pause nothing older than 0.5 s (5 scans) is acted on. |
 # | IMU | `imu/data` | `sensor_msgs/Imu`, 100 Hz | State estimation may be busy for 50 ms (5 readings) and must still see each of them, but never more than the last 0.5 s (50 readings). |
-# | emergency stop | `emergency/stop` | `std_msgs/String`, on each press and release | Every event, in order, at every consumer, whichever reliability it asks for. Up to 100 events can queue up while a consumer is busy. |
+# | emergency stop | `emergency/stop` | `std_msgs/String`, on each press and release | Every event, in order, at every consumer, whichever reliability it asks for. Up to 100 events can queue up while a consumer is busy or out of radio range; whoever comes back into range gets all that it missed. |
 #
 # And one rule for camera, LIDAR and IMU together: a node that starts late must not be handed old
 # readings. Whether the emergency stop remembers its last event for late joiners is up to you.
@@ -143,7 +143,8 @@ check("qos")
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "qos-about-hidden", "locked": true, "schema_version": 3, "solution": false}
 # The next cell is empty for you. When your work is graded, it examines the rest of the table: the
-# IMU's burst, the complete sequence of stop events, and the node that starts late.
+# IMU's burst, the complete sequence of stop events, a gap in the radio link, in which every packet
+# is lost, and the node that starts late.
 
 # %% nbgrader={"grade": true, "grade_id": "qos-hidden", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 # Filled in when your work is graded.

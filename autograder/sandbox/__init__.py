@@ -1,0 +1,10 @@
+"""Where a submission runs: in a sandbox of its own, or, if it is trusted, on this machine as it is.
+
+`place` gives one or the other. A sandbox is a network, process, file and IPC namespace made with
+bubblewrap, with limits; the examiner shares nothing with the submission but that network.
+"""
+
+from autograder.sandbox.place import Place, RunningSubject
+from autograder.sandbox.probe import Abilities, SandboxError, abilities, place, require
+
+__all__ = ["Abilities", "Place", "RunningSubject", "SandboxError", "abilities", "place", "require"]

@@ -1,0 +1,69 @@
+"""How much of the machine one submission may use.
+
+Two mechanisms, because neither is enough: the kernel's resource limits hold for each process (and
+for the number of processes of the sandbox's user), a watcher outside adds up the whole tree.
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+MIB = 1024 * 1024
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds for one submission; sizes in bytes, times in seconds.
+
+    Attributes:
+        memory: what all its processes together may hold.
+        data: writable memory that one process may reserve; beyond it Python raises MemoryError.
+        tasks: processes and threads at a time.
+        processes: processes at a time; a bomb is ended before it has slowed others down.
+        cpu: processor time of all its processes together.
+        file: largest file.
+        open_files: open file descriptors of one process.
+        scratch: room in its home folder, in /tmp and in /dev/shm, each.
+        wall: time from start to end, exams included.
+    """
+
+    memory: int = 1536 * MIB
+    data: int = 2048 * MIB
+    tasks: int = 200
+    processes: int = 48
+    cpu: int = 300
+    file: int = 64 * MIB
+    open_files: int = 2048
+    scratch: int = 64 * MIB
+    wall: int = 900
+
+    def to_json(self) -> str:
+        """Return the limits as JSON."""
+        return json.dumps(asdict(self))
+
+    @classmethod
+    def from_json(cls, text: str) -> Limits:
+        """Read what `to_json` wrote."""
+        return cls(**json.loads(text))
+
+    def apply(self) -> None:
+        """Limit this process and all that it starts, for good."""
+        bounds = {
+            resource.RLIMIT_DATA: self.data,
+            resource.RLIMIT_NPROC: self.tasks,
+            resource.RLIMIT_CPU: self.cpu,
+            resource.RLIMIT_FSIZE: self.file,
+            resource.RLIMIT_NOFILE: self.open_files,
+            resource.RLIMIT_CORE: 0,
+        }
+        for what, bound in bounds.items():
+            _, hard = resource.getrlimit(what)
+            most = bound if hard == resource.RLIM_INFINITY else min(bound, hard)
+            resource.setrlimit(what, (most, most))
+        with suppress(OSError):
+            # If the machine runs out of memory all the same, this process goes first.
+            Path("/proc/self/oom_score_adj").write_text("1000")

@@ -1,0 +1,64 @@
+"""What a runner needs of the place that a submission runs in: somewhere to start two processes."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Mapping, Sequence
+from types import TracebackType
+from typing import Any, Protocol, Self
+
+
+class RunningSubject(Protocol):
+    """A subject's process. Leaving its block ends it with everything it started."""
+
+    @property
+    def pid(self) -> int:
+        """Its process id as the examiner sees it; known once it has said that it is ready."""
+
+    def ready(self) -> None:
+        """Note that the subject has started and has not run any of the student's code yet."""
+
+    def failed(self) -> str:
+        """Return why it did not start, in words."""
+
+    def fate(self) -> str:
+        """Return how the process ended, in words."""
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End the process and all that it started, and remove what they left."""
+
+
+class Place(Protocol):
+    """Where an examiner and a subject find each other over DDS, and nobody else does."""
+
+    domain_id: int
+    """The ROS domain of both."""
+    own_network: bool
+    """Whether the network is theirs alone, so that the examiner may make it lose packets."""
+
+    def spawn(self, command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+        """Start the examiner; ``options`` are those of `subprocess.Popen`."""
+
+    def start_subject(
+        self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
+    ) -> RunningSubject:
+        """Start the subject with ``files`` in its working folder and the descriptors ``fds``."""
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Give back what the place holds."""

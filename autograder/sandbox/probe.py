@@ -1,0 +1,138 @@
+"""Whether submissions can be sandboxed on this machine, and what to do if not."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from autograder.sandbox.box import Box
+from autograder.sandbox.host import Host
+from autograder.sandbox.network import BoxError
+from autograder.sandbox.place import Place
+from course.errors import CourseError
+
+TOOLS = {
+    "bwrap": "bubblewrap", "ip": "iproute2", "prlimit": "util-linux",
+    "unshare": "util-linux", "nsenter": "util-linux", "setpriv": "util-linux",
+}  # fmt: skip
+TRUST = "or, if you trust every submission, grade with --trust-submissions"
+PROFILE = Path(__file__).with_name("bwrap.apparmor")
+_APPARMOR = Path("/proc/sys/kernel/apparmor_restrict_unprivileged_userns")
+
+
+class SandboxError(CourseError):
+    """There is no working sandbox here; the message says how to get one."""
+
+
+@dataclass(frozen=True)
+class Abilities:
+    """What this machine can do: ``problem`` says in a sentence why there is no sandbox, if so.
+
+    ``loss`` is whether a sandbox's network can be made to lose packets (it takes nftables).
+    """
+
+    problem: str = ""
+    loss: bool = False
+
+    def mode(self, *, trust: bool) -> str:
+        """Return in a word how submissions are run: outcomes of two modes may differ."""
+        if trust:
+            return "trusted"
+        return "sandboxed" if self.loss else "sandboxed without loss"
+
+
+_trying = threading.Lock()
+
+
+def abilities() -> Abilities:
+    """Try a sandbox, once a process, and return what works."""
+    with _trying:
+        return _abilities()
+
+
+@cache
+def _abilities() -> Abilities:
+    missing = [package for tool, package in TOOLS.items() if shutil.which(tool) is None]
+    if missing:
+        packages = " ".join(sorted({*missing, "bubblewrap", "iproute2", "nftables"}))
+        return Abilities(
+            f"Submissions cannot be sandboxed here because {' and '.join(missing)} is missing: "
+            f"install it with `sudo apt install {packages}`, {TRUST}."
+        )
+    try:
+        return Abilities(loss=_try())
+    except BoxError as error:
+        return Abilities(_advice(str(error)))
+
+
+def place(*, trust: bool = False, hidden: Iterable[Path] = ()) -> Place:
+    """Return where one submission is to run.
+
+    Args:
+        trust: run it on this machine as it is, with the rights of whoever grades.
+        hidden: folders that a sandboxed submission must never see (the course root).
+
+    Raises:
+        SandboxError: it is not trusted, and there is no working sandbox here.
+    """
+    if trust:
+        return Host()
+    require()
+    return Box(hidden=hidden)
+
+
+def require() -> None:
+    """Raise SandboxError unless submissions can be sandboxed here."""
+    if problem := abilities().problem:
+        raise SandboxError(problem)
+
+
+def _try() -> bool:
+    """Run this Python in a sandbox; return whether its network can lose packets."""
+    with Box() as box:
+        nft = "nft add table inet probe" if shutil.which("nft") else "false"
+        outer = box.spawn(
+            ["sh", "-c", f"{nft} && echo yes; read -r _"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+        try:
+            with box.start([sys.executable, "-c", "import rclpy"], {}, ()) as subject:
+                if subject.fate() != "exit code 0":
+                    raise BoxError(subject.failed())
+        finally:
+            said, _ = outer.communicate(b"\n", timeout=60)
+    return said.strip() == b"yes"
+
+
+def _advice(said: str) -> str:
+    """Return one sentence about why bwrap failed and what helps."""
+    reason = said.splitlines()[-1] if said else "it said nothing"
+    if _reads(_APPARMOR) == "1":
+        return (
+            "Submissions cannot be sandboxed here because this system's AppArmor keeps bubblewrap "
+            f"from making namespaces ({reason}): allow it with `sudo cp {PROFILE} "
+            f"/etc/apparmor.d/bwrap && sudo apparmor_parser -r /etc/apparmor.d/bwrap`, {TRUST}."
+        )
+    if _reads(Path("/proc/sys/kernel/unprivileged_userns_clone")) == "0":
+        return (
+            f"Submissions cannot be sandboxed here because user namespaces are off ({reason}): "
+            f"turn them on with `sudo sysctl kernel.unprivileged_userns_clone=1`, {TRUST}."
+        )
+    return (
+        f"Submissions cannot be sandboxed here because bubblewrap fails ({reason}): start a "
+        "container with the right to make namespaces (docker run --privileged, for instance), "
+        f"{TRUST}."
+    )
+
+
+def _reads(path: Path) -> str:
+    try:
+        return path.read_text(encoding="ascii").strip()
+    except OSError:
+        return ""

@@ -1,0 +1,61 @@
+"""The system calls that a submission does without: a filter for `bwrap --seccomp`.
+
+Refused is what no limit reaches (memory that belongs to no process), what opens large parts of the
+kernel to a stranger (new user namespaces, io_uring, bpf, keyrings, tracing), and sockets that lead
+out of a network namespace (VM sockets). Written for x86-64, the one machine that ROS 2 wheels are
+made for. The format is that of seccomp(2): an array of ``struct sock_filter``.
+"""
+
+from __future__ import annotations
+
+import errno
+import socket
+import struct
+
+_LOAD, _EQUAL, _GREATER_EQUAL, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
+_NUMBER, _ARCHITECTURE, _ARGUMENT_0 = 0, 4, 16  # offsets in struct seccomp_data
+_X86_64 = 0xC000003E
+_X32 = 0x40000000  # the first number of the x32 calls
+_ALLOW, _KILL, _ERRNO = 0x7FFF0000, 0x80000000, 0x00050000
+_NEW_USER_NAMESPACE = 0x10000000
+
+REFUSED = {
+    "shmget": 29, "shmat": 30, "msgget": 68, "ptrace": 101, "pivot_root": 155, "mount": 165,
+    "umount2": 166, "swapon": 167, "init_module": 175, "mq_open": 240, "kexec_load": 246,
+    "add_key": 248, "request_key": 249, "keyctl": 250, "unshare": 272, "perf_event_open": 298,
+    "open_by_handle_at": 304, "setns": 308, "process_vm_readv": 310, "process_vm_writev": 311,
+    "finit_module": 313, "memfd_create": 319, "kexec_file_load": 320, "bpf": 321,
+    "userfaultfd": 323, "io_uring_setup": 425, "open_tree": 428, "move_mount": 429, "fsopen": 430,
+    "fsconfig": 431, "fsmount": 432, "fspick": 433, "mount_setattr": 442, "memfd_secret": 447,
+}  # fmt: skip
+_CLONE, _CLONE3, _SOCKET = 56, 435, 41
+FAMILIES = (socket.AF_UNIX, socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK)
+"""Kinds of sockets that remain; DDS looks network interfaces up over netlink."""
+
+
+def _step(code: int, value: int, if_true: int = 0, if_false: int = 0) -> bytes:
+    return struct.pack("<HBBI", code, if_true, if_false, value)
+
+
+def _refuse(error: int) -> bytes:
+    return _step(_RETURN, _ERRNO | error)
+
+
+def program() -> bytes:
+    """Return the filter."""
+    steps = [
+        _step(_LOAD, _ARCHITECTURE), _step(_EQUAL, _X86_64, 1, 0), _step(_RETURN, _KILL),
+        _step(_LOAD, _NUMBER), _step(_GREATER_EQUAL, _X32, 0, 1), _refuse(errno.ENOSYS),
+        # Its flags are in memory, where no filter can look: without it the C library uses clone.
+        _step(_EQUAL, _CLONE3, 0, 1), _refuse(errno.ENOSYS),
+    ]  # fmt: skip
+    for number in REFUSED.values():
+        steps += [_step(_EQUAL, number, 0, 1), _refuse(errno.EPERM)]
+    steps += [
+        _step(_EQUAL, _CLONE, 0, 4), _step(_LOAD, _ARGUMENT_0),
+        _step(_ANY_BIT, _NEW_USER_NAMESPACE, 0, 1), _refuse(errno.EPERM), _step(_RETURN, _ALLOW),
+        _step(_EQUAL, _SOCKET, 0, 2 + len(FAMILIES)), _step(_LOAD, _ARGUMENT_0),
+        *(_step(_EQUAL, family, len(FAMILIES) - place, 0) for place, family in enumerate(FAMILIES)),
+        _refuse(errno.EAFNOSUPPORT), _step(_RETURN, _ALLOW),
+    ]  # fmt: skip
+    return b"".join(steps)

@@ -1,0 +1,110 @@
+"""The files that a submission sees: the system and this Python read-only, and a small scratch.
+
+Not among them: home folders, the course root with its gradebook, sources and other submissions,
+and the host's processes, which a /proc of its own hides.
+"""
+
+from __future__ import annotations
+
+import os
+import site
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+import autograder
+import course
+import quizzes
+from autograder.sandbox.limits import Limits
+from course.interfaces import cache
+
+HOME = Path("/home/student")
+HANDED_IN = Path("/run/handed-in")
+"""Where a submission's other files lie, read-only; the subject copies them to its home."""
+
+_MERGED = ("bin", "lib", "lib32", "lib64", "libx32", "sbin")
+_ETC = (
+    "alternatives", "fonts", "ld.so.cache", "ld.so.conf", "ld.so.conf.d", "localtime", "mime.types",
+)  # fmt: skip
+
+
+def arguments(limits: Limits, handed_in: Path | None, hidden: Iterable[Path]) -> Iterator[str]:
+    """Yield bwrap's arguments for the files.
+
+    Args:
+        limits: has the size of the scratch folders.
+        handed_in: the folder with the submission's other files.
+        hidden: folders that must not be seen even if they lie within something that is.
+    """
+    yield from _system()
+    for scratch in (Path("/tmp"), HOME, Path("/dev/shm")):
+        yield from _way_to(scratch)
+        yield from ("--perms", "1777", "--size", str(limits.scratch), "--tmpfs", str(scratch))
+    shown = list(python_folders())
+    cached = cache.root()
+    for folder in (*shown, *([cached] if cached.is_dir() else [])):
+        yield from _way_to(folder)
+        yield from ("--ro-bind", str(folder), str(folder))
+    if handed_in is not None:
+        yield from _way_to(HANDED_IN)
+        yield from ("--ro-bind", str(handed_in), str(HANDED_IN))
+    for folder in (*hidden, *_bundled()):
+        if folder.is_dir() and _is_within(folder, [Path("/usr"), *shown]):
+            yield from ("--tmpfs", str(folder), "--remount-ro", str(folder))
+    yield from ("--remount-ro", "/dev", "--remount-ro", "/", "--chdir", str(HOME))
+
+
+def _way_to(folder: Path) -> Iterator[str]:
+    """Yield what makes the folders above a mount point: bwrap itself would lock others out."""
+    for above in reversed(folder.parents[:-1]):
+        yield from ("--perms", "0755", "--dir", str(above))
+
+
+def _system() -> Iterator[str]:
+    yield from ("--ro-bind", "/usr", "/usr")
+    for name in _MERGED:
+        folder = Path("/", name)
+        if folder.is_symlink():
+            yield from ("--symlink", str(folder.readlink()), str(folder))
+        elif folder.is_dir():
+            yield from ("--ro-bind", str(folder), str(folder))
+    for name in _ETC:
+        yield from ("--ro-bind-try", f"/etc/{name}", f"/etc/{name}")
+    yield from ("--proc", "/proc", "--dev", "/dev")
+
+
+def python_folders() -> Iterator[Path]:
+    """Yield the folders of this Python, of what is installed for it, and of our own packages."""
+    seen = [Path("/usr")]
+    named = [sys.base_prefix, sys.base_exec_prefix, sys.prefix, sys.exec_prefix]
+    if site.ENABLE_USER_SITE:
+        named.append(site.getusersitepackages())
+    packages = [Path(package.__path__[0]) for package in (autograder, course, quizzes)]
+    wanted = [*(Path(os.path.abspath(name)) for name in named), *packages]  # noqa: PTH100 - links
+    for folder in [variant for path in wanted for variant in (path, path.resolve())]:
+        if folder.is_dir() and not _is_within(folder, seen):
+            seen.append(folder)
+            yield folder
+
+
+def _bundled() -> list[Path]:
+    """Return where notebooks, solutions and corpus may lie among installed packages.
+
+    An editable installation has them beside the other packages, not beside its own modules.
+    """
+    installed = [Path(entry, "course") for entry in sys.path]
+    return [package / "data" for package in {*installed, Path(course.__path__[0])}]
+
+
+def _is_within(folder: Path, others: Sequence[Path]) -> bool:
+    return any(folder.is_relative_to(other) for other in others)
+
+
+def written(uid: int) -> dict[str, str]:
+    """Return {path: text} of the few files that are the sandbox's own: who is who in it."""
+    return {
+        "/etc/passwd": f"student:x:{uid}:{uid}:Student:{HOME}:/bin/sh\n",
+        "/etc/group": f"student:x:{uid}:\n",
+        "/etc/hosts": "127.0.0.1 localhost robot\n::1 localhost\n",
+        "/etc/nsswitch.conf": "passwd: files\ngroup: files\nhosts: files\n",
+    }

@@ -1,0 +1,173 @@
+"""The sandbox itself: whom it lets in, what it says where it does not work, what is examined in it.
+
+What it keeps out is in tests/hostile.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from autograder import runner, sandbox
+from autograder.corpus import Case
+from autograder.sandbox import SandboxError, probe, seccomp
+from autograder.sandbox.limits import Limits
+from autograder.store import OutcomeStore
+from autograder.submission import Cell
+
+from .conftest import ASSIGNMENT, NOTEBOOK, Course, needs_sandbox
+
+EXAM = Cell("", "qos-hidden", "qos", "hidden")
+
+
+def without(tool: str, folder: Path) -> str:
+    """Return a PATH on which everything is found but ``tool``."""
+    folder.mkdir()
+    for place in reversed(os.environ["PATH"].split(os.pathsep)):
+        for file in Path(place).glob("*"):
+            if file.name != tool:
+                (folder / file.name).unlink(missing_ok=True)
+                (folder / file.name).symlink_to(file)
+    return str(folder)
+
+
+def grade(course: Course, path: str, *options: str) -> subprocess.CompletedProcess[str]:
+    executable = shutil.which("autograder")
+    assert executable is not None
+    return subprocess.run(
+        [executable, "grade", ASSIGNMENT, "--json", *options], cwd=course.root, check=False,
+        env={**os.environ, "PATH": path}, capture_output=True, text=True, timeout=170,
+    )  # fmt: skip
+
+
+def test_nobody_is_graded_without_a_sandbox_unless_trusted(
+    course: Course, cases: dict[str, Case], tmp_path: Path
+) -> None:
+    course.submit("right", cases["right-chapter"].submission(course.source, course.released))
+    path = without("bwrap", tmp_path / "bin")
+
+    refused = grade(course, path)
+    assert refused.returncode == 1
+    assert "sudo apt install bubblewrap iproute2 nftables" in refused.stderr
+    assert "--trust-submissions" in refused.stderr
+    assert len(refused.stderr.strip().splitlines()) == 1
+    assert not (course.root / "grades.csv").exists()
+
+    trusted = grade(course, path, "--trust-submissions")
+    assert trusted.returncode == 0, trusted.stderr
+    (entry,) = json.loads(trusted.stdout)["grades"]
+    assert entry["score"] == 13, "what needs a lossy network is neither passed nor failed"
+    assert entry["needs_manual_grade"]
+    feedback = (course.root / f"feedback/right/{ASSIGNMENT}/{NOTEBOOK}.html").read_text()
+    assert "A person will look at it." in feedback
+    assert "not examined here" in feedback
+
+
+def test_appamor_is_named_where_it_is_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setting = tmp_path / "apparmor_restrict_unprivileged_userns"
+    setting.write_text("1\n")
+    monkeypatch.setattr(probe, "_APPARMOR", setting)
+    advice = probe._advice("bwrap: setting up uid map: Permission denied")
+    assert "AppArmor" in advice
+    assert "apparmor_parser -r /etc/apparmor.d/bwrap" in advice
+    assert "--trust-submissions" in advice
+    assert probe.PROFILE.is_file()
+
+
+def test_a_container_without_the_right_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(probe, "_reads", lambda _path: "")
+    advice = probe._advice("bwrap: No permissions to create new namespace")
+    assert "No permissions to create new namespace" in advice
+    assert "docker run --privileged" in advice
+
+
+def test_an_untrusted_program_never_falls_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(probe, "abilities", lambda: sandbox.Abilities("There is none here."))
+    with pytest.raises(SandboxError, match=r"There is none here\."):
+        runner.run((Cell("1"),))
+
+
+def test_outcomes_of_different_places_are_kept_apart(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    outcome = runner.Outcome([[]])
+    trusting = OutcomeStore(tmp_path, trust=True)
+    trusting.put((Cell("1"),), {}, outcome)
+    assert trusting.get((Cell("1"),), {}) == outcome
+    for loss in (True, False):
+        monkeypatch.setattr("autograder.store.abilities", lambda x=loss: sandbox.Abilities(loss=x))
+        assert OutcomeStore(tmp_path).get((Cell("1"),), {}) is None
+        OutcomeStore(tmp_path).put((Cell("1"),), {}, outcome)
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+@needs_sandbox
+def test_a_submission_finds_its_files_and_a_scratch_of_its_own() -> None:
+    source = """
+import os, tempfile
+from helpers.profiles import DEPTH
+print(DEPTH, os.getcwd(), os.environ["HOME"])
+open("mine", "w").write("x" * 1000)
+tempfile.TemporaryFile().write(b"x" * 1000)
+"""
+    outcome = runner.run((Cell(source),), {"helpers/profiles.py": b"DEPTH = 7"})
+    assert outcome.outputs[0][0]["text"] == "7 /home/student /home/student\n"
+    assert not outcome.notes
+
+
+@needs_sandbox
+def test_the_examiner_sees_the_subjects_process() -> None:
+    with sandbox.place() as place:
+        examiner = place.spawn(["sh", "-c", "read -r _"], stdin=subprocess.PIPE)
+        program = "import os, sys; os.write(int(sys.argv[1]), b'up'); os.read(int(sys.argv[2]), 1)"
+        (up, up_end), (stay, stay_end) = os.pipe(), os.pipe()
+        command = [sys.executable, "-c", program, str(up_end), str(stay)]
+        with place.start_subject(command, {}, [up_end, stay]) as subject:
+            os.close(up_end)
+            assert os.read(up, 2) == b"up"
+            subject.ready()
+            process = Path(f"/proc/{subject.pid}")
+            assert program in (process / "cmdline").read_text()
+            assert list((process / "task").iterdir())
+            assert list((process / "fd").iterdir())
+            assert int((process / "statm").read_text().split()[1]) > 0
+        examiner.communicate(b"\n")
+        for descriptor in (up, stay, stay_end):
+            os.close(descriptor)
+    assert not process.exists()
+
+
+@needs_sandbox
+def test_who_is_not_root_gets_the_same_sandbox() -> None:
+    """Root of a user namespace is a user like others: it takes the way of who is not root."""
+    program = "from autograder import sandbox; print(sandbox.abilities())"
+    ran = subprocess.run(
+        ["unshare", "-r", sys.executable, "-c", program],
+        capture_output=True, text=True, timeout=60, check=True,
+    )  # fmt: skip
+    assert ran.stdout.strip() == str(sandbox.abilities())
+
+
+@needs_sandbox
+def test_the_hidden_part_is_examined_in_full() -> None:
+    outcome = runner.run((EXAM,))
+    assert {check.status for check in outcome.verdicts["qos-hidden"].checks} == {"not_checked"}
+
+
+def test_limits_survive_the_way_to_the_subject() -> None:
+    limits = Limits(memory=1, wall=2)
+    assert Limits.from_json(limits.to_json()) == limits
+
+
+def test_the_filter_is_a_whole_number_of_instructions() -> None:
+    program = seccomp.program()
+    assert len(program) % 8 == 0
+    assert len(program) // 8 < 4096, "more than the kernel takes"

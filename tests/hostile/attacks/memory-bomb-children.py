@@ -1,0 +1,12 @@
+# title: Each child holds what one process may hold
+# told: it held more than 1536 MB of memory
+
+import os
+
+for _ in range(20):
+    if os.fork() == 0:
+        hoard = bytearray(b"x") * (700 * 2**20)
+        while True:
+            pass
+while True:
+    pass

@@ -1,0 +1,6 @@
+# title: A real segmentation fault
+# told: killed by SIGSEGV
+
+import ctypes
+
+ctypes.string_at(0)

@@ -1,0 +1,220 @@
+"""Attacks on the grader: contained, explained in the grade, and of no effect on anybody else.
+
+Each ``attacks/<name>.py`` is a cell that a student hands in, under a header of comments:
+
+    # title: what it tries
+    # told: a fragment of what the grade says about it (any number of them)
+    # prints: a fragment of what the cell itself must print, an error included
+    # base: the corpus case that the rest of the submission is; an empty solution if left out
+    # score: its automatic points; 0 if left out, "any" if they do not matter
+    # seconds: what a cell of it may take, if not as long as always
+
+While it runs, so does a neighbour's right submission, which must get what it gets in quiet.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import socket
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat import NotebookNode
+from nbformat.v4 import new_code_cell
+
+from autograder import corpus, engine, runner, submission
+from autograder.build import build
+from autograder.corpus import Case
+from autograder.corpus.trials import one_notebook
+from autograder.gradebook import CourseGradebook
+from autograder.release import release
+from autograder.runner import CELL_TIMEOUT, Outcome
+from autograder.sandbox import abilities, network
+from autograder.submission import Program
+
+HERE = Path(__file__).parent
+EMPTY = "broken-empty"
+FULL = 15.0
+
+pytestmark = pytest.mark.skipif(bool(abilities().problem), reason=abilities().problem or "-")
+
+
+@dataclass(frozen=True)
+class Attack:
+    name: str
+    text: str
+    told: list[str] = field(default_factory=list)
+    prints: list[str] = field(default_factory=list)
+    base: str = EMPTY
+    score: str = "0"
+    seconds: float = CELL_TIMEOUT
+
+
+def attacks() -> list[Attack]:
+    return [attack_of(file) for file in sorted((HERE / "attacks").glob("*.py"))]
+
+
+def attack_of(file: Path) -> Attack:
+    text = file.read_text()
+    fields: dict[str, list[str]] = {}
+    for key, value in re.findall(r"^# (\w+): (.*)$", text, re.MULTILINE):
+        fields.setdefault(key, []).append(value)
+    return Attack(
+        file.stem, text, fields.get("told", []), fields.get("prints", []),
+        fields.get("base", [EMPTY])[0], fields.get("score", ["0"])[0],
+        float(fields.get("seconds", [CELL_TIMEOUT])[0]),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Class:
+    root: Path
+    source: NotebookNode
+    released: NotebookNode
+    cases: dict[str, Case]
+
+    def program(self, base: str, attack: str = "") -> Program:
+        notebook = self.cases[base].submission(self.source, self.released)
+        if attack:
+            place = next(
+                number for number, cell in enumerate(notebook.cells)
+                if submission.grade_id(cell) == "qos-solution"
+            )  # fmt: skip
+            notebook.cells.insert(place + 1, new_code_cell(attack))
+        return submission.program(submission.restore(notebook, self.source, self.released)[0])
+
+
+@pytest.fixture(scope="module")
+def class_(tmp_path_factory: pytest.TempPathFactory) -> Class:
+    root = one_notebook(tmp_path_factory.mktemp("course"), "qos")
+    build(root)
+    release(root, "ch05")
+    source, released = (
+        submission.read(root / step / "ch05" / "qos-design.ipynb") for step in ("source", "release")
+    )
+    cases = {case.name: case for case in corpus.load(HERE.parent / "submissions", "qos")}
+    return Class(root, source, released, cases)
+
+
+@pytest.fixture
+def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "scratch"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+@pytest.fixture
+def host() -> Iterator[tuple[int, list[socket.socket]]]:
+    """Listen on the host where a submission might call; give the port, and who listens."""
+    with socket.create_server(("127.0.0.1", 0)) as internet, socket.socket(socket.AF_UNIX) as local:
+        local.bind("\0ros2-course-hostile")
+        local.listen()
+        yield internet.getsockname()[1], [internet, local]
+
+
+@pytest.fixture
+def namespaces(monkeypatch: pytest.MonkeyPatch) -> set[int]:
+    """Collect the process namespaces of the sandboxes that are made from now on."""
+    made: set[int] = set()
+    find = network.child
+
+    def spy(info: int, process: subprocess.Popen[bytes]) -> int:
+        init = find(info, process)
+        made.add(Path(f"/proc/{init}/ns/pid").stat().st_ino)
+        return init
+
+    monkeypatch.setattr(network, "child", spy)
+    return made
+
+
+def running(namespaces: set[int]) -> list[str]:
+    """Return the processes that are in one of the process namespaces."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with suppress(OSError):
+            if (process / "ns/pid").stat().st_ino in namespaces:
+                found.append(process.name)
+    return found
+
+
+def score(outcome: Outcome) -> float:
+    return sum(verdict.score for verdict in outcome.verdicts.values())
+
+
+def grade_text(outcome: Outcome) -> str:
+    checks = [check for verdict in outcome.verdicts.values() for check in verdict.checks]
+    return "\n".join([*outcome.notes, *(f"{check.expected} {check.actual}" for check in checks)])
+
+
+@pytest.mark.parametrize("attack", attacks(), ids=lambda attack: attack.name)
+def test_an_attack_is_contained_and_explained_and_hurts_nobody(
+    attack: Attack,
+    class_: Class,
+    scratch: Path,
+    host: tuple[int, list[socket.socket]],
+    namespaces: set[int],
+) -> None:
+    port, listeners = host
+    text = attack.text.replace("PORT", str(port)).replace("ROOT", repr(str(class_.root)))
+    with ThreadPoolExecutor(2) as pool:
+        neighbour = pool.submit(runner.run, class_.program("right-chapter"), hidden=[class_.root])
+        hostile = pool.submit(
+            runner.run, class_.program(attack.base, text), hidden=[class_.root],
+            cell_timeout=attack.seconds,
+        )  # fmt: skip
+        outcome = hostile.result()
+        assert score(neighbour.result()) == FULL, grade_text(neighbour.result())
+
+    said, shown = grade_text(outcome), json.dumps(outcome.outputs, ensure_ascii=False)
+    if attack.score != "any":
+        assert score(outcome) == float(attack.score), said
+    for fragment in attack.told:
+        assert fragment in said
+    for fragment in attack.prints:
+        assert fragment in shown
+    assert "Traceback" not in said
+    assert len(shown) < 2_000_000
+    assert len(namespaces) == 2
+    assert not running(namespaces), "something is still running"
+    assert list(scratch.iterdir()) == [], "something was left on disk"
+    for listener in listeners:
+        listener.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            listener.accept()
+
+
+def test_odd_files_in_a_submission_folder(class_: Class) -> None:
+    right = class_.cases["right-chapter"].submission(class_.source, class_.released)
+
+    def folder(student: str) -> Path:
+        path = class_.root / "submitted" / student / "ch05"
+        path.mkdir(parents=True)
+        return path
+
+    nbformat.write(right, folder("honest") / "qos-design.ipynb")
+    (folder("link") / "qos-design.ipynb").symlink_to("../../honest/ch05/qos-design.ipynb")
+    (folder("large") / "qos-design.ipynb").write_bytes(b'{"cells": ["' + b"x" * 200 * 2**20)
+    (folder("nested") / "qos-design.ipynb").write_text("[" * 200_000 + "]" * 200_000)
+    climbing = folder("climbing")
+    nbformat.write(right, climbing / "qos-design.ipynb")
+    (climbing / "gradebook.db").symlink_to(class_.root / "gradebook.db")
+    (climbing / "up").symlink_to("../../..")
+
+    graded = {g.student: g for g in engine.grade(class_.root, "ch05")}
+    grades = {g.student: g for g in CourseGradebook(class_.root).grades("ch05")}
+
+    assert {name: grade.score for name, grade in grades.items()} == {
+        "honest": FULL, "climbing": FULL, "link": 0, "large": 0, "nested": 0,
+    }  # fmt: skip
+    assert "is not a file" in graded["link"].problem
+    assert "200 MB" in graded["large"].problem
+    assert "not valid JSON" in graded["nested"].problem
