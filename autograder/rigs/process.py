@@ -44,12 +44,15 @@ class Process:
         return Usage(self.threads(), files, pages * resource.getpagesize() // 1024)
 
     def positions(self, name: str) -> list[int]:
-        """Return the file positions of its descriptors of a memory file (memfd_create(2))."""
+        """Return the file positions of its descriptors of a file that has been unlinked.
+
+        Only the last part of the path is compared: the rest depends on the mount namespace.
+        """
         found = []
         for descriptor in (self._proc / "fd").iterdir():
             # It may be closed while we look.
             with suppress(FileNotFoundError, ProcessLookupError):
-                if str(descriptor.readlink()) == f"/memfd:{name} (deleted)":
+                if descriptor.readlink().name == f"{name} (deleted)":
                     info = (self._proc / "fdinfo" / descriptor.name).read_text("ascii")
                     found.append(int(info.split()[1]))  # "pos:  <number>" comes first
         return found

@@ -137,12 +137,16 @@ def _modes(learner: Learner) -> list[str]:
     return modes
 
 
-def test_without_its_mark_a_control_would_let_shortcuts_through(sit: Sit) -> None:
-    """Guards the test above: the keys are shortcuts there, and the mark is what holds them."""
+def test_without_its_guards_a_control_would_let_shortcuts_through(sit: Sit) -> None:
+    """Guards the test above: the keys are shortcuts there, and the quiz is what holds them."""
     learner = sit()
     learner.root.evaluate(
-        "root => root.querySelectorAll('[data-lm-suppress-shortcuts]')"
-        ".forEach(element => element.removeAttribute('data-lm-suppress-shortcuts'))"
+        """root => {
+            const bare = root.cloneNode(true); // without listeners
+            for (const element of bare.querySelectorAll('[data-lm-suppress-shortcuts]'))
+                element.removeAttribute('data-lm-suppress-shortcuts');
+            root.replaceWith(bare);
+        }"""
     )
     learner.question(1).locator("input").first.focus()
     learner.page.keyboard.press("x")

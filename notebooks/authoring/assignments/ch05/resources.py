@@ -68,6 +68,7 @@ import array
 import errno
 import os
 import queue
+import tempfile
 import threading
 
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
@@ -102,7 +103,7 @@ class Camera:
         self.device = device
         self._exposure = 0.3 if device.startswith('slow') else 0.0  # s
         self._zoom = 1
-        self._file = os.memfd_create(f'camera:{device}')
+        self._file = self._entry(f'camera:{device}')
         self._stream = None
         self._closed = threading.Event()
         self._lock = threading.Lock()
@@ -114,7 +115,7 @@ class Camera:
             if self.device.startswith('stuck'):
                 raise OSError(errno.EIO, f'the stream of camera {self.device!r} does not start')
             if self._stream is None:
-                self._stream = os.memfd_create(f'camera-stream:{self.device}')
+                self._stream = self._entry(f'camera-stream:{self.device}')
 
     def stop(self):
         """Stop the stream."""
@@ -163,6 +164,12 @@ class Camera:
     def _require_open(self):
         if self._closed.is_set():
             raise OSError(errno.EBADF, f'the camera {self.device!r} is closed')
+
+    @staticmethod
+    def _entry(name):
+        """Open a file that is there only as long as it is open, like the entry of a device."""
+        with tempfile.TemporaryDirectory() as folder:
+            return os.open(os.path.join(folder, name), os.O_RDWR | os.O_CREAT)
 
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-your-work", "locked": true, "schema_version": 3, "solution": false}
