@@ -76,11 +76,11 @@ def grade(
         GradebookError: the gradebook itself cannot be used.
         SandboxError: they are not trusted, and there is no working sandbox here.
     """
+    if not trust:
+        sandbox.require()
     gradebook = CourseGradebook(root, staged=STAGED)
     names = _notebooks(gradebook, assignment)
     students = _students(root, assignment)
-    if not trust:
-        sandbox.require()
     store = OutcomeStore(root / bridge.WORK_FOLDER / "outcomes", trust=trust, hidden=[root])
     class_ = _Class(gradebook, assignment, names, store, fresh)
     graded = [_unusable(student) for student in students if set(student) & set(GLOB)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,7 @@ def nbgrader(course: Course, *arguments: str) -> subprocess.CompletedProcess[str
 
 
 def test_a_class_is_graded_whatever_state_its_files_are_in(course: Course, cases: Cases) -> None:
-    right = cases["right-chapter"].submission
+    right = partial(cases["right-chapter"].submission, course.source)
     course.submit("right", right(course.released))
     course.submit("wrong", cases["wrong-imu-endless"].submission(course.source, course.released))
     course.submit("cut-off", "{" + '"cells": [')

@@ -1,5 +1,5 @@
 # title: A stop queue that is deep, but not deep enough
-# fails: stop_complete
+# fails: stop_complete, stop_repaired
 # in: the stub
 
 camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)

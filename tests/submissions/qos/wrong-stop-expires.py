@@ -1,5 +1,5 @@
 # title: Stop events that expire while they wait
-# fails: stop_complete
+# fails: stop_complete, stop_repaired
 # in: the stub
 
 from rclpy.duration import Duration
