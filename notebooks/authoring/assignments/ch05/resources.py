@@ -169,7 +169,7 @@ class Camera:
     def _entry(name):
         """Open a file that is there only as long as it is open, like the entry of a device."""
         with tempfile.TemporaryDirectory() as folder:
-            return os.open(os.path.join(folder, name), os.O_RDWR | os.O_CREAT)
+            return os.open(f'{folder}/{name}', os.O_RDWR | os.O_CREAT)
 
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-your-work", "locked": true, "schema_version": 3, "solution": false}
