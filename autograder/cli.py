@@ -32,7 +32,7 @@ Root = Annotated[
     Path | None,
     typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
 ]
-Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Submissions run at a time.")]
+Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Notebooks run at a time.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
@@ -204,14 +204,14 @@ def demo(
 
 
 def _demo_table(done: Any) -> None:
-    table = Table("Student", "What is special", "Fails", "Points", "Verdict", padding=(0, 0))
+    table = Table("Student", "What is special", "Must fail", "Points", "Verdict", padding=(0, 0))
     for column in (0, 3):
         table.columns[column].no_wrap = True
     for row in done.rows:
         score = f"{row.grade.score:g} of {row.grade.max_score:g}"
         table.add_row(row.student, row.title, row.expected, score, row.difference or "as expected")
     out.print(table)
-    out.print("Five of the points are for the written explanation, which a person grades.")
+    out.print("25 of the 100 points are for the written explanations, which a person grades.")
     places = {
         "gradebook": done.root / "gradebook.db",
         "grades": done.csv,

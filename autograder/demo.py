@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import shutil
+import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import nbformat
 
-from autograder import corpus, engine, submission
+from autograder import corpus, engine, points, submission
 from autograder.build import build
+from autograder.corpus import Case
 from autograder.corpus.command import untrusting
 from autograder.engine import Graded, Progress
 from autograder.gradebook import CourseGradebook, Grade, write_csv
@@ -18,17 +20,18 @@ from autograder.release import release
 from course.content import content_root, copy_authoring, corpus_root
 from course.errors import CourseError
 
-ASSIGNMENT, NOTEBOOK, EXAM = "ch05", "qos-design", "qos"
+ASSIGNMENT = "ch05"
+CLASS = "class.toml"
+"""The bundled class, in the corpus: what each student hands in."""
 
-CLASS = (
-    "right-chapter", "right-sensor-data", "right-two-sides", "right-plain-nodes",
-    "wrong-stub", "wrong-camera-reliable", "wrong-imu-endless", "wrong-stop-best-effort",
-    "wrong-lidar-durable", "wrong-incompatible", "broken-syntax",
-)  # fmt: skip
-"""The students of the bundled class, by the corpus case that each hands in."""
+CUT_OFF = "(cut off)"
 
-DAMAGED = "broken-file"
-"""One more student: the file was cut off on the way."""
+Class = dict[str, dict[str, str]]
+"""{student: {exam: corpus case}}, and a ``title``."""
+
+
+Cases = dict[str, dict[str, Case]]
+"""{exam: {name: case}}."""
 
 
 @dataclass(frozen=True)
@@ -79,37 +82,54 @@ def run(
     build(root)
     say(f"Releasing {ASSIGNMENT} with nbgrader")
     release(root, ASSIGNMENT)
-    cases = {case.name: case for case in corpus.load(corpus_root(), EXAM)}
-    students = collect(root, [cases[name] for name in CLASS])
-    say(f"Collected {len(students)} submissions; grading them on real DDS")
+    class_ = bundled_class()
+    cases = _cases()
+    collect(root, class_, cases)
+    say(f"Collected {len(class_)} submissions; grading them on real DDS")
     trust = untrusting(say)
     graded = engine.grade(root, ASSIGNMENT, jobs=jobs, trust=trust, progress=progress)
     grades = CourseGradebook(root).grades(ASSIGNMENT)
     csv = root / "grades.csv"
     write_csv(grades, ASSIGNMENT, csv)
-    rows = _rows(cases, {g.student: g for g in graded}, grades)
+    by_student = {grade.student: grade for grade in grades}
+    rows = [_row(class_[g.student], g, by_student[g.student], cases) for g in graded]
     return Demo(root, csv, tuple(rows))
 
 
-def collect(root: Path, cases: list[corpus.Case]) -> list[str]:
-    """Write one submission a case into the course's ``submitted`` folder; return the students."""
-    source, released = (
-        submission.read(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
-        for step in ("source", "release")
-    )
-    for case in cases:
-        folder = _submitted(root, case.name)
-        nbformat.write(case.submission(source, released), folder / f"{NOTEBOOK}.ipynb")  # type: ignore[no-untyped-call]
-    whole = (root / "release" / ASSIGNMENT / f"{NOTEBOOK}.ipynb").read_text(encoding="utf-8")
-    damaged = _submitted(root, DAMAGED) / f"{NOTEBOOK}.ipynb"
-    damaged.write_text(whole[: len(whole) // 2], encoding="utf-8")
-    return [*(case.name for case in cases), DAMAGED]
+def bundled_class() -> Class:
+    """Return the bundled class."""
+    class_: Class = tomllib.loads((corpus_root() / CLASS).read_text(encoding="utf-8"))
+    return class_
 
 
-def _submitted(root: Path, student: str) -> Path:
-    folder = root / "submitted" / student / ASSIGNMENT
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder
+def _cases() -> Cases:
+    return {
+        exam: {case.name: case for case in corpus.load(corpus_root(), exam)}
+        for exam, entry in points.table().items()
+        if entry.assignment == ASSIGNMENT
+    }
+
+
+def collect(root: Path, class_: Class, cases: Cases) -> None:
+    """Write what the class hands in into the course's ``submitted`` folder."""
+    for student, handed_in in class_.items():
+        folder = root / "submitted" / student / ASSIGNMENT
+        folder.mkdir(parents=True, exist_ok=True)
+        for exam in cases:
+            if exam in handed_in:
+                _hand_in(root, folder, exam, handed_in[exam], cases[exam])
+
+
+def _hand_in(root: Path, folder: Path, exam: str, name: str, cases: dict[str, Case]) -> None:
+    file = f"{points.table()[exam].notebook}.ipynb"
+    released_file = root / "release" / ASSIGNMENT / file
+    if name == CUT_OFF:
+        whole = released_file.read_text(encoding="utf-8")
+        (folder / file).write_text(whole[: len(whole) // 2], encoding="utf-8")
+        return
+    source = submission.read(root / "source" / ASSIGNMENT / file)
+    handed_in = cases[name].submission(source, submission.read(released_file))
+    nbformat.write(handed_in, folder / file)  # type: ignore[no-untyped-call]
 
 
 def _course_root(folder: Path) -> Path:
@@ -131,19 +151,21 @@ def _course_root(folder: Path) -> Path:
     return copy_authoring(content_root(), folder)
 
 
-def _rows(
-    cases: dict[str, corpus.Case], graded: dict[str, Graded], grades: list[Grade]
-) -> list[Row]:
-    rows = []
-    for grade in grades:
-        outcome = graded[grade.student].outcomes[NOTEBOOK]
-        case = cases.get(grade.student)
-        if case is None:
-            difference = "" if outcome.unreadable else "it was read, though it is damaged"
-            rows.append(
-                Row(grade.student, "A file that was cut off", grade, "unreadable", difference)
-            )
-            continue
-        difference = case.verdict_of(outcome)
-        rows.append(Row(grade.student, case.title, grade, case.fails_in_words, difference))
-    return rows
+def _row(handed_in: dict[str, str], graded: Graded, grade: Grade, cases: Cases) -> Row:
+    """Return a student's line: what had to come out, and what came out differently."""
+    expected, differences = [], []
+    for exam, own in cases.items():
+        outcome = graded.outcomes[points.table()[exam].notebook]
+        name = handed_in.get(exam)
+        if name is None or name == CUT_OFF:
+            unseen = "not handed in" if name is None else "unreadable"
+            checked = [c for v in outcome.verdicts.values() for c in v.checks if c.points]
+            differences += [f"{exam}: it has points"] if checked else []
+            expected.append(f"{exam}: {unseen}")
+        else:
+            differences += [f"{exam}: {d}" for d in [own[name].verdict_of(outcome)] if d]
+            expected += [f"{exam}: {own[name].fails_in_words}"] if own[name].fails else []
+    return Row(
+        graded.student, handed_in["title"], grade, "; ".join(expected) or "nothing",
+        "; ".join(differences),
+    )  # fmt: skip

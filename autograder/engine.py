@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import copy
 import shutil
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import nbformat
@@ -65,7 +66,7 @@ def grade(
     Args:
         root: the nbgrader course root.
         assignment: its name.
-        jobs: how many submissions are run at a time.
+        jobs: how many notebooks are run at a time.
         fresh: run also what was run before and has not changed.
         trust: run submissions outside of a sandbox, with the rights of this process.
         feedback: write HTML feedback, too.
@@ -86,11 +87,17 @@ def grade(
     graded = [_unusable(student) for student in students if set(student) & set(GLOB)]
     students = [student for student in students if not set(student) & set(GLOB)]
     with ThreadPoolExecutor(max_workers=jobs) as pool:
-        futures = [pool.submit(class_.run, student, progress) for student in students]
+        # Notebook by notebook, so that one student's run side by side, too.
+        futures = {
+            pool.submit(class_.run, student, name, progress): (student, name)
+            for student in students
+            for name in names
+        }
         try:
             for future in as_completed(futures):
-                graded.append(class_.enter(future.result(), feedback))
-                progress(graded[-1].student, graded[-1])
+                if whole := class_.collect(*futures[future], future.result()):
+                    graded.append(class_.enter(whole, feedback))
+                    progress(graded[-1].student, graded[-1])
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -116,22 +123,46 @@ class _Class:
         self._originals = {
             name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
         }
+        self._begun: dict[str, list[str]] = {}
+        self._outcomes: dict[str, dict[str, Outcome]] = {}
+        self._lock = threading.Lock()
 
-    def run(self, student: str, progress: Progress) -> Graded:
-        """Stage and run one student's notebooks. Runs in a worker thread."""
-        progress(student, None)
-        staged = self._root / STAGED / student / self._assignment
+    def run(self, student: str, name: str, progress: Progress) -> Outcome:
+        """Stage and run one of a student's notebooks. Runs in a worker thread."""
+        submitted = self._submitted(student)
+        with self._lock:
+            if student not in self._begun:
+                progress(student, None)
+                self._begun[student] = self._begin(student)
+        notebook, outcome = self._one(submitted / f"{name}.ipynb")
+        outcome = quiz_marks.with_quizzes(outcome, notebook, submitted, student)
+        nbformat.write(notebook, self._staged(student) / f"{name}.ipynb")  # type: ignore[no-untyped-call]
+        return outcome
+
+    def collect(self, student: str, name: str, outcome: Outcome) -> Graded | None:
+        """Keep an outcome; return all of a student's once the last one is there."""
+        outcomes = self._outcomes.setdefault(student, {})
+        outcomes[name] = outcome
+        if len(outcomes) < len(self._originals):
+            return None
+        problems = list(self._begun[student])
+        for key in self._originals:
+            problems += outcomes[key].notes if outcomes[key].unreadable else []
+        ordered = {key: outcomes[key] for key in self._originals}
+        return Graded(student, ordered, " ".join(problems))
+
+    def _begin(self, student: str) -> list[str]:
+        """Make room for a student's notebooks; return what is wrong with the submission."""
+        staged = self._staged(student)
         shutil.rmtree(staged, ignore_errors=True)
         staged.mkdir(parents=True)
-        submitted = self._root / "submitted" / student / self._assignment
-        outcomes, problems = {}, _stage_timestamp(submitted, staged)
-        for name in self._originals:
-            notebook, outcome = self._one(submitted / f"{name}.ipynb")
-            outcome = quiz_marks.with_quizzes(outcome, notebook, submitted, student)
-            nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
-            outcomes[name] = outcome
-            problems += outcome.notes if outcome.unreadable else []
-        return Graded(student, outcomes, " ".join(problems))
+        return _stage_timestamp(self._submitted(student), staged)
+
+    def _submitted(self, student: str) -> Path:
+        return self._root / "submitted" / student / self._assignment
+
+    def _staged(self, student: str) -> Path:
+        return self._root / STAGED / student / self._assignment
 
     def _one(self, path: Path) -> tuple[NotebookNode, Outcome]:
         source, released = self._originals[path.stem]
@@ -140,7 +171,10 @@ class _Class:
             program = submission.program(notebook)
             files = submission.extras(path.parent)
         except SubmissionError as error:
-            return self._refused(path.stem, str(error), "not_checked")
+            notebook, outcome = self._refused(path.stem, str(error), "not_checked")
+            # Whoever hands in some of the notebooks has left the others out: nothing to look into.
+            left_out = not path.exists() and any(path.parent.glob("*.ipynb"))
+            return notebook, replace(outcome, unreadable=not left_out)
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
             return self._refused(path.stem, f"{type(error).__name__}: {error}", "grader_error")
         notebook.metadata[bridge.NOTES_KEY] = notes

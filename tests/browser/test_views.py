@@ -34,6 +34,8 @@ VIEWS = {
     "qos_lab": ("session.qos_lab()", "QoS lab"),
 }
 
+pytestmark = pytest.mark.timeout(900)  # a browser, a server and kernels, on a busy machine
+
 Open = Callable[..., NotebookPage]
 
 

@@ -17,7 +17,9 @@ from course.content import content_root
 from course.errors import CourseError
 
 CHAPTER, EXERCISE = Path("ch05-building-blocks.ipynb"), Path("ch05/qos-design.ipynb")
-QUIZ = Path("ch05-quiz/quiz.ipynb")
+SOURCE = content_root() / "source"
+NOTEBOOKS = sorted(path.relative_to(SOURCE) for path in SOURCE.glob("*/*.ipynb"))
+"""Every notebook of an assignment; `EXERCISE` is one of them."""
 COMMAND = [sys.executable, "-c", "from course.launch import course; course()", "lab"]
 
 
@@ -49,9 +51,9 @@ def everything(folder: Path) -> dict[Path, bytes]:
 
 def test_a_new_copy_has_the_chapters_and_the_student_versions(root: Path, folder: Path) -> None:
     copied = lab.make_copy(folder, root)
-    assert copied.new == [CHAPTER, EXERCISE, QUIZ]
+    assert copied.new == [CHAPTER, *NOTEBOOKS]
     assert not copied.beside
-    assert set(everything(folder)) == {CHAPTER, EXERCISE, QUIZ, Path(lab.MANIFEST)}
+    assert set(everything(folder)) == {CHAPTER, *NOTEBOOKS, Path(lab.MANIFEST)}
     exercise = (folder / EXERCISE).read_text(encoding="utf-8")
     assert "# Your work goes here." in exercise
     assert "BEGIN SOLUTION" not in exercise
@@ -93,7 +95,7 @@ def test_a_file_from_elsewhere_is_kept_and_a_deleted_one_comes_back(
     (folder / "ch05").mkdir(parents=True)
     (folder / EXERCISE).write_text("fetched elsewhere, and worked on")
     copied = lab.make_copy(folder, root)
-    assert copied.new == [CHAPTER, QUIZ]
+    assert copied.new == [CHAPTER, *(path for path in NOTEBOOKS if path != EXERCISE)]
     assert copied.beside == {EXERCISE: Path("ch05/qos-design.new.ipynb")}
     assert (folder / EXERCISE).read_text() == "fetched elsewhere, and worked on"
     (folder / CHAPTER).unlink()
