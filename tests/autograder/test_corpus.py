@@ -32,8 +32,15 @@ def results(exam: str) -> dict[str, Trial]:
 @pytest.mark.timeout(1800)  # the first case of an exam runs them all
 @pytest.mark.parametrize(
     "case",
-    [case for cases in CASES.values() for case in cases],
-    ids=lambda case: f"{case.exam}-{case.name}",
+    [
+        pytest.param(
+            case,
+            id=f"{case.exam}-{case.name}",
+            marks=pytest.mark.xdist_group(f"corpus-{case.exam}"),
+        )
+        for cases in CASES.values()
+        for case in cases
+    ],
 )
 def test_the_case_gets_its_verdict(case: Case) -> None:
     trial = results(case.exam)[case.name]

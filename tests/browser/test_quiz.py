@@ -22,7 +22,7 @@ from .notebook_page import TIMEOUT
 from .quizzing import STUDENT, Learner, write_notebook
 
 expect.set_options(timeout=TIMEOUT)
-pytestmark = pytest.mark.timeout(900)
+pytestmark = [pytest.mark.timeout(900), pytest.mark.xdist_group("browser")]
 
 Sit = Callable[..., Learner]
 

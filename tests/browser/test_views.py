@@ -34,7 +34,10 @@ VIEWS = {
     "qos_lab": ("session.qos_lab()", "QoS lab"),
 }
 
-pytestmark = pytest.mark.timeout(900)  # a browser, a server and kernels, on a busy machine
+pytestmark = [
+    pytest.mark.timeout(900),
+    pytest.mark.xdist_group("browser"),
+]  # a browser, a server and kernels, on a busy machine
 
 Open = Callable[..., NotebookPage]
 
