@@ -67,7 +67,13 @@ class Residents:
             residents = list(self._residents.values())
         for resident in residents:
             if not is_alive(resident.node):
-                self.stop(resident.node)  # its action servers are still there
+                try:
+                    self.stop(resident.node)  # its action servers are still there
+                except Exception as error:  # noqa: BLE001 - its cleanup does not take a second call
+                    self._tell(
+                        f"{resident.name} had been destroyed already; destroying it once more, "
+                        f"which must be safe, raised {type(error).__name__}: {error}"
+                    )
         return [resident for resident in residents if resident.node not in self.stopped]
 
     def run(

@@ -90,3 +90,21 @@ def test_what_a_constructor_raised_is_what_is_seen() -> None:
         with pytest.raises(ValueError, match="in the constructor"):
             session.run(Half)
         session.until(alone(witness), timeout=20, what="the half-made node to be gone")
+
+
+def test_a_cleanup_that_fails_the_second_time_is_told_and_nothing_else_suffers(
+    session: Session,
+) -> None:
+    class Once(Node):
+        gone = False
+
+        def destroy_node(self) -> None:
+            if self.gone:
+                raise RuntimeError("called twice")
+            self.gone = True
+            super().destroy_node()
+
+    session.run(Once, "once").destroy_node()
+    other = session.run(Node, "other")
+    assert list(session.nodes) == [other.get_fully_qualified_name()]
+    assert "raised RuntimeError: called twice" in session.notices[-1]
