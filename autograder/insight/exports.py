@@ -96,9 +96,8 @@ def as_csv(rows: Iterable[Sequence[str]]) -> str:
 
 def _export(data: ClassData, rows: list[Sequence[str]], students: int, provisional: bool) -> Export:
     left_out = () if provisional else tuple(g.student for g in data.grades if _waits(g))
-    odd = tuple(
-        g.student for g in data.grades if is_formula(g.student) and g.student not in left_out
-    )
+    shown = (grade.student for grade in data.grades if grade.student not in left_out)
+    odd = tuple(student for student in shown if is_formula(student))
     return Export(as_csv(rows), students, left_out, odd)
 
 

@@ -16,7 +16,8 @@ LONGEST = 240
 
 # Quotes around something short: a name, a value. An apostrophe inside a word is none.
 _QUOTED = re.compile(r"""(?<!\w)(?:'[^'\n]{0,200}'|"[^"\n]{0,200}"|`[^`\n]{0,200}`)(?!\w)""")
-_CURLY = re.compile(r"‘[^’\n]{0,200}’")
+_CURLY = re.compile(r"\u2018[^\u2019\n]{0,200}\u2019")
+_ANGLE = re.compile(r"<[^<>\n]{1,200}>")
 _TOPIC = re.compile(r"(?<![\w/])(?:/\w+)+")
 _NUMBER = re.compile(r"(?<![A-Za-z_])[-+]?(?:0x[0-9a-fA-F]+|\d+(?:[.,]\d+)*(?:[eE][-+]?\d+)?)")
 _LIST = re.compile(r"#(?:(?:, | and |, and |; )#)+")
@@ -49,13 +50,13 @@ def common(data: ClassData) -> list[Group]:
 def stripped(text: str, names: Iterable[str] = ()) -> str:
     """Return ``text`` with what differs from one submission to the next taken out.
 
-    Quoted words, topics and ``names`` become ``…``; numbers, and enumerations of numbers, ``#``.
+    Quoted words, what stands in angle brackets, topics and ``names`` become ``…``; numbers, and enumerations of numbers, ``#``.
     """
     text = " ".join(text[: 4 * LONGEST].split())
     for name in names:
         if len(name) > 2:  # a shorter one stands inside too many ordinary words
             text = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", "…", text)
-    text = _CURLY.sub("…", _QUOTED.sub("…", text))
+    text = _ANGLE.sub("…", _CURLY.sub("…", _QUOTED.sub("…", text)))
     text = _NUMBER.sub("#", _TOPIC.sub("…", text))
     text = _LIST.sub("#", text)
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"

@@ -9,13 +9,13 @@ chapter 14).
 from __future__ import annotations
 
 import statistics
-from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from autograder.insight.collect import ClassData
 from autograder.quiz_marks import PREFIX
-from autograder.verdict import CheckResult
+from autograder.verdict import CheckResult, Status
 
 FEW = 10
 """Submissions below which figures say little; they are shown all the same, and marked."""
@@ -91,12 +91,12 @@ def results(data: ClassData) -> Iterator[tuple[str, Key, CheckResult]]:
 def checks(data: ClassData) -> tuple[CheckFigures, ...]:
     """Return the figures of each check, in the order in which they stand in the verdicts."""
     by_check: dict[Key, dict[str, CheckResult]] = {}
-    totals: Counter[str] = Counter()
+    totals: defaultdict[str, float] = defaultdict(float)
     for student, key, result in results(data):
         by_check.setdefault(key, {})[student] = result
     for found in by_check.values():
         for student, result in found.items():
-            totals[student] += result.points  # type: ignore[assignment]  # a Counter of floats
+            totals[student] += result.points
     notebooks = {key[0]: None for key in sorted(by_check, key=lambda key: key[0])}
     ordered = (key for notebook in notebooks for key in by_check if key[0] == notebook)
     return tuple(_figures(key, by_check[key], totals) for key in ordered)
@@ -128,7 +128,7 @@ def times(data: ClassData) -> Times:
     return Times(seconds)
 
 
-def _figures(key: Key, found: dict[str, CheckResult], totals: Counter[str]) -> CheckFigures:
+def _figures(key: Key, found: dict[str, CheckResult], totals: Mapping[str, float]) -> CheckFigures:
     counts = Counter(result.status for result in found.values())
     examined = counts["passed"] + counts["failed"]
     rate = counts["failed"] / examined if examined else None
@@ -147,7 +147,7 @@ def _figures(key: Key, found: dict[str, CheckResult], totals: Counter[str]) -> C
 
 
 def _advice(
-    counts: Counter[str], examined: int, rate: float | None, correlation: float | None
+    counts: Counter[Status], examined: int, rate: float | None, correlation: float | None
 ) -> str:
     if counts["grader_error"]:
         return "the grader itself failed here: see what needs a person"

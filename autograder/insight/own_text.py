@@ -17,7 +17,7 @@ from itertools import islice
 
 from nbformat import NotebookNode
 from pygments.lexers.python import PythonLexer
-from pygments.token import Comment, Name, Token
+from pygments.token import Comment, Name, String, _TokenType
 
 from autograder import submission
 
@@ -25,7 +25,7 @@ MAX_CHARACTERS = 60_000
 """Characters of one submission that are looked at: work stays bounded whatever is handed in."""
 MAX_TOKENS = 4_000
 MANY, COMMON = 10, 0.25
-"""A line is common ground if more than ten students and more than a quarter of the class have it."""
+"""A line is common ground if more than ten students, and a quarter of the class, have it."""
 
 OWN_NAME = "\N{OPEN BOX}"
 
@@ -51,7 +51,9 @@ class GivenText:
         }
         sources = [c.source for nb in released.values() for c in nb.cells if c.cell_type == "code"]
         self.lines = frozenset(bare(line) for s in sources for line in s.splitlines())
-        self.names = frozenset(text for s in sources for kind, text in _lex(s) if kind in Name)
+        self.names = frozenset(
+            text for s in sources for kind, text in _lex(s) if _within(kind, Name)
+        )
 
     def own(self, notebooks: Mapping[str, NotebookNode], files: Mapping[str, bytes]) -> OwnText:
         """Return what a student wrote in their notebooks, and in Python files beside them."""
@@ -97,18 +99,23 @@ def tokens(text: OwnText, given: GivenText, common: frozenset[str]) -> tuple[str
 
 def _normal(text: str, chosen: set[str]) -> Iterable[str]:
     for kind, token in _lex(text):
-        if kind in Name and token in chosen:
+        if _within(kind, Name) and token in chosen:
             yield OWN_NAME
         else:
             yield token
 
 
-def _lex(text: str) -> Iterable[tuple[object, str]]:
+def _lex(text: str) -> Iterable[tuple[_TokenType, str]]:
     """Yield (kind, text) of the tokens that mean something; never fails, whatever the text is."""
     for kind, token in PythonLexer().get_tokens(text):
-        bare = token.strip()
-        if bare and kind not in Comment and kind not in Token.Literal.String.Doc:
-            yield kind, bare
+        meaning = token.strip()
+        if meaning and not _within(kind, Comment) and not _within(kind, String.Doc):
+            yield kind, meaning
+
+
+def _within(kind: _TokenType, family: _TokenType) -> bool:
+    """Whether a kind of token belongs to a family: kinds are tuples that begin with it."""
+    return kind[: len(family)] == family
 
 
 def _chosen_names(text: str) -> set[str]:

@@ -33,7 +33,7 @@ th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid #8888
   vertical-align: top; }
 td.number { text-align: right; font-variant-numeric: tabular-nums; }
 th { font-weight: normal; }
-thead th { font-weight: 600; }
+thead th { font-weight: 600; overflow-wrap: normal; }
 caption { text-align: left; padding: .4rem .6rem; }
 td, th { overflow-wrap: anywhere; }
 .scroll { overflow-x: auto; }
@@ -184,8 +184,8 @@ def _alike(report: ClassReport) -> list[str]:
     if found.too_short:
         said += f" Too little to compare: {_count(len(found.too_short), 'submission')}."
     hint = (
-        "This is a hint where to look, never a verdict: people who learn together, or from the same "
-        "example, write alike."
+        "This is a hint where to look, never a verdict: people who learn together, or from the "
+        "same example, write alike."
     )
     parts = [f"<h2>Alike</h2><p><strong>{escape(hint)}</strong></p><p>{escape(said)}</p>"]
     if found.found > MOST_PAIRS:

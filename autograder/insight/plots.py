@@ -1,4 +1,4 @@
-"""The plots of the class report, as SVG to stand inside the page: no file, no script, no request."""
+"""The plots of the class report, as SVG to stand inside the page: no file, script or request."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def checks(shown: Sequence[CheckFigures], name: str) -> str:
         right.axvline(0, color="#666666", linewidth=0.8)
         right.hlines([place for place, _ in known], 0, [r for _, r in known], color="#0072b2")
         right.scatter([r for _, r in known], [place for place, _ in known], color="#0072b2", s=36)
-        right.set(xlim=(-1.05, 1.05), xlabel="discrimination: correlation with the rest")
+        right.set(xlim=(-1.05, 1.05), xlabel="discrimination")
         right.tick_params(axis="y", length=0)
         return _svg(figure, name)
 

@@ -74,7 +74,7 @@ def alike(texts: Mapping[str, OwnText], given: GivenText, threshold: float = THR
     best: list[Pair] = []
     for similarity, left, right in _scores(same, threshold):
         found += 1
-        best.append(Pair(*sorted((left, right)), similarity))
+        best.append(Pair(min(left, right), max(left, right), similarity))
         if len(best) > 50 * MOST_PAIRS:
             best = _top(best)
     short = tuple(sorted(texts.keys() - long_enough.keys()))
@@ -95,7 +95,7 @@ def side_by_side(left: OwnText, right: OwnText) -> list[tuple[str, str, str]]:
                 b[b1 + n] if b1 + n < b2 else "",
             ))  # fmt: skip
     if len(left.lines) > MOST_LINES or len(right.lines) > MOST_LINES:
-        rows.append(("cut", *(_rest(text) for text in (left, right))))
+        rows.append(("cut", _rest(left), _rest(right)))
     return rows
 
 
