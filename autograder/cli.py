@@ -173,7 +173,7 @@ def report(
         bool, typer.Option("--provisional", help="Also export grades that wait for a person.")
     ] = False,
     similarity: Annotated[
-        float, typer.Option("--similarity", min=0.5, max=1.0, help="Show pairs at least so alike.")
+        float, typer.Option("--similarity", min=0.7, max=1.0, help="Show pairs at least so alike.")
     ] = 0.9,
     as_json: AsJson = False,
 ) -> None:

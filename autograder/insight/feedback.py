@@ -50,7 +50,8 @@ def common(data: ClassData) -> list[Group]:
 def stripped(text: str, names: Iterable[str] = ()) -> str:
     """Return ``text`` with what differs from one submission to the next taken out.
 
-    Quoted words, what stands in angle brackets, topics and ``names`` become ``…``; numbers, and enumerations of numbers, ``#``.
+    Quoted words, what stands in angle brackets, topics and ``names`` become ``…``; numbers, and
+    enumerations of numbers, ``#``.
     """
     text = " ".join(text[: 4 * LONGEST].split())
     for name in names:

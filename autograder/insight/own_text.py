@@ -23,7 +23,8 @@ from autograder import submission
 
 MAX_CHARACTERS = 60_000
 """Characters of one submission that are looked at: work stays bounded whatever is handed in."""
-MAX_TOKENS = 4_000
+MAX_TOKENS = 2_000
+"""Tokens of one submission that are compared; a whole chapter's solutions have fewer."""
 MANY, COMMON = 10, 0.25
 """A line is common ground if more than ten students, and a quarter of the class, have it."""
 

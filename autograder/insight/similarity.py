@@ -26,6 +26,9 @@ MOST_PAIRS = 40
 """Most pairs that are shown side by side; the table's heading says how many there are."""
 MOST_LINES = 250
 """Most lines of a side that are shown."""
+MOST_WORK = 800_000
+"""Tokens of a whole class that are compared: 800 of each of 1,000 submissions. The time grows with
+its square, so that a class of any size, handing in what it likes, takes minutes at most."""
 BLOCK = 256
 """Submissions compared with all others at a time, which bounds the memory."""
 
@@ -66,7 +69,8 @@ def alike(texts: Mapping[str, OwnText], given: GivenText, threshold: float = THR
     """
     common = common_ground(texts.values())
     own = {student: tokens(text, given, common) for student, text in texts.items()}
-    long_enough = {student: text for student, text in own.items() if len(text) >= FEWEST_TOKENS}
+    most = max(FEWEST_TOKENS, MOST_WORK // max(1, len(own)))
+    long_enough = {s: text[:most] for s, text in own.items() if len(text) >= FEWEST_TOKENS}
     same: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
     for student in sorted(long_enough):
         same[long_enough[student]].append(student)
