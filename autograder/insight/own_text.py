@@ -91,11 +91,13 @@ def common_ground(texts: Iterable[OwnText]) -> frozenset[str]:
     return frozenset(line for line, count in counts.items() if count > many)
 
 
-def tokens(text: OwnText, given: GivenText, common: frozenset[str]) -> tuple[str, ...]:
-    """Return the tokens of what counts, with one sign for every name that the student chose."""
+def tokens(
+    text: OwnText, given: GivenText, common: frozenset[str], most: int = MAX_TOKENS
+) -> tuple[str, ...]:
+    """Return the first ``most`` tokens of what counts; names that the student chose are one."""
     left = [line for line in text.lines if bare(line) not in given.lines | common]
     chosen = _chosen_names("\n".join(text.lines)) - given.names
-    return tuple(islice(_normal("\n".join(left), chosen), MAX_TOKENS))
+    return tuple(islice(_normal("\n".join(left), chosen), most))
 
 
 def _normal(text: str, chosen: set[str]) -> Iterable[str]:

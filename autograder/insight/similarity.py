@@ -16,7 +16,7 @@ from itertools import combinations
 from rapidfuzz import process
 from rapidfuzz.distance import Indel
 
-from autograder.insight.own_text import GivenText, OwnText, common_ground, tokens
+from autograder.insight.own_text import MAX_TOKENS, GivenText, OwnText, common_ground, tokens
 
 THRESHOLD = 0.9
 """Similarity from which a pair is shown, 0 to 1."""
@@ -68,9 +68,9 @@ def alike(texts: Mapping[str, OwnText], given: GivenText, threshold: float = THR
         threshold: similarity from which a pair is reported.
     """
     common = common_ground(texts.values())
-    own = {student: tokens(text, given, common) for student, text in texts.items()}
-    most = max(FEWEST_TOKENS, MOST_WORK // max(1, len(own)))
-    long_enough = {s: text[:most] for s, text in own.items() if len(text) >= FEWEST_TOKENS}
+    most = max(FEWEST_TOKENS, min(MAX_TOKENS, MOST_WORK // max(1, len(texts))))
+    own = {student: tokens(text, given, common, most) for student, text in texts.items()}
+    long_enough = {student: text for student, text in own.items() if len(text) >= FEWEST_TOKENS}
     same: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
     for student in sorted(long_enough):
         same[long_enough[student]].append(student)

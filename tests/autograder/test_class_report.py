@@ -7,6 +7,7 @@ import io
 import json
 import random
 import re
+import shutil
 from collections.abc import Sequence
 from html.parser import HTMLParser
 from pathlib import Path
@@ -377,18 +378,32 @@ def test_everything_from_a_student_is_escaped_and_nothing_is_loaded() -> None:
 # Really graded submissions
 
 
-def test_the_report_of_a_graded_class(course: Course, cases: Cases) -> None:
+@pytest.fixture(scope="module")
+def graded_course(
+    released_course: Path, cases: Cases, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    root = tmp_path_factory.mktemp("graded") / "course"
+    shutil.copytree(released_course, root)
+    course = Course(root)
     for student, case in {
         "ann": "right-two-sides", "bob": "wrong-imu-endless", "cy": "wrong-imu-endless",
         "-dan": "right-two-sides",
     }.items():  # fmt: skip
         course.submit(student, cases[case].submission(course.source, course.released))
     course.submit("eve", "{" + '"cells": [')
-    engine.grade(course.root, ASSIGNMENT)
+    engine.grade(root, ASSIGNMENT)
     mark_written_answers(course, "ann", "-dan")
-    late = course.folder("late")
+    course.folder("late")
+    return root
 
-    report = reports.make(course.root, ASSIGNMENT)
+
+@pytest.fixture
+def graded(graded_course: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(graded_course, tmp_path / "graded"))
+
+
+def test_the_report_of_a_graded_class(graded: Path) -> None:
+    report = reports.make(graded, ASSIGNMENT)
     page, canvas, moodle = reports.write(report)
 
     by_name = {check.name: check for check in report.checks}
@@ -403,10 +418,11 @@ def test_the_report_of_a_graded_class(course: Course, cases: Cases) -> None:
     assert report.feedback[0].students == ("bob", "cy")
     urgent = {need.students: need.why for need in report.needs if need.urgent}
     assert "not valid JSON" in urgent[("eve",)]
-    assert "autograder grade ch05" in urgent[(late.parent.name,)]
+    assert "autograder grade ch05" in urgent[("late",)]
     [waiting] = [need for need in report.needs if not need.urgent]
     assert waiting.students == ("bob", "cy")
-    assert [(p.left, p.right, p.similarity) for p in report.likeness.pairs] == [("-dan", "ann", 1)]
+    alike = {(pair.left, pair.right): pair.similarity for pair in report.likeness.pairs}
+    assert alike == {("-dan", "ann"): 1.0, ("bob", "cy"): 1.0}
     assert rows_of(canvas.read_text())[2:] == [
         ["'-dan", "", "", "'-dan", "", "19"],
         ["ann", "", "", "ann", "", "19"],
@@ -415,30 +431,40 @@ def test_the_report_of_a_graded_class(course: Course, cases: Cases) -> None:
     assert Links(page.read_text()).loads == []
     assert "never a verdict" in page.read_text()
 
-    # A damaged record costs its own figures, and says so.
-    record = records.path(course.root / ".autograder", ASSIGNMENT, "bob", NOTEBOOK)
-    for damage in ("", "[]", '{"version": 1}', '{"version": 99}', "\x00" * 20, "[" * 100_000):
-        record.write_text(damage)
-        again = reports.make(course.root, ASSIGNMENT)
-        assert "bob" not in again.times.seconds
-        assert [n for n in again.notes if "bob's check results" in n and "damaged" in n]
-    record.unlink()
-    again = reports.make(course.root, ASSIGNMENT)
-    assert any("1 notebook has a grade but no record" in note for note in again.notes)
 
-    # The command, for people and for machines.
-    root = ("--root", str(course.root))
-    shown = autograder("report", ASSIGNMENT, *root, cwd=course.root).stdout
+@pytest.mark.parametrize(
+    "damage", ["", "[]", '{"version": 1}', '{"version": 99}', "\x00" * 20, "[" * 100_000]
+)
+def test_a_damaged_record_costs_its_own_figures_and_says_so(graded: Path, damage: str) -> None:
+    records.path(graded / ".autograder", ASSIGNMENT, "bob", NOTEBOOK).write_text(damage)
+    report = reports.make(graded, ASSIGNMENT)
+    assert set(report.times.seconds) == {"ann", "cy", "-dan"}
+    [note] = report.data.notes
+    assert "bob's check results" in note
+    assert "run `autograder grade ch05` again" in note
+
+
+def test_a_grade_from_before_records_were_kept_is_counted(graded: Path) -> None:
+    records.path(graded / ".autograder", ASSIGNMENT, "bob", NOTEBOOK).unlink()
+    [note] = reports.make(graded, ASSIGNMENT).data.notes
+    assert "1 notebook has a grade but no record" in note
+
+
+def test_the_command_speaks_to_people_and_to_machines(graded: Path) -> None:
+    root = ("--root", str(graded))
+    shown = autograder("report", ASSIGNMENT, *root, cwd=graded).stdout
     assert "class-report.html" in shown
     assert "The exports hold 2 of 5 students" in shown
     assert "match them by hand: -dan" in shown
-    spoken = json.loads(autograder("report", ASSIGNMENT, *root, "--json", cwd=course.root).stdout)
-    assert {check["name"] for check in spoken["checks"]} == set(by_name)
+    spoken = json.loads(autograder("report", ASSIGNMENT, *root, "--json", cwd=graded).stdout)
+    assert len(spoken["checks"]) == 9
+    assert [pair["left"] for pair in spoken["alike"]] == ["-dan", "bob"]
 
-    # A folder that nothing can be written to.
-    read_only = f"mount --bind {course.root} {course.root}; mount -o remount,ro,bind {course.root}"
+
+def test_a_read_only_folder_is_one_sentence(graded: Path) -> None:
+    read_only = f"mount --bind {graded} {graded} && mount -o remount,ro,bind {graded}"
     refused = autograder(
-        "report", ASSIGNMENT, *root, cwd=course.root, code=1, before=read_only.replace(";", " &&")
+        "report", ASSIGNMENT, "--root", str(graded), cwd=graded, code=1, before=read_only
     )
     assert "cannot be written" in refused.stderr
     assert len(refused.stderr.strip().splitlines()) == 1
