@@ -21,7 +21,7 @@ from pygments.token import Comment, Name, String, _TokenType
 
 from autograder import submission
 
-MAX_CHARACTERS = 60_000
+MAX_CHARACTERS = 30_000
 """Characters of one submission that are looked at: work stays bounded whatever is handed in."""
 MAX_TOKENS = 2_000
 """Tokens of one submission that are compared; a whole chapter's solutions have fewer."""
@@ -123,28 +123,27 @@ def _within(kind: _TokenType, family: _TokenType) -> bool:
 
 def _chosen_names(text: str) -> set[str]:
     """Return the names that a text itself gives to something; none if it is not Python."""
-    names: set[str] = set()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a student's odd escapes are not the reader's concern
             tree = ast.parse(text)
-        for node in ast.walk(tree):
-            names.update(_bound(node))
+        names = {name for node in ast.walk(tree) if (name := _bound(node))}
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return set()
     return {name for name in names if not keyword.iskeyword(name) and not hasattr(builtins, name)}
 
 
-def _bound(node: ast.AST) -> Iterable[str]:
-    match node:
-        case ast.Name(id=name, ctx=ast.Store()) | ast.Attribute(attr=name, ctx=ast.Store()):
-            yield name
-        case ast.FunctionDef(name=name) | ast.AsyncFunctionDef(name=name) | ast.ClassDef(name=name):
-            yield name
-        case ast.arg(arg=name):
-            yield name
-        case ast.alias(asname=str(name)):
-            yield name
+def _bound(node: ast.AST) -> str | None:
+    """Return the name that a node gives to something, if it does."""
+    if isinstance(node, ast.Name):
+        return node.id if isinstance(node.ctx, ast.Store) else None
+    if isinstance(node, ast.Attribute):
+        return node.attr if isinstance(node.ctx, ast.Store) else None
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+        return node.name
+    if isinstance(node, ast.arg):
+        return node.arg
+    return node.asname if isinstance(node, ast.alias) else None
 
 
 def bare(line: str) -> str:
