@@ -164,19 +164,62 @@ def corpus(
 
 
 @app.command()
-def report(assignment: str, root: Root = None, as_json: AsJson = False) -> None:
-    """Show the grades of an assignment, what still needs a person, and how its quizzes went."""
+def report(
+    assignment: str,
+    root: Root = None,
+    column: Annotated[
+        str,
+        typer.Option(
+            "--column",
+            help="The assignment's name in Canvas or Moodle; in Canvas with its id, as in "
+            "'Exercise 1 (4711)'. The name here if left out.",
+        ),
+    ] = "",
+    provisional: Annotated[
+        bool, typer.Option("--provisional", help="Also export grades that wait for a person.")
+    ] = False,
+    similarity: Annotated[
+        float, typer.Option("--similarity", min=0.7, max=1.0, help="Show pairs at least so alike.")
+    ] = 0.9,
+    as_json: AsJson = False,
+) -> None:
+    """Show the grades of an assignment, what still needs a person, and how its checks went.
+
+    Writes into reports/ASSIGNMENT of the course root: class-report.html, which opens in any
+    browser and needs no network, and two exports.
+
+    canvas.csv is for Canvas: Grades, Import. Its columns are Student, ID, SIS User ID, SIS Login
+    ID, Section and the assignment; its first row is Points Possible. A student's folder name is
+    their SIS Login ID; ID is the lms_user_id of nbgrader's gradebook, if it is set there.
+
+    moodle.csv is for Moodle: Grades, Import, CSV file. Its columns are Username (the folder
+    name), ID number (the lms_user_id), First name, Last name, Email address and the assignment,
+    in points: map Username, or another that identifies your users, and the assignment's grade
+    item.
+
+    Neither has students whose grade still waits for a person: both platforms take an empty cell
+    for "delete the grade".
+    """
     from autograder import quiz_report
-    from autograder.gradebook import CourseGradebook
+    from autograder.insight import command
 
     where = _root(root)
-    grades = CourseGradebook(where).grades(assignment)
+    made = command.run(
+        where, assignment, column=column, provisional=provisional, threshold=similarity
+    )
+    grades = made.report.data.grades
     quizzes = quiz_report.of_assignment(where, assignment)
     if as_json:
         data = [quiz.as_data() for quiz in quizzes]
-        _print_json({"grades": [vars(grade) for grade in grades], "quizzes": data})
+        shown = {"grades": [vars(grade) for grade in grades], "quizzes": data, **made.as_data()}
+        _print_json(shown)
         return
-    _grades_table(grades, {})
+    _grades_table(list(grades), {})
+    out.print(*made.tables(), sep="\n")
+    for remark in made.remarks:
+        out.print(remark, soft_wrap=True, highlight=False, markup=False)
+    out.print(f"Written: {', '.join(map(str, made.files))}", soft_wrap=True, highlight=False,
+              markup=False)  # fmt: skip
     for quiz in quizzes:
         out.print(*quiz.tables(), sep="\n")
         out.print(f"Written: {', '.join(map(str, quiz.files))}", soft_wrap=True, highlight=False)

@@ -18,6 +18,7 @@ from nbgrader.preprocessors import NbGraderPreprocessor
 from traitlets import Bool
 
 from autograder import cells, submission
+from autograder.insight import records
 from autograder.report import Report
 from autograder.verdict import Verdict
 
@@ -66,6 +67,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
                 # What stands here goes into the student's feedback: no hidden check, no key.
                 cell.source = cells.without_hidden(cell.source)
                 cell.outputs = _graded(verdict)
+        resources["ros2_course_outcome"] = outcome
         resources["ros2_course_flags"] = [
             name
             for name, verdict in outcome.verdicts.items()
@@ -93,8 +95,11 @@ class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]
     """After the scores are saved: have a person look where the grader could not decide."""
 
     def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:
-        """Mark the flagged grade cells as needing a manual grade."""
+        """Mark the flagged grade cells as needing a manual grade; keep the verdicts of all."""
         assignment, student, notebook = _names(resources)
+        if "ros2_course_outcome" in resources:
+            work = Path(_coursedir(self).root) / WORK_FOLDER
+            records.keep(work, assignment, student, notebook, resources["ros2_course_outcome"])
         flags = resources.get("ros2_course_flags", [])
         if flags:
             with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:

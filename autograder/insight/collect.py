@@ -1,0 +1,143 @@
+"""Collects what is known of a graded class: grades, people, and the verdicts behind the points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from nbgrader.api import Gradebook
+from sqlalchemy.exc import SQLAlchemyError
+
+from autograder.gradebook import CourseGradebook, Grade
+from autograder.insight import InsightError, records
+from autograder.insight.records import Record, RecordError
+from autograder.nbgrader_bridge import WORK_FOLDER
+
+
+@dataclass(frozen=True)
+class Person:
+    """A student as nbgrader's gradebook knows them; what it does not know is empty."""
+
+    student: str
+    first_name: str = ""
+    last_name: str = ""
+    email: str = ""
+    lms_user_id: str = ""
+
+
+@dataclass(frozen=True)
+class ClassData:
+    """A graded class.
+
+    Attributes:
+        root: the nbgrader course root.
+        assignment: its name.
+        max_score: points there are to earn.
+        grades: one a student, sorted by student.
+        people: {student: person}.
+        records: {student: {notebook: what came of running it}}; what is missing was graded before
+            records were kept, or is damaged (`notes` says so).
+        not_entered: students with a folder in ``submitted/`` and no grade.
+        notes: a sentence for each thing that is left out.
+    """
+
+    root: Path
+    assignment: str
+    max_score: float
+    grades: tuple[Grade, ...]
+    people: Mapping[str, Person] = field(default_factory=dict)
+    records: Mapping[str, Mapping[str, Record]] = field(default_factory=dict)
+    not_entered: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def collect(root: Path, assignment: str) -> ClassData:
+    """Read what is known of an assignment's class.
+
+    Raises:
+        InsightError: no such assignment, nothing of it graded yet, or a gradebook that cannot be
+            read.
+        GradebookError: ``root`` is no course.
+    """
+    gradebook = CourseGradebook(root)
+    try:
+        _require(gradebook, assignment)
+        grades = tuple(gradebook.grades(assignment))
+        people = _people(gradebook)
+    except SQLAlchemyError as error:
+        raise InsightError(
+            f"The gradebook of {gradebook.root} cannot be read ({_reason(error)}): if another "
+            "program uses it, wait until that is done; if it is damaged, put a copy back."
+        ) from None
+    if not grades:
+        raise InsightError(
+            f"Nothing of '{assignment}' has been graded yet: run `autograder grade {assignment}` "
+            "first."
+        )
+    found, notes = _records(gradebook.root, assignment, grades)
+    known = {grade.student for grade in grades}
+    return ClassData(
+        gradebook.root, assignment, max(grade.max_score for grade in grades), grades, people,
+        found, tuple(s for s in _submitted(gradebook.root, assignment) if s not in known),
+        tuple(notes),
+    )  # fmt: skip
+
+
+def _require(gradebook: CourseGradebook, assignment: str) -> None:
+    known = gradebook.assignments()
+    if assignment not in known:
+        raise InsightError(
+            f"There is no assignment '{assignment}' in the gradebook of {gradebook.root}: there "
+            f"are {', '.join(known) or 'none yet'}."
+        )
+
+
+def _people(gradebook: CourseGradebook) -> dict[str, Person]:
+    courses = gradebook.coursedir
+    with Gradebook(courses.db_url, courses.course_id) as book:
+        return {
+            s.id: Person(
+                s.id, s.first_name or "", s.last_name or "", s.email or "", s.lms_user_id or ""
+            )
+            for s in book.students
+        }
+
+
+def _records(
+    root: Path, assignment: str, grades: tuple[Grade, ...]
+) -> tuple[dict[str, dict[str, Record]], list[str]]:
+    found: dict[str, dict[str, Record]] = {}
+    notes: list[str] = []
+    missing = 0
+    for grade in grades:
+        of_student = found.setdefault(grade.student, {})
+        for notebook in grade.cells:
+            try:
+                record = records.load(root / WORK_FOLDER, assignment, grade.student, notebook)
+            except RecordError as error:
+                notes.append(str(error))
+                continue
+            if record is None:
+                missing += 1
+            else:
+                of_student[notebook] = record
+    if missing:
+        what = "1 notebook has" if missing == 1 else f"{missing} notebooks have"
+        notes.append(
+            f"{what} a grade but no record of the checks behind it: run "
+            f"`autograder grade {assignment}` again to have it written."
+        )
+    return found, notes
+
+
+def _submitted(root: Path, assignment: str) -> list[str]:
+    try:
+        folders = [f for f in (root / "submitted").iterdir() if (f / assignment).is_dir()]
+    except OSError:  # nothing is there (any more), so nothing waits there
+        return []
+    return sorted(folder.name for folder in folders)
+
+
+def _reason(error: SQLAlchemyError) -> str:
+    return str(getattr(error, "orig", None) or error).splitlines()[0][:200]

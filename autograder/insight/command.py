@@ -1,0 +1,55 @@
+"""``autograder report``: makes the class report, writes it, and shows the gist in a terminal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.markup import escape
+from rich.table import Table
+
+from autograder.insight import exports, report
+from autograder.insight.report import ClassReport
+
+
+@dataclass(frozen=True)
+class Made:
+    """A report that was written: its files, and remarks on the exports."""
+
+    report: ClassReport
+    files: list[Path]
+    remarks: list[str]
+
+    def as_data(self) -> dict[str, Any]:
+        """Return the report for machines."""
+        files = [str(path) for path in self.files]
+        return {**self.report.as_data(), "remarks": self.remarks, "files": files}
+
+    def tables(self) -> list[Table]:
+        """Return the checks, and what needs a person, for a terminal."""
+        checks = Table("Check", "Fails", "r", "Remark", padding=(0, 0))
+        checks.caption = "Fails: of those examined; r: discrimination, correlation with the rest"
+        for check in self.report.checks:
+            rate = "" if check.failure_rate is None else f"{100 * check.failure_rate:.0f} %"
+            r = "" if check.discrimination is None else f"{check.discrimination:+.2f}"
+            checks.add_row(escape(check.title), rate, r, check.advice)
+        needs = Table("Needs a person", "How many", "Who")
+        for need in self.report.needs:
+            who = ", ".join(need.students[:5]) + (", …" if len(need.students) > 5 else "")
+            style = "bold" if need.urgent else None
+            needs.add_row(escape(need.why), str(len(need.students)), escape(who), style=style)
+        return [table for table in (checks, needs) if table.row_count]
+
+
+def run(root: Path, assignment: str, *, column: str, provisional: bool, threshold: float) -> Made:
+    """Make the report of an assignment and write it; arguments as in `report` and `exports`.
+
+    Raises:
+        InsightError: no such assignment, nothing graded, or a folder that cannot be written.
+    """
+    made = report.make(root, assignment, threshold)
+    files = report.write(made, column, provisional=provisional)
+    export = exports.canvas(made.data, column, provisional=provisional)
+    remarks = [*made.notes, *report.export_remarks(export)]
+    return Made(made, files, remarks)

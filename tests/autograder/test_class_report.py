@@ -1,0 +1,484 @@
+"""The class report: right figures, safe exports, honest hints, from really graded submissions."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import random
+import re
+import shutil
+from collections.abc import Sequence
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from nbgrader.api import Gradebook
+
+from autograder import engine
+from autograder.corpus import Case
+from autograder.gradebook import Grade
+from autograder.insight import InsightError, exports, feedback, figures, needs, records, similarity
+from autograder.insight import page as pages
+from autograder.insight import report as reports
+from autograder.insight.collect import ClassData, Person
+from autograder.insight.own_text import GivenText, OwnText, tokens
+from autograder.insight.records import Record
+from autograder.verdict import CheckResult, Status, Verdict
+
+from .conftest import ASSIGNMENT, NOTEBOOK, Course
+from .test_cli import autograder
+
+Cases = dict[str, Case]
+EVIL = "<script>alert(1)</script>"
+NOTHING_GIVEN = GivenText({})
+
+
+class Links(HTMLParser):
+    """Collects what a browser would load or run, and whether the tags are balanced."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.loads: list[str] = []
+        self.open: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag in ("script", "link", "img", "iframe", "object", "embed", "base", "form"):
+            self.loads.append(tag)
+        for name, value in attrs:
+            local = (value or "").startswith("#")
+            if name.startswith("on") or (name in ("src", "href", "xlink:href") and not local):
+                self.loads.append(f"{tag} {name}={value}")
+        if tag not in ("meta", "br"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        self.handle_endtag(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag != "meta":
+            assert self.open.pop() == tag
+
+
+def result(name: str, status: Status, points: float = 1.0, actual: str = "") -> CheckResult:
+    earned = points if status == "passed" else 0.0
+    return CheckResult(name, f"Title of {name}.", status, earned, points, actual=actual)
+
+
+def grade(student: str, score: float = 1.0, waits: bool = False) -> Grade:
+    cells = {NOTEBOOK: {"qos-visible": score, "qos-explanation": None if waits else 0.0}}
+    return Grade(student, score, 20.0, waits, cells)
+
+
+def class_of(verdicts: dict[str, Sequence[CheckResult]], seconds: float = 2.0) -> ClassData:
+    kept = {
+        student: {NOTEBOOK: Record({"qos-visible": Verdict("qos", "visible", tuple(found))},
+                                   seconds=seconds)}
+        for student, found in verdicts.items()
+    }  # fmt: skip
+    return ClassData(
+        Path("/nowhere"), ASSIGNMENT, 20.0, tuple(grade(student) for student in sorted(kept)),
+        records=kept,
+    )  # fmt: skip
+
+
+def class_of_skill(count: int, worth: Sequence[float], seed: int = 1) -> ClassData:
+    """Students who pass each check with a probability of their own."""
+    rng = random.Random(seed)
+    return class_of({
+        f"s{n:03}": [
+            result(f"c{k}", "passed" if rng.random() < n / count else "failed", points)
+            for k, points in enumerate(worth)
+        ]
+        for n in range(count)
+    })  # fmt: skip
+
+
+def mark_written_answers(course: Course, *students: str) -> None:
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        for student in students:
+            entry = book.find_grade("qos-explanation", NOTEBOOK, ASSIGNMENT, student)
+            entry.manual_score, entry.needs_manual_grade = 4, False
+        book.db.commit()
+
+
+def rows_of(text: str) -> list[list[str]]:
+    return list(csv.reader(io.StringIO(text)))
+
+
+# Figures
+
+
+def test_failure_rates_and_discrimination_are_what_numpy_says() -> None:
+    worth = [1.0, 2.0, 0.5, 3.0, 0.1]
+    data = class_of_skill(90, worth)
+    passed = np.array([
+        [check.passed for check in notebooks[NOTEBOOK].verdicts["qos-visible"].checks]
+        for notebooks in data.records.values()
+    ])  # fmt: skip
+    earned = passed * np.array(worth)
+    found = figures.checks(data)
+    assert [check.name for check in found] == ["c0", "c1", "c2", "c3", "c4"]
+    for k, check in enumerate(found):
+        rest = earned.sum(axis=1) - earned[:, k]
+        assert check.passed == passed[:, k].sum()
+        assert check.failure_rate == pytest.approx(1 - passed[:, k].mean())
+        assert check.discrimination == pytest.approx(np.corrcoef(passed[:, k], rest)[0, 1])
+        assert check.discrimination is not None
+        assert check.discrimination > 0.3
+
+
+def test_what_was_not_examined_is_no_failure() -> None:
+    data = class_of({
+        "a": [result("x", "passed"), result("y", "passed")],
+        "b": [result("x", "failed"), result("y", "not_checked")],
+        "c": [result("x", "passed"), result("y", "grader_error")],
+        "d": [result("x", "passed"), result("y", "failed")],
+    })  # fmt: skip
+    x, y = figures.checks(data)
+    assert (x.passed, x.failed, x.failure_rate) == (3, 1, 0.25)
+    assert (y.passed, y.failed, y.not_checked, y.grader_errors) == (1, 1, 1, 1)
+    assert y.failure_rate == 0.5
+    assert y.discrimination is None, "two submissions say nothing"
+    assert "the grader itself failed" in y.advice
+
+
+def test_a_check_that_good_students_fail_is_pointed_out() -> None:
+    data = class_of({
+        f"s{n}": [
+            *(result(f"c{k}", "passed" if n > k else "failed") for k in range(12)),
+            result("odd", "failed" if n > 6 else "passed"),
+        ]
+        for n in range(13)
+    })  # fmt: skip
+    odd = figures.checks(data)[-1]
+    assert odd.discrimination is not None
+    assert odd.discrimination < -0.5
+    assert "wording" in odd.advice
+
+
+@pytest.mark.parametrize(
+    "pairs", [[], [(1, 2), (0, 1)], [(1, 1), (1, 2), (1, 3)], [(0, 5), (1, 5), (1, 5)]]
+)
+def test_a_correlation_that_is_not_defined_is_none(pairs: list[tuple[float, float]]) -> None:
+    assert figures.discrimination(pairs) is None
+
+
+def test_questions_of_a_quiz_and_unreadable_submissions_are_no_checks() -> None:
+    data = class_of({"a": [result("x", "passed")]})
+    quiz = Record({"quiz-ch05": Verdict("quiz-ch05", "answers", (result("q", "failed"),))})
+    blank = Record(
+        {"qos-visible": Verdict("qos", "visible", (result("x", "not_checked"),))}, unreadable=True
+    )
+    kept = {**data.records, "b": {NOTEBOOK: quiz}, "c": {NOTEBOOK: blank}}
+    both = ClassData(data.root, ASSIGNMENT, 20.0, data.grades, records=kept)
+    [x] = figures.checks(both)
+    assert (x.name, x.passed, x.not_checked) == ("x", 1, 0)
+    assert set(figures.times(both).seconds) == {"a", "b"}
+
+
+# Feedback
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("Of 20 readings 3 arrived: 1, 2, 19.", "Of 7 readings 5 arrived: 0, 1, 2, 3 and 6."),
+        ("NameError: name 'cam' is not defined", "NameError: name 'lidar_2' is not defined"),
+        ("Nothing on /ann/scan after 1.5 s.", "Nothing on /bob/laser/scan after 12 s."),
+        ("ann's node stopped", "bob's node stopped"),
+        ("<Node object at 0x7f1c>", "<Node object at 0x99ab>"),
+    ],
+)
+def test_feedback_is_grouped_without_numbers_and_names(one: str, other: str) -> None:
+    assert feedback.stripped(one, ["ann"]) == feedback.stripped(other, ["bob"])
+
+
+def test_different_feedback_stays_different_and_short() -> None:
+    assert feedback.stripped("It isn't there, it can't be") == "It isn't there, it can't be"
+    assert feedback.stripped("too few") != feedback.stripped("too many")
+    assert len(feedback.stripped("x" * 10_000)) <= feedback.LONGEST
+    data = class_of({
+        "a": [result("x", "failed", actual="Got 3.")],
+        "b": [result("x", "failed", actual="Got 17.")],
+        "c": [result("x", "failed", actual="Nothing came.")],
+        "d": [result("x", "passed", actual="Got 3.")],
+    })  # fmt: skip
+    first, second = feedback.common(data)
+    assert (first.text, first.students) == ("Got #.", ("a", "b"))
+    assert second.students == ("c",)
+
+
+# Exports
+
+
+def test_canvas_and_moodle_files_have_the_columns_that_they_import() -> None:
+    people = {"ann": Person("ann", "Ann", "O'Hara, Jr.", "ann@example.org", "4711")}
+    data = ClassData(Path("/x"), "ch05", 20.0, (grade("ann", 12.25), grade("bob", 7)), people)
+    canvas = rows_of(exports.canvas(data, "Exercise 1 (99)").text)
+    assert canvas == [
+        ["Student", "ID", "SIS User ID", "SIS Login ID", "Section", "Exercise 1 (99)"],
+        ["    Points Possible", "", "", "", "", "20"],
+        ["O'Hara, Jr., Ann", "4711", "", "ann", "", "12.25"],
+        ["bob", "", "", "bob", "", "7"],
+    ]
+    moodle = rows_of(exports.moodle(data).text)
+    assert moodle == [
+        ["Username", "ID number", "First name", "Last name", "Email address", "ch05"],
+        ["ann", "4711", "Ann", "O'Hara, Jr.", "ann@example.org", "12.25"],
+        ["bob", "", "", "", "", "7"],
+    ]
+
+
+def test_a_grade_that_waits_is_not_exported_unless_asked_for() -> None:
+    data = ClassData(Path("/x"), "ch05", 20.0, (grade("ann"), grade("bob", waits=True)))
+    for write in (exports.canvas, exports.moodle):
+        export = write(data)
+        assert (export.students, export.waiting) == (1, ("bob",))
+        assert "bob" not in export.text
+        assert "bob" in write(data, provisional=True).text
+
+
+@pytest.mark.parametrize(
+    "student",
+    ["=1+1", "+49", "-x", "@SUM(A1)", "\tx", "\rx", "\nx", " =1", "＝1", '=HYPERLINK("a","b")'],  # noqa: RUF001
+)
+def test_no_cell_of_an_export_is_a_formula(student: str) -> None:
+    people = {student: Person(student, student, student, student, student)}
+    data = ClassData(Path("/x"), "=ch05", 20.0, (grade(student),), people)
+    for write in (exports.canvas, exports.moodle):
+        export = write(data)
+        assert export.guarded == (student,)
+        for cell in (cell for row in rows_of(export.text) for cell in row):
+            assert not cell.lstrip().startswith(exports.FORMULA), cell
+        assert f"'{student}" in [cell for row in rows_of(export.text) for cell in row]
+
+
+# Similarity
+
+CODE = """\
+camera_qos = QoSProfile(depth=3, reliability=ReliabilityPolicy.BEST_EFFORT)
+def make(topic, qos, limit=4):
+    found = []
+    for number in range(limit):
+        found.append(Publisher(topic, qos, number * 2))
+    return {'camera': found, 'lidar': [p.name for p in found if p.depth > 1]}
+stop_qos = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""
+OTHER = """\
+class Rig:
+    def __init__(self, node):
+        self.pub = node.create_publisher(Image, 'camera/image', 5)
+        self.sub = node.create_subscription(LaserScan, 'scan', self.heard, qos_profile_sensor_data)
+    def heard(self, message):
+        self.last = message.ranges[0] if message.ranges else None
+        self.pub.publish(Image(height=480, width=640))
+"""
+
+
+def text(source: str) -> OwnText:
+    return OwnText(tuple(source.splitlines()))
+
+
+def test_a_renamed_copy_is_found_and_another_idea_is_not() -> None:
+    renamed = re.sub(r"\bfound\b", "mine", CODE).replace("number", "i").replace("make", "build")
+    renamed = "# all my own work\n" + renamed.replace("    ", "  ").replace("limit", "n")
+    found = similarity.alike(
+        {"ann": text(CODE), "bob": text(renamed), "cy": text(OTHER)}, NOTHING_GIVEN
+    )
+    assert found.pairs == (similarity.Pair("ann", "bob", 1.0),)
+    assert (found.found, found.compared) == (1, 3)
+
+
+def test_given_code_and_the_stub_do_not_count(course: Course) -> None:
+    given = GivenText({NOTEBOOK: course.released})
+    stub = given.own({NOTEBOOK: course.released}, {})
+    assert tokens(stub, given, frozenset()) == ()
+    solved = given.own({NOTEBOOK: course.source}, {})
+    assert tokens(solved, given, frozenset())
+    assert similarity.alike({"a": stub, "b": stub}, given).too_short == ("a", "b")
+
+
+def test_what_many_have_is_common_ground() -> None:
+    texts = {f"s{n}": text(CODE) for n in range(20)}
+    assert similarity.alike(texts, NOTHING_GIVEN).found == 0
+    few = {f"s{n}": text(CODE) for n in range(4)}
+    assert similarity.alike(few, NOTHING_GIVEN).found == 6
+
+
+def test_odd_texts_are_compared_without_a_word(recwarn: pytest.WarningsRecorder) -> None:
+    for odd in (
+        "(" * 5_000,
+        "def f(:\n" * 50,
+        "'\\d' + " * 99,
+        "\x00",
+        "x" + ".y" * 9_000,
+        "\ud800",
+    ):
+        similarity.alike({"a": text(odd), "b": text(odd + "\n")}, NOTHING_GIVEN)
+    assert not recwarn.list
+
+
+def test_work_is_bounded_and_only_the_most_alike_are_shown() -> None:
+    rng = random.Random(3)
+    base = [f"value_{n} = call({n}, other={n})" for n in range(60)]
+    texts = {
+        f"s{n:04}": OwnText(
+            tuple(rng.sample(base, 30)) + tuple(f"z = {rng.random()}" for _ in "ab")
+        )
+        for n in range(300)
+    }
+    assert similarity.alike(texts, NOTHING_GIVEN, 0.7).found == 0, "all of it is common ground"
+    twins = {f"{s}{t}": OwnText((*(f"a{k} = {k}{s}" for k in range(20)),)) for s in range(60)
+             for t in "xy"}  # fmt: skip
+    found = similarity.alike(twins, NOTHING_GIVEN, 1.0)
+    assert found.found >= 60
+    assert len(found.pairs) == similarity.MOST_PAIRS
+
+
+def test_side_by_side_keeps_every_line_and_marks_differences() -> None:
+    rows = similarity.side_by_side(text("a\nb\nc"), text("a\nx\ny\nc"))
+    assert [left for _, left, _ in rows if left] == ["a", "b", "c"]
+    assert [right for _, _, right in rows if right] == ["a", "x", "y", "c"]
+    assert [kind for kind, _, _ in rows] == ["same", "changed", "changed", "same"]
+    assert similarity.side_by_side(text("x\n" * 900), text("y\n" * 900))[-1][0] == "cut"
+
+
+# The page
+
+
+def test_everything_from_a_student_is_escaped_and_nothing_is_loaded() -> None:
+    evil = f"{EVIL}$x_1$"
+    data = class_of({evil: [result("x", "failed", actual=EVIL)],
+                     "bob": [result("x", "grader_error", actual=EVIL)]})  # fmt: skip
+    data = ClassData(
+        data.root, ASSIGNMENT, 20.0, (grade(evil, waits=True), grade("bob", waits=True)),
+        records=data.records, not_entered=(EVIL,), notes=(EVIL,),
+    )  # fmt: skip
+    texts = {name: text(CODE + f"print('{EVIL}')") for name in (evil, "bob")}
+    report = reports.ClassReport(
+        data, figures.checks(data), figures.times(data), feedback.common(data),
+        needs.people_needed(data), similarity.alike(texts, NOTHING_GIVEN), texts, NOTHING_GIVEN,
+        0.9, data.notes,
+    )  # fmt: skip
+    html = pages.page(report)
+    assert report.likeness.pairs
+    assert "<script" not in html
+    assert html.count("&lt;script&gt;") >= 8
+    parsed = Links(html)
+    assert parsed.loads == []
+    assert parsed.open == []
+    assert "http-equiv" in html
+
+
+# Really graded submissions
+
+
+@pytest.fixture(scope="module")
+def graded_course(
+    released_course: Path, cases: Cases, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    root = tmp_path_factory.mktemp("graded") / "course"
+    shutil.copytree(released_course, root)
+    course = Course(root)
+    for student, case in {
+        "ann": "right-two-sides", "bob": "wrong-imu-endless", "cy": "wrong-imu-endless",
+        "-dan": "right-two-sides",
+    }.items():  # fmt: skip
+        course.submit(student, cases[case].submission(course.source, course.released))
+    course.submit("eve", "{" + '"cells": [')
+    engine.grade(root, ASSIGNMENT)
+    mark_written_answers(course, "ann", "-dan")
+    course.folder("late")
+    return root
+
+
+@pytest.fixture
+def graded(graded_course: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(graded_course, tmp_path / "graded"))
+
+
+def test_the_report_of_a_graded_class(graded: Path) -> None:
+    report = reports.make(graded, ASSIGNMENT)
+    page, canvas, moodle = reports.write(report)
+
+    by_name = {check.name: check for check in report.checks}
+    assert set(by_name) == {
+        "nodes_start", "readings_flow", "camera_best_effort", "camera_newest", "lidar_fresh",
+        "stop_reaches_all", "imu_burst", "stop_complete", "late_joiner",
+    }  # fmt: skip
+    assert (by_name["imu_burst"].passed, by_name["imu_burst"].failed) == (2, 2)
+    assert by_name["readings_flow"].failure_rate == 0
+    assert set(report.times.seconds) == {"ann", "bob", "cy", "-dan"}
+    assert all(seconds > 0 for seconds in report.times.seconds.values())
+    assert report.feedback[0].students == ("bob", "cy")
+    urgent = {need.students: need.why for need in report.needs if need.urgent}
+    assert "not valid JSON" in urgent[("eve",)]
+    assert "autograder grade ch05" in urgent[("late",)]
+    [waiting] = [need for need in report.needs if not need.urgent]
+    assert waiting.students == ("bob", "cy")
+    alike = {(pair.left, pair.right): pair.similarity for pair in report.likeness.pairs}
+    assert alike == {("-dan", "ann"): 1.0, ("bob", "cy"): 1.0}
+    assert rows_of(canvas.read_text())[2:] == [
+        ["'-dan", "", "", "'-dan", "", "19"],
+        ["ann", "", "", "ann", "", "19"],
+    ]
+    assert len(rows_of(moodle.read_text())) == 3
+    assert Links(page.read_text()).loads == []
+    assert "never a verdict" in page.read_text()
+
+
+@pytest.mark.parametrize(
+    "damage", ["", "[]", '{"version": 1}', '{"version": 99}', "\x00" * 20, "[" * 100_000]
+)
+def test_a_damaged_record_costs_its_own_figures_and_says_so(graded: Path, damage: str) -> None:
+    records.path(graded / ".autograder", ASSIGNMENT, "bob", NOTEBOOK).write_text(damage)
+    report = reports.make(graded, ASSIGNMENT)
+    assert set(report.times.seconds) == {"ann", "cy", "-dan"}
+    [note] = report.data.notes
+    assert "bob's check results" in note
+    assert "run `autograder grade ch05` again" in note
+
+
+def test_a_grade_from_before_records_were_kept_is_counted(graded: Path) -> None:
+    records.path(graded / ".autograder", ASSIGNMENT, "bob", NOTEBOOK).unlink()
+    [note] = reports.make(graded, ASSIGNMENT).data.notes
+    assert "1 notebook has a grade but no record" in note
+
+
+def test_the_command_speaks_to_people_and_to_machines(graded: Path) -> None:
+    root = ("--root", str(graded))
+    shown = autograder("report", ASSIGNMENT, *root, cwd=graded).stdout
+    assert "class-report.html" in shown
+    assert "The exports hold 2 of 5 students" in shown
+    assert "match them by hand: -dan" in shown
+    spoken = json.loads(autograder("report", ASSIGNMENT, *root, "--json", cwd=graded).stdout)
+    assert len(spoken["checks"]) == 9
+    assert [pair["left"] for pair in spoken["alike"]] == ["-dan", "bob"]
+
+
+def test_a_read_only_folder_is_one_sentence(graded: Path) -> None:
+    read_only = f"mount --bind {graded} {graded} && mount -o remount,ro,bind {graded}"
+    refused = autograder(
+        "report", ASSIGNMENT, "--root", str(graded), cwd=graded, code=1, before=read_only
+    )
+    assert "cannot be written" in refused.stderr
+    assert len(refused.stderr.strip().splitlines()) == 1
+
+
+def test_an_assignment_that_is_not_there_or_not_graded_is_one_sentence(course: Course) -> None:
+    with pytest.raises(InsightError, match=r"no assignment 'ch99'.*there are ch05"):
+        reports.make(course.root, "ch99")
+    with pytest.raises(InsightError, match=r"Nothing of 'ch05' has been graded yet: run"):
+        reports.make(course.root, ASSIGNMENT)
+    result = autograder(
+        "report", "ch05", "--root", str(course.root), cwd=course.root, code=1
+    ).stderr
+    assert "graded yet" in result
+    (course.root / "gradebook.db").write_text("this is no database, but a long enough text" * 99)
+    with pytest.raises(InsightError, match="cannot be read"):
+        reports.make(course.root, ASSIGNMENT)
