@@ -178,7 +178,8 @@ def test_the_installed_metadata_are_those_of_this_project(project: dict[str, Any
 
 
 def commands(app: typer.Typer) -> set[str]:
-    return {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
+    own = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
+    return own | {group.name for group in app.registered_groups if group.name}
 
 
 def test_every_command_in_the_readme_exists() -> None:

@@ -75,7 +75,7 @@ def test_an_unknown_assignment_or_exam_names_those_there_are(course: Course) -> 
     assert "ch05" in result.stderr
     result = autograder("release", "ch99", "--root", str(course.root), cwd=course.root, code=1)
     assert "ch05" in result.stderr
-    result = autograder("corpus", "qso", cwd=course.root, code=1)
+    result = autograder("corpus", "--exercise", "qso", cwd=course.root, code=1)
     assert "Did you mean 'qos'?" in result.stderr
 
 
