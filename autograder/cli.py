@@ -230,13 +230,17 @@ def demo(
     folder: Annotated[
         Path, typer.Option("--dir", help="Where to work; an earlier demo there is replaced.")
     ] = Path("ros2-course-demo"),
+    every: Annotated[
+        bool, typer.Option("--all", help="All five exercises, which takes some minutes.")
+    ] = False,
     jobs: Jobs = 2,
     as_json: AsJson = False,
 ) -> None:
     """Build, release, collect a bundled class, grade it on real DDS, and show the grades."""
     from autograder import demo as demo_run
 
-    done = demo_run.run(folder, jobs=jobs, say=_say(as_json), progress=Progress(silent=as_json))
+    progress = Progress(silent=as_json)
+    done = demo_run.run(folder, every=every, jobs=jobs, say=_say(as_json), progress=progress)
     if as_json:
         rows = [{**vars(row), "grade": vars(row.grade)} for row in done.rows]
         _print_json({"root": str(done.root), "rows": rows, "as_expected": done.as_expected})
@@ -254,7 +258,7 @@ def _demo_table(done: Any) -> None:
         score = f"{row.grade.score:g} of {row.grade.max_score:g}"
         table.add_row(row.student, row.title, row.expected, score, row.difference or "as expected")
     out.print(table)
-    out.print("25 of the 100 points are for the written explanations, which a person grades.")
+    out.print("A quarter of the points is for written explanations, which a person grades.")
     places = {
         "gradebook": done.root / "gradebook.db",
         "grades": done.csv,

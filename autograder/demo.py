@@ -62,6 +62,7 @@ class Demo:
 def run(
     folder: Path,
     *,
+    every: bool = False,
     jobs: int = 2,
     say: Callable[[str], None] = lambda _line: None,
     progress: Progress = lambda _student, _graded: None,
@@ -70,6 +71,7 @@ def run(
 
     Args:
         folder: where to work; a demo that is there already is replaced, nothing else ever is.
+        every: all exercises of the assignment, which takes some minutes; else the first one.
         jobs: how many submissions are run at a time.
         say: is told what happens, a line a step.
         progress: is told about each submission.
@@ -77,13 +79,15 @@ def run(
     Raises:
         CourseError: ``folder`` holds something that is not a demo.
     """
-    root = _course_root(folder)
+    cases = _cases()
+    class_ = bundled_class(cases, every=every)
+    handed_in = {exam for student in class_.values() for exam in student}
+    cases = {exam: own for exam, own in cases.items() if exam in handed_in}
+    root = _course_root(folder, list(cases))
     say(f"Building the notebooks in {root}")
     build(root)
     say(f"Releasing {ASSIGNMENT} with nbgrader")
     release(root, ASSIGNMENT)
-    class_ = bundled_class()
-    cases = _cases()
     collect(root, class_, cases)
     say(f"Collected {len(class_)} submissions; grading them on real DDS")
     trust = untrusting(say)
@@ -96,10 +100,17 @@ def run(
     return Demo(root, csv, tuple(rows))
 
 
-def bundled_class() -> Class:
-    """Return the bundled class."""
-    class_: Class = tomllib.loads((corpus_root() / CLASS).read_text(encoding="utf-8"))
-    return class_
+def bundled_class(cases: Cases, *, every: bool) -> Class:
+    """Return the bundled class: of all exercises, or of the first one."""
+    bundled = tomllib.loads((corpus_root() / CLASS).read_text(encoding="utf-8"))
+    if every:
+        return dict(bundled["all"])
+    first = bundled["first"]
+    exam = first["exam"]
+    class_: Class = {
+        name: {"title": cases[exam][name].title, exam: name} for name in first["cases"]
+    }
+    return {**class_, first["damaged"]: {"title": "A file that was cut off", exam: CUT_OFF}}
 
 
 def _cases() -> Cases:
@@ -132,8 +143,8 @@ def _hand_in(root: Path, folder: Path, exam: str, name: str, cases: dict[str, Ca
     nbformat.write(handed_in, folder / file)  # type: ignore[no-untyped-call]
 
 
-def _course_root(folder: Path) -> Path:
-    """Return a fresh course root in ``folder``, made of the package's own sources."""
+def _course_root(folder: Path, exams: list[str]) -> Path:
+    """Return a fresh course root in ``folder`` with the package's own sources of these exams."""
     marker = folder / ".ros2-course-demo"
     if folder.exists() and any(folder.iterdir()) and not marker.exists():
         raise CourseError(
@@ -148,7 +159,12 @@ def _course_root(folder: Path) -> Path:
         raise CourseError(
             f"The demo cannot write to {folder} ({error.strerror}): name a folder with --dir."
         ) from error
-    return copy_authoring(content_root(), folder)
+    root = copy_authoring(content_root(), folder)
+    kept = {points.table()[exam].notebook for exam in exams}
+    for path in (root / "authoring" / "assignments").glob("*/*"):
+        if path.parent.name != ASSIGNMENT or path.stem not in kept:
+            path.unlink()
+    return root
 
 
 def _row(handed_in: dict[str, str], graded: Graded, grade: Grade, cases: Cases) -> Row:
@@ -161,10 +177,11 @@ def _row(handed_in: dict[str, str], graded: Graded, grade: Grade, cases: Cases) 
             unseen = "not handed in" if name is None else "unreadable"
             checked = [c for v in outcome.verdicts.values() for c in v.checks if c.points]
             differences += [f"{exam}: it has points"] if checked else []
-            expected.append(f"{exam}: {unseen}")
+            expected.append(f"{exam}: {unseen}" if len(cases) > 1 else unseen)
         else:
             differences += [f"{exam}: {d}" for d in [own[name].verdict_of(outcome)] if d]
-            expected += [f"{exam}: {own[name].fails_in_words}"] if own[name].fails else []
+            fails = own[name].fails_in_words if own[name].fails else ""
+            expected += [f"{exam}: {fails}" if len(cases) > 1 else fails] if fails else []
     return Row(
         graded.student, handed_in["title"], grade, "; ".join(expected) or "nothing",
         "; ".join(differences),

@@ -14,7 +14,7 @@ from .conftest import Course
 
 
 def autograder(
-    *arguments: str, cwd: Path, code: int = 0, before: str = ""
+    *arguments: str, cwd: Path, code: int = 0, before: str = "", timeout: float = 170
 ) -> subprocess.CompletedProcess[str]:
     """Run the command; ``before`` is shell that prepares a private mount namespace for it."""
     executable = shutil.which("autograder")
@@ -24,7 +24,7 @@ def autograder(
         command = ["unshare", "-rm", "bash", "-c", f'{before}; exec "$@"', "bash", *command]
     env = {**os.environ, "COLUMNS": "200"}
     result = subprocess.run(
-        command, cwd=cwd, env=env, capture_output=True, text=True, timeout=170, check=False
+        command, cwd=cwd, env=env, capture_output=True, text=True, timeout=timeout, check=False
     )
     assert result.returncode == code, result.stdout + result.stderr
     assert "Traceback" not in result.stdout + result.stderr
@@ -36,16 +36,29 @@ def test_the_demo_ends_with_grades(tmp_path: Path) -> None:
     demo = json.loads(result.stdout)
     assert demo["as_expected"] is True
     scores = {row["student"]: row["grade"]["score"] for row in demo["rows"]}
-    assert len(scores) == 8
+    assert len(scores) == 12
+    assert scores["right-chapter"] == scores["right-two-sides"] == 15
+    assert scores["broken-file"] == scores["broken-syntax"] == 0
+    assert 0 < scores["wrong-stub"] < scores["wrong-imu-endless"] < 15
+    root = tmp_path / "here"
+    assert len((root / "grades.csv").read_text().splitlines()) == 1 + len(scores)
+    assert len(list((root / "feedback").glob("*/ch05/qos-design.html"))) == len(scores)
+    waiting = {row["student"] for row in demo["rows"] if row["grade"]["needs_manual_grade"]}
+    assert "right-chapter" in waiting, "the written explanation waits for a person"
+
+
+@pytest.mark.timeout(900)
+def test_the_demo_of_all_exercises(tmp_path: Path) -> None:
+    result = autograder("demo", "--all", "--dir", "here", "--json", cwd=tmp_path, timeout=850)
+    demo = json.loads(result.stdout)
+    assert demo["as_expected"] is True, demo["rows"]
+    scores = {row["student"]: row["grade"]["score"] for row in demo["rows"]}
     assert scores["by-the-chapter"] == scores["other-designs"] == 75
     assert scores["not-python"] == scores["damaged"] == 0
     assert 0 < scores["as-handed-out"] < scores["first-two-only"] < scores["one-mistake-each"] < 75
     assert scores["first-two-only"] == 30
-    root = tmp_path / "here"
-    assert len((root / "grades.csv").read_text().splitlines()) == 1 + len(scores)
-    assert len(list((root / "feedback").glob("*/ch05/*.html"))) == 5 * len(scores)
-    waiting = {row["student"] for row in demo["rows"] if row["grade"]["needs_manual_grade"]}
-    assert "by-the-chapter" in waiting, "the written explanations wait for a person"
+    assert {row["grade"]["max_score"] for row in demo["rows"]} == {100}
+    assert len(list((tmp_path / "here/feedback").glob("*/ch05/*.html"))) == 5 * len(scores)
 
 
 def test_the_demo_leaves_other_peoples_files_alone(tmp_path: Path) -> None:

@@ -24,8 +24,8 @@ def notebooks(exam: str) -> Notebooks:
 
 @cache
 def results(exam: str) -> dict[str, Trial]:
-    """Run a whole corpus, four cases at a time (they mostly wait); return its trials by name."""
-    done = corpus.run(CASES[exam], *notebooks(exam), jobs=4)
+    """Run a whole corpus, two cases at a time (they mostly wait); return its trials by name."""
+    done = corpus.run(CASES[exam], *notebooks(exam), jobs=2)
     return {trial.case.name: trial for trial in done}
 
 
