@@ -1,10 +1,8 @@
 // A form made of fields that the kernel describes: {path, takes, kind, default}.
 
-let forms = 0;
-
 /** Return {element, draw(fields, problem)}; `send(values)` gets what was typed, by path. */
 function formFor(label, button, send) {
-  const id = `rosform-${(forms += 1)}`;
+  const id = newId();
   const inputs = new Map();
   const grid = make("div", { class: "rosform-grid" });
   const problem = make("p", { class: "rosform-problem", role: "alert" });

@@ -12,6 +12,11 @@ const DEAD =
   "Run this cell again.";
 const FOCUSABLE = "a, button, input, select, summary, textarea, [tabindex]";
 
+/** An id that nothing else on the page has: each view is a module of its own, with its own counters. */
+function newId() {
+  return `rosview-${Math.random().toString(36).slice(2)}`;
+}
+
 /** Make an element; `on…` are listeners, other keys attributes, `true` sets an empty one. */
 function make(tag, attributes = {}, ...children) {
   return fill(document.createElement(tag), attributes, children);

@@ -16,8 +16,8 @@ const view = {
         if (shape !== known) {
           known = shape;
           rows.clear();
-          grid.replaceChildren(...frame.entries.flatMap((entry, number) => {
-            const made = row(entry, `${frame.title}-${number}`, send);
+          grid.replaceChildren(...frame.entries.flatMap((entry) => {
+            const made = row(entry, newId(), send);
             rows.set(entry.name, made);
             return made.elements;
           }));

@@ -3,12 +3,10 @@
 const POLICIES = ["reliability", "durability", "history", "depth", "deadline", "lifespan", "liveliness", "lease"];
 const UNITS = { depth: "messages", deadline: "s, 0: none", lifespan: "s, 0: none", lease: "s, 0: none" };
 
-let labs = 0;
-
 const view = {
   label: "QoS lab",
   start(stage, send) {
-    const id = `roslab-${(labs += 1)}`;
+    const id = newId();
     let parts = null;
     return {
       draw(frame) {

@@ -20,6 +20,7 @@ from test_msgs.msg import Empty
 from course import Session
 from course.diagnosis import Diagnosis
 from course.errors import WaitTimeout
+from course.graph import reader
 
 
 def about(found: Diagnosis, name: str) -> str:
@@ -163,6 +164,7 @@ def test_a_dead_service_in_another_process(
     process = start_script(REMOTE.format(domain=session.domain_id))
     assert process.stdout is not None
     assert process.stdout.readline().strip() == "ready"
+    session.until(lambda: "/remote" in reader.read(session.observer).nodes, 30)
     session.until(lambda: session.observer.count_services("/remote/list_parameters"), 30)
     session.until(lambda: not about(session.diagnose(), "node"), 30)
     os.kill(process.pid, signal.SIGSTOP)
