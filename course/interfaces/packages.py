@@ -8,6 +8,7 @@ conversion functions.
 
 from __future__ import annotations
 
+import functools
 import importlib.abc
 import importlib.machinery
 import importlib.util
@@ -16,6 +17,7 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from course.interfaces.build import Unit
 from course.interfaces.errors import BuildError
@@ -76,11 +78,24 @@ def module(name: str) -> ModuleType:
     if name not in sys.modules:
         made = importlib.util.module_from_spec(package_spec(name))
         made.__doc__ = "ROS interfaces, built from their text."
+        vars(made)["__getattr__"] = functools.partial(_once_loaded, made)
         sys.modules[name] = made
         parent, _, child = name.rpartition(".")
         if parent:
             setattr(module(parent), child, made)
     return sys.modules[name]
+
+
+def _once_loaded(made: ModuleType, name: str) -> Any:
+    """Look a name up that a module does not have yet: another thread may be about to fill it in.
+
+    Python hands a module that is in ``sys.modules`` to every thread, filled or not (PEP 562).
+    """
+    if not name.startswith("__"):
+        with lock:
+            if name in vars(made):
+                return vars(made)[name]
+    raise AttributeError(f"module {made.__name__!r} has no attribute {name!r}")
 
 
 def load(unit: Unit, folder: Path) -> None:

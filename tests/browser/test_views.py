@@ -133,7 +133,7 @@ def test_a_view_survives_a_reload_and_says_when_the_kernel_is_gone(open_cells: O
     expect(graph.get_by_role("status")).to_contain_text("Run this cell again")
     page.run_all()
     expect(region(page, "ROS graph").locator("svg text", has_text="/listener")).to_be_visible()
-    expect(region(page, "ROS graph").get_by_role("status")).to_have_text("")
+    expect(region(page, "ROS graph").locator(".rosview-status")).to_have_text("")
 
 
 def test_a_closed_session_is_said(open_cells: Open) -> None:

@@ -44,7 +44,10 @@ HERE = Path(__file__).parent
 EMPTY = "broken-empty"
 FULL = 15.0
 
-pytestmark = pytest.mark.skipif(bool(abilities().problem), reason=abilities().problem or "-")
+pytestmark = [
+    pytest.mark.skipif(bool(abilities().problem), reason=abilities().problem or "-"),
+    pytest.mark.xdist_group("hostile"),  # one listener on the host, which no attack may reach
+]
 
 
 @dataclass(frozen=True)
