@@ -119,9 +119,10 @@ def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def host() -> Iterator[tuple[int, list[socket.socket]]]:
     """Listen on the host where a submission might call; give the port, and who listens."""
     with socket.create_server(("127.0.0.1", 0)) as internet, socket.socket(socket.AF_UNIX) as local:
-        local.bind("\0ros2-course-hostile")
+        port = internet.getsockname()[1]
+        local.bind(f"\0ros2-course-hostile-{port}")
         local.listen()
-        yield internet.getsockname()[1], [internet, local]
+        yield port, [internet, local]
 
 
 @pytest.fixture

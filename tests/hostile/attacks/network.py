@@ -8,7 +8,7 @@ for family, kind, address in [
     (socket.AF_INET, socket.SOCK_STREAM, ("127.0.0.1", PORT)),
     (socket.AF_INET, socket.SOCK_STREAM, ("1.1.1.1", 53)),
     (socket.AF_INET, socket.SOCK_DGRAM, ("8.8.8.8", 53)),
-    (socket.AF_UNIX, socket.SOCK_STREAM, "\0ros2-course-hostile"),
+    (socket.AF_UNIX, socket.SOCK_STREAM, "\0ros2-course-hostile-PORT"),
     (socket.AF_UNIX, socket.SOCK_STREAM, "/run/docker.sock"),
 ]:
     try:
