@@ -19,6 +19,8 @@ import re
 import socket
 import subprocess
 import tempfile
+import threading
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -188,6 +190,10 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
     assert "Traceback" not in said
     assert len(shown) < 2_000_000
     assert len(namespaces) == 2
+    # What was killed takes the kernel a moment to clear away; what was not stays.
+    deadline, never = time.monotonic() + 10, threading.Event()
+    while running(namespaces) and time.monotonic() < deadline:
+        never.wait(0.05)
     assert not running(namespaces), "something is still running"
     assert list(scratch.iterdir()) == [], "something was left on disk"
     for listener in listeners:
