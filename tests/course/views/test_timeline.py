@@ -89,10 +89,10 @@ def test_callbacks_run_as_before_and_are_seen(session: Session) -> None:
         publisher.publish(String(data=f"{number}"))
     session.until(lambda: len(listener.seen) == 9)
     session.until(lambda: len(view.runs("/chatter")) == 9)
+    session.until(lambda: view.figures()["/chatter"].count == 3)
     assert {kind for kind, _ in listener.seen} == {"one", "two", "later"}
     runs = view.runs("/chatter")
     assert all(run.published <= run.started <= run.ended for run in runs)
-    assert view.figures()["/chatter"].count == 3
     assert "callbacks of /listener: 9" in view.words()
     (topic,) = view.frame()["topics"]
     assert [lane["label"] for lane in topic["lanes"]] == [
