@@ -14,10 +14,11 @@ from autograder import corpus, engine, points, submission
 from autograder.build import build
 from autograder.corpus import Case
 from autograder.corpus.command import untrusting
+from autograder.corpus.trials import notebooks_of
 from autograder.engine import Graded, Progress
 from autograder.gradebook import CourseGradebook, Grade, write_csv
 from autograder.release import release
-from course.content import content_root, copy_authoring, corpus_root
+from course.content import corpus_root
 from course.errors import CourseError
 
 ASSIGNMENT = "ch05"
@@ -159,12 +160,7 @@ def _course_root(folder: Path, exams: list[str]) -> Path:
         raise CourseError(
             f"The demo cannot write to {folder} ({error.strerror}): name a folder with --dir."
         ) from error
-    root = copy_authoring(content_root(), folder)
-    kept = {points.table()[exam].notebook for exam in exams}
-    for path in (root / "authoring" / "assignments").glob("*/*"):
-        if path.parent.name != ASSIGNMENT or path.stem not in kept:
-            path.unlink()
-    return root
+    return notebooks_of(folder, exams)
 
 
 def _row(handed_in: dict[str, str], graded: Graded, grade: Grade, cases: Cases) -> Row:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -55,10 +55,16 @@ def notebooks(exam: str) -> Notebooks:
 
 def one_notebook(folder: Path, exam: str) -> Path:
     """Make ``folder`` a course root with the text source of one exam's notebook; return it."""
-    entry = points.table()[exam]
+    return notebooks_of(folder, [exam])
+
+
+def notebooks_of(folder: Path, exams_: Iterable[str]) -> Path:
+    """Make ``folder`` a course root with the text sources of these exams only; return it."""
+    entries = [points.table()[exam] for exam in exams_]
+    kept = {(entry.assignment, entry.notebook) for entry in entries}
     root = copy_authoring(content_root(), folder)
     for path in (root / "authoring" / "assignments").glob("*/*"):
-        if (path.parent.name, path.stem) != (entry.assignment, entry.notebook):
+        if (path.parent.name, path.stem) not in kept:
             path.unlink()
     return root
 

@@ -10,17 +10,16 @@ from __future__ import annotations
 
 import statistics
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from autograder.insight.collect import ClassData
 from autograder.quiz_marks import PREFIX
 from autograder.verdict import CheckResult, Status
+from quizzes.insight.analysis import discrimination
 
 FEW = 10
 """Submissions below which figures say little; they are shown all the same, and marked."""
-FEWEST = 3
-"""Submissions below which a correlation says nothing."""
 EASY, HARD, FLAT = 0.05, 0.75, 0.1
 """Bounds for advice: failure rates that hardly anybody or nearly everybody has; hardly tells."""
 
@@ -100,22 +99,6 @@ def checks(data: ClassData) -> tuple[CheckFigures, ...]:
     notebooks = {key[0]: None for key in sorted(by_check, key=lambda key: key[0])}
     ordered = (key for notebook in notebooks for key in by_check if key[0] == notebook)
     return tuple(_figures(key, by_check[key], totals) for key in ordered)
-
-
-def discrimination(pairs: Iterable[tuple[float, float]]) -> float | None:
-    """Return the correlation of (passed, rest score) pairs.
-
-    None where it is not defined: with fewer than three submissions, or where all passed or failed
-    alike or have the same rest score.
-    """
-    all_pairs = list(pairs)
-    earned, rest = [passed for passed, _ in all_pairs], [score for _, score in all_pairs]
-    if len(all_pairs) < FEWEST or len(set(earned)) < 2 or len(set(rest)) < 2:
-        return None
-    try:
-        return max(-1.0, min(1.0, statistics.correlation(earned, rest)))
-    except statistics.StatisticsError:  # differences so small that they vanish when squared
-        return None
 
 
 def times(data: ClassData) -> Times:

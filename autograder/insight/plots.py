@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import io
-import re
 import textwrap
 from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from autograder.insight.figures import FLAT, CheckFigures
+from quizzes.insight.svg import new_axes, svg_of
 
 # Colours that people with any colour vision can tell apart (Okabe and Ito), each with a pattern.
 _PARTS = (
@@ -39,23 +37,23 @@ def scores(earned: Sequence[float], most: float) -> str:
     """Return how many students have how many points, in at most twenty steps up to ``most``."""
     steps = max(1, min(20, round(most)))
     with mpl.rc_context(_STYLE):
-        figure, axes = _axes(8.0, 2.8)
+        figure, axes = new_axes(8.0, 2.8)
         top = max([most, *earned]) or 1.0
         axes.hist(earned, bins=steps, range=(0, top), color="#0072b2", edgecolor="white")
         axes.set(xlim=(0, top), xlabel="points", ylabel="students")
         axes.yaxis.get_major_locator().set_params(integer=True)
-        return _svg(figure, "scores")
+        return svg_of(figure, "scores")
 
 
 def times(seconds: Sequence[float]) -> str:
     """Return how many submissions took how long, in seconds."""
     with mpl.rc_context(_STYLE):
-        figure, axes = _axes(8.0, 2.4)
+        figure, axes = new_axes(8.0, 2.4)
         top = max(seconds) or 1.0
         axes.hist(seconds, bins=20, range=(0, top), color="#56b4e9", edgecolor="white")
         axes.set(xlim=(0, top), xlabel="seconds that a submission took", ylabel="submissions")
         axes.yaxis.get_major_locator().set_params(integer=True)
-        return _svg(figure, "times")
+        return svg_of(figure, "times")
 
 
 def checks(shown: Sequence[CheckFigures], name: str) -> str:
@@ -82,7 +80,7 @@ def checks(shown: Sequence[CheckFigures], name: str) -> str:
         right.scatter([r for _, r in known], [place for place, _ in known], color="#0072b2", s=36)
         right.set(xlim=(-1.05, 1.05), xlabel="discrimination")
         right.tick_params(axis="y", length=0)
-        return _svg(figure, name)
+        return svg_of(figure, name)
 
 
 def _bars(axes: Any, shown: Sequence[CheckFigures]) -> None:
@@ -93,21 +91,3 @@ def _bars(axes: Any, shown: Sequence[CheckFigures]) -> None:
         axes.barh(range(len(shown)), widths, left=starts, color=colour, hatch=hatch, height=0.62,
                   label=label)  # fmt: skip
         starts = [start + width for start, width in zip(starts, widths, strict=True)]
-
-
-def _axes(width: float, height: float) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.add_subplot()
-
-
-def _svg(figure: Figure, name: str) -> str:
-    buffer = io.StringIO()
-    canvas: Any = FigureCanvasSVG(figure)
-    canvas.print_svg(buffer, metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
-    svg = buffer.getvalue()
-    svg = svg[svg.index("<svg") :]
-    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, count=1, flags=re.DOTALL)
-    # Several plots share one page: ids must differ between them, and so must what refers to them.
-    svg = re.sub(r'\bid="', f'id="{name}-', svg)
-    svg = re.sub(r"url\(#", f"url(#{name}-", svg)
-    return re.sub(r'href="#', f'href="#{name}-', svg)

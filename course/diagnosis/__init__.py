@@ -65,6 +65,6 @@ def quick(session: Session) -> list[Finding]:
     """Return what can be found without waiting for anybody."""
     checks = (
         nodes.stuck, nodes.stolen, nodes.paused, nodes.unspun, nodes.on_another_domain,
-        graph.mismatches, graph.twins, graph.lonely_topics, graph.lonely_clients,
+        graph.check,
     )  # fmt: skip
     return [finding for check in checks for finding in check(session)]

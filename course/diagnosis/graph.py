@@ -19,18 +19,28 @@ _MENDS = {
 }
 
 
-def mismatches(session: Session) -> Iterator[Finding]:
+def check(session: Session) -> Iterator[Finding]:
+    """Find what one look at the graph shows."""
+    own = session.nodes
+    graph = reader.read(session.observer, own=list(own.values()))
+    yield from mismatches(graph)
+    yield from twins(graph, set(own))
+    yield from lonely_topics(graph, set(own))
+    yield from lonely_clients(graph, set(own))
+
+
+def mismatches(graph: Graph) -> Iterator[Finding]:
     """Find publishers and subscriptions that DDS does not connect."""
-    for topic, pair in _graph(session).mismatches:
+    for topic, pair in graph.mismatches:
         mends = [_MENDS[policy] for policy in pair.policies if policy in _MENDS]
         what = "type" if "TYPE" in pair.policies else "QoS"
         yield problem(what, words.mismatch(topic, pair), " ".join(mends))
 
 
-def twins(session: Session) -> Iterator[Finding]:
+def twins(graph: Graph, own: set[str]) -> Iterator[Finding]:
     """Find names that several nodes bear: one may be a ghost of an earlier run."""
-    for name in _graph(session).twins:
-        where = "One is in this session" if name in session.nodes else "None is in this session"
+    for name in graph.twins:
+        where = "One is in this session" if name in own else "None is in this session"
         yield problem(
             "name", f"Several nodes are called {name}. {where}; another may be left from an "
             "earlier run, of a cell that made it with rclpy or of another program.",
@@ -38,9 +48,8 @@ def twins(session: Session) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def lonely_topics(session: Session) -> Iterator[Finding]:
+def lonely_topics(graph: Graph, own: set[str]) -> Iterator[Finding]:
     """Find endpoints of the session's nodes that have nobody on the other side."""
-    graph, own = _graph(session), set(session.nodes)
     published = [topic.name for topic in graph.topics if topic.publishers]
     read = [topic.name for topic in graph.topics if topic.subscriptions]
     for topic in graph.topics:
@@ -58,9 +67,8 @@ def lonely_topics(session: Session) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def lonely_clients(session: Session) -> Iterator[Finding]:
+def lonely_clients(graph: Graph, own: set[str]) -> Iterator[Finding]:
     """Find clients of the session's nodes that have no server."""
-    graph, own = _graph(session), set(session.nodes)
     for kind, exchanges in (("service", graph.services), ("action", graph.actions)):
         offered = [exchange.name for exchange in exchanges if exchange.servers]
         for exchange in exchanges:
@@ -71,10 +79,6 @@ def lonely_clients(session: Session) -> Iterator[Finding]:
                     f"offers it{_alike(exchange.name, offered)}.",
                     "Start its server, or correct the name.",
                 )  # fmt: skip
-
-
-def _graph(session: Session) -> Graph:
-    return reader.read(session.observer, own=list(session.nodes.values()))
 
 
 def _alike(name: str, names: list[str]) -> str:

@@ -109,7 +109,7 @@ def discrimination(pairs: Iterable[tuple[float, float]]) -> float | None:
     """Return the correlation of (credit, rest score) pairs.
 
     None where it is not defined: with fewer than three learners, or where all have the same credit
-    or the same rest score.
+    or the same rest score. The checks of an exercise are judged by it, too.
     """
     all_pairs = list(pairs)
     earned, rest = [credit for credit, _ in all_pairs], [score for _, score in all_pairs]

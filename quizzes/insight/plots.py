@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import io
-import re
 import textwrap
 from typing import Any
 
 import matplotlib as mpl
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.figure import Figure
 
 from quizzes.insight.analysis import EASY, FLAT, HARD, Analysis
+from quizzes.insight.svg import new_axes, svg_of
 
 # Colours that people with any colour vision can tell apart (Okabe and Ito), with a marker each.
 _LOOKS = [
@@ -38,7 +35,7 @@ _BARS = 15
 def items(analysis: Analysis) -> str:
     """Return difficulty against discrimination, a mark for each variant that has both."""
     with mpl.rc_context(_STYLE):
-        figure, axes = _axes(8.0, 4.8)
+        figure, axes = new_axes(8.0, 4.8)
         axes.axhline(0, color="#666666", linewidth=0.8)
         axes.axhspan(-1, FLAT, color="#d55e00", alpha=0.08, linewidth=0)
         for bound in (HARD, EASY):
@@ -65,7 +62,7 @@ def items(analysis: Analysis) -> str:
             ylabel="discrimination: correlation with the rest",
         )  # fmt: skip
         axes.legend(loc="lower left", fontsize=8, title="concept", title_fontsize=8)
-        return _svg(figure, "items")
+        return svg_of(figure, "items")
 
 
 def beliefs(analysis: Analysis) -> str:
@@ -74,7 +71,7 @@ def beliefs(analysis: Analysis) -> str:
     if not shown:
         return ""
     with mpl.rc_context(_STYLE):
-        figure, axes = _axes(8.0, 0.9 + 0.46 * len(shown))
+        figure, axes = new_axes(8.0, 0.9 + 0.46 * len(shown))
         places = range(len(shown))
         axes.barh(places, [100 * f.share for f in shown], color="#d55e00", height=0.62)
         axes.set_yticks(places, [textwrap.fill(f.belief, 52) for f in shown], fontsize=8)
@@ -83,7 +80,7 @@ def beliefs(analysis: Analysis) -> str:
             axes.annotate(text, (100 * figures.share, place), xytext=(4, -3),
                           textcoords="offset points", fontsize=8)  # fmt: skip
         axes.set(xlim=(0, 112), xlabel="% of the learners whom a question tempted")
-        return _svg(figure, "beliefs")
+        return svg_of(figure, "beliefs")
 
 
 def scores(analysis: Analysis) -> str:
@@ -92,27 +89,9 @@ def scores(analysis: Analysis) -> str:
     steps = [half / 2 for half in range(2 * most + 1)]
     halves = [round(2 * score) / 2 for score in analysis.scores]
     with mpl.rc_context(_STYLE):
-        figure, axes = _axes(8.0, 2.6)
+        figure, axes = new_axes(8.0, 2.6)
         axes.bar(steps, [halves.count(step) for step in steps], width=0.42, color="#0072b2")
         axes.set(xlim=(-0.4, most + 0.4), xticks=range(most + 1),
                  xlabel="points in the first attempt", ylabel="learners")  # fmt: skip
         axes.yaxis.get_major_locator().set_params(integer=True)
-        return _svg(figure, "scores")
-
-
-def _axes(width: float, height: float) -> tuple[Figure, Any]:
-    figure = Figure(figsize=(width, height), layout="constrained")
-    return figure, figure.add_subplot()
-
-
-def _svg(figure: Figure, name: str) -> str:
-    buffer = io.StringIO()
-    canvas: Any = FigureCanvasSVG(figure)
-    canvas.print_svg(buffer, metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
-    svg = buffer.getvalue()
-    svg = svg[svg.index("<svg") :]
-    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, count=1, flags=re.DOTALL)
-    # Several plots share one page: ids must differ between them, and so must what refers to them.
-    svg = re.sub(r'\bid="', f'id="{name}-', svg)
-    svg = re.sub(r"url\(#", f"url(#{name}-", svg)
-    return re.sub(r'href="#', f'href="#{name}-', svg)
+        return svg_of(figure, "scores")
