@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-
 import pytest
-from jupyter_client import KernelManager
 from rclpy.node import Node
 
 import course
 from course.notebook import News
+from tests.kernel import Kernel
 
 SETUP = """
 %load_ext course
@@ -28,68 +26,47 @@ class Talker(Node):
 """
 
 
-class Notebook:
-    """A kernel, and cells to run in it."""
+class Notebook(Kernel):
+    """A kernel whose output is read as one text."""
 
-    def __init__(self):
-        environment = dict(os.environ)
-        environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
-        self.manager = KernelManager(kernel_name="python3", transport="ipc")
-        self.manager.start_kernel(env=environment)
-        self.client = self.manager.client()
-        self.client.start_channels()
-        self.client.wait_for_ready(timeout=60)
-
-    def run(self, cell):
-        """Run a cell; return its status and what it showed, as text."""
-        shown = []
-
-        def show(message):
-            content = message["content"]
-            if message["msg_type"] == "stream":
-                shown.append(content["text"])
-            elif message["msg_type"] in ("display_data", "execute_result"):
-                shown.append(content["data"]["text/plain"])
-            elif message["msg_type"] == "error":
-                shown.append("\n".join(content["traceback"]))
-
-        reply = self.client.execute_interactive(cell, output_hook=show, timeout=120)
-        return reply["content"]["status"], "\n".join(shown)
+    def text(self, cell):
+        """Run a cell; return its status and what it showed, in order."""
+        status, shown = self.run(cell)
+        return status, "\n".join(text for _, text in shown)
 
 
 @pytest.fixture
 def notebook():
     opened = Notebook()
     yield opened
-    opened.client.stop_channels()
-    opened.manager.shutdown_kernel()
+    opened.close()
 
 
 def test_what_the_learner_sees(notebook):
-    assert notebook.run(SETUP) == ("ok", "")
-    status, shown = notebook.run("t = course.run(Talker); course.until(lambda: t.count > 5); None")
+    assert notebook.text(SETUP) == ("ok", "")
+    status, shown = notebook.text("t = course.run(Talker); course.until(lambda: t.count > 5); None")
     assert status == "ok"
     assert "Talker.say of /talker raised ValueError: <three>. The node goes on spinning." in shown
     assert "said in a thread" not in shown
-    assert notebook.run("None") == ("ok", "")  # said once
+    assert notebook.text("None") == ("ok", "")  # said once
 
-    status, shown = notebook.run("rclpy.spin_once(t)")
+    status, shown = notebook.text("rclpy.spin_once(t)")
     assert status == "ok"
     assert "/talker was taken out of this session" in shown
-    assert notebook.run("n = t.count; course.until(lambda: t.count > n); None") == ("ok", "")
+    assert notebook.text("n = t.count; course.until(lambda: t.count > n); None") == ("ok", "")
 
-    status, shown = notebook.run("rclpy.init()")
+    status, shown = notebook.text("rclpy.init()")
     assert status == "error"
     assert "has initialised rclpy for this notebook already" in shown
 
-    status, shown = notebook.run("course.Session(domain_id=300)")
+    status, shown = notebook.text("course.Session(domain_id=300)")
     assert (status, shown.count("\n")) == ("error", 0)
     assert shown.startswith("DomainError: ROS domain 300 is out of range")
 
 
 def test_a_restart_and_an_interrupt_leave_nothing_behind(notebook):
-    notebook.run(SETUP)
-    domain_id = int(notebook.run("t = course.run(Talker); print(course.session().domain_id)")[1])
+    notebook.text(SETUP)
+    domain_id = int(notebook.text("t = course.run(Talker); print(course.session().domain_id)")[1])
     with course.Session(domain_id=domain_id) as outside:
         watcher = outside.run(Node, "watcher")
         outside.until(
@@ -100,15 +77,15 @@ def test_a_restart_and_an_interrupt_leave_nothing_behind(notebook):
             lambda: "talker" not in watcher.get_node_names(), timeout=10.0, what="no ghost"
         )
     notebook.client.wait_for_ready(timeout=60)
-    notebook.run(SETUP)
-    notebook.run("t = course.run(Talker)")
+    notebook.text(SETUP)
+    notebook.text("t = course.run(Talker)")
     waiting = notebook.client.execute("print('waiting'); course.until(lambda: False, timeout=600)")
     while notebook.client.get_iopub_msg(timeout=60)["msg_type"] != "stream":
         pass  # until the cell has begun
     notebook.manager.interrupt_kernel()
     while notebook.client.get_shell_msg(timeout=60)["parent_header"]["msg_id"] != waiting:
         pass
-    status, _ = notebook.run("n = t.count; course.until(lambda: t.count > n); None")
+    status, _ = notebook.text("n = t.count; course.until(lambda: t.count > n); None")
     assert status == "ok"  # the node went on spinning
 
 
@@ -124,8 +101,8 @@ executor = SingleThreadedExecutor()
 
 @pytest.mark.parametrize("cell", ["rclpy.spin(node)", "executor.add_node(node); executor.spin()"])
 def test_the_interrupt_button_ends_rclpys_own_spinning(notebook, cell):
-    notebook.run(SETUP)
-    notebook.run(SILENT)
+    notebook.text(SETUP)
+    notebook.text(SILENT)
     spinning = notebook.client.execute(f"print('spinning', flush=True)\n{cell}")
     while notebook.client.get_iopub_msg(timeout=60)["msg_type"] != "stream":
         pass  # until the cell has begun
@@ -136,11 +113,11 @@ def test_the_interrupt_button_ends_rclpys_own_spinning(notebook, cell):
             break
     assert reply["content"]["ename"] == "KeyboardInterrupt"
     if "executor" in cell:
-        _, shown = notebook.run("course.until(lambda: False, timeout=0.1)")
+        _, shown = notebook.text("course.until(lambda: False, timeout=0.1)")
         assert "/silent: in an executor of your own" in shown
-        notebook.run("executor.remove_node(node)")
+        notebook.text("executor.remove_node(node)")
     # The node is back: it runs callbacks without anybody's spinning.
-    status, _ = notebook.run(
+    status, _ = notebook.text(
         "ran = []; node.create_timer(0.01, lambda: ran.append(1)); course.until(lambda: ran); None"
     )
     assert status == "ok"
@@ -164,24 +141,24 @@ class Asker(Node):
 
 
 def test_a_deadlock_is_news_at_the_next_cell_and_replacing_the_node_ends_it(notebook):
-    notebook.run(SETUP + BLOCKED)
-    notebook.run("course.run(Server); course.run(Asker)")
-    status, shown = notebook.run("course.until(lambda: False, timeout=2.0)")
+    notebook.text(SETUP + BLOCKED)
+    notebook.text("course.run(Server); course.run(Asker)")
+    status, shown = notebook.text("course.until(lambda: False, timeout=2.0)")
     assert status == "error"
     assert "Asker.ask of /asker (at line" in shown
     assert shown.count("Deadlock: it waits for the answer of switch") == 2  # error, and news
-    assert notebook.run("None") == ("ok", "")  # said once
-    _, shown = notebook.run("course.stop(Asker)")
+    assert notebook.text("None") == ("ok", "")  # said once
+    _, shown = notebook.text("course.stop(Asker)")
     assert "/asker was stopped, but its callback" in shown
-    status, _ = notebook.run("t = course.run(Talker); course.until(lambda: t.count > 1); None")
+    status, _ = notebook.text("t = course.run(Talker); course.until(lambda: t.count > 1); None")
     assert status == "ok"
-    _, shown = notebook.run("print(course.close(timeout=0.2).leaked)")
+    _, shown = notebook.text("print(course.close(timeout=0.2).leaked)")
     assert "a callback of /asker" in shown
 
 
 def test_what_is_raised_as_a_sentence_ends_with_one_full_stop(notebook):
-    notebook.run(SETUP)
-    notebook.run(
+    notebook.text(SETUP)
+    notebook.text(
         "class Wrong(Node):\n"
         "    def __init__(self):\n"
         "        super().__init__('wrong')\n"
@@ -189,7 +166,9 @@ def test_what_is_raised_as_a_sentence_ends_with_one_full_stop(notebook):
         "    def tick(self):\n"
         "        raise ValueError('No camera.')\n"
     )
-    _, shown = notebook.run("course.run(Wrong); course.until(lambda: course.session().errors);None")
+    _, shown = notebook.text(
+        "course.run(Wrong); course.until(lambda: course.session().errors);None"
+    )
     assert "raised ValueError: No camera. The node goes on spinning." in shown
 
 

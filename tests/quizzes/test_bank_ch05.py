@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import ast
-import os
 import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-from jupyter_client import KernelManager
 
 from quizzes import lint, loader
 from quizzes.bank import Bank, Predict
+from tests.kernel import Kernel
 
 BANK = loader.load_bank("ch05")
 PROOFS = Path(__file__).parent / "proofs"
@@ -53,42 +51,13 @@ PREDICTIONS = {
 }
 
 
-class Kernel:
-    """A real kernel, as a learner's notebook has one."""
-
-    def __init__(self) -> None:
-        environment = dict(os.environ)
-        # The ROS wheels mark a prepared environment; a child has to prepare its own.
-        environment.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None)
-        self.manager = KernelManager(kernel_name="python3", transport="ipc")
-        self.manager.start_kernel(env=environment)
-        self.client = self.manager.client()
-        self.client.start_channels()
-        try:
-            self.client.wait_for_ready(timeout=120)
-        except BaseException:
-            self.close()
-            raise
-
-    def run(self, source: str) -> str:
-        """Run a cell; it must raise nothing, write nothing to stderr, and print something."""
-        printed: dict[str, str] = {"stdout": "", "stderr": "", "error": ""}
-
-        def take(message: dict[str, Any]) -> None:
-            content = message["content"]
-            if message["msg_type"] == "stream":
-                printed[content["name"]] += content["text"]
-            elif message["msg_type"] == "error":
-                printed["error"] += "\n".join(content["traceback"])
-
-        self.client.execute_interactive(source, output_hook=take, timeout=150)
-        assert (printed["error"], printed["stderr"]) == ("", "")
-        assert printed["stdout"].strip()
-        return printed["stdout"]
-
-    def close(self) -> None:
-        self.client.stop_channels()
-        self.manager.shutdown_kernel()
+def clean_output(kernel: Kernel, cell: str) -> str:
+    """What a cell printed; it must raise nothing and write nothing to stderr."""
+    status, shown = kernel.run(cell)
+    assert (status, [text for kind, text in shown if kind in ("stderr", "error")]) == ("ok", [])
+    printed = "".join(text for kind, text in shown if kind == "stdout")
+    assert printed.strip()
+    return printed
 
 
 @pytest.fixture(scope="module")
@@ -144,13 +113,13 @@ def test_every_proof_exists_and_every_proof_is_named_by_a_variant() -> None:
 
 @pytest.mark.parametrize("name", SHOWS)
 def test_a_show_cell_runs_and_prints_what_happens(kernel: Kernel, name: str) -> None:
-    kernel.run(SHOWS[name])
+    clean_output(kernel, SHOWS[name])
 
 
 @pytest.mark.parametrize("name", PREDICTIONS)
 def test_a_prediction_comes_true(kernel: Kernel, name: str) -> None:
     variant = PREDICTIONS[name]
-    printed = kernel.run(variant.code).strip().splitlines()[-1]
+    printed = clean_output(kernel, variant.code).strip().splitlines()[-1]
     outcomes = {option.text: option.correct for option in variant.options}
     assert outcomes[f"`{printed}`"]
 
@@ -159,10 +128,10 @@ def test_cells_do_not_touch_the_learners_own_nodes(kernel: Kernel) -> None:
     """A show cell opens its own session: the notebook's one, and its nodes, stay as they are."""
     look = "print(list(course.session().nodes), course.session().domain_id)"
     mine = "import course\nfrom rclpy.node import Node\nmine = course.run(Node, 'mine')\n"
-    before = kernel.run(mine + look)
+    before = clean_output(kernel, mine + look)
     assert "'/mine'" in before
-    kernel.run(SHOWS["qos-purpose-1/topic-stores-messages"])
-    assert kernel.run(look) == before
+    clean_output(kernel, SHOWS["qos-purpose-1/topic-stores-messages"])
+    assert clean_output(kernel, look) == before
 
 
 def test_no_cell_sleeps() -> None:
