@@ -76,6 +76,12 @@ def serve(
         verdicts.flush()
 
 
+def preload() -> None:
+    """Import every exam: `autograder.warm` calls it before it forks examiners."""
+    for name in exams.names():
+        exams.load(name)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the process; returns its exit code."""
     parser = argparse.ArgumentParser(prog="autograder.examiner")

@@ -42,6 +42,10 @@ def run(engine: Channel, control: Channel, domain_id: int) -> None:
             engine.send({"ran": number, "outputs": run_cell(shell, cell["source"])})
 
 
+def preload() -> None:
+    """Import what a run is going to need: `autograder.warm` calls it before it forks subjects."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the process; returns its exit code."""
     parser = argparse.ArgumentParser(prog="autograder.subject")

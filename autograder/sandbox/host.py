@@ -11,6 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
 
+from autograder.sandbox.place import Process
 from course.domains import lease_domain
 
 
@@ -24,7 +25,7 @@ class Host:
         self._lease = lease_domain()
         self.domain_id = self._lease.domain_id
 
-    def spawn(self, command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+    def spawn(self, command: Sequence[str], **options: Any) -> Process:
         """Start the examiner."""
         return subprocess.Popen(command, **options)
 
