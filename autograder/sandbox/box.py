@@ -10,18 +10,17 @@ from __future__ import annotations
 
 import os
 import secrets
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, Self
 
+from autograder.files import scratch_folder
 from autograder.sandbox import network, seccomp, view
-from autograder.sandbox.host import fate_of, write_files
+from autograder.sandbox.host import fate_of, tethered, write_files
 from autograder.sandbox.limits import MIB, Limits
 from autograder.sandbox.watch import Watch
 from course.interfaces import cache
@@ -72,7 +71,8 @@ class Box:
         options["env"] = {**(options.get("env") or os.environ), **DDS}
         # A flood of messages ends the examiner, not the machine.
         bound = ["prlimit", f"--data={EXAMINER_DATA}", "--"]
-        return network.start([*network.joining(self._namespaces), *bound, *command], **options)
+        joined = [*network.joining(self._namespaces), *tethered([*bound, *command])]
+        return network.start(joined, **options)
 
     def start_subject(
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
@@ -151,8 +151,7 @@ class _Given:
 
     def folder(self, files: Mapping[str, bytes]) -> Path:
         """Return a folder with ``files`` that every user can read."""
-        folder = Path(tempfile.mkdtemp(prefix="ros2-course-handed-in-"))
-        self._stack.callback(shutil.rmtree, folder, ignore_errors=True)
+        folder = self._stack.enter_context(scratch_folder())
         write_files(folder, files)
         for path in (folder, *folder.rglob("*")):
             path.chmod(0o755 if path.is_dir() else 0o644)
