@@ -12,6 +12,7 @@ import argparse
 import gc
 import json
 import os
+import select
 import signal
 import socket
 import sys
@@ -75,14 +76,22 @@ def _keep(task: Task, report: socket.socket, handed: list[int]) -> Task:
 
 
 def _stay(report: socket.socket, pid: int) -> NoReturn:
-    """Report a process and how it ended; its number is its own until whoever asked is done."""
+    """Report a process and how it ended; its number is its own until whoever asked is done.
+
+    When whoever asked is gone, by ``kill -9`` too, nobody wants the process any more: it is killed.
+    """
     handle = os.pidfd_open(pid)
     with suppress(OSError):
         socket.send_fds(report, [json.dumps({"pid": pid}).encode()], [handle])
     # The others are the process's own: that it has closed one must be seen at the other end.
-    os.closerange(0, report.fileno())
-    os.closerange(report.fileno() + 1, 2**31 - 1)
-    ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+    first, second = sorted((handle, report.fileno()))
+    for start, end in ((0, first), (first + 1, second), (second + 1, 2**31 - 1)):
+        os.closerange(start, end)
+    select.select([handle, report.fileno()], [], [])  # it has ended, or nobody is at the other end
+    ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT | os.WNOHANG)
+    if ended is None:
+        signal.pidfd_send_signal(handle, signal.SIGKILL)
+        ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
     assert ended is not None
     code = ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
     _say(report, {"code": code})
