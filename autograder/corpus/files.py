@@ -68,6 +68,8 @@ def _case(exam: str, file: Path, *, every: bool = False) -> Case:
     says = [line.partition(": ") for line in fields.get("says", [])]
     texts = _texts(exam, text[header.end() :])
     in_stub = "in" in fields
+    if in_stub and fields["in"] != ["the stub"]:
+        raise CorpusError(f"{file}: '# in:' can be 'the stub', not '{fields['in'][0]}'.")
     return Case(
         exam, file.stem, fields["title"][0], _fails(fields["fails"][0]),
         says={check: fragment for check, _, fragment in says},
