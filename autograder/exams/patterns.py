@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import secrets
 import time
+from collections.abc import Sequence
 from functools import partial
 
 from sensor_msgs.msg import BatteryState
@@ -280,7 +281,7 @@ def battery_broadcast(rig: RobotRig) -> None:
             )
 
 
-def _is_level(level: float, heard: list[float]) -> bool:
+def _is_level(level: float, heard: Sequence[float]) -> bool:
     return bool(heard) and abs(heard[-1] - level) < 1e-3
 
 
