@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from autograder import quiz_cli
+from autograder.interruption import Stopped
 from course.errors import CourseError
 
 EXIT_DIFFERENT = 1
@@ -34,30 +36,6 @@ Root = Annotated[
 ]
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Notebooks run at a time.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
-
-
-class Progress:
-    """One line a submission that is done: readable in a terminal and in a log file."""
-
-    def __init__(self, *, silent: bool) -> None:
-        """Say nothing if ``silent``."""
-        self._silent = silent
-        self._done = 0
-
-    def __call__(self, student: str, graded: Any | None) -> None:
-        """Report a submission that is done."""
-        if graded is None or self._silent:
-            return
-        self._done += 1
-        verdicts = [v for outcome in graded.outcomes.values() for v in outcome.verdicts.values()]
-        points, most = sum(v.score for v in verdicts), sum(v.max_score for v in verdicts)
-        seconds = sum(outcome.seconds for outcome in graded.outcomes.values())
-        problem = f"  {graded.problem}" if graded.problem else ""
-        out.print(
-            f"  {self._done:>3}  {student}: {points:g} of {most:g} automatic points, "
-            f"{seconds:.1f} s{problem}",
-            markup=False, highlight=False, soft_wrap=True,
-        )  # fmt: skip
 
 
 @app.command()
@@ -97,18 +75,30 @@ def grade(
             "--trust-submissions", help="Run them without a sandbox, with your own rights."
         ),
     ] = False,
+    scheduler: Annotated[
+        str,
+        typer.Option(
+            "--scheduler",
+            help="Run the notebooks on the workers of this Dask scheduler, as in tcp://host:8786.",
+        ),
+    ] = "",
     as_json: AsJson = False,
 ) -> None:
-    """Grade what is in ``submitted/`` into the gradebook, with feedback and grades.csv."""
-    from autograder import engine
-    from autograder.gradebook import CourseGradebook, write_csv
+    """Grade what is in ``submitted/`` into the gradebook, with feedback and grades.csv.
+
+    What has not changed since it was graded is left as it is. A run that was ended, however, goes
+    on where it was when it is started again.
+    """
+    from autograder import engine, grades_csv, progress
+    from autograder.gradebook import CourseGradebook
 
     where = _root(root)
     done = engine.grade(
-        where, assignment, jobs=jobs, fresh=fresh, trust=trust, progress=Progress(silent=as_json),
+        where, assignment, jobs=jobs, fresh=fresh, trust=trust, scheduler=scheduler,
+        progress=progress.for_console(out, err, machine=as_json),
     )  # fmt: skip
     grades = CourseGradebook(where).grades(assignment)
-    write_csv(grades, assignment, where / "grades.csv")
+    grades_csv.write(grades, assignment, where / "grades.csv")
     problems = {
         graded.student: graded.problem if graded.entered else f"NOT ENTERED: {graded.problem}"
         for graded in done
@@ -238,9 +228,10 @@ def demo(
 ) -> None:
     """Build, release, collect a bundled class, grade it on real DDS, and show the grades."""
     from autograder import demo as demo_run
+    from autograder import progress
 
-    progress = Progress(silent=as_json)
-    done = demo_run.run(folder, every=every, jobs=jobs, say=_say(as_json), progress=progress)
+    shown = progress.for_console(out, err, machine=as_json)
+    done = demo_run.run(folder, every=every, jobs=jobs, say=_say(as_json), progress=shown)
     if as_json:
         rows = [{**vars(row), "grade": vars(row.grade)} for row in done.rows]
         _print_json({"root": str(done.root), "rows": rows, "as_expected": done.as_expected})
@@ -309,6 +300,6 @@ def main() -> None:
             markup=False, highlight=False, soft_wrap=True,
         )  # fmt: skip
         sys.exit(1)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         err.print("autograder: stopped; what was graded so far is kept.")
-        sys.exit(130)
+        sys.exit(128 + (stop.signum if isinstance(stop, Stopped) else signal.SIGINT))

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import nbformat
 
-from autograder import corpus, engine, points, submission
+from autograder import corpus, engine, grades_csv, points, submission
 from autograder.build import build
 from autograder.corpus import Case
 from autograder.corpus.command import untrusting
 from autograder.corpus.trials import notebooks_of
-from autograder.engine import Graded, Progress
-from autograder.gradebook import CourseGradebook, Grade, write_csv
+from autograder.engine import Graded
+from autograder.gradebook import CourseGradebook, Grade
+from autograder.progress import Collecting, Progress
 from autograder.release import release
 from course.content import corpus_root
 from course.errors import CourseError
@@ -66,7 +67,7 @@ def run(
     every: bool = False,
     jobs: int = 2,
     say: Callable[[str], None] = lambda _line: None,
-    progress: Progress = lambda _student, _graded: None,
+    progress: Progress = engine.QUIET,
 ) -> Demo:
     """Build, release, collect the bundled class, grade it, and write feedback and grades.
 
@@ -92,12 +93,15 @@ def run(
     collect(root, class_, cases)
     say(f"Collected {len(class_)} submissions; grading them on real DDS")
     trust = untrusting(say)
-    graded = engine.grade(root, ASSIGNMENT, jobs=jobs, trust=trust, progress=progress)
+    graded: dict[str, Graded] = {}
+    engine.grade(
+        root, ASSIGNMENT, jobs=jobs, trust=trust, progress=Collecting(graded, then=progress)
+    )
     grades = CourseGradebook(root).grades(ASSIGNMENT)
     csv = root / "grades.csv"
-    write_csv(grades, ASSIGNMENT, csv)
+    grades_csv.write(grades, ASSIGNMENT, csv)
     by_student = {grade.student: grade for grade in grades}
-    rows = [_row(class_[g.student], g, by_student[g.student], cases) for g in graded]
+    rows = [_row(class_[s], graded[s], by_student[s], cases) for s in sorted(graded)]
     return Demo(root, csv, tuple(rows))
 
 

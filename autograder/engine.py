@@ -1,54 +1,68 @@
 """Grade a whole assignment: run submissions side by side, enter scores one by one.
 
-Running is parallel, because a subject mostly waits; the gradebook has one writer, this process.
+Running is parallel, because a subject mostly waits; the gradebook has one writer, this process. It
+may be killed at any moment: outcomes and grades are kept one by one, each as a whole or not at all,
+and the next run takes up what is missing.
 """
 
 from __future__ import annotations
 
-import copy
-import shutil
-import threading
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import nbformat
-from nbformat import NotebookNode
-from nbgrader.utils import parse_utc
+from filelock import FileLock, Timeout
 
+from autograder import files, ledger, points, roster, sandbox
 from autograder import nbgrader_bridge as bridge
-from autograder import quiz_marks, runner, sandbox, submission
+from autograder.desk import Desk, Piece, Work
 from autograder.gradebook import CourseGradebook, GradebookError
+from autograder.interruption import Interruption
+from autograder.jobs import Job, Result
+from autograder.ledger import Entry, Ledger, Standing
+from autograder.progress import Progress
 from autograder.runner import Outcome
-from autograder.store import OutcomeStore, StoreError
-from autograder.submission import SubmissionError
-from autograder.verdict import Status
+from autograder.store import OutcomeStore
+from autograder.workers import Done, LocalWorkers, Workers
 from course.errors import CourseError
 
-GLOB = "*?[]"
 STAGED = f"{bridge.WORK_FOLDER}/staged"
+LOCK = f"{bridge.WORK_FOLDER}/engine.lock"
 
 
 class AssignmentError(CourseError):
     """An assignment that does not exist or is not ready; the message names what there is."""
 
 
+class BusyError(CourseError):
+    """Another engine is grading in the same course."""
+
+
 @dataclass(frozen=True)
 class Graded:
-    """One student's submission: outcomes by notebook, and what a person should know about it.
+    """One student's submission, and what a person should know about it.
 
-    ``entered`` is False if the gradebook did not take the scores.
+    Attributes:
+        student: whose it is.
+        outcomes: by notebook; only what `Progress.done` is told has them, because a class's would
+            fill the memory.
+        points: automatic points, of ``max_points``.
+        seconds: wall time that its notebooks ran.
+        problem: what is wrong with it, in sentences.
+        entered: False if the gradebook did not take the scores.
     """
 
     student: str
     outcomes: dict[str, Outcome]
+    points: float = 0.0
+    max_points: float = 0.0
+    seconds: float = 0.0
     problem: str = ""
     entered: bool = True
 
 
-Progress = Callable[[str, Graded | None], None]
-"""Told (student, None) when a submission is taken up and (student, Graded) when it is done."""
+QUIET = Progress()
 
 
 def grade(
@@ -59,9 +73,12 @@ def grade(
     fresh: bool = False,
     trust: bool = False,
     feedback: bool = True,
-    progress: Progress = lambda _student, _graded: None,
+    scheduler: str = "",
+    progress: Progress = QUIET,
 ) -> list[Graded]:
     """Grade every submission of an assignment into the gradebook of the course at ``root``.
+
+    What has not changed since it was graded is left as it is.
 
     Args:
         root: the nbgrader course root.
@@ -70,164 +87,229 @@ def grade(
         fresh: run also what was run before and has not changed.
         trust: run submissions outside of a sandbox, with the rights of this process.
         feedback: write HTML feedback, too.
-        progress: is told about each submission.
+        scheduler: address of a Dask scheduler whose workers run the notebooks, in place of this
+            machine.
+        progress: is told how it goes.
 
     Raises:
         AssignmentError: no such assignment, not released, or nothing submitted.
+        BusyError: another engine is at work in this course.
+        ClusterError: the scheduler cannot be used.
         GradebookError: the gradebook itself cannot be used.
+        GradebookUnusable: it cannot be used any more: a full disk, or a lock, say.
         SandboxError: they are not trusted, and there is no working sandbox here.
+        StoreError: there is no room for what came out.
+        Stopped: a signal ended the run; what was graded is kept.
     """
-    if not trust:
+    if not trust and not scheduler:
         sandbox.require()
     gradebook = CourseGradebook(root, staged=STAGED)
     names = _notebooks(gradebook, assignment)
-    students = _students(root, assignment)
+    students, wrong = _students(gradebook, assignment)
+    refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
     store = OutcomeStore(root / bridge.WORK_FOLDER / "outcomes", trust=trust, hidden=[root])
-    class_ = _Class(gradebook, assignment, names, store, fresh)
-    graded = [_unusable(student) for student in students if set(student) & set(GLOB)]
-    students = [student for student in students if not set(student) & set(GLOB)]
-    with ThreadPoolExecutor(max_workers=jobs) as pool:
-        # Notebook by notebook, so that one student's run side by side, too.
-        futures = {
-            pool.submit(class_.run, student, name, progress): (student, name)
-            for student in students
-            for name in names
-        }
-        try:
-            for future in as_completed(futures):
-                if whole := class_.collect(*futures[future], future.result()):
-                    graded.append(class_.enter(whole, feedback))
-                    progress(graded[-1].student, graded[-1])
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with ExitStack() as stack:
+        stack.enter_context(_alone(root))
+        stack.callback(progress.end)
+        files.sweep()
+        files.remove_partial(root / bridge.WORK_FOLDER)
+        workers = stack.enter_context(_workers(jobs, store, trust, scheduler, root, progress))
+        interruption = stack.enter_context(Interruption(workers.wake))
+        desk = Desk(gradebook, assignment, names, trust=trust)
+        run = _Run(desk, store, workers, interruption, progress, feedback=feedback, fresh=fresh)
+        graded = [*refused, *run.grade(students, refused)]
     return sorted(graded, key=lambda item: item.student)
 
 
-class _Class:
-    """The submissions of one assignment on their way into the gradebook."""
+class _Run:
+    """One run of the engine over the submissions of one assignment."""
 
     def __init__(
         self,
-        gradebook: CourseGradebook,
-        assignment: str,
-        notebooks: list[str],
+        desk: Desk,
         store: OutcomeStore,
+        workers: Workers,
+        interruption: Interruption,
+        progress: Progress,
+        *,
+        feedback: bool,
         fresh: bool,
     ) -> None:
-        self._gradebook = gradebook
-        self._assignment = assignment
-        self._root = gradebook.root
+        self._desk = desk
         self._store = store
-        self._fresh = fresh
-        self._originals = {
-            name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
-        }
-        self._begun: dict[str, list[str]] = {}
-        self._outcomes: dict[str, dict[str, Outcome]] = {}
-        self._lock = threading.Lock()
+        self._workers = workers
+        self._interruption = interruption
+        self._progress = progress
+        self._feedback, self._fresh = feedback, fresh
+        self._ledger = Ledger(desk.work_folder, desk.assignment)
+        self._course = ledger.of_course(
+            desk.root, desk.folders, workers.modes[0], _exams(desk.assignment)
+        )
+        self._running: dict[str, list[Piece]] = {}
+        self._graded: list[Graded] = []
 
-    def run(self, student: str, name: str, progress: Progress) -> Outcome:
-        """Stage and run one of a student's notebooks. Runs in a worker thread."""
-        submitted = self._submitted(student)
-        with self._lock:
-            if student not in self._begun:
-                progress(student, None)
-                self._begun[student] = self._begin(student)
-        notebook, outcome = self._one(submitted / f"{name}.ipynb")
-        outcome = quiz_marks.with_quizzes(outcome, notebook, submitted, student)
-        nbformat.write(notebook, self._staged(student) / f"{name}.ipynb")  # type: ignore[no-untyped-call]
-        return outcome
+    def grade(self, students: list[str], refused: list[Graded]) -> list[Graded]:
+        """Grade what needs it; return all that was looked at."""
+        standings = self._desk.gradebook.standings(self._desk.assignment)
+        changed: list[Work] = []
+        for student in students:
+            self._interruption.check()
+            work = self._desk.work(student, self._course)
+            if (left := self._unchanged(work, standings.get(student))) is not None:
+                self._graded.append(left)
+            else:
+                changed.append(work)
+        notebooks = len(changed) * len(self._desk.notebooks)
+        self._progress.begin(len(changed) + len(refused), notebooks, len(self._graded))
+        for graded in refused:
+            self._progress.done(graded)
+        self._run(self._pieces(changed))
+        return self._graded
 
-    def collect(self, student: str, name: str, outcome: Outcome) -> Graded | None:
-        """Keep an outcome; return all of a student's once the last one is there."""
-        outcomes = self._outcomes.setdefault(student, {})
-        outcomes[name] = outcome
-        if len(outcomes) < len(self._originals):
+    def _unchanged(self, work: Work, standing: Standing | None) -> Graded | None:
+        """Return what is known of a submission that needs nothing, bar new feedback, or None."""
+        entry = None if self._fresh else self._ledger.get(work.student)
+        if entry is None or standing is None or entry.made_of != work.made_of:
             return None
-        problems = list(self._begun[student])
-        for key in self._originals:
-            problems += outcomes[key].notes if outcomes[key].unreadable else []
-        ordered = {key: outcomes[key] for key in self._originals}
-        return Graded(student, ordered, " ".join(problems))
+        if entry.standing.automatic != standing.automatic or not self._desk.is_graded(work.student):
+            return None
+        if self._feedback and not (
+            entry.feedback and entry.standing == standing and self._desk.has_feedback(work.student)
+        ):
+            # A person has graded or commented since: that belongs into the feedback.
+            try:
+                self._desk.gradebook.generate_feedback(self._desk.assignment, work.student)
+            except GradebookError:
+                return None
+            self._ledger.put(work.student, replace(entry, standing=standing, feedback=True))
+        return Graded(
+            work.student, {}, entry.points, entry.max_points, entry.seconds, entry.problem
+        )
 
-    def _begin(self, student: str) -> list[str]:
-        """Make room for a student's notebooks; return what is wrong with the submission."""
-        staged = self._staged(student)
-        shutil.rmtree(staged, ignore_errors=True)
-        staged.mkdir(parents=True)
-        return _stage_timestamp(self._submitted(student), staged)
+    def _pieces(self, changed: list[Work]) -> Iterator[Piece]:
+        for work in changed:
+            yield from self._desk.pieces(work)
 
-    def _submitted(self, student: str) -> Path:
-        return self._root / "submitted" / student / self._assignment
+    def _run(self, pieces: Iterator[Piece]) -> None:
+        more = True
+        while more or self._running:
+            while more and len(self._running) < self._workers.room():
+                self._interruption.check()
+                piece = next(pieces, None)
+                if piece is None:
+                    more = False
+                else:
+                    self._begin(piece)
+            if self._running:
+                self._interruption.check()
+                for done in self._workers.wait():
+                    self._finish(done)
+                    self._interruption.check()
 
-    def _staged(self, student: str) -> Path:
-        return self._root / STAGED / student / self._assignment
+    def _begin(self, piece: Piece) -> None:
+        """Have a notebook run, unless its outcome is known or on its way."""
+        if piece.job is None:
+            assert piece.outcome is not None
+            self._take(piece, piece.outcome, waited=False)
+            return
+        keys = [piece.job.key(mode) for mode in self._workers.modes]
+        if keys[0] in self._running:
+            self._running[keys[0]].append(piece)
+            return
+        found = (None if self._fresh else self._store.named(key) for key in keys)
+        kept = next((outcome for outcome in found if outcome is not None), None)
+        if kept is not None:
+            self._take(piece, kept, waited=False)
+        else:
+            self._running[keys[0]] = [piece]
+            self._workers.submit(keys[0], piece.job)
 
-    def _one(self, path: Path) -> tuple[NotebookNode, Outcome]:
-        source, released = self._originals[path.stem]
+    def _finish(self, done: Done) -> None:
+        pieces = self._running.pop(done.key)
+        if isinstance(done.error, CourseError):
+            raise done.error  # no room, no sandbox: the next one would fare no better
+        for piece in pieces:
+            if done.result is not None:
+                outcome = done.result.outcome
+            else:
+                reason = f"{type(done.error).__name__}: {done.error}"
+                outcome = self._desk.refused(piece, reason[:500], "grader_error")
+            self._take(piece, outcome, waited=True)
+
+    def _take(self, piece: Piece, outcome: Outcome, *, waited: bool) -> None:
+        """Note a notebook's outcome; enter the student with the last of them."""
+        self._progress.ran(waited)
+        work = piece.work
+        work.outcomes[piece.notebook] = replace(
+            outcome, verdicts={**outcome.verdicts, **piece.marks}
+        )
+        if len(work.outcomes) == len(self._desk.notebooks):
+            graded = self._enter(work)
+            self._progress.done(graded)
+            self._graded.append(replace(graded, outcomes={}))
+
+    def _enter(self, work: Work) -> Graded:
+        graded = _summary(work, self._desk.notebooks)
+        self._ledger.remove(work.student)
         try:
-            notebook, notes = submission.restore(submission.read(path), source, released)
-            program = submission.program(notebook)
-            files = submission.extras(path.parent)
-        except SubmissionError as error:
-            notebook, outcome = self._refused(path.stem, str(error), "not_checked")
-            # Whoever hands in some of the notebooks has left the others out: nothing to look into.
-            left_out = not path.exists() and any(path.parent.glob("*.ipynb"))
-            return notebook, replace(outcome, unreadable=not left_out)
-        except Exception as error:  # noqa: BLE001 - one student's data must not end the class
-            return self._refused(path.stem, f"{type(error).__name__}: {error}", "grader_error")
-        notebook.metadata[bridge.NOTES_KEY] = notes
-        try:
-            return notebook, self._store.outcome(program, files, fresh=self._fresh)
-        except StoreError:
-            raise
-        except Exception as error:  # noqa: BLE001 - the same: a person looks at this one
-            return self._refused(path.stem, f"{type(error).__name__}: {error}", "grader_error")
-
-    def _refused(self, name: str, reason: str, status: Status) -> tuple[NotebookNode, Outcome]:
-        """Return the released notebook in place of one that cannot be run, and why."""
-        source, released = self._originals[name]
-        blank: NotebookNode = copy.deepcopy(released)
-        notebook, _ = submission.restore(blank, source, released)
-        return notebook, runner.refuse(submission.program(notebook), reason, status)
-
-    def enter(self, graded: Graded, feedback: bool) -> Graded:
-        """Enter one student's outcomes into the gradebook. Runs in the one writer."""
-        for name, outcome in graded.outcomes.items():
-            bridge.prepared[self._assignment, graded.student, name] = outcome
-        try:
-            self._gradebook.autograde(self._assignment, graded.student)
-            if feedback:
-                self._gradebook.generate_feedback(self._assignment, graded.student)
+            self._desk.enter(work, feedback=self._feedback)
         except GradebookError as error:
-            return Graded(graded.student, graded.outcomes, str(error), entered=False)
-        finally:
-            for name in graded.outcomes:
-                bridge.prepared.pop((self._assignment, graded.student, name), None)
+            return replace(graded, problem=f"{graded.problem} {error}".strip(), entered=False)
+        if not any(outcome.spoilt for outcome in work.outcomes.values()):
+            standing = self._desk.gradebook.standings(self._desk.assignment, work.student)
+            self._ledger.put(
+                work.student,
+                Entry(
+                    work.made_of, standing[work.student], graded.points, graded.max_points,
+                    graded.seconds, graded.problem, self._feedback,
+                ),
+            )  # fmt: skip
         return graded
 
 
-def _unusable(student: str) -> Graded:
-    problem = (
-        f"nbgrader takes one of the characters {' '.join(GLOB)} in the folder name '{student}' for "
-        "a pattern: rename the folder."
-    )
-    return Graded(student, {}, problem, entered=False)
+def _summary(work: Work, notebooks: list[str]) -> Graded:
+    outcomes = {name: work.outcomes[name] for name in notebooks}
+    verdicts = [v for outcome in outcomes.values() for v in outcome.verdicts.values()]
+    problems = list(work.problems)
+    for outcome in outcomes.values():
+        problems += outcome.notes if outcome.unreadable else []
+    return Graded(
+        work.student, outcomes, sum(v.score for v in verdicts), sum(v.max_score for v in verdicts),
+        sum(outcome.seconds for outcome in outcomes.values()), " ".join(problems),
+    )  # fmt: skip
 
 
-def _stage_timestamp(submitted: Path, staged: Path) -> list[str]:
-    """Copy the time of submission if nbgrader can read it; return what is wrong with it."""
-    file = submitted / "timestamp.txt"
-    if not file.is_file():
-        return []
+def _workers(
+    count: int, store: OutcomeStore, trust: bool, scheduler: str, root: Path, progress: Progress
+) -> Workers:
+    def keep(job: Job, result: Result) -> None:
+        store.put(job.program, job.files, result.outcome, result.mode)
+
+    if not scheduler:
+        return LocalWorkers(count, keep, trust=trust, hidden=[root])
+    from autograder.cluster import Cluster
+
+    return Cluster(scheduler, keep, trust=trust, hidden=[root], say=progress.say)
+
+
+@contextmanager
+def _alone(root: Path) -> Iterator[None]:
+    """Hold the course for this engine; the kernel lets it go when the process ends, however."""
+    path = root / LOCK
+    path.parent.mkdir(parents=True, exist_ok=True)
     try:
-        text = file.read_text(encoding="utf-8").strip()
-        parse_utc(text)
-    except (ValueError, OverflowError, UnicodeError, OSError):
-        return ["timestamp.txt holds no date, so the time of submission is unknown."]
-    (staged / "timestamp.txt").write_text(text, encoding="utf-8")
-    return []
+        with FileLock(path, timeout=0):
+            yield
+    except Timeout:
+        raise BusyError(
+            f"Another `autograder grade` is at work in {root}: wait until it is done, or end it, "
+            "and run the same command again."
+        ) from None
+
+
+def _exams(assignment: str) -> tuple[str, ...]:
+    table = points.table()
+    return tuple(sorted(exam for exam, entry in table.items() if entry.assignment == assignment))
 
 
 def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
@@ -250,15 +332,12 @@ def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.ipynb"))
 
 
-def _students(root: Path, assignment: str) -> list[str]:
-    """Return the students who have a folder for the assignment."""
-    submitted = root / "submitted"
-    students = sorted(
-        path.parent.name for path in submitted.glob(f"*/{assignment}") if path.is_dir()
-    )
-    if not students:
+def _students(gradebook: CourseGradebook, assignment: str) -> tuple[list[str], dict[str, str]]:
+    """Return who has submitted, and what is wrong with the folders that cannot be graded."""
+    students, wrong = roster.submissions(gradebook.root, assignment, gradebook.roster())
+    if not students and not wrong:
         raise AssignmentError(
             f"Nobody has submitted '{assignment}' yet: nbgrader expects the files in "
-            f"{submitted}/<student>/{assignment}/."
+            f"{gradebook.root / 'submitted'}/<student>/{assignment}/."
         )
-    return students
+    return students, wrong

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import csv
+import hashlib
+import json
 import logging
 import re
+import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,19 +17,23 @@ from typing import Any
 from nbgrader.api import Gradebook, MissingEntry
 from nbgrader.apps import NbGraderAPI
 from nbgrader.coursedir import CourseDirectory
+from sqlalchemy.exc import SQLAlchemyError
 from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
+from autograder import database, roster
+from autograder.database import GradebookUnusable
+from autograder.ledger import Standing
 from autograder.nbgrader_bridge import RestoreCells
+from autograder.roster import Roster
 from course.errors import CourseError
+
+LOCK_PATIENCE = 30.0
+"""Seconds that another program may hold the gradebook: SQLite itself waits 5 s at a time."""
 
 
 class GradebookError(CourseError):
     """nbgrader could not do what was asked; the message carries its own last words."""
-
-
-class DiskFullError(CourseError):
-    """There is no room for the gradebook or what nbgrader writes: the whole run has to stop."""
 
 
 @dataclass(frozen=True)
@@ -70,11 +76,16 @@ class CourseGradebook:
         self._call(self._api.generate_assignment, assignment, force=True, create=True)
 
     def autograde(self, assignment: str, student: str) -> None:
-        """Enter one student's scores."""
+        """Enter one student's scores.
+
+        Raises:
+            GradebookError: nbgrader cannot enter this student.
+            GradebookUnusable: it could not enter anybody: a full disk, or a lock, say.
+        """
         self._call(self._api.autograde, assignment, student, force=True, create=True)
 
     def generate_feedback(self, assignment: str, student: str) -> None:
-        """Write one student's feedback as HTML."""
+        """Write one student's feedback as HTML; raises as `autograde` does."""
         self._call(self._api.generate_feedback, assignment, student, force=True)
 
     def assignments(self) -> list[str]:
@@ -88,28 +99,53 @@ class CourseGradebook:
             submissions = gradebook.assignment_submissions(assignment)
             return sorted((_grade(s) for s in submissions), key=lambda grade: grade.student)
 
+    def standings(self, assignment: str, student: str = "") -> dict[str, Standing]:
+        """Return how the students (or one) stand in the gradebook, as digests to compare."""
+        with self._open() as gradebook:
+            rows = database.standing_rows(gradebook.db, assignment, student)
+        return {name: Standing(*map(_digest, both)) for name, both in rows.items()}
+
+    def roster(self) -> Roster:
+        """Return which students the gradebook knows, and whether there may be others."""
+        with self._open() as gradebook:
+            people = {
+                s.id: bool(s.first_name or s.last_name or s.email) for s in gradebook.students
+            }
+        create = self.config.Autograde.get("create_student", True)
+        return roster.of_people(people, create if isinstance(create, bool) else True)
+
     def _call(self, method: Any, *arguments: Any, **options: Any) -> None:
-        with _quiet():
-            result = method(*arguments, **options)
-        if not result["success"]:
+        deadline = time.monotonic() + LOCK_PATIENCE
+        while True:
+            with _quiet():
+                result = method(*arguments, **options)
+            if result["success"]:
+                return
             said = f"{result.get('log', '')}\n{result.get('error') or ''}"
-            if any(full in said for full in ("disk is full", "No space left on device")):
-                raise DiskFullError(
-                    f"The disk of {self.root} is full: make room there and run the same command "
-                    "again; what was graded so far is kept."
-                )
-            raise GradebookError(
-                f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: {_why(said)}"
-            )
+            # Each try waits for the lock by itself, so this loop does not spin.
+            if not database.is_locked(said) or time.monotonic() > deadline:
+                break
+        if unusable := database.unusable(said, self.root):
+            raise unusable
+        raise GradebookError(
+            f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: {_why(said)}"
+        )
 
     @contextmanager
     def _open(self) -> Iterator[Gradebook]:
         try:
+            database.require_this_schema(self.coursedir.db_url, self.root)
             with _quiet(), Gradebook(self.coursedir.db_url, self.coursedir.course_id) as gradebook:
                 yield gradebook
         except MissingEntry as error:
             raise GradebookError(
                 f"The gradebook in {self.root} has no such entry: {error}"
+            ) from None
+        except SQLAlchemyError as error:
+            said = str(getattr(error, "orig", None) or error)
+            raise database.unusable(said, self.root) or GradebookUnusable(
+                f"The gradebook of {self.root} cannot be used ({said.splitlines()[0][:200]}): put "
+                "a copy back that was sound; submissions and outcomes are not touched."
             ) from None
 
 
@@ -118,6 +154,11 @@ def _why(said: str) -> str:
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     causes = [line for line in lines if re.match(r"[\w.]+(Error|Exception|Entry)\b", line)]
     return (causes or lines or ["no reason given"])[-1]
+
+
+def _digest(rows: list[list[Any]]) -> str:
+    ordered = sorted(json.dumps(row, default=str) for row in rows)
+    return hashlib.sha256("\n".join(ordered).encode()).hexdigest()
 
 
 def _grade(submission: Any) -> Grade:
@@ -136,25 +177,6 @@ def _grade(submission: Any) -> Grade:
         bool(submission.needs_manual_grade),
         cells,
     )
-
-
-def write_csv(grades: list[Grade], assignment: str, path: Path) -> None:
-    """Write one line a student; a cell that waits for a manual grade is empty."""
-    columns = sorted({(n, c) for g in grades for n, cells in g.cells.items() for c in cells})
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        head = ["assignment", "student_id", "score", "max_score", "needs_manual_grade"]
-        writer.writerow(head + [f"{notebook}:{cell}" for notebook, cell in columns])
-        for grade in grades:
-            points = [grade.cells.get(notebook, {}).get(cell) for notebook, cell in columns]
-            row = [
-                assignment,
-                grade.student,
-                grade.score,
-                grade.max_score,
-                grade.needs_manual_grade,
-            ]
-            writer.writerow([*row, *("" if p is None else p for p in points)])
 
 
 def _config(root: Path) -> Config:

@@ -2,41 +2,19 @@
 
 from __future__ import annotations
 
-import hashlib
-import os
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
-from functools import cache
-from importlib import resources
-from importlib.resources.abc import Traversable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from autograder import runner
+from autograder import jobs, sandbox
+from autograder.files import write_whole
+from autograder.jobs import Job
 from autograder.runner import Outcome
-from autograder.sandbox import abilities
-from autograder.submission import Program, digest
+from autograder.submission import Program
 from course.errors import CourseError
 
 
 class StoreError(CourseError):
     """An outcome could not be kept (a full disk, say): the whole run has to stop."""
-
-
-@cache
-def exam_salt() -> str:
-    """Return a digest of everything that decides a verdict beside the submission itself."""
-    state = hashlib.sha256()
-    for file in sorted(_sources(resources.files("autograder")), key=lambda f: f.name):
-        state.update(file.name.encode() + b"\0" + file.read_bytes())
-    return state.hexdigest()
-
-
-def _sources(folder: Traversable) -> Iterator[Traversable]:
-    for entry in folder.iterdir():
-        if entry.is_dir():
-            yield from _sources(entry)
-        elif entry.name.endswith((".py", ".toml", ".xml")):
-            yield entry
 
 
 class OutcomeStore:
@@ -62,18 +40,27 @@ class OutcomeStore:
         kept = None if fresh else self.get(program, files)
         if kept is not None:
             return kept
-        outcome = runner.run(program, files, trust=self._trust, hidden=self._hidden)
-        self.put(program, files, outcome)
-        return outcome
+        result = jobs.run(Job(program, files, self._trust), self._hidden)
+        self.put(program, files, result.outcome)
+        return result.outcome
 
-    def get(self, program: Program, files: Mapping[str, bytes]) -> Outcome | None:
-        """Return the outcome of an equal program under equal exams, if there is a sound one."""
+    def get(self, program: Program, files: Mapping[str, bytes], mode: str = "") -> Outcome | None:
+        """Return the outcome of an equal program under equal exams, if there is a sound one.
+
+        ``mode`` is the one in which it was run; that of this machine if left out.
+        """
+        return self.named(self.key(program, files, mode))
+
+    def named(self, key: str) -> Outcome | None:
+        """Return the outcome whose key is ``key``, if there is a sound one."""
         try:
-            return Outcome.from_json(self._path(program, files).read_text(encoding="utf-8"))
-        except (OSError, ValueError, KeyError, TypeError, CourseError):
+            return Outcome.from_json(self._path(key).read_text(encoding="utf-8"))
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, CourseError):
             return None
 
-    def put(self, program: Program, files: Mapping[str, bytes], outcome: Outcome) -> None:
+    def put(
+        self, program: Program, files: Mapping[str, bytes], outcome: Outcome, mode: str = ""
+    ) -> None:
         """Keep an outcome; one that a grader error spoilt is not kept.
 
         Raises:
@@ -81,12 +68,9 @@ class OutcomeStore:
         """
         if outcome.spoilt:
             return
-        path = self._path(program, files)
+        path = self._path(self.key(program, files, mode))
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
-                file.write(outcome.to_json())
-            os.replace(file.name, path)  # noqa: PTH105 - atomic: a reader sees all of it or none
+            write_whole(path, outcome.to_json())
         except OSError as error:
             raise StoreError(
                 f"The outcome of a submission could not be written to {path.parent} "
@@ -94,7 +78,11 @@ class OutcomeStore:
                 "graded so far is kept."
             ) from error
 
-    def _path(self, program: Program, files: Mapping[str, bytes]) -> Path:
+    def key(self, program: Program, files: Mapping[str, bytes], mode: str = "") -> str:
+        """Return the name under which a program's outcome is kept."""
         # What a sandbox or its lossy network finds is not found without.
-        salt = f"{exam_salt()} {abilities().mode(trust=self._trust)}"
-        return self._folder / f"{digest(program, files, salt)}.json"
+        mode = mode or sandbox.abilities().mode(trust=self._trust)
+        return Job(program, files, self._trust).key(mode)
+
+    def _path(self, key: str) -> Path:
+        return self._folder / f"{key}.json"

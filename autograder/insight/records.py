@@ -6,16 +6,14 @@ whichever door they come in: ``autograder grade``, ``nbgrader autograde`` or the
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from autograder.files import write_whole
 from autograder.verdict import Verdict
 from course.errors import CourseError
 
@@ -66,19 +64,7 @@ def keep(work: Path, assignment: str, student: str, notebook: str, outcome: Outc
         "seconds": outcome.seconds,
         "unreadable": outcome.unreadable,
     }
-    target = path(work, assignment, student, notebook)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(
-        "w", dir=target.parent, encoding="utf-8", errors="replace", delete=False
-    ) as file:
-        try:
-            json.dump(data, file, ensure_ascii=False)
-            file.flush()
-            os.replace(file.name, target)  # noqa: PTH105 - atomic: a reader sees all of it or none
-        except BaseException:
-            with contextlib.suppress(OSError):
-                Path(file.name).unlink()
-            raise
+    write_whole(path(work, assignment, student, notebook), json.dumps(data, ensure_ascii=False))
 
 
 def load(work: Path, assignment: str, student: str, notebook: str) -> Record | None:

@@ -10,17 +10,16 @@ from __future__ import annotations
 
 import os
 import secrets
-import shutil
 import subprocess
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
+from autograder.files import scratch_folder
 from autograder.sandbox import environment, network, seccomp, view, warmth
 from autograder.sandbox.boxed import BoxedSubject, WarmSubject
-from autograder.sandbox.host import write_files
+from autograder.sandbox.host import tethered, write_files
 from autograder.sandbox.limits import MIB, Limits
 from autograder.sandbox.place import Process
 
@@ -70,9 +69,8 @@ class Box:
                 arguments, options["pass_fds"], variables, self._namespaces, EXAMINER_DATA
             )
         bound = ["prlimit", f"--data={EXAMINER_DATA}", "--"]
-        return network.start(
-            [*network.joining(self._namespaces), *bound, *command], env=variables, **options
-        )
+        joined = [*network.joining(self._namespaces), *tethered([*bound, *command])]
+        return network.start(joined, env=variables, **options)
 
     def start_subject(
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
@@ -186,8 +184,7 @@ class _Given:
 
     def folder(self, files: Mapping[str, bytes]) -> Path:
         """Return a folder with ``files`` that every user can read."""
-        folder = Path(tempfile.mkdtemp(prefix="ros2-course-handed-in-"))
-        self._stack.callback(shutil.rmtree, folder, ignore_errors=True)
+        folder = self._stack.enter_context(scratch_folder())
         write_files(folder, files)
         for path in (folder, *folder.rglob("*")):
             path.chmod(0o755 if path.is_dir() else 0o644)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
-import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any, Self
 
+from autograder.files import scratch_folder
 from autograder.sandbox.place import Process
 from course.domains import lease_domain
 
@@ -27,7 +28,7 @@ class Host:
 
     def spawn(self, command: Sequence[str], **options: Any) -> Process:
         """Start the examiner."""
-        return subprocess.Popen(command, **options)
+        return subprocess.Popen(tethered(command), **options)
 
     def start_subject(
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
@@ -51,11 +52,8 @@ class HostSubject:
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
     ) -> None:
         """Start it."""
-        # What a subject leaves there that cannot be removed is no reason to stop.
-        self._home = tempfile.TemporaryDirectory(
-            prefix="ros2-course-subject-", ignore_cleanup_errors=True
-        )
-        home = self._home.name
+        self._held = ExitStack()
+        home = str(self._held.enter_context(scratch_folder()))
         write_files(Path(home), files)
         cache = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
         env = {
@@ -63,7 +61,7 @@ class HostSubject:
             "ROS_LOG_DIR": f"{home}/log", "MPLBACKEND": "Agg",
         }  # fmt: skip
         self._process = subprocess.Popen(
-            command, cwd=home, env=env, start_new_session=True, pass_fds=fds,
+            tethered(command), cwd=home, env=env, start_new_session=True, pass_fds=fds,
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         self.pid = self._process.pid
@@ -94,7 +92,16 @@ class HostSubject:
         self._process.wait()
         for segment in segments:
             segment.unlink(missing_ok=True)
-        self._home.cleanup()
+        self._held.close()
+
+
+def tethered(command: Sequence[str]) -> list[str]:
+    """Return a command that is killed when whoever starts it dies, by ``kill -9`` too.
+
+    It dies with the thread that starts it: one that sees the whole run through.
+    """
+    setpriv = shutil.which("setpriv")
+    return [*([setpriv, "--pdeathsig", "KILL", "--"] if setpriv else []), *command]
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> None:

@@ -88,9 +88,7 @@ class Zygote:
         with theirs:
             try:
                 with self._sending:
-                    socket.send_fds(
-                        self._tasks, [task.to_json()], [theirs.fileno(), *descriptors]
-                    )
+                    socket.send_fds(self._tasks, [task.to_json()], [theirs.fileno(), *descriptors])
             except OSError as error:
                 ours.close()
                 reason = error.strerror

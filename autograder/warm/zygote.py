@@ -12,6 +12,7 @@ import argparse
 import gc
 import json
 import os
+import select
 import signal
 import socket
 import sys
@@ -77,15 +78,19 @@ def _keep(task: Task, report: socket.socket, handed: list[int]) -> Task:
 def _stay(report: socket.socket, pid: int, holder: int | None) -> NoReturn:
     """Report a process and how it ended; its number is its own until whoever asked is done.
 
+    When whoever asked is gone, by ``kill -9`` too, nobody wants the process any more: it is killed.
     With it ends the process of which ``holder`` is the pidfd, and so all that it has left behind.
     """
     handle = os.pidfd_open(pid)
     with suppress(OSError):
         socket.send_fds(report, [json.dumps({"pid": pid}).encode()], [handle])
     # The others are the process's own: that it has closed one must be seen at the other end.
-    kept = {descriptor for descriptor in (report.fileno(), holder) if descriptor is not None}
-    close_others(kept)
-    ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+    close_others({report.fileno(), handle, *([] if holder is None else [holder])})
+    select.select([handle, report.fileno()], [], [])  # it has ended, or nobody is at the other end
+    ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT | os.WNOHANG)
+    if ended is None:
+        signal.pidfd_send_signal(handle, signal.SIGKILL)
+        ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
     assert ended is not None
     code = ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
     if holder is not None:

@@ -16,7 +16,9 @@ import pytest
 
 from autograder import engine, quiz_marks, submission
 from autograder.build import build
+from autograder.engine import Graded
 from autograder.gradebook import CourseGradebook, Grade
+from autograder.progress import Collecting
 from autograder.release import release
 from autograder.verdict import Verdict
 from course.content import content_root, copy_authoring
@@ -108,7 +110,8 @@ def test_the_best_attempt_becomes_points(root: Path, hand_in: HandIn) -> None:
     notebook.cells.insert(0, nbformat.v4.new_code_cell("import os; os._exit(3)"))
     nbformat.write(notebook, crashed / f"{NOTEBOOK}.ipynb")
 
-    graded = {one.student: one for one in engine.grade(root, ASSIGNMENT)}
+    graded: dict[str, Graded] = {}
+    engine.grade(root, ASSIGNMENT, progress=Collecting(graded, then=engine.QUIET))
     found = points(root)
 
     assert graded["ada"].outcomes[NOTEBOOK].notes == [], "the quiz's own cells run in a subject"

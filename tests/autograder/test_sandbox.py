@@ -100,7 +100,7 @@ def test_outcomes_of_different_places_are_kept_apart(
     trusting.put((Cell("1"),), {}, outcome)
     assert trusting.get((Cell("1"),), {}) == outcome
     for loss in (True, False):
-        monkeypatch.setattr("autograder.store.abilities", lambda x=loss: sandbox.Abilities(loss=x))
+        monkeypatch.setattr(sandbox, "abilities", lambda x=loss: sandbox.Abilities(loss=x))
         assert OutcomeStore(tmp_path).get((Cell("1"),), {}) is None
         OutcomeStore(tmp_path).put((Cell("1"),), {}, outcome)
     assert len(list(tmp_path.iterdir())) == 3

@@ -1,0 +1,157 @@
+"""The database under nbgrader: what is wrong with it, and what changed in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from alembic.config import Config as AlembicConfig
+from alembic.script import ScriptDirectory
+from nbgrader import dbutil
+from nbgrader.api import (
+    Assignment,
+    BaseCell,
+    Comment,
+    Grade,
+    Notebook,
+    SubmittedAssignment,
+    SubmittedNotebook,
+)
+from sqlalchemy import create_engine, inspect, text
+from sqlalchemy.orm import Session
+
+from course.errors import CourseError
+
+Rows = list[list[Any]]
+
+
+class GradebookUnusable(CourseError):  # noqa: N818 - a state of the gradebook, not of one student
+    """Nothing can be entered into the gradebook: the whole run has to stop."""
+
+
+class DiskFullError(GradebookUnusable):
+    """There is no room for the gradebook or for what nbgrader writes."""
+
+
+class GradebookLockedError(GradebookUnusable):
+    """Another program holds the gradebook."""
+
+
+class OldGradebookError(GradebookUnusable):
+    """The gradebook has the tables of another version of nbgrader."""
+
+
+def is_locked(said: str) -> bool:
+    """Whether an error's text says that another program holds the database."""
+    return "database is locked" in said or "database table is locked" in said
+
+
+def unusable(said: str, root: Path) -> GradebookUnusable | None:
+    """Return the sentence for an error of the database that concerns everybody, if it is one."""
+    full = ("disk is full", "No space left on device", "Disk quota exceeded", "File too large")
+    if any(words in said for words in full):
+        return DiskFullError(
+            f"The disk of {root} is full: make room there and run the same command again; what was "
+            "graded so far is kept."
+        )
+    if is_locked(said):
+        return GradebookLockedError(
+            f"Another program holds the gradebook of {root}: wait until it is done, or end it, and "
+            "run the same command again; what was graded so far is kept."
+        )
+    if "no such column" in said or "no such table" in said:
+        return _old(root)
+    if "readonly database" in said or "unable to open database file" in said:
+        return GradebookUnusable(
+            f"The gradebook of {root} cannot be written: make its file and folder writable for "
+            "you, and run the same command again; what was graded so far is kept."
+        )
+    if any(words in said for words in ("malformed", "not a database", "disk I/O error")):
+        return GradebookUnusable(
+            f"The gradebook of {root} is damaged or its disk fails: put back a copy that is sound "
+            "and run the same command again; what was run so far is kept."
+        )
+    return None
+
+
+def require_this_schema(db_url: str, root: Path) -> None:
+    """Look whether a gradebook, if there is one, has the tables that this nbgrader uses.
+
+    Raises:
+        OldGradebookError: it has not.
+        SQLAlchemyError: it cannot be read.
+    """
+    engine = create_engine(db_url)
+    try:
+        tables = inspect(engine).get_table_names()
+        if not tables:
+            return
+        found = None
+        if "alembic_version" in tables:
+            with engine.connect() as connection:
+                found = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()
+        if found != _this_schema():
+            raise _old(root)
+    finally:
+        engine.dispose()
+
+
+@cache
+def _this_schema() -> str | None:
+    """Return the name of the newest schema that the installed nbgrader knows."""
+    config = AlembicConfig()
+    config.set_main_option("script_location", dbutil.ALEMBIC_DIR)
+    return ScriptDirectory.from_config(config).get_current_head()
+
+
+def _old(root: Path) -> OldGradebookError:
+    return OldGradebookError(
+        f"The gradebook of {root} was made by another version of nbgrader: run `nbgrader db "
+        "upgrade` there, which keeps a copy of it, and then the same command again."
+    )
+
+
+def standing_rows(db: Session, assignment: str, student: str = "") -> dict[str, tuple[Rows, Rows]]:
+    """Return {student: (what was found automatically, what people set)} of an assignment.
+
+    Args:
+        db: the gradebook's session.
+        assignment: its name.
+        student: only this one, if given.
+    """
+    submitted = SubmittedAssignment
+    rows: dict[str, tuple[Rows, Rows]] = {}
+
+    def chosen(query: Any) -> Any:
+        query = query.filter(Assignment.name == assignment)
+        return query.filter(submitted.student_id == student) if student else query
+
+    whole = db.query(submitted.student_id, submitted.timestamp, submitted.extension)
+    for name, time, extension in chosen(whole.join(Assignment)):
+        rows[name] = ([[str(time)]], [[str(extension)]])
+    for name, notebook, cell, auto, *by_hand in chosen(_of_cells(db, Grade, Grade.auto_score,
+            Grade.manual_score, Grade.extra_credit, Grade.needs_manual_grade)):  # fmt: skip
+        rows[name][0].append([notebook, cell, auto])
+        rows[name][1].append([notebook, cell, *by_hand])
+    for name, notebook, cell, auto, by_hand in chosen(
+        _of_cells(db, Comment, Comment.auto_comment, Comment.manual_comment)
+    ):
+        rows[name][0].append([notebook, cell, auto])
+        rows[name][1].append([notebook, cell, by_hand])
+    return rows
+
+
+def _of_cells(db: Session, what: Callable[..., Any], *columns: Any) -> Any:
+    """Return a query for columns of grades or comments, with student, notebook and cell."""
+    kind: Any = what
+    query = db.query(SubmittedAssignment.student_id, Notebook.name, BaseCell.name, *columns)
+    return (
+        query.select_from(kind)
+        .join(BaseCell, kind.cell_id == BaseCell.id)
+        .join(SubmittedNotebook, kind.notebook_id == SubmittedNotebook.id)
+        .join(Notebook, SubmittedNotebook.notebook_id == Notebook.id)
+        .join(SubmittedAssignment, SubmittedNotebook.assignment_id == SubmittedAssignment.id)
+        .join(Assignment, SubmittedAssignment.assignment_id == Assignment.id)
+    )

@@ -1,0 +1,162 @@
+"""Between a submission and nbgrader: what of it is run, and entering what came of it."""
+
+from __future__ import annotations
+
+import copy
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import nbformat
+from nbformat import NotebookNode
+
+from autograder import ledger, quiz_marks, roster, runner, submission
+from autograder import nbgrader_bridge as bridge
+from autograder.gradebook import CourseGradebook
+from autograder.jobs import Job
+from autograder.runner import Outcome
+from autograder.submission import SubmissionError
+from autograder.verdict import Status, Verdict
+from course.errors import CourseError
+
+
+@dataclass
+class Work:
+    """A submission on its way into the gradebook.
+
+    Attributes:
+        student: whose it is.
+        made_of: digest of it and of all that its grades depend on.
+        problems: what a person should know about it.
+        outcomes: {notebook: outcome}, as far as they are there.
+    """
+
+    student: str
+    made_of: str
+    problems: list[str] = field(default_factory=list)
+    outcomes: dict[str, Outcome] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One notebook of a submission: a ``job`` to run, or an ``outcome`` if it cannot be run.
+
+    ``marks`` are the verdicts on its quizzes, by grade id.
+    """
+
+    work: Work
+    notebook: str
+    job: Job | None = None
+    outcome: Outcome | None = None
+    marks: Mapping[str, Verdict] = field(default_factory=dict)
+
+
+class Desk:
+    """Reads the submissions of one assignment, and enters their outcomes."""
+
+    def __init__(
+        self, gradebook: CourseGradebook, assignment: str, notebooks: list[str], *, trust: bool
+    ) -> None:
+        """Work for an ``assignment`` that has these ``notebooks``; ``trust`` is for its jobs."""
+        self.gradebook = gradebook
+        self.assignment = assignment
+        self.notebooks = notebooks
+        self.root = gradebook.root
+        self.work_folder = self.root / bridge.WORK_FOLDER
+        self._trust = trust
+        self._originals = {
+            name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
+        }
+
+    @property
+    def folders(self) -> tuple[Path, Path]:
+        """The assignment's source and release."""
+        return self.root / "source" / self.assignment, self.root / "release" / self.assignment
+
+    def work(self, student: str, course: str) -> Work:
+        """Return a student's submission; ``course`` is a digest of what all depend on."""
+        return Work(student, f"{course} {ledger.of_folder(self._submitted(student))}")
+
+    def is_graded(self, student: str) -> bool:
+        """Whether nbgrader has a graded copy of every notebook."""
+        return self._has("autograded", student, ".ipynb")
+
+    def has_feedback(self, student: str) -> bool:
+        """Whether there is feedback on every notebook."""
+        return self._has("feedback", student, ".html")
+
+    def pieces(self, work: Work) -> Iterator[Piece]:
+        """Stage a submission's notebooks one by one."""
+        submitted, staged = self._submitted(work.student), self._staged(work.student)
+        shutil.rmtree(staged, ignore_errors=True)
+        staged.mkdir(parents=True)
+        work.problems += roster.remarks(submitted)
+        if (time := roster.timestamp(submitted / "timestamp.txt")) is not None:
+            (staged / "timestamp.txt").write_text(time, encoding="utf-8")
+        for name in self.notebooks:
+            notebook, piece = self._piece(work, submitted / f"{name}.ipynb")
+            marks = quiz_marks.with_quizzes(Outcome(), notebook, submitted, work.student).verdicts
+            nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
+            yield replace(piece, marks=marks)
+
+    def refused(self, piece: Piece, reason: str, status: Status) -> Outcome:
+        """Return the outcome of a notebook that could not be run after all, for ``reason``."""
+        assert piece.job is not None
+        return runner.refuse(piece.job.program, reason, status)
+
+    def enter(self, work: Work, *, feedback: bool) -> None:
+        """Enter one student's outcomes into the gradebook. Only ever in the one writer.
+
+        Raises:
+            GradebookError: nbgrader cannot enter this student.
+            GradebookUnusable: it could not enter anybody.
+        """
+        for name, outcome in work.outcomes.items():
+            bridge.prepared[self.assignment, work.student, name] = outcome
+        try:
+            self.gradebook.autograde(self.assignment, work.student)
+            if feedback:
+                self.gradebook.generate_feedback(self.assignment, work.student)
+        finally:
+            for name in work.outcomes:
+                bridge.prepared.pop((self.assignment, work.student, name), None)
+        shutil.rmtree(self._staged(work.student).parent, ignore_errors=True)
+
+    def _piece(self, work: Work, path: Path) -> tuple[NotebookNode, Piece]:
+        source, released = self._originals[path.stem]
+        try:
+            notebook, notes = submission.restore(submission.read(path), source, released)
+            program = submission.program(notebook)
+            files = submission.extras(path.parent)
+        except SubmissionError as error:
+            notebook, outcome = self._unreadable(path.stem, str(error), "not_checked")
+            # Whoever hands in some of the notebooks has left the others out: nothing to look into.
+            left_out = not path.exists() and any(path.parent.glob("*.ipynb"))
+            outcome = replace(outcome, unreadable=not left_out)
+        except CourseError:
+            raise
+        except Exception as error:  # noqa: BLE001 - one student's data must not end the class
+            reason = f"{type(error).__name__}: {error}"
+            notebook, outcome = self._unreadable(path.stem, reason, "grader_error")
+        else:
+            notebook.metadata[bridge.NOTES_KEY] = notes
+            return notebook, Piece(work, path.stem, Job(program, files, self._trust))
+        return notebook, Piece(work, path.stem, outcome=outcome)
+
+    def _unreadable(self, name: str, reason: str, status: Status) -> tuple[NotebookNode, Outcome]:
+        """Return the released notebook in place of one that cannot be read, and why."""
+        source, released = self._originals[name]
+        blank: NotebookNode = copy.deepcopy(released)
+        notebook, _ = submission.restore(blank, source, released)
+        return notebook, runner.refuse(submission.program(notebook), reason, status)
+
+    def _submitted(self, student: str) -> Path:
+        return self.root / "submitted" / student / self.assignment
+
+    def _staged(self, student: str) -> Path:
+        return self.root / bridge.WORK_FOLDER / "staged" / student / self.assignment
+
+    def _has(self, step: str, student: str, suffix: str) -> bool:
+        folder = self.root / step / student / self.assignment
+        return all((folder / f"{name}{suffix}").is_file() for name in self.notebooks)

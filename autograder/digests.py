@@ -1,0 +1,112 @@
+"""What a verdict depends on beside the submission: digests of the code that comes to it.
+
+An exam's verdict depends on its module, on the rigs that it imports, and on whatever runs a
+subject and an examiner. So a digest covers the modules that these import, directly or not, and a
+change of one exam lets the outcomes of the others stand.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import json
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from autograder import points
+
+PACKAGES = ("autograder", "course", "quizzes")
+HARNESS = ("autograder.runner", "autograder.subject", "autograder.examiner")
+"""Where the processes of a run begin; what they import is behind every verdict."""
+
+GRADING = ("autograder.desk",)
+"""Where outcomes become points and feedback."""
+
+RUN_DATA = (".xml",)
+"""Files beside the code that decide how a run goes: the settings of DDS."""
+
+GRADING_DATA = (".yaml",)
+"""The same for points: the banks of the quizzes."""
+
+
+@cache
+def of_exams(names: tuple[str, ...], root: Path | None = None) -> str:
+    """Return a digest of everything that decides the verdicts of these exams.
+
+    Args:
+        names: sorted names of exams; none for a program that sits no exam.
+        root: a folder with copies of the packages; the installed ones if left out.
+    """
+    table = points.table()
+    worth = json.dumps({name: table[name].parts for name in names if name in table}, sort_keys=True)
+    modules = [*HARNESS, *(f"autograder.exams.{name}" for name in names)]
+    return _Code(root).digest(modules, RUN_DATA, worth)
+
+
+@cache
+def of_grading(names: tuple[str, ...], root: Path | None = None) -> str:
+    """Return a digest of what decides these exams' verdicts and turns them into grades."""
+    return f"{of_exams(names, root)} {_Code(root).digest(GRADING, GRADING_DATA)}"
+
+
+class _Code:
+    """The source of some packages, and what of them imports what."""
+
+    def __init__(self, root: Path | None) -> None:
+        self._files: dict[str, Traversable] = {}
+        self._data: list[Traversable] = []
+        for name in PACKAGES:
+            self._walk(name, root / name if root else resources.files(name))
+
+    def digest(self, modules: Iterable[str], data: tuple[str, ...], more: str = "") -> str:
+        """Return a digest of these modules, of all that they import, of data, and of ``more``."""
+        state = hashlib.sha256(more.encode())
+        for name in sorted(self._closure(modules)):
+            state.update(name.encode() + b"\0" + self._files[name].read_bytes())
+        for file in (file for file in self._data if file.name.endswith(data)):
+            state.update(file.name.encode() + b"\0" + file.read_bytes())
+        return state.hexdigest()
+
+    def _walk(self, package: str, folder: Traversable) -> None:
+        for entry in sorted(folder.iterdir(), key=lambda entry: entry.name):
+            if entry.is_dir():
+                self._walk(f"{package}.{entry.name}", entry)
+            elif entry.name == "__init__.py":
+                self._files[package] = entry
+            elif entry.name.endswith(".py"):
+                self._files[f"{package}.{entry.name[:-3]}"] = entry
+            elif entry.name.endswith((*RUN_DATA, *GRADING_DATA)):
+                self._data.append(entry)
+
+    def _closure(self, modules: Iterable[str]) -> set[str]:
+        found: set[str] = set()
+        waiting = list(modules)
+        while waiting:
+            name = waiting.pop()
+            if name in found or name not in self._files:
+                continue
+            found.add(name)
+            waiting += self._imports(name)
+        return found
+
+    def _imports(self, name: str) -> Iterator[str]:
+        """Yield what a module may import, its own packages included; too many names do no harm."""
+        yield from _parents(name)
+        for node in ast.walk(ast.parse(self._files[name].read_bytes())):
+            if isinstance(node, ast.Import):
+                for alias in node.names:
+                    yield alias.name
+                    yield from _parents(alias.name)
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                yield node.module
+                yield from _parents(node.module)
+                yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def _parents(name: str) -> Iterator[str]:
+    while "." in name:
+        name = name.rpartition(".")[0]
+        yield name

@@ -1,0 +1,96 @@
+"""Files that are there as a whole or not at all, and folders that a killed process leaves behind.
+
+A process that is killed cleans nothing up. What it was writing lies beside the file that it was to
+become, and its scratch folders lie about; both carry a mark by which the next one knows that
+nobody uses them any more, and removes them.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+PARTIAL = ".partial"
+SCRATCH = "ros2-course-scratch-"
+_OLD = 600.0
+"""Seconds after which a partial file belongs to nobody: writing one takes a moment."""
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a file in one step: a reader, and whoever comes after a kill, sees all of it or none.
+
+    Raises:
+        OSError: it cannot be written; what stood there before still does.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f"{path.name[:60]}.", suffix=PARTIAL, dir=path.parent)
+    partial = Path(name)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", errors="replace") as file:
+            file.write(text)
+        partial.replace(path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise
+
+
+def remove_partial(folder: Path) -> None:
+    """Remove what killed processes were writing anywhere in ``folder``."""
+    now = time.time()
+    for partial in folder.rglob(f"*{PARTIAL}"):
+        with suppress(OSError):
+            if now - partial.stat().st_mtime > _OLD:
+                partial.unlink()
+
+
+@contextmanager
+def scratch_folder() -> Iterator[Path]:
+    """Make a folder for the block, and remove it afterwards; `sweep` does if this is killed."""
+    folder, handle = _locked()
+    try:
+        yield folder
+    finally:
+        # What a submission leaves there that cannot be removed is no reason to stop.
+        shutil.rmtree(folder, ignore_errors=True)
+        os.close(handle)
+
+
+def _locked() -> tuple[Path, int]:
+    """Return a new folder and the descriptor that holds a lock on it."""
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=SCRATCH))
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        if folder.exists():  # nobody took it for abandoned before it was locked
+            return folder, handle
+        os.close(handle)
+
+
+def sweep() -> int:
+    """Remove scratch folders whose processes are gone; return how many there were."""
+    swept = 0
+    for folder in Path(tempfile.gettempdir()).glob(f"{SCRATCH}*"):
+        with suppress(OSError):
+            swept += _abandoned(folder)
+    return swept
+
+
+def _abandoned(folder: Path) -> bool:
+    """Remove a folder of ours that nobody holds; return whether it was one."""
+    if folder.lstat().st_uid != os.geteuid():
+        return False
+    handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        shutil.rmtree(folder, ignore_errors=True)
+        return True
+    except BlockingIOError:
+        return False
+    finally:
+        os.close(handle)

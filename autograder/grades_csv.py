@@ -1,0 +1,29 @@
+"""``grades.csv``: one line a student, for spreadsheets and other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from autograder.files import write_whole
+from autograder.gradebook import Grade
+from autograder.insight.exports import as_csv, guarded
+
+HEAD = ("assignment", "student_id", "score", "max_score", "needs_manual_grade")
+
+
+def write(grades: list[Grade], assignment: str, path: Path) -> None:
+    """Write one line a student; a cell that waits for a manual grade is empty.
+
+    A text that a spreadsheet would run as a formula has an apostrophe in front.
+
+    Raises:
+        OSError: it cannot be written; what stood there before still does.
+    """
+    columns = sorted({(n, c) for g in grades for n, cells in g.cells.items() for c in cells})
+    rows = [[*HEAD, *(guarded(f"{notebook}:{cell}") for notebook, cell in columns)]]
+    for grade in grades:
+        points = [grade.cells.get(notebook, {}).get(cell) for notebook, cell in columns]
+        found = (grade.score, grade.max_score, grade.needs_manual_grade)
+        texts = [guarded(assignment), guarded(grade.student), *map(str, found)]
+        rows.append([*texts, *("" if p is None else str(p) for p in points)])
+    write_whole(path, as_csv(rows))

@@ -1,0 +1,136 @@
+"""What has been entered into the gradebook, so that it is not entered again without need.
+
+A record says from what a student's grades were made and how they then stood in the gradebook. It
+is removed before a student is entered and written afterwards, so what a kill interrupted has none.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import stat
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from autograder import digests
+from autograder.files import write_whole
+from autograder.submission import MAX_EXTRAS, MAX_NOTEBOOK
+
+VERSION = 1
+FOLDER = "entered"
+MAX_FILE = MAX_NOTEBOOK + MAX_EXTRAS
+"""Bytes of one file beyond which only its size and date are looked at: it is not read anyway."""
+
+MAX_FILES = 2000
+"""Files of one submission that are looked at one by one."""
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a student stands in the gradebook: digests of what was found and of what people set."""
+
+    automatic: str
+    manual: str
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A record of one student's grades.
+
+    Attributes:
+        made_of: digest of the submission and of all that its grades depend on.
+        standing: how they stood in the gradebook afterwards.
+        points: automatic points, of ``max_points``.
+        seconds: wall time that the submission's notebooks ran.
+        problem: what a person should know about the submission.
+        feedback: whether HTML feedback was written, too.
+    """
+
+    made_of: str
+    standing: Standing
+    points: float
+    max_points: float
+    seconds: float
+    problem: str
+    feedback: bool
+
+
+class Ledger:
+    """The records of one assignment."""
+
+    def __init__(self, work: Path, assignment: str) -> None:
+        """Keep them in the engine's folder ``work``."""
+        # A folder of its own whatever the name; a student's folder name may be as long as a
+        # file name can be, so a record goes by its digest.
+        self._folder = work / FOLDER / assignment
+
+    def get(self, student: str) -> Entry | None:
+        """Return a student's record, or None if there is no sound one."""
+        try:
+            data = json.loads(self._path(student).read_text(encoding="utf-8"))
+            if data.pop("version") != VERSION or data.pop("student") != student:
+                return None
+            return Entry(**{**data, "standing": Standing(**data["standing"])})
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return None
+
+    def put(self, student: str, entry: Entry) -> None:
+        """Keep a student's record; raises OSError if it cannot be written."""
+        data = {"version": VERSION, "student": student, **asdict(entry)}
+        write_whole(self._path(student), json.dumps(data))
+
+    def remove(self, student: str) -> None:
+        """Forget a student's record."""
+        self._path(student).unlink(missing_ok=True)
+
+    def _path(self, student: str) -> Path:
+        name = hashlib.sha256(student.encode(errors="surrogateescape")).hexdigest()[:32]
+        return self._folder / f"{name}.json"
+
+
+def of_course(root: Path, folders: Iterable[Path], mode: str, exams: tuple[str, ...]) -> str:
+    """Return a digest of what all students' grades depend on.
+
+    Args:
+        root: the course root, whose configuration counts.
+        folders: the assignment's source and release.
+        mode: how submissions are run (see `autograder.sandbox.Abilities`).
+        exams: sorted names of the assignment's exams.
+    """
+    state = hashlib.sha256(f"{mode} {digests.of_grading(exams)}".encode())
+    for path in (root / "nbgrader_config.py", *folders):
+        state.update(of_folder(path).encode())
+    return state.hexdigest()
+
+
+def of_folder(folder: Path) -> str:
+    """Return a digest of a file or of a folder's files: names, kinds and contents."""
+    state = hashlib.sha256()
+    paths = [folder] if folder.is_file() else sorted(_walk(folder))
+    for path in paths:
+        name = os.fsencode(path.relative_to(folder) if path != folder else path.name)
+        state.update(name + b"\0" + _content(path) + b"\0")
+    return state.hexdigest()
+
+
+def _walk(folder: Path) -> list[Path]:
+    found: list[Path] = []
+    for place, folders, files in os.walk(folder):
+        links = [name for name in folders if (Path(place) / name).is_symlink()]
+        found += [Path(place) / name for name in (*files, *links)]
+        if len(found) > MAX_FILES:
+            break
+    return found[:MAX_FILES]
+
+
+def _content(path: Path) -> bytes:
+    try:
+        status = path.lstat()
+        if not stat.S_ISREG(status.st_mode) or status.st_size > MAX_FILE:
+            return f"{status.st_mode} {status.st_size} {status.st_mtime_ns}".encode()
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").digest()
+    except OSError as error:
+        return str(error.errno).encode()

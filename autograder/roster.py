@@ -1,0 +1,139 @@
+"""Whose work lies in ``submitted/``, and which folders there cannot be what they should be."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from nbgrader.utils import parse_utc
+
+GLOB = "*?[]"
+LONGEST_ID = 128
+"""Characters of a student id in nbgrader's gradebook."""
+
+COPYING = (".part", ".partial", ".filepart", ".crdownload", ".tmp")
+"""How copying programs name what they have not finished."""
+
+
+@dataclass(frozen=True)
+class Roster:
+    """The students that a gradebook knows.
+
+    Attributes:
+        known: their ids.
+        closed: nobody else may be graded: they were imported, with names, or the course's
+            configuration says that students are not made on the way (``create_student``).
+    """
+
+    known: frozenset[str] = frozenset()
+    closed: bool = False
+
+
+def submissions(root: Path, assignment: str, roster: Roster) -> tuple[list[str], dict[str, str]]:
+    """Return the students whose submissions can be graded, and {folder: what is wrong with it}."""
+    good: list[str] = []
+    wrong: dict[str, str] = {}
+    for folder in _folders(root / "submitted"):
+        problem = _misplaced(folder, assignment)
+        if not problem and (folder / assignment).is_dir():
+            problem = _bad_id(folder.name) or _stranger(folder.name, roster)
+            good += [] if problem else [folder.name]
+        if problem:
+            wrong[folder.name] = problem
+    return good, wrong
+
+
+def remarks(folder: Path) -> list[str]:
+    """Return what a person should know about how a submission's folder looks."""
+    found = []
+    cut = sorted(path.name for path in folder.iterdir() if _is_partial_copy(path))
+    if cut:
+        found.append(
+            f"{cut[0]} looks like a copy that was interrupted: copy the submission again, then "
+            "grade again."
+        )
+    file = folder / "timestamp.txt"
+    if file.is_file() and timestamp(file) is None:
+        found.append("timestamp.txt holds no date, so the time of submission is unknown.")
+    return found
+
+
+def timestamp(file: Path) -> str | None:
+    """Return a time of submission that nbgrader can read, or None."""
+    try:
+        text = file.read_text(encoding="utf-8").strip()
+        parse_utc(text)
+    except (ValueError, OverflowError, UnicodeError, OSError):
+        return None
+    return text
+
+
+def of_people(people: Mapping[str, bool], create: bool) -> Roster:
+    """Return the roster that a gradebook's students make.
+
+    Args:
+        people: {student id: whether a name or an address is known}.
+        create: whether nbgrader may make students that it does not know.
+    """
+    return Roster(frozenset(people), not create or any(people.values()))
+
+
+def _folders(submitted: Path) -> Iterator[Path]:
+    if submitted.is_dir():
+        yield from sorted(
+            path for path in submitted.iterdir() if path.is_dir() and path.name[0] != "."
+        )
+
+
+def _misplaced(folder: Path, assignment: str) -> str:
+    """Return what is wrong if a student's work is not where nbgrader looks for it."""
+    place = folder / assignment
+    if place.is_dir():
+        return ""
+    if place.exists() or place.is_symlink():
+        return (
+            f"submitted/{folder.name}/{assignment} is no folder: put the submission's files in one."
+        )
+    if any(folder.glob("*.ipynb")):
+        return (
+            f"Its notebooks lie in submitted/{folder.name} itself: move them to "
+            f"submitted/{folder.name}/{assignment}, if they belong to this assignment."
+        )
+    return ""
+
+
+def _bad_id(student: str) -> str:
+    if set(student) & set(GLOB):
+        return (
+            f"nbgrader takes one of the characters {' '.join(GLOB)} in the folder name '{student}' "
+            "for a pattern: rename the folder."
+        )
+    if not student.isprintable():
+        return (
+            f"The folder name {student!a} has characters that nobody can read: rename the folder."
+        )
+    if len(student) > LONGEST_ID:
+        return (
+            f"A student id has at most {LONGEST_ID} characters in the gradebook, and this folder's "
+            f"name {len(student)}: rename the folder."
+        )
+    return ""
+
+
+def _stranger(student: str, roster: Roster) -> str:
+    if not roster.closed or student in roster.known:
+        return ""
+    close = difflib.get_close_matches(student, roster.known, n=1)
+    meant = f" (is it '{close[0]}'?)" if close else ""
+    return (
+        f"The course has no student '{student}'{meant}: rename the folder, or add the student with "
+        f"`nbgrader db student add {student}`, then grade again."
+    )
+
+
+def _is_partial_copy(path: Path) -> bool:
+    # rsync writes `.name.ipynb.a1B2c3` beside what is to become `name.ipynb`.
+    hidden = path.name.startswith(".") and ".ipynb." in path.name
+    return hidden or path.name.endswith(COPYING)
