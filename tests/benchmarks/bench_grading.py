@@ -237,10 +237,11 @@ def shown(results: dict[str, object]) -> str:
     lines = []
     for number, pair in enumerate(results.get("runs", []), start=1):  # type: ignore[arg-type, var-annotated]
         for name, run in pair.items():
+            count = run["submissions"]
             lines.append(
-                f"round {number} {name:6} {run['submissions']:5} submissions {run['wall']:8.1f} s "
-                f"{run['submissions'] / run['wall']:7.3f}/s  cpu {run['cpu'] / run['submissions']:5.2f}"
-                f" s each  peak {run['peak_mib']:6.0f} MiB  load {run['load']:.1f}"
+                f"round {number} {name:6} {count:5} submissions {run['wall']:8.1f} s, "
+                f"{count / run['wall']:.3f}/s, cpu {run['cpu'] / count:.2f} s each, "
+                f"peak {run['peak_mib']:.0f} MiB, load {run['load']:.1f}"
             )
     lines += [
         f"{name}: {value}" for name, value in results.items() if name not in ("runs", "sizes")
