@@ -78,6 +78,9 @@ def serve(
 
 def preload() -> None:
     """Import every exam: `autograder.warm` calls it before it forks examiners."""
+    from autograder.warm import modules
+
+    modules.import_all()
     for name in exams.names():
         exams.load(name)
 

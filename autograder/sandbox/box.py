@@ -29,10 +29,8 @@ USER = 1000
 EXAMINER_DATA = 3 * 1024 * MIB
 """Bytes of writable memory that an examiner may reserve."""
 
-HOLDER = ("env", "--ignore-signal=CHLD", "sh", "-c", "echo up; exec sleep infinity >/dev/null 2>&1")
-"""Process 1 of a warm subject's sandbox: it says that the sandbox is there, and then only waits.
-
-Nothing in the sandbox can end it, and what it ignores the kernel clears away: orphans."""
+HOLDER = ("sh", "-c", "echo up; exec sleep infinity >/dev/null 2>&1")
+"""What holds a sandbox open for a subject: it says that the sandbox is there, and only waits."""
 
 
 class Box:
@@ -92,8 +90,9 @@ class Box:
     ) -> BoxedSubject:
         """Start any command as `start_subject` does, without options for a subject."""
         with ExitStack() as stack:
+            user = _user()
             process, init = self._enclose(
-                command, _user(), files, _Given(stack), fds, stdout=subprocess.DEVNULL
+                command, user, user, files, _Given(stack), fds, stdout=subprocess.DEVNULL
             )
             return BoxedSubject(process, init, self._limits, stack.pop_all())
 
@@ -103,8 +102,9 @@ class Box:
         """Make the sandbox around a process that only waits, and fork the subject into it."""
         with ExitStack() as stack:
             user = _user()
+            # Root's subject is another user than what holds its sandbox, and cannot touch that.
             process, init = self._enclose(
-                HOLDER, user, files, _Given(stack), (), "--as-pid-1", stdout=subprocess.PIPE
+                HOLDER, user, _user(), files, _Given(stack), (), stdout=subprocess.PIPE
             )
             subject = WarmSubject(process, init, self._limits, stack.pop_all())
             stack.push(subject)
@@ -115,18 +115,22 @@ class Box:
     def _enclose(
         self,
         command: Sequence[str],
+        named: int,
         user: int,
         files: Mapping[str, bytes],
         given: _Given,
         fds: Sequence[int],
-        *more: str,
+        *,
         stdout: int,
     ) -> tuple[subprocess.Popen[bytes], int]:
-        """Start a command in the sandbox; return bwrap's process and the sandbox's process 1."""
+        """Start a command in the sandbox; return bwrap's process and the sandbox's process 1.
+
+        ``named`` is the user id that its files call the student's, ``user`` that of the command.
+        """
         # Through a descriptor, so that the sandbox's process 1 does not tell them.
-        arguments = given.file("\0".join(self._arguments(given, user, files)).encode())
+        arguments = given.file("\0".join(self._arguments(given, named, files)).encode())
         info, info_end = os.pipe()
-        sandbox = ["bwrap", "--args", arguments, "--info-fd", str(info_end), *more, "--"]
+        sandbox = ["bwrap", "--args", arguments, "--info-fd", str(info_end), "--"]
         command = [*sandbox, *(_as_user(user) if network.is_root() else []), *command]
         try:
             process = network.start(
@@ -195,5 +199,4 @@ def _as_user(uid: int) -> list[str]:
     return [
         "setpriv", "--reuid", str(uid), "--regid", str(uid), "--clear-groups",
         "--inh-caps=-all", "--bounding-set=-all", "--no-new-privs",
-        "--pdeathsig", "KILL",  # bwrap's own is forgotten with the change of user
     ]  # fmt: skip

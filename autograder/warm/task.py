@@ -8,7 +8,7 @@ import os
 import resource
 import signal
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -28,7 +28,7 @@ class Task:
         arguments: its command line.
         descriptors: the numbers that its descriptors get; 0, 1 and 2 are among them.
         namespaces: kinds of namespaces that it joins, each by a descriptor of it.
-        process: it joins all namespaces of one process, by a pidfd.
+        process: it joins all namespaces of one process, by a pidfd, and that ends when it does.
         user: as root only: the user id that it takes on, for good.
         calls: it gives up all capabilities, and this filter (hexadecimal) decides about its system
             calls.
@@ -57,15 +57,20 @@ class Task:
         """Read what `to_json` wrote."""
         return cls(**json.loads(text))
 
-    def join(self, handed: list[int]) -> list[int]:
-        """Join the namespaces; return the descriptors that are left of ``handed``."""
+    def join(self, handed: list[int]) -> tuple[list[int], int | None]:
+        """Join the namespaces, by the first of the descriptors.
+
+        Returns:
+            The descriptors that are left, and the pidfd of the process that ends with this one.
+        """
+        pidfd = None
         if self.process:
             pidfd, *handed = handed
             linux.join(pidfd, _differing(pidfd))
         for kind in self.namespaces:
             namespace, *handed = handed
             linux.join(namespace, linux.NAMESPACES[kind])
-        return handed
+        return handed, pidfd
 
     def become(self, handed: list[int]) -> None:
         """Turn this process, a fork of a fork that has joined, into the one that is wanted.
@@ -126,9 +131,14 @@ def _put_in_order(wanted: Mapping[int, int]) -> None:
         raise ValueError(f"descriptor {max(wanted)} is over {_HIGH - 1}")
     for number, descriptor in high.items():
         os.dup2(descriptor, number)
+    close_others(wanted)
+
+
+def close_others(kept: Iterable[int]) -> None:
+    """Close all descriptors of this process but these."""
     low = 0
-    for number in sorted(wanted):
-        if low < number:
+    for number in sorted(kept):
+        if low < number:  # Python takes an empty range that starts at 0 for one without an end
             os.closerange(low, number)
         low = number + 1
     os.closerange(low, 2**31 - 1)

@@ -22,7 +22,7 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any, NoReturn
 
-from autograder.warm.task import Task
+from autograder.warm.task import Task, close_others
 
 MOST_DESCRIPTORS = 64
 LARGEST_TASK = 128 * 1024
@@ -61,7 +61,7 @@ def _keep(task: Task, report: socket.socket, handed: list[int]) -> Task:
     """Join, and fork the task's process; return in that process only."""
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     try:
-        handed = task.join(handed)
+        handed, holder = task.join(handed)
     except OSError as error:
         _say(report, {"error": str(error)})
         os._exit(1)
@@ -71,22 +71,21 @@ def _keep(task: Task, report: socket.socket, handed: list[int]) -> Task:
         task.become(handed)
         return task
     if pid is not None:
-        _stay(report, pid)
+        _stay(report, pid, holder)
     os._exit(1)
 
 
-def _stay(report: socket.socket, pid: int) -> NoReturn:
+def _stay(report: socket.socket, pid: int, holder: int | None) -> NoReturn:
     """Report a process and how it ended; its number is its own until whoever asked is done.
 
     When whoever asked is gone, by ``kill -9`` too, nobody wants the process any more: it is killed.
+    With it ends the process of which ``holder`` is the pidfd, and so all that it has left behind.
     """
     handle = os.pidfd_open(pid)
     with suppress(OSError):
         socket.send_fds(report, [json.dumps({"pid": pid}).encode()], [handle])
     # The others are the process's own: that it has closed one must be seen at the other end.
-    first, second = sorted((handle, report.fileno()))
-    for start, end in ((0, first), (first + 1, second), (second + 1, 2**31 - 1)):
-        os.closerange(start, end)
+    close_others({report.fileno(), handle, *([] if holder is None else [holder])})
     select.select([handle, report.fileno()], [], [])  # it has ended, or nobody is at the other end
     ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT | os.WNOHANG)
     if ended is None:
@@ -94,6 +93,9 @@ def _stay(report: socket.socket, pid: int) -> NoReturn:
         ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
     assert ended is not None
     code = ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
+    if holder is not None:
+        with suppress(ProcessLookupError):
+            signal.pidfd_send_signal(holder, signal.SIGKILL)
     _say(report, {"code": code})
     with suppress(OSError):
         report.recv(1)
