@@ -41,12 +41,14 @@ class Subject:
     """The examiner's end of the control channel. It asks; it does not believe.
 
     ``name`` is always a name of the notebook's: of a class, or of anything that makes a node.
+    ``hangs`` says in a sentence that the subject did not answer in time, once it did not.
     """
 
     def __init__(self, channel: Channel, pid: int = 0) -> None:
         """Talk to the harness over ``channel``; ``pid`` is the subject's process as seen here."""
         self._channel = channel
         self._gone: str | None = None
+        self.hangs = ""
         self.pid = pid
 
     def open(self, *, threads: int = 1, sim_time: bool = False) -> None:
@@ -192,6 +194,7 @@ class Subject:
                 f"Your program did not answer within {timeout:.0f} s when it was asked to "
                 f"{doing}: does a constructor, a callback or a cleanup wait for ever?"
             )
+            self.hangs = self._gone
             raise SubjectGone(self._gone) from None
         if not reply.get("ok"):
             raise StudentError(str(reply.get("error", "unknown")), str(reply.get("trace", "")))

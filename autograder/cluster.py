@@ -7,12 +7,14 @@ pickle between its processes, which no submission can reach.
 
 from __future__ import annotations
 
+import json
 import logging
 import socket
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
+from urllib.parse import urlsplit
 
 from autograder import jobs
 from autograder.jobs import Job, Result
@@ -20,8 +22,14 @@ from autograder.sandbox import Abilities
 from autograder.workers import Done, Keep, Queue
 from course.errors import CourseError
 
-CONNECT_TIMEOUT = 10.0
-"""Seconds in which a scheduler must answer, at the start and if the connection is lost."""
+REACH_TIMEOUT = 10.0
+"""Seconds in which a scheduler's machine must take a connection."""
+
+CONNECT_TIMEOUT = 60.0
+"""Seconds in which the scheduler must then answer; a busy one takes a while."""
+
+CLOSE_TIMEOUT = 10.0
+"""Seconds that saying good-bye may take."""
 
 MAX_RESULT = 2 * jobs.MAX_OUTCOME + 1024
 """Largest result in characters that is read: a result quotes the outcome's JSON as a string."""
@@ -43,8 +51,6 @@ def perform(text: str, hidden: list[str]) -> str:
     Returns:
         ``{"result": ...}`` or ``{"problem": a phrase, "where": host name}``, as JSON.
     """
-    import json
-
     from distributed import Status, get_worker
 
     try:
@@ -138,8 +144,6 @@ class Cluster:
         return Done(key, result)
 
     def _read(self, text: Any) -> Result:
-        import json
-
         if not isinstance(text, str) or len(text) > MAX_RESULT:
             raise ClusterError(f"A worker of {self._address} sent no result of bounded size.")
         data = json.loads(text)
@@ -179,7 +183,7 @@ class Cluster:
         with suppress(Exception):
             self._client.cancel(list(self._futures.values()), force=True)
         with suppress(Exception):
-            self._client.close(timeout=CONNECT_TIMEOUT)
+            self._client.close(timeout=CLOSE_TIMEOUT)
 
 
 def _connect(address: str) -> Any:
@@ -189,22 +193,37 @@ def _connect(address: str) -> Any:
         raise ClusterError(
             f"--scheduler needs Dask, which is not installed here: install it with `{EXTRA}`."
         ) from None
-    if "://" not in address:
-        raise ClusterError(
-            f"'{address}' is no address of a scheduler: write it as it prints it, for example "
-            "tcp://192.168.1.10:8786."
-        )
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its own words are not for people
     try:
+        _reach(address)
         return Client(  # type: ignore[no-untyped-call]
-            address, timeout=CONNECT_TIMEOUT, set_as_default=False, name="autograder",
+            address,
+            timeout=CONNECT_TIMEOUT,
+            set_as_default=False,
+            name="autograder",
             direct_to_workers=False,
-        )  # fmt: skip
+        )
     except (OSError, ValueError, TimeoutError) as error:
         raise ClusterError(
             f"There is no scheduler at {address} ({_first_line(error)}): start one with "
             "`dask scheduler`, or mend the address; nothing was graded."
         ) from None
+
+
+def _reach(address: str) -> None:
+    """Connect once by ourselves: Dask goes on trying for long where nobody listens.
+
+    Raises:
+        ClusterError: it is no address.
+        OSError: nobody takes the connection.
+    """
+    url = urlsplit(address)
+    if url.scheme not in ("tcp", "tls") or not url.hostname or not url.port:
+        raise ClusterError(
+            f"'{address}' is no address of a scheduler: write it as it prints it, for example "
+            "tcp://192.168.1.10:8786."
+        )
+    socket.create_connection((url.hostname, url.port), REACH_TIMEOUT).close()
 
 
 def _first_line(error: BaseException) -> str:

@@ -89,21 +89,21 @@ class _Code:
             if name in found or name not in self._files:
                 continue
             found.add(name)
-            waiting += self._imports(name)
+            waiting += _imports(name, self._files[name].read_bytes())
         return found
 
-    def _imports(self, name: str) -> Iterator[str]:
-        """Yield what a module may import, its own packages included; too many names do no harm."""
-        yield from _parents(name)
-        for node in ast.walk(ast.parse(self._files[name].read_bytes())):
-            if isinstance(node, ast.Import):
-                for alias in node.names:
-                    yield alias.name
-                    yield from _parents(alias.name)
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                yield node.module
-                yield from _parents(node.module)
-                yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+@cache
+def _imports(name: str, source: bytes) -> frozenset[str]:
+    """Return what a module may import, its own packages included; too many names do no harm."""
+    found = set(_parents(name))
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            found |= {name for alias in node.names for name in (alias.name, *_parents(alias.name))}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *_parents(node.module)}
+            found |= {f"{node.module}.{alias.name}" for alias in node.names}
+    return frozenset(found)
 
 
 def _parents(name: str) -> Iterator[str]:

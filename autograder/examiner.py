@@ -2,7 +2,8 @@
 
 Started as ``python -m autograder.examiner --control FD --domain N``. It reads requests
 ``{"exam": ..., "part": ..., "moved_on": ..., "key": ..., "pid": ...}`` from standard input, one
-JSON object a line, and writes one verdict a line to standard output. ``moved_on`` says that the
+JSON object a line, and writes one verdict a line to standard output, with ``hangs`` in addition:
+why the subject cannot be expected to go on, if so. ``moved_on`` says that the
 notebook ran cells since, ``key`` is the answer key of the part's hidden cell, ``pid`` the subject's
 process.
 File descriptor ``FD`` is the control channel to the subject's harness. With ``--own-network`` the
@@ -72,7 +73,7 @@ def serve(
         if request["moved_on"]:
             sittings.clear()
         verdict = sit(request, session, subject, sittings, own_network=own_network)
-        verdicts.write(verdict + "\n")
+        verdicts.write(json.dumps({**json.loads(verdict), "hangs": subject.hangs}) + "\n")
         verdicts.flush()
 
 

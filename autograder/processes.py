@@ -31,7 +31,10 @@ class ExaminerError(CourseError):
 
 
 class ExaminerProcess:
-    """A running examiner, bound to one subject by a control channel."""
+    """A running examiner, bound to one subject by a control channel.
+
+    ``hangs`` says in a sentence that the subject did not answer in time, if a verdict came with it.
+    """
 
     def __init__(
         self,
@@ -71,6 +74,7 @@ class ExaminerProcess:
         finally:
             control.close()
         self._buffer = b""
+        self.hangs = ""
 
     def request(
         self,
@@ -125,7 +129,9 @@ class ExaminerProcess:
                 raise ExaminerError(f"The examiner ended without a verdict: {self._last_words()}")
             self._buffer += chunk
         line, self._buffer = self._buffer.split(b"\n", 1)
-        return Verdict.from_json(line.decode())
+        verdict = Verdict.from_json(line.decode())
+        self.hangs = str(json.loads(line).get("hangs", ""))
+        return verdict
 
     def _last_words(self) -> str:
         self._kill()

@@ -136,6 +136,10 @@ def _follow(
                 )
                 outcome.verdicts[cell.grade_id] = examiner.verdict()
                 moved_on = False
+                if examiner.hangs:
+                    # The examiner has waited long enough: it would find the same in every part.
+                    _give_up(program, outcome, examiner.hangs)
+                    return
             else:
                 moved_on = True
                 outcome.outputs[number] = _outputs(message, number)

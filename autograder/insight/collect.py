@@ -59,6 +59,7 @@ def collect(root: Path, assignment: str) -> ClassData:
         InsightError: no such assignment, nothing of it graded yet, or a gradebook that cannot be
             read.
         GradebookError: ``root`` is no course.
+        GradebookUnusable: its gradebook cannot be read.
     """
     gradebook = CourseGradebook(root)
     try:

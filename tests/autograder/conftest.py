@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,8 +15,10 @@ from autograder import corpus, submission
 from autograder.build import build
 from autograder.corpus import Case
 from autograder.corpus.trials import one_notebook
+from autograder.gradebook import Grade
 from autograder.release import release
 from autograder.sandbox import abilities
+from tests.killing import Engine, fresh_copy
 
 SUBMISSIONS = Path(__file__).parents[1] / "submissions"
 ASSIGNMENT, NOTEBOOK = "ch05", "qos-design"
@@ -69,3 +72,29 @@ def course(released_course: Path, tmp_path: Path) -> Course:
 @pytest.fixture(scope="session")
 def cases() -> dict[str, Case]:
     return {case.name: case for case in corpus.load(SUBMISSIONS, "qos")}
+
+
+@dataclass(frozen=True)
+class Undisturbed:
+    """A class before and after it was graded by an engine that nobody disturbed."""
+
+    ungraded: Path
+    graded: Path
+    grades: dict[str, Grade]
+    seconds: float
+
+
+@pytest.fixture(scope="session")
+def class_(
+    released_course: Path, cases: dict[str, Case], tmp_path_factory: pytest.TempPathFactory
+) -> Undisturbed:
+    folder = tmp_path_factory.mktemp("class")
+    course = Course(fresh_copy(released_course, folder / "ungraded"))
+    for student, case in {"right": "right-chapter", "same": "right-chapter",
+                          "wrong": "wrong-imu-single"}.items():  # fmt: skip
+        course.submit(student, cases[case].submission(course.source, course.released))
+    course.submit("cut-off", "{")
+    whole = Engine(fresh_copy(course.root, folder / "graded"), ASSIGNMENT, folder / "scratch")
+    started = time.monotonic()
+    whole.finish()
+    return Undisturbed(course.root, whole.root, whole.grades(), time.monotonic() - started)

@@ -18,6 +18,7 @@ from nbgrader.api import Gradebook
 
 from autograder import engine, exams
 from autograder.corpus import Case
+from autograder.database import GradebookUnusable
 from autograder.gradebook import Grade
 from autograder.insight import InsightError, exports, feedback, figures, needs, records, similarity
 from autograder.insight import page as pages
@@ -477,5 +478,5 @@ def test_an_assignment_that_is_not_there_or_not_graded_is_one_sentence(course: C
     ).stderr
     assert "graded yet" in result
     (course.root / "gradebook.db").write_text("this is no database, but a long enough text" * 99)
-    with pytest.raises(InsightError, match="cannot be read"):
+    with pytest.raises(GradebookUnusable, match="is damaged"):
         reports.make(course.root, ASSIGNMENT)

@@ -78,6 +78,22 @@ class SensorDrivers(Node):
     assert {check.status for check in rest} == {"not_checked"}
 
 
+def test_nobody_waits_twice_for_a_program_that_hangs(monkeypatch: pytest.MonkeyPatch) -> None:
+    source = """
+import time
+from rclpy.node import Node
+class SensorDrivers(Node):
+    def __init__(self):
+        time.sleep(10**6)
+"""
+    later = (Cell("x = 1"), Cell("", "qos-hidden", "qos", "hidden"))
+    outcome = runner.run((*program(source), *later))
+    (note,) = outcome.notes
+    assert "did not answer" in note, "not: a cell was still running"
+    hidden = outcome.verdicts["qos-hidden"].checks
+    assert {(check.status, check.actual) for check in hidden} == {("not_checked", note)}
+
+
 def test_a_flood_of_output_is_cut() -> None:
     outcome = runner.run((Cell("print('x' * 5_000_000)"),))
     text = text_of(outcome.outputs[0])

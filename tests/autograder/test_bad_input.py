@@ -1,0 +1,228 @@
+"""Whatever is wrong around a class is one clear sentence, and nothing is lost."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sqlite3
+import subprocess
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from nbgrader.api import Gradebook
+
+from autograder import engine, gradebook, grades_csv, submission
+from autograder.database import (
+    DiskFullError,
+    GradebookLockedError,
+    GradebookUnusable,
+    OldGradebookError,
+)
+from autograder.engine import AssignmentError, Graded
+from autograder.gradebook import CourseGradebook, Grade
+from autograder.progress import Progress
+from tests.killing import fresh_copy
+
+from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed, needs_sandbox
+
+pytestmark = [needs_sandbox, pytest.mark.xdist_group("class")]
+
+OUTCOMES = ".autograder/outcomes"
+
+
+@pytest.fixture
+def course(class_: Undisturbed, tmp_path: Path) -> Course:
+    """A class whose submissions have been run, and not one of them entered."""
+    root = fresh_copy(class_.ungraded, tmp_path / "course")
+    shutil.copytree(class_.graded / OUTCOMES, root / OUTCOMES)
+    return Course(root)
+
+
+def grade(course: Course, progress: Progress = engine.QUIET) -> dict[str, Graded]:
+    graded = engine.grade(course.root, ASSIGNMENT, feedback=False, progress=progress)
+    return {one.student: one for one in graded}
+
+
+def grades(course: Course) -> dict[str, Grade]:
+    return {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+
+
+def book(course: Course) -> Gradebook:
+    return Gradebook(f"sqlite:///{course.root / 'gradebook.db'}")
+
+
+def database(course: Course) -> sqlite3.Connection:
+    return sqlite3.connect(course.root / "gradebook.db", isolation_level=None)
+
+
+def test_folders_that_are_not_what_they_should_be_stop_nobody(
+    course: Course, class_: Undisturbed
+) -> None:
+    submitted = course.root / "submitted"
+    half = course.folder("half-copied")
+    (half / f".{NOTEBOOK}.ipynb.x7Gh2k").write_text('{"cells": [')
+    (submitted / "a-file").mkdir()
+    (submitted / "a-file" / ASSIGNMENT).write_text("not a folder")
+    (submitted / "one-up").mkdir()
+    shutil.copy(
+        course.root / "submitted/right" / ASSIGNMENT / f"{NOTEBOOK}.ipynb", submitted / "one-up"
+    )
+    for odd in ("tab\there", "q?", "x" * 129):
+        course.folder(odd)
+    (submitted / ".ipynb_checkpoints" / ASSIGNMENT).mkdir(parents=True)
+    (submitted / "notes.txt").write_text("who was ill")
+
+    graded = grade(course)
+    found = grades(course)
+
+    says = {
+        "a-file": "is no folder",
+        "one-up": f"move them to submitted/one-up/{ASSIGNMENT}",
+        "tab\there": "characters that nobody can read: rename the folder",
+        "q?": "for a pattern: rename the folder",
+        "x" * 129: "at most 128 characters",
+    }
+    for student, problem in says.items():
+        assert problem in graded[student].problem
+        assert not graded[student].entered
+        assert student not in found
+    assert "a copy that was interrupted" in graded["half-copied"].problem
+    assert found["half-copied"].needs_manual_grade
+    assert {student: found[student] for student in class_.grades} == class_.grades
+    assert len(graded) == len(class_.grades) + len(says) + 1
+
+
+def test_why_it_could_not_be_run_stands_where_a_person_grades(course: Course) -> None:
+    grade(course)
+    copy = submission.read(
+        course.root / "autograded" / "cut-off" / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
+    )
+    shown = [
+        output["data"]["text/plain"]
+        for cell in copy.cells
+        if submission.grade_id(cell) == "qos-visible"
+        for output in cell.outputs
+    ]
+    assert "not valid JSON" in shown[0]
+
+
+def test_nobody_is_graded_who_is_not_in_the_class(course: Course, class_: Undisturbed) -> None:
+    with book(course) as people:
+        for student in ("right", "same", "cut-off"):
+            people.add_student(student, last_name=student.title())
+        people.add_student("wrongly", email="w@example.org")
+    graded = grade(course)
+    assert "no student 'wrong' (is it 'wrongly'?)" in graded["wrong"].problem
+    assert "nbgrader db student add wrong" in graded["wrong"].problem
+    assert set(grades(course)) == {"right", "same", "cut-off"}
+    with book(course) as people:
+        people.add_student("wrong")
+    grade(course)
+    assert grades(course) == class_.grades
+
+
+class LocksTheGradebook(Progress):
+    """Another program that takes the gradebook while the engine is at work."""
+
+    def __init__(self, connection: sqlite3.Connection) -> None:
+        self._connection = connection
+
+    def begin(self, submissions: int, notebooks: int, unchanged: int) -> None:
+        self._connection.execute("BEGIN EXCLUSIVE")
+
+
+def test_a_locked_gradebook_is_one_sentence(
+    course: Course, class_: Undisturbed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gradebook, "LOCK_PATIENCE", 0.0)
+    with closing(database(course)) as other:
+        with pytest.raises(GradebookLockedError, match="Another program holds the gradebook"):
+            grade(course, LocksTheGradebook(other))
+        with pytest.raises(GradebookLockedError, match="Another program holds the gradebook"):
+            grade(course)
+        other.execute("ROLLBACK")
+    grade(course)
+    assert grades(course) == class_.grades
+
+
+@pytest.mark.parametrize(
+    "change",
+    ["UPDATE alembic_version SET version_num = '167914646830'", "DROP TABLE alembic_version"],
+)
+def test_an_older_gradebook_says_how_to_upgrade_it(course: Course, change: str) -> None:
+    with closing(database(course)) as older:
+        older.execute(change)
+    before = (course.root / "gradebook.db").read_bytes()
+    with pytest.raises(OldGradebookError, match="run `nbgrader db upgrade`"):
+        grade(course)
+    assert (course.root / "gradebook.db").read_bytes() == before
+
+
+def test_a_gradebook_that_is_none_says_so(course: Course) -> None:
+    (course.root / "gradebook.db").write_text("this is no database, but a long enough text" * 99)
+    with pytest.raises(GradebookUnusable, match="is damaged"):
+        grade(course)
+
+
+FULL = """
+set -e
+mount -t tmpfs -o size=64m none "$1"
+cp -r "$2/." "$1"
+rest=$(( $(stat -f -c '%a * %S' "$1") ))
+head -c $(( rest - 500000 )) /dev/zero > "$1/ballast"
+set +e
+autograder grade {assignment} --root "$1" 2>"$3/said"
+echo $? > "$3/code"
+rm "$1/ballast"
+autograder grade {assignment} --root "$1" 2>"$3/said-later"
+echo $? > "$3/code-later"
+cp "$1/gradebook.db" "$1/nbgrader_config.py" "$3"
+"""
+
+
+@pytest.mark.timeout(600)
+def test_a_disk_that_fills_up_in_the_middle_is_one_sentence(
+    course: Course, class_: Undisturbed, tmp_path: Path
+) -> None:
+    disk, result = tmp_path / "disk", tmp_path / "result"
+    disk.mkdir()
+    result.mkdir()
+    script = FULL.format(assignment=ASSIGNMENT)
+    done = subprocess.run(
+        ["unshare", "-rm", "bash", "-c", script, "bash", disk, course.root, result],
+        env={**os.environ, "TMPDIR": str(tmp_path)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    said = (result / "said").read_text()
+    assert (result / "code").read_text() == "1\n", said
+    assert "make room there" in said
+    assert len(said.strip().splitlines()) == 1
+    assert ((result / "code-later").read_text(), (result / "said-later").read_text()) == ("0\n", "")
+    assert grades(Course(result)) == class_.grades
+
+
+def test_every_full_disk_is_recognised() -> None:
+    from autograder import database as words
+
+    for said in (
+        "database or disk is full",
+        "[Errno 28] No space left on device",
+        "Disk quota exceeded",
+    ):
+        assert isinstance(words.unusable(said, Path("/c")), DiskFullError)
+    assert words.unusable("InvalidEntry: no such thing", Path("/c")) is None
+
+
+def test_nobody_at_all_is_one_sentence(course: Course) -> None:
+    shutil.rmtree(course.root / "submitted")
+    with pytest.raises(AssignmentError, match="Nobody has submitted"):
+        grade(course)
+
+
+def test_a_spreadsheet_runs_nothing_of_what_a_student_is_called(tmp_path: Path) -> None:
+    found = [Grade("=1+1", 3.0, 5.0, False, {"@nb": {"cell": 3.0, "text": None}})]
+    grades_csv.write(found, "-ch05", tmp_path / "grades.csv")
+    head, line = (tmp_path / "grades.csv").read_text().splitlines()
+    assert head == "assignment,student_id,score,max_score,needs_manual_grade,'@nb:cell,'@nb:text"
+    assert line == "'-ch05,'=1+1,3.0,5.0,False,3.0,"

@@ -1,0 +1,159 @@
+"""The same grades from a Dask cluster: real schedulers and workers, and some that are killed."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+import pytest
+
+from autograder import jobs
+from autograder.jobs import Job, JobError, Result
+from autograder.runner import Outcome
+from autograder.submission import Cell
+from tests.killing import GONE, Engine, fresh_copy
+
+from .conftest import ASSIGNMENT, Undisturbed, needs_sandbox
+
+pytestmark = [needs_sandbox, pytest.mark.xdist_group("class"), pytest.mark.timeout(900)]
+
+PATIENCE = 300.0
+"""Seconds until something must have happened that takes a few on a machine that is idle."""
+
+DASK = [sys.executable, "-c", "from dask.__main__ import main; main()"]
+
+
+@dataclass
+class Cluster:
+    """A scheduler, and workers with one thread each."""
+
+    address: str
+    scheduler: subprocess.Popen[bytes]
+    workers: list[subprocess.Popen[bytes]]
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[Cluster]:
+    with ExitStack() as stack:
+
+        def start(*arguments: str) -> subprocess.Popen[bytes]:
+            log = stack.enter_context((tmp_path / f"{arguments[0]}.log").open("ab"))
+            process = subprocess.Popen(
+                [*DASK, *arguments, "--no-dashboard"], stdout=log, stderr=log
+            )
+            stack.callback(process.wait)
+            stack.callback(process.kill)
+            return process
+
+        file = tmp_path / "scheduler.json"
+        scheduler = start(
+            "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(file)
+        )
+        wait_for(lambda: file.is_file() and file.read_text().endswith("}"), "the scheduler")
+        address = json.loads(file.read_text())["address"]
+        workers = [
+            start(
+                "worker", address, "--nthreads", "1", "--no-nanny", "--name", name,
+                "--local-directory", str(tmp_path / name),
+            )
+            for name in ("ada", "grace")
+        ]  # fmt: skip
+        yield Cluster(address, scheduler, workers)
+
+
+def wait_for(condition: Callable[[], object], what: str) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, f"waited for {what} in vain"
+        time.sleep(0.05)
+
+
+def children(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
+    """Return a worker's examiners and subjects."""
+    return psutil.Process(process.pid).children(recursive=True)
+
+
+def engine_of(class_: Undisturbed, tmp_path: Path, address: str) -> Engine:
+    root = fresh_copy(class_.ungraded, tmp_path / "course")
+    return Engine(root, ASSIGNMENT, tmp_path / "scratch", ("--scheduler", address))
+
+
+def test_a_worker_that_is_killed_changes_no_grade(
+    class_: Undisturbed, tmp_path: Path, cluster: Cluster
+) -> None:
+    engine = engine_of(class_, tmp_path, cluster.address)
+    with engine.start() as process:
+        wait_for(
+            lambda: process.poll() is not None or any(map(children, cluster.workers)),
+            "a worker at work",
+        )
+        victim = next(worker for worker in cluster.workers if children(worker))
+        started = children(victim)
+        victim.send_signal(signal.SIGKILL)
+        said, complaint = process.communicate()
+    assert process.returncode == 0, complaint
+    assert engine.grades() == class_.grades, said
+    _, alive = psutil.wait_procs(started, timeout=GONE)
+    assert not alive, "a dead worker leaves nothing running"
+    assert "4 submissions have not changed" in engine.finish()
+
+
+def test_a_scheduler_that_goes_away_is_one_sentence(
+    class_: Undisturbed, tmp_path: Path, cluster: Cluster
+) -> None:
+    engine = engine_of(class_, tmp_path, cluster.address)
+    with engine.start() as process:
+        wait_for(
+            lambda: process.poll() is not None or any(map(children, cluster.workers)),
+            "a worker at work",
+        )
+        cluster.scheduler.send_signal(signal.SIGKILL)
+        _, complaint = process.communicate()
+    assert process.returncode == 1
+    assert "went away" in complaint
+    assert len(complaint.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("address", "says"),
+    [("tcp://127.0.0.1:{closed}", "There is no scheduler at"), ("10.0.0.1", "no address of a")],
+)
+def test_a_scheduler_that_is_not_there_is_one_sentence(
+    class_: Undisturbed, tmp_path: Path, address: str, says: str
+) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        closed = server.getsockname()[1]
+    engine = engine_of(class_, tmp_path, address.format(closed=closed))
+    with engine.start() as process:
+        _, complaint = process.communicate()
+    assert process.returncode == 1
+    assert says in complaint
+    assert len(complaint.strip().splitlines()) == 1
+    assert engine.grades() == {}
+
+
+def test_a_job_survives_the_journey() -> None:
+    job = Job((Cell("x = 1"), Cell("", "qos-visible", "qos", "visible", {"a": 1})), {"f": b"\0"})
+    assert Job.from_json(job.to_json()) == job
+    other = job.to_json().replace(job.salt, "0" * 64)
+    with pytest.raises(JobError, match="another version"):
+        Job.from_json(other)
+
+
+def test_an_outcome_is_bounded() -> None:
+    stream = {"output_type": "stream", "name": "stdout", "text": "x" * jobs.MAX_OUTCOME}
+    outcome = jobs.bounded(Outcome([[stream], []], notes=["a note"]))
+    assert outcome.outputs == [[], []]
+    assert outcome.notes[0] == "a note"
+    assert "left out" in outcome.notes[1]
+    result = Result(outcome, "sandboxed")
+    assert Result.from_json(result.to_json()) == result

@@ -1,0 +1,63 @@
+"""Files that are whole or not there, and what killed processes leave behind."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+from autograder import files
+
+
+@pytest.fixture(autouse=True)
+def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    return tmp_path
+
+
+def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "file.json"
+    files.write_whole(path, "old")
+    with pytest.raises(TypeError):
+        files.write_whole(path, None)  # type: ignore[arg-type]
+    assert path.read_text() == "old"
+    assert [file.name for file in path.parent.iterdir()] == ["file.json"]
+
+
+def test_what_a_killed_process_was_writing_is_removed_later(tmp_path: Path) -> None:
+    old, new = tmp_path / "a" / f"x{files.PARTIAL}", tmp_path / f"y{files.PARTIAL}"
+    old.parent.mkdir()
+    for path in (old, new):
+        path.write_text("{")
+    os.utime(old, (0, 0))
+    files.remove_partial(tmp_path)
+    assert (old.exists(), new.exists()) == (False, True), "somebody may be writing the new one"
+
+
+def test_scratch_folders_of_the_dead_are_swept_and_only_those(tmp_path: Path) -> None:
+    program = (
+        "import sys; from autograder import files\n"
+        "with files.scratch_folder() as folder:\n"
+        "    (folder / 'f').touch(); print(folder, flush=True); sys.stdin.read()"
+    )
+    other = subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+    )  # fmt: skip
+    assert other.stdout is not None
+    theirs = Path(other.stdout.readline().strip())
+    (tmp_path / "ros2-course-interfaces-x").mkdir()
+    with files.scratch_folder() as own:
+        assert files.sweep() == 0
+        assert own.is_dir()
+        assert theirs.is_dir()
+        other.kill()
+        other.communicate()
+        assert files.sweep() == 1
+        assert own.is_dir()
+        assert not theirs.exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["ros2-course-interfaces-x"]

@@ -1,0 +1,164 @@
+"""An engine that is killed goes on where it was: nothing lost, nothing graded twice."""
+
+from __future__ import annotations
+
+import random
+import shutil
+import signal
+from pathlib import Path
+
+import pytest
+from filelock import FileLock
+from nbgrader.api import Gradebook
+
+from autograder import engine, runner
+from autograder.engine import BusyError, Graded
+from autograder.gradebook import CourseGradebook
+from autograder.progress import Progress
+from tests.killing import Engine, episode, fresh_copy
+
+from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed, needs_sandbox
+
+pytestmark = [needs_sandbox, pytest.mark.xdist_group("class")]
+
+KILL, INT, TERM = signal.SIGKILL, signal.SIGINT, signal.SIGTERM
+OUTCOMES = ".autograder/outcomes"
+
+
+def course_of(class_: Undisturbed, tmp_path: Path, *, graded: bool = True) -> Course:
+    return Course(fresh_copy(class_.graded if graded else class_.ungraded, tmp_path / "course"))
+
+
+@pytest.mark.timeout(900)  # it starts many engines, which takes long on a busy machine
+@pytest.mark.parametrize(
+    ("kept", "signals"),
+    [(False, [KILL, TERM, KILL]), (True, [KILL, INT, KILL])],
+    ids=["while submissions run", "while grades are entered"],
+)
+def test_an_engine_that_is_killed_goes_on_where_it_was(
+    class_: Undisturbed, tmp_path: Path, kept: bool, signals: list[signal.Signals]
+) -> None:
+    course = course_of(class_, tmp_path, graded=False)
+    if kept:
+        shutil.copytree(class_.graded / OUTCOMES, course.root / OUTCOMES)
+    whole = Engine(course.root, ASSIGNMENT, tmp_path / "scratch")
+    seed = random.SystemRandom().randrange(10**6)
+    kills = episode(whole, random.Random(seed), class_.seconds, signals)
+    before = whole.outcomes()
+    whole.finish()
+    whole.check(before)
+    assert whole.grades() == class_.grades, f"seed {seed}, {kills} kills"
+    assert len(whole.outcomes()) == 2, "two students handed in the same"
+    assert "4 submissions have not changed" in whole.finish()
+
+
+class Seen(Progress):
+    """What an engine did: notebooks that were run, students that were entered, lines."""
+
+    def __init__(self) -> None:
+        self.run = 0
+        self.unchanged = 0
+        self.entered: list[str] = []
+
+    def begin(self, submissions: int, notebooks: int, unchanged: int) -> None:
+        self.unchanged = unchanged
+
+    def ran(self, waited: bool) -> None:
+        self.run += waited
+
+    def done(self, graded: Graded) -> None:
+        self.entered.append(graded.student)
+
+
+def again(course: Course, **options: bool) -> Seen:
+    seen = Seen()
+    engine.grade(course.root, ASSIGNMENT, progress=seen, **options)
+    return seen
+
+
+def test_what_has_not_changed_is_left_as_it_is(class_: Undisturbed, tmp_path: Path) -> None:
+    course = course_of(class_, tmp_path)
+    seen = again(course)
+    assert (seen.run, seen.unchanged, seen.entered) == (0, 4, [])
+    problems = {g.student: g.problem for g in engine.grade(course.root, ASSIGNMENT)}
+    assert "not valid JSON" in problems["cut-off"], "it is said again of what is left as it is"
+
+    course.submit("same", course.released)
+    (course.folder("wrong") / "timestamp.txt").write_text("2030-01-31 12:00:00 UTC")
+    seen = again(course)
+    assert (seen.run, seen.unchanged, seen.entered) == (1, 2, ["same", "wrong"][::-1])
+
+
+def test_what_is_missing_is_made_again(class_: Undisturbed, tmp_path: Path) -> None:
+    course = course_of(class_, tmp_path)
+    shutil.rmtree(course.root / "autograded" / "right")
+    (course.root / "feedback" / "wrong" / ASSIGNMENT / f"{NOTEBOOK}.html").unlink()
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        book.remove_submission(ASSIGNMENT, "same")
+    seen = again(course)
+    assert (seen.run, sorted(seen.entered)) == (0, ["right", "same"])
+    assert (course.root / "feedback" / "wrong" / ASSIGNMENT / f"{NOTEBOOK}.html").is_file()
+    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
+
+
+def test_marks_that_a_person_gives_get_into_the_feedback(
+    class_: Undisturbed, tmp_path: Path
+) -> None:
+    course = course_of(class_, tmp_path)
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        grade = book.find_grade("qos-explanation", NOTEBOOK, ASSIGNMENT, "right")
+        grade.manual_score, grade.needs_manual_grade = 4, False
+        comment = book.find_comment("qos-explanation", NOTEBOOK, ASSIGNMENT, "right")
+        comment.manual_comment = "Well argued, Countess."
+        book.db.commit()
+    seen = again(course)
+    assert (seen.run, seen.entered) == (0, [])
+    page = course.root / "feedback" / "right" / ASSIGNMENT / f"{NOTEBOOK}.html"
+    assert "Well argued, Countess." in page.read_text()
+    seen = again(course, fresh=True)
+    assert seen.run == 3
+    found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    assert found["right"].score == class_.grades["right"].score + 4
+
+
+def test_scores_that_somebody_else_entered_are_put_right(
+    class_: Undisturbed, tmp_path: Path
+) -> None:
+    course = course_of(class_, tmp_path)
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        book.find_grade("qos-visible", NOTEBOOK, ASSIGNMENT, "wrong").auto_score = 0
+        book.db.commit()
+    seen = again(course)
+    assert (seen.run, seen.entered) == (0, ["wrong"])
+    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
+
+
+def test_a_mistake_of_the_grader_is_tried_again(
+    class_: Undisturbed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    course = course_of(class_, tmp_path)
+    course.submit("right", course.released)
+    with monkeypatch.context() as broken:
+        broken.setattr(runner, "START_TIMEOUT", 0.0)
+        again(course)
+    found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    assert found["right"].needs_manual_grade
+    feedback = course.root / "feedback" / "right" / ASSIGNMENT / f"{NOTEBOOK}.html"
+    assert "did not start" in feedback.read_text()
+    seen = again(course)
+    assert (seen.run, seen.entered) == (1, ["right"])
+
+
+def test_one_engine_at_a_time(class_: Undisturbed, tmp_path: Path) -> None:
+    course = course_of(class_, tmp_path)
+    with (
+        FileLock(course.root / engine.LOCK),
+        pytest.raises(BusyError, match="Another `autograder grade` is at work"),
+    ):
+        engine.grade(course.root, ASSIGNMENT)
+
+
+def test_the_number_of_jobs_does_not_matter(class_: Undisturbed, tmp_path: Path) -> None:
+    course = course_of(class_, tmp_path, graded=False)
+    engine.grade(course.root, ASSIGNMENT, jobs=1)
+    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
