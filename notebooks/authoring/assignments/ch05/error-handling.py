@@ -435,6 +435,10 @@ class NavigationServer(Node):
 # it says what was observed, what was needed, and why it matters on a robot. Ask for more help with
 # `check("safety", hint=2)` or `hint=3` in a cell of your own. What your callbacks raised or printed
 # is in `course.logs()` after you ran the node yourself with `course.run(GripperClient, threads=4)`.
+#
+# **Look inside**, in cells of your own after `import course`: `course.session(threads=4).log_panel()`
+# shows live what all nodes log and raise. After `course.run(NavigationServer)` you are the dispatcher
+# in `course.session().action("drive")`: send goals, several at once, and cancel them.
 
 # %% nbgrader={"grade": true, "grade_id": "safety-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 from autograder import check
