@@ -23,7 +23,7 @@ from pathlib import Path
 import nbformat
 from playwright.sync_api import BrowserContext, sync_playwright
 
-from tests.browser import robot
+from tests import robot
 from tests.browser.conftest import ARGUMENTS, BROWSERS
 from tests.browser.lab import Lab
 from tests.browser.notebook_page import NotebookPage
@@ -80,7 +80,7 @@ def main() -> None:
     options = parser.parse_args()
     turns: dict[str, list[Figures]] = defaultdict(list)
     with tempfile.TemporaryDirectory() as folder, Lab(Path(folder)) as lab, browser() as context:
-        shutil.copy(str(robot.__file__), lab.work / "robot.py")
+        shutil.copy(robot.__file__, lab.work / "robot.py")
         for _ in range(options.rounds):
             for rate in RATES:
                 for views in (0, len(VIEWS)):

@@ -142,6 +142,13 @@ class NotebookPage:
         content: dict[str, Any] = json.loads((self.lab.work / self.path).read_text())
         return content
 
+    def scroll_to(self, number: int) -> None:
+        """Bring a cell, counted from 0, into sight."""
+        self.page.evaluate(
+            "number => window.jupyterapp.shell.currentWidget.content.scrollToItem(number, 'start')",
+            number,
+        )
+
     def cell(self, number: int) -> Locator:
         """Return a cell of the notebook, counted from 0."""
         return self.page.locator(f'.jp-Notebook [data-windowed-list-index="{number}"]')

@@ -11,6 +11,8 @@ import nbformat
 import pytest
 from playwright.sync_api import Locator, expect
 
+from tests import robot
+
 from .lab import Lab
 from .notebook_page import NotebookPage
 
@@ -45,7 +47,7 @@ Open = Callable[..., NotebookPage]
 @pytest.fixture
 def open_cells(lab: Lab, open_notebook: Callable[[str], NotebookPage]) -> Open:
     """Open a notebook of these cells, after one that runs the robot, and run it all."""
-    shutil.copy(Path(__file__).parent / "robot.py", lab.work / "robot.py")
+    shutil.copy(robot.__file__, lab.work / "robot.py")
 
     def open_(*sources: str, rate: float = 20.0) -> NotebookPage:
         cells = [SETUP.format(rate=rate), *sources]
@@ -134,6 +136,49 @@ def test_a_view_survives_a_reload_and_says_when_the_kernel_is_gone(open_cells: O
     page.run_all()
     expect(region(page, "ROS graph").locator("svg text", has_text="/listener")).to_be_visible()
     expect(region(page, "ROS graph").locator(".rosview-status")).to_have_text("")
+
+
+def test_every_view_is_honest_after_a_restart_and_in_a_notebook_that_is_opened_again(
+    open_cells: Open,
+) -> None:
+    page = open_cells(*(source for source, _ in VIEWS.values()))
+    saved = {
+        label: page.page.locator(".rosview-saved").filter(has_text=f"{label} as it was at")
+        for _, label in VIEWS.values()
+    }
+    for copy in saved.values():
+        expect(copy).to_have_count(1)
+        expect(copy).to_be_hidden()
+    page.restart_kernel()
+    for label in saved:
+        expect(region(page, label).locator(".rosview-status")).to_contain_text("Run this cell agai")
+    page.save()
+    page.reload()
+    for copy in saved.values():
+        expect(copy).to_be_visible()
+        expect(copy).to_contain_text("not live: run this cell again")
+    expect(saved["ROS graph"]).to_contain_text("/chatter")
+    expect(page.page.get_by_text("model not found")).to_have_count(len(VIEWS))
+    for lost in page.page.get_by_text("model not found").all():
+        expect(lost).to_be_hidden()
+    page.run_all()
+    for label, copy in saved.items():
+        expect(region(page, label)).to_be_visible()
+        expect(copy).to_be_hidden()
+
+
+def test_a_view_that_was_scrolled_away_is_up_to_date_when_it_is_back(open_cells: Open) -> None:
+    page = open_cells("session.graph()", *["print('far\\n' * 30)"] * 12)
+    label = region(page, "ROS graph").locator("svg text", has_text="/listener")
+    expect(label).to_be_in_viewport()
+    page.scroll_to(page.cell_count() - 1)
+    expect(label).not_to_be_in_viewport()
+    run_in_kernel(page, "session.stop('listener')")
+    page.scroll_to(1)
+    view = region(page, "ROS graph")
+    expect(view.locator("svg text", has_text="/robot")).to_be_in_viewport()
+    expect(label).to_have_count(0)
+    assert page.errors == []
 
 
 def test_a_closed_session_is_said(open_cells: Open) -> None:

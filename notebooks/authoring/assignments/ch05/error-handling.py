@@ -36,7 +36,7 @@
 #    examiner runs your robot on simulated time. Times in the task are in that time's seconds, and
 #    0.2 s more or less do no harm. Timers fire when they are due; a thread of your own sees the
 #    clock move in steps of 0.1 s or more, and sleeps on it with
-#    `self.get_clock().sleep_for(duration, context=self.context)`.
+#    `self.get_clock().sleep_for(duration)`.
 # 2. **Nothing blocks.** Each node runs in an executor with 4 threads. While a callback waits,
 #    everything else in its callback group waits too, and in the node's default group that is also
 #    the clock itself. The stubs therefore use a reentrant group, `self.group`.

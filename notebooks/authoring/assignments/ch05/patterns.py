@@ -71,8 +71,7 @@ choices = {
 # | battery | `robot/battery` | Everyone who is interested knows a new level within 1 s. So does whoever joins later, within 1 s: the hardware reports the level only when it changes. |
 #
 # All times are those of the node's clock: `create_timer` and `self.get_clock()` go by it,
-# `time.sleep` does not. The examiner moves that clock faster than the one on the wall. (`sleep_for`
-# of the clock needs `context=self.context` in a notebook, where a session has a context of its own.)
+# `time.sleep` does not. The examiner moves that clock faster than the one on the wall.
 #
 # **Types.** Which one you need follows from the pattern that you choose.
 #
