@@ -25,7 +25,8 @@ class LabError(CourseError):
 
 
 _SETTINGS = Path(__file__).resolve().parent / "jupyter"
-"""A Jupyter configuration folder: no questions about news, no look for updates on the internet."""
+"""A Jupyter configuration folder: no questions about news, no look for updates on the internet, and
+time for nbgrader's Validate button to run checks that take several seconds of simulated time."""
 
 
 @dataclass(frozen=True)

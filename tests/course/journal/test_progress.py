@@ -11,9 +11,11 @@ from typing import Any
 import nbformat
 import pytest
 from markdown_it import MarkdownIt
+from typer.testing import CliRunner
 
 import course
 from course import lab
+from course.cli import app
 from course.content import content_root
 from course.errors import CourseError
 from course.journal.progress import WELCOME
@@ -188,6 +190,17 @@ def test_a_damaged_journal_and_damaged_attempts_are_said(folder: Path) -> None:
     assert progress.quizzes[0].passed
     assert "progress.json was damaged: it is kept as progress.json.corrupt-1" in repr(progress)
     assert "quiz-ch05.attempts.jsonl has 1 damaged lines" in repr(progress)
+
+
+def test_the_command_says_the_same_in_a_terminal(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder.parent)
+    told = CliRunner().invoke(app, ["progress", str(folder)])
+    assert told.exit_code == 0
+    assert "0 of 5 exercises ready to hand in, the quiz not passed yet." in told.output
+    folder.rename(folder.parent / lab.DEFAULT)
+    assert CliRunner().invoke(app, ["progress"]).output == told.output
 
 
 def test_elsewhere_it_says_where_to_go(tmp_path: Path) -> None:
