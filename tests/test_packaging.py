@@ -213,7 +213,7 @@ def test_ci_ends_with_the_readmes_own_test_command() -> None:
 
 
 def test_nothing_in_the_packages_reaches_the_wrong_way() -> None:
-    """Imports run one way: autograder to course and quizzes, course to quizzes, these to nothing."""
+    """Imports run one way: autograder to course to quizzes, and these to nothing of ours."""
     allowed = {
         "course": {"course", "quizzes"}, "autograder": {"autograder", "course", "quizzes"},
         "quizzes": {"quizzes"},
