@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 PATIENCE = 0.2  # s that a callback must have slept
 LOOKS = 40  # that must have found it asleep: on a busy machine PATIENCE passes in a few
-WORK = 1e-3  # s of processor time a look: a loop that spins uses five times as much, a nap a tenth
+WORK = 0.5e-3  # s of processor time a look: a loop that spins uses ten times as much, a nap a tenth
 RESTLESS = 8  # looks in a row at which a blocked thread may have stirred: it looks at a clock
 
 

@@ -1,0 +1,29 @@
+"""What a student of exercise 1 reads, word for word: three mistakes, with all hints."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from autograder import corpus
+from autograder.corpus import trials
+from autograder.report import Report
+from autograder.sandbox import abilities
+
+from .conftest import SUBMISSIONS
+
+GOLDEN = Path(__file__).parent / "golden"
+CASES = {case.name: case for case in corpus.load(SUBMISSIONS, "qos")}
+MISTAKES = ("wrong-camera-reliable", "wrong-imu-single", "wrong-incompatible")
+
+
+@pytest.mark.skipif(not abilities().loss, reason="lost packets need a network of its own")
+@pytest.mark.parametrize("name", MISTAKES)
+def test_the_report_reads_as_it_should(name: str) -> None:
+    (trial,) = corpus.run([CASES[name]], *trials.notebooks("qos"), jobs=1)
+    shown = [repr(Report(verdict, hints=3)) for verdict in trial.outcome.verdicts.values()]
+    # Readings come in at a sensor's rate until all have had their pause: one more or less.
+    text = re.sub(r"\bof \d{3} readings", "of 151 readings", "\n".join(shown)) + "\n"
+    assert text == (GOLDEN / f"qos-{name}.txt").read_text(encoding="utf-8")
