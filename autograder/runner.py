@@ -88,10 +88,12 @@ def run(
     outcome = Outcome(outputs=[[] for _ in program])
     with ExitStack() as stack:
         place = stack.enter_context(sandbox.place(trust=trust, hidden=hidden))
-        engine, subject_engine = socket.socketpair()
+        # The lower number is the engine's: what writes to every descriptor in turn must find this
+        # one, which is being read, before the examiner's, which is not until an exam begins.
+        pairs = sorted((socket.socketpair() for _ in range(2)), key=lambda pair: pair[1].fileno())
+        (engine, subject_engine), (control, subject_control) = pairs
         channel = Channel(engine)
         stack.callback(channel.close)
-        control, subject_control = socket.socketpair()
         examiner = stack.enter_context(
             ExaminerProcess(
                 control, place.domain_id, own_network=place.own_network, spawn=place.spawn

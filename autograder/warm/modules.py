@@ -5,6 +5,7 @@ Only time is saved by what stands here. What is missing is imported when it is n
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable
 from contextlib import suppress
 from importlib import import_module
@@ -41,6 +42,8 @@ def import_all(more: Iterable[str] = ()) -> None:
     for package, modules in INTERFACES.items():
         for module in modules:
             _load(import_module(f"{package}.{module}"))
+    # It notes the file of every module there is, once: IPython asks for each cell and traceback.
+    inspect.getmodule(import_all.__code__)
 
 
 def _load(interfaces: object) -> None:
