@@ -193,7 +193,7 @@ def _connect(address: str) -> Any:
         raise ClusterError(
             f"--scheduler needs Dask, which is not installed here: install it with `{EXTRA}`."
         ) from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its own words are not for people
+    _silence()
     try:
         _reach(address)
         return Client(  # type: ignore[no-untyped-call]
@@ -208,6 +208,13 @@ def _connect(address: str) -> Any:
             f"There is no scheduler at {address} ({_first_line(error)}): start one with "
             "`dask scheduler`, or mend the address; nothing was graded."
         ) from None
+
+
+def _silence() -> None:
+    """Keep Dask's own log off the screen: what matters of it is said in a sentence."""
+    for name in ["distributed", *logging.root.manager.loggerDict]:
+        if name.split(".")[0] == "distributed":  # several have a level of their own
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 def _reach(address: str) -> None:
