@@ -83,6 +83,8 @@ def test_folders_that_are_not_what_they_should_be_stop_nobody(
         "q?": "for a pattern: rename the folder",
         "x" * 129: "at most 128 characters",
     }
+    for student in (*class_.grades, "half-copied"):
+        assert graded[student].entered, graded[student].problem
     for student, problem in says.items():
         assert problem in graded[student].problem
         assert not graded[student].entered
