@@ -30,6 +30,12 @@ class StudentError(Exception):
         super().__init__(error)
         self.trace = trace
 
+    @property
+    def told(self) -> str:
+        """Return what was raised, and where in the student's own lines, as feedback tells it."""
+        where = f" It happened here:\n{self.trace}" if self.trace else ""
+        return f"It raised {self}.{where}"
+
 
 class Subject:
     """The examiner's end of the control channel. It asks; it does not believe.

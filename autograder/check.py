@@ -8,6 +8,7 @@ import signal
 import socket
 import threading
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from autograder import exams
@@ -19,6 +20,7 @@ from autograder.wire import Channel
 from course import Session
 from course.domains import lease_domain
 from course.errors import CourseError
+from course.journal.store import JournalError, journal_here
 
 STUCK = 3.0
 """Seconds after a verdict in which the student's node must have been stopped."""
@@ -48,7 +50,7 @@ def check(
     if SUBJECT_ENV in os.environ:
         return 0.0  # the real examiner is at work outside this process
     verdict = examine(exam, part, namespace, key)
-    _show(Report(verdict, hints=hint))
+    _show(Report(_noted(verdict), hints=hint))
     return float(verdict.score + verdict.unexamined)
 
 
@@ -129,6 +131,20 @@ class _Sitting:
         main = threading.main_thread().ident
         assert main is not None
         signal.pthread_kill(main, signal.SIGINT)
+
+
+def _noted(verdict: Verdict) -> Verdict:
+    """Note a student's visible checks in the journal of the working copy, if this is in one."""
+    journal = journal_here()
+    if journal is None or verdict.part != "visible":
+        return verdict
+    passed = [check.title for check in verdict.checks if check.passed]
+    left = [c.title for c in verdict.checks if not c.passed and c.status != "not_examined"]
+    try:
+        journal.checked(verdict.exam, verdict.score, verdict.max_score, passed, left)
+    except JournalError as error:
+        return replace(verdict, notes=(*verdict.notes, str(error)))
+    return verdict
 
 
 def _caller_globals() -> Mapping[str, Any]:

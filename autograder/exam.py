@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 from autograder import points as points_table
-from autograder.bench import Bench, SubjectGone
+from autograder.bench import Bench, StudentError, SubjectGone
 from autograder.verdict import CheckResult, Status, Verdict
 from course.errors import CourseError
 
@@ -118,18 +118,31 @@ class Exam(Generic[RigT]):
         table = self.part(part)
         failed = {} if failed is None else failed
         done = dict(failed)
-        with self.rig(bench) as rig:
+        with ExitStack() as stack:
+            rig: RigT | None
+            try:
+                rig = stack.enter_context(self.rig(bench))
+            except (StudentError, SubjectGone) as error:
+                done.update((name, _blamed(self.checks[name], error)) for name in self._roots())
+                rig = None
             results = [_worth(self._result(name, rig, done), table[name]) for name in table]
         failed.update((name, result) for name, result in done.items() if result.status == "failed")
         return Verdict(self.name, part, tuple(results))
 
-    def _result(self, name: str, rig: RigT, done: dict[str, CheckResult]) -> CheckResult:
+    def _roots(self) -> list[str]:
+        return [name for name, check in self.checks.items() if not check.needs]
+
+    def _result(self, name: str, rig: RigT | None, done: dict[str, CheckResult]) -> CheckResult:
         if name not in done:
             check = self.checks[name]
             for need in check.needs:
                 self._result(need, rig, done)
             missing = [done[need] for need in check.needs if not done[need].passed]
-            done[name] = _not_checked(check, missing[0]) if missing else _run(check, rig)
+            if missing:
+                done[name] = _not_checked(check, missing[0])
+            else:
+                assert rig is not None  # without one, what needs nothing has failed already
+                done[name] = _run(check, rig)
         return done[name]
 
 
@@ -153,11 +166,8 @@ def _run(check: Check[RigT], rig: RigT) -> CheckResult:
         note = check.run(rig) or ""
     except Failed as failed:
         return replace(_result_of(check, "failed"), expected=failed.expected, actual=failed.actual)
-    except SubjectGone as gone:
-        return replace(
-            _result_of(check, "failed"), actual=str(gone),
-            expected="Your program keeps running and answering while it is examined.",
-        )  # fmt: skip
+    except (StudentError, SubjectGone) as error:
+        return _blamed(check, error)
     except NotExaminable as reason:
         return replace(_result_of(check, "not_examined"), actual=str(reason))
     except Exception as error:  # noqa: BLE001 - whatever else goes wrong in here is our fault
@@ -167,6 +177,16 @@ def _run(check: Check[RigT], rig: RigT) -> CheckResult:
             f"{_innermost(error)}). This is not your fault: a person will look at it.",
         )
     return replace(_result_of(check, "passed"), note=note)
+
+
+def _blamed(check: Check[RigT], error: StudentError | SubjectGone) -> CheckResult:
+    """Return the failure of a check that the student's own code or process has cut short."""
+    if isinstance(error, StudentError):
+        expected, actual = "Your code does what it is asked for without an error.", error.told
+    else:
+        expected = "Your program keeps running and answering while it is examined."
+        actual = str(error)
+    return replace(_result_of(check, "failed"), expected=expected, actual=actual)
 
 
 def _innermost(error: BaseException) -> str:

@@ -77,6 +77,15 @@ def serve(
         verdicts.flush()
 
 
+def preload() -> None:
+    """Import every exam: `autograder.warm` calls it before it forks examiners."""
+    from autograder.warm import modules
+
+    modules.import_all()
+    for name in exams.names():
+        exams.load(name)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the process; returns its exit code."""
     parser = argparse.ArgumentParser(prog="autograder.examiner")

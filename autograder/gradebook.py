@@ -25,6 +25,7 @@ from autograder import database, roster
 from autograder.database import GradebookUnusable
 from autograder.ledger import Standing
 from autograder.nbgrader_bridge import RestoreCells
+from autograder.nbgrader_once import Engines, FeedbackExporter
 from autograder.roster import Roster
 from course.errors import CourseError
 
@@ -66,6 +67,9 @@ class CourseGradebook:
             config.CourseDirectory.submitted_directory = staged
             steps = config.Autograde.sanitize_preprocessors
             config.Autograde.sanitize_preprocessors = [s for s in steps if s is not RestoreCells]
+        if "exporter_class" not in config.GenerateFeedback:
+            config.GenerateFeedback.exporter_class = FeedbackExporter
+        self._engines = Engines()
         self.config: Config = config
         self.coursedir = CourseDirectory(config=config)
         self._api = NbGraderAPI(coursedir=self.coursedir, config=config)
@@ -117,7 +121,7 @@ class CourseGradebook:
     def _call(self, method: Any, *arguments: Any, **options: Any) -> None:
         deadline = time.monotonic() + LOCK_PATIENCE
         while True:
-            with _quiet():
+            with _quiet(), self._engines.shared():
                 result = method(*arguments, **options)
             if result["success"]:
                 return
@@ -135,7 +139,11 @@ class CourseGradebook:
     def _open(self) -> Iterator[Gradebook]:
         try:
             database.require_this_schema(self.coursedir.db_url, self.root)
-            with _quiet(), Gradebook(self.coursedir.db_url, self.coursedir.course_id) as gradebook:
+            with (
+                _quiet(),
+                self._engines.shared(),
+                Gradebook(self.coursedir.db_url, self.coursedir.course_id) as gradebook,
+            ):
                 yield gradebook
         except MissingEntry as error:
             raise GradebookError(

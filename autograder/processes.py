@@ -12,15 +12,18 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from autograder.verdict import MAX_BYTES, Verdict
 from course.errors import CourseError
 
+if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
+    from autograder.sandbox.place import Process
+
 EXAM_TIMEOUT = 120.0
 """Seconds one part of an exam may take in all: its own deadlines end it long before."""
 
-Spawn = Callable[..., "subprocess.Popen[bytes]"]
+Spawn = Callable[..., "Process"]
 
 
 class ExaminerError(CourseError):

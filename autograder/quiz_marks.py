@@ -7,8 +7,6 @@ file that was written by hand earns what its answers earn.
 
 from __future__ import annotations
 
-import os
-import stat
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -63,7 +61,7 @@ def verdict(bank: Bank, folder: Path, student: str) -> Verdict:
     """Mark the best attempt that lies in ``folder``."""
     name = record.filename(bank.quiz)
     try:
-        content = _read(folder / name)
+        content = record.handed_in(folder, bank.quiz)
     except FileNotFoundError:
         reason = (
             f"There is no {name} in the submission: it lies beside the notebook once you have "
@@ -93,15 +91,6 @@ def _bank(name: str) -> Bank:
         return loader.load_bank(name)
     except QuizError as error:
         raise QuizMarksError(str(error)) from error
-
-
-def _read(path: Path) -> bytes:
-    """Return what a plain file holds, but not much more than is ever marked; follow no link."""
-    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    with os.fdopen(handle, "rb") as file:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise OSError("it is not a file")
-        return file.read(record.MAX_FILE + 1)
 
 
 def _check(mark: Mark) -> CheckResult:

@@ -22,6 +22,13 @@ from autograder.shell import make_shell, run_cell
 from autograder.wire import Channel, ChannelClosed
 from course import Session
 
+SHELL = (
+    "IPython.core.application", "IPython.core.completer", "IPython.core.completerlib",
+    "IPython.core.crashhandler", "IPython.core.logger", "IPython.core.magics.extension",
+    "IPython.core.oinspect", "pygments.formatters.terminal256", "stack_data",
+)  # fmt: skip
+"""What IPython imports for its first cell and for its first traceback."""
+
 
 def run(engine: Channel, control: Channel, domain_id: int) -> None:
     """Run the engine's program cell by cell, and serve the examiner where it says so."""
@@ -40,6 +47,13 @@ def run(engine: Channel, control: Channel, domain_id: int) -> None:
             Harness(open_session, shell.user_ns).serve(control)
         else:
             engine.send({"ran": number, "outputs": run_cell(shell, cell["source"])})
+
+
+def preload() -> None:
+    """Import what a run is going to need: `autograder.warm` calls it before it forks subjects."""
+    from autograder.warm import modules
+
+    modules.import_all(SHELL)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from course.errors import DomainError as DomainError
     from course.errors import SessionError as SessionError
     from course.errors import WaitTimeout as WaitTimeout
+    from course.journal.progress import Progress as Progress
+    from course.journal.progress import progress as progress
     from course.notebook import load_ipython_extension as load_ipython_extension
     from course.notebook import unload_ipython_extension as unload_ipython_extension
     from course.runtime.actions import GoalRun as GoalRun
@@ -71,6 +73,8 @@ _HOMES = {
     "DomainError": "course.errors",
     "SessionError": "course.errors",
     "WaitTimeout": "course.errors",
+    "Progress": "course.journal.progress",
+    "progress": "course.journal.progress",
     "load_ipython_extension": "course.notebook",
     "unload_ipython_extension": "course.notebook",
     "GoalRun": "course.runtime.actions",

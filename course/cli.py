@@ -61,6 +61,21 @@ def lab(
 
 
 @app.command()
+def progress(
+    folder: Annotated[
+        Path | None,
+        typer.Argument(metavar="[DIR]", help="The working copy (./ros2-course, or here)."),
+    ] = None,
+) -> None:
+    """Say what is done and what is left in your working copy."""
+    from course import lab as course_lab
+    from course.journal.progress import progress as read
+
+    inside = course_lab.DEFAULT if course_lab.DEFAULT.is_dir() else None
+    _print(repr(read(folder.expanduser() if folder else inside)))
+
+
+@app.command()
 def doctor(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:

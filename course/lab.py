@@ -13,10 +13,11 @@ from typing import NoReturn
 
 from course.content import content_root
 from course.errors import CourseError
+from course.journal import welcome
+from course.journal.progress import WELCOME
+from course.journal.store import MANIFEST
 
 DEFAULT = Path("ros2-course")
-MANIFEST = ".ros2-course.json"
-"""File in a working copy that remembers what was handed out: {path: digests of its versions}."""
 
 
 class LabError(CourseError):
@@ -24,7 +25,8 @@ class LabError(CourseError):
 
 
 _SETTINGS = Path(__file__).resolve().parent / "jupyter"
-"""A Jupyter configuration folder: no questions about news, no look for updates on the internet."""
+"""A Jupyter configuration folder: no questions about news, no look for updates on the internet, and
+time for nbgrader's Validate button to run checks that take several seconds of simulated time."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +47,9 @@ class Copied:
 def make_copy(folder: Path, root: Path | None = None) -> Copied:
     """Put the chapters and the released assignments into ``folder``.
 
-    A file that is there is never changed. Where the course has a version that was not handed out
-    yet, that one is put beside it as ``NAME.new.ipynb`` (``NAME.new-2.ipynb``, ...).
+    A file that is there is never changed, but for the progress that the first notebook shows. Where
+    the course has a version that was not handed out yet, that one is put beside it as
+    ``NAME.new.ipynb`` (``NAME.new-2.ipynb``, ...).
 
     Args:
         folder: the working copy; it is made if need be.
@@ -64,6 +67,7 @@ def make_copy(folder: Path, root: Path | None = None) -> Copied:
         for name, text in files.items():
             _hand_out(copied, name, text.encode(), handed_out.setdefault(str(name), []))
         _write_manifest(folder, handed_out)
+        welcome.refresh(folder)
     except OSError as error:
         raise LabError(
             f"The working copy {folder} cannot be written ({error.strerror or error}): name a "
@@ -85,12 +89,19 @@ def open_lab(folder: Path, arguments: Sequence[str] = ()) -> NoReturn:
         places = [str(_SETTINGS), *([inherited] if inherited else [])]
         os.environ["JUPYTER_CONFIG_PATH"] = os.pathsep.join(places)
         # -m, and not the script: it starts the JupyterLab of this very Python.
-        os.execv(sys.executable, [sys.executable, "-m", "jupyterlab", *arguments])
+        command = [sys.executable, "-m", "jupyterlab", *_first_view(arguments), *arguments]
+        os.execv(sys.executable, command)
     except OSError as error:
         raise LabError(
             f"JupyterLab cannot be started in {folder} ({error.strerror or error}): choose "
             "another folder, or run `course doctor`."
         ) from error
+
+
+def _first_view(arguments: Sequence[str]) -> list[str]:
+    """Return the option by which JupyterLab opens the student's progress first."""
+    chosen = any("default_url" in argument for argument in arguments)
+    return [] if chosen or not WELCOME.is_file() else [f"--LabApp.default_url=/lab/tree/{WELCOME}"]
 
 
 def _course_files(root: Path) -> dict[Path, str]:
@@ -142,7 +153,7 @@ def _free_name(path: Path) -> Path:
 
 
 def _read_manifest(folder: Path) -> dict[str, list[str]]:
-    """Return what was handed out; a damaged record only costs a copy put beside."""
+    """Return {path: digests of the versions handed out}; a damaged record costs a copy beside."""
     try:
         data = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
         return {str(name): [str(digest) for digest in digests] for name, digests in data.items()}

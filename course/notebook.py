@@ -1,4 +1,4 @@
-"""What `%load_ext course` adds to a notebook: `%%interface`, and news of nodes after each cell."""
+"""What `%load_ext course` adds: `%%interface`, `%ros`, news of nodes, notes of progress."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 from rclpy.exceptions import NotInitializedException
 
 from course.interfaces import magic
+from course.journal.notes import CellNotes
 from course.ros import magic as ros_magic
 from course.runtime import closing
 from course.runtime.callback_errors import CallbackError
@@ -82,6 +83,7 @@ class _Reported:
 
 
 _reported = _Reported()
+_notes = CellNotes()
 
 
 def _about(error: CallbackError, *, again: bool) -> News:
@@ -96,6 +98,8 @@ def _about(error: CallbackError, *, again: bool) -> News:
 def _report(result: Any) -> None:
     from IPython.display import display
 
+    if problem := _notes.after(result):
+        display(News(problem))  # type: ignore[no-untyped-call]
     error = getattr(result, "error_in_exec", None)
     if isinstance(error, RuntimeError) and _INIT_TWICE in str(error):
         display(  # type: ignore[no-untyped-call]

@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import stat
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 from quizzes.answers import Answer
@@ -55,6 +58,23 @@ class Attempt:
 def filename(quiz: str) -> str:
     """Return the name of the file with the attempts of a quiz."""
     return f"quiz-{quiz}.attempts.jsonl"
+
+
+def handed_in(folder: Path, quiz: str) -> bytes:
+    """Return what a submission's file of attempts holds, but not much more than is ever marked.
+
+    A link is not followed, and what is no plain file is not waited for.
+
+    Raises:
+        FileNotFoundError: there is no such file.
+        OSError: it cannot be read.
+    """
+    path = folder / filename(quiz)
+    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
+    with os.fdopen(handle, "rb") as file:
+        if not stat.S_ISREG(os.fstat(handle).st_mode):
+            raise OSError("it is not a plain file")
+        return file.read(MAX_FILE + 1)
 
 
 def parse(content: bytes) -> tuple[list[Attempt], int]:

@@ -52,7 +52,10 @@ class Kernel:
             elif message["msg_type"] == "error":
                 shown.append(("error", "\n".join(content["traceback"])))
 
-        reply = self.client.execute_interactive(cell, output_hook=take, timeout=timeout)
+        # After an error the kernel would drop what arrives before it has told: each cell is meant.
+        reply = self.client.execute_interactive(
+            cell, output_hook=take, timeout=timeout, stop_on_error=False
+        )
         return reply["content"]["status"], shown
 
     def close(self) -> None:

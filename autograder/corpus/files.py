@@ -13,7 +13,7 @@ The text is that of the cell ``<exam>-solution``. A line ``# %% <grade id>`` beg
 
 ``<exam>/mutants.toml`` has one table a mutant: ``title``, ``fails`` (a list), ``says`` (a table),
 and ``splices``: a list of {cell, old, new}, applied to the exemplar's cells, so that mutants follow
-the exemplar. ``cell`` is ``<exam>-solution`` if it is left out.
+the exemplar. ``cell`` is ``<exam>-solution`` if it is left out. Without splices it is the exemplar.
 
 ``every/<name>.py`` are cases for every exam: their text replaces the solution cell, and the other
 solution cells are emptied.
@@ -68,6 +68,8 @@ def _case(exam: str, file: Path, *, every: bool = False) -> Case:
     says = [line.partition(": ") for line in fields.get("says", [])]
     texts = _texts(exam, text[header.end() :])
     in_stub = "in" in fields
+    if in_stub and fields["in"] != ["the stub"]:
+        raise CorpusError(f"{file}: '# in:' can be 'the stub', not '{fields['in'][0]}'.")
     return Case(
         exam, file.stem, fields["title"][0], _fails(fields["fails"][0]),
         says={check: fragment for check, _, fragment in says},
@@ -110,7 +112,7 @@ def _mutants(exam: str, file: Path) -> Iterator[Case]:
 
 
 def _splices(exam: str, data: list[dict[str, Any]]) -> dict[str, tuple[Splice, ...]]:
-    splices: dict[str, tuple[Splice, ...]] = {}
+    splices: dict[str, tuple[Splice, ...]] = {f"{exam}-solution": ()}
     for splice in data:
         cell = splice.get("cell", f"{exam}-solution")
         splices[cell] = (*splices.get(cell, ()), (splice["old"], splice["new"]))

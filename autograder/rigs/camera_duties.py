@@ -132,3 +132,23 @@ def require_zoom(rig: CameraRig, device: str, factor: int, when: str) -> None:
         actual=f"The pictures went on with a zoom of {rig.pictures(device)[-1].zoom}"
         f"{rig.raised()}.",
     )
+
+
+def require_callbacks_ended(rig: CameraRig, among: set[int], usual: int, when: str) -> None:
+    """Fail if a callback of a driver that was taken down goes on for ever.
+
+    A session gives such a callback's thread up and goes on with a new one. So there is a thread
+    that is not ``among`` those of before, and one more than the ``usual`` number without a driver.
+    """
+
+    def replaced() -> bool:
+        now = rig.process.thread_ids()
+        return bool(now - among) and len(now) > usual
+
+    if not rig.wait(lambda: not replaced()):
+        raise Failed(
+            expected=f"{when} every callback of the driver comes to its end.",
+            actual=f"One that waited for the camera was still waiting {SETTLE:.0f} s later. The "
+            "thread that runs it is lost: a program with that one thread takes up no callback "
+            "ever again.",
+        )

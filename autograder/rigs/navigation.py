@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from typing import Any
 
 from geometry_msgs.msg import Twist
@@ -18,6 +19,7 @@ from std_msgs.msg import Bool, Int32, String
 from test_msgs.action import Fibonacci as Drive
 
 from autograder.rigs.safety import Player
+from course.runtime.executor import BackgroundExecutor
 
 
 class Navigator(Node):
@@ -34,12 +36,14 @@ class Navigator(Node):
             cancel_callback=self._cancel, callback_group=ReentrantCallbackGroup(),
         )  # fmt: skip
 
-    def _goal(self, goal: Drive.Goal) -> GoalResponse:
+    async def _goal(self, goal: Drive.Goal) -> GoalResponse:
         self._user.orders.append(goal.order)
+        await self._user.pause(self)
         return GoalResponse.ACCEPT if self._user.accepts else GoalResponse.REJECT
 
-    def _cancel(self, _goal: ServerGoalHandle) -> CancelResponse:
+    async def _cancel(self, _goal: ServerGoalHandle) -> CancelResponse:
         self._user.cancels.append(self._user.now)
+        await self._user.pause(self)
         return CancelResponse.ACCEPT if self._user.obeys else CancelResponse.REJECT
 
     def destroy_node(self) -> None:
@@ -144,7 +148,8 @@ class Dispatcher(Player):
         def fed(message: Any) -> None:
             drive.feedback.append(list(message.feedback.sequence))
 
-        goal = self._client.send_goal_async(Drive.Goal(order=metres), fed)
+        with self._held():
+            goal = self._client.send_goal_async(Drive.Goal(order=metres), fed)
         goal.add_done_callback(answered)
         return drive
 
@@ -154,7 +159,14 @@ class Dispatcher(Player):
         def answered(future: Future) -> None:
             drive.canceling = bool(future.result().goals_canceling)
 
-        drive.handle.cancel_goal_async().add_done_callback(answered)
+        with self._held():
+            canceling = drive.handle.cancel_goal_async()
+        canceling.add_done_callback(answered)
+
+    def _held(self) -> AbstractContextManager[None]:
+        """Keep answers from being taken: rclpy registers a request after it has sent it."""
+        assert isinstance(self.executor, BackgroundExecutor)
+        return self.executor.held()
 
     def missing_servers(self) -> list[str]:
         """Return whether the server is missing."""

@@ -35,7 +35,11 @@ class Process:
 
     def threads(self) -> int:
         """Return how many threads it has."""
-        return sum(1 for _ in (self._proc / "task").iterdir())
+        return len(self.thread_ids())
+
+    def thread_ids(self) -> set[int]:
+        """Return the kernel's numbers of its threads."""
+        return {int(task.name) for task in (self._proc / "task").iterdir()}
 
     def usage(self) -> Usage:
         """Return what it holds now."""

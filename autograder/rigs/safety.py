@@ -13,8 +13,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
 
+from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.task import Future
 
 from autograder.bench import Bench, Endpoints, StudentError
 from autograder.exam import Failed
@@ -40,6 +42,28 @@ class Player(Node):
         self._ears: dict[str, tuple[Any, Callable[[Any], None]]] = {}
         self.spoken: list[str] = []
         self.used: list[str] = []
+        self._paused: list[tuple[Executor, Future]] = []
+
+    async def pause(self, server: Node) -> None:
+        """Let a server of the examiner's wait until the subject has come to rest.
+
+        rclpy's action client registers a request after it has sent it, and drops an answer that
+        another thread takes in between. Where the student's node runs in several threads, an
+        answer must not be faster than the line that asks.
+        """
+        executor = server.executor
+        assert isinstance(executor, Executor)
+        over = Future(executor=executor)
+        self._paused.append((executor, over))
+        await over
+
+    def resume(self) -> bool:
+        """Let all go on that wait in `pause`; return whether there were any."""
+        paused, self._paused = self._paused, []
+        for executor, over in paused:
+            over.set_result(None)
+            executor.wake()
+        return bool(paused)
 
     def hear(self, msg_type: Any, topic: str, note: Callable[[Any], None]) -> None:
         """Listen to a topic that the student's node publishes on, once it does."""
@@ -127,6 +151,8 @@ class Robot:
     def rest(self) -> None:
         """Return when all that was sent has been dealt with, on both sides."""
         self._still.reached()
+        while self._player.resume():
+            self._still.reached()
 
     def run(self, until: Callable[[], Any], limit: float, stride: float = STRIDE) -> bool:
         """Let time pass until ``until`` holds, ``limit`` s at most; return whether it does."""

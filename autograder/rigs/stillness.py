@@ -12,12 +12,24 @@ import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import NamedTuple
 
-RESTLESS = 0.25  # s; a subject with a thread that polls is never still: then this is the pause
+RESTLESS = 0.25
+"""Seconds of activity after which a subject counts as one that is never still: a thread polls."""
+HANGS = 5.0
+"""Seconds of wall time after which it is not waited for in any case."""
 _NAP = 0.0005  # s between two looks
+_CLIP = 0.005  # s that one look may count for
 
-Look = Mapping[tuple[int, int], str]
-"""How often each thread of each process has run, by process and thread id."""
+Task = tuple[int, int]
+"""A process and one of its threads."""
+
+
+class Look(NamedTuple):
+    """How often each thread has run, if all were asleep; else one that was not."""
+
+    runs: Mapping[Task, str]
+    awake: Task | None = None
 
 
 class Stillness:
@@ -28,33 +40,45 @@ class Stillness:
         self._pids = (subject_pid, os.getpid())
         self._nap = threading.Event()  # never set
 
-    def reached(self, timeout: float = RESTLESS) -> bool:
-        """Return once both processes are at rest, or after ``timeout`` s; say which it was."""
-        deadline = time.monotonic() + timeout
-        before = self._look()
-        while True:
-            now = self._look()
-            if now is not None and now == before:
-                return True
-            if time.monotonic() >= deadline:
-                return False
-            before = now
-            if now is None:
-                self._nap.wait(_NAP)
+    def reached(self, restless: float = RESTLESS, timeout: float = HANGS) -> bool:
+        """Return once both processes are at rest, or prove to be restless; say which it was.
 
-    def _look(self) -> Look | None:
-        """Return how often each thread has run, or None if one of them runs."""
+        Restless is who has computed, or slept and woken again, for ``restless`` s. A thread that
+        is kept from running by other processes does neither: it is waited for, but not longer
+        than ``timeout`` s.
+        """
+        deadline = time.monotonic() + timeout
+        spent, worked = 0.0, dict[Task, float]()
+        before, looked = self._look(), time.monotonic()
+        while True:
+            now, moment = self._look(), time.monotonic()
+            if now.awake is None:
+                if now == before:
+                    return True
+                spent += min(moment - looked, _CLIP)
+            else:
+                total = _worked(now.awake)
+                spent += max(0.0, total - worked.get(now.awake, total))
+                worked[now.awake] = total
+            if spent >= restless or moment >= deadline:
+                return False
+            if now.awake is not None:
+                self._nap.wait(_NAP)
+            before, looked = now, moment
+
+    def _look(self) -> Look:
         me = threading.get_native_id()
-        found: dict[tuple[int, int], str] = {}
+        found: dict[Task, str] = {}
         for pid in self._pids:
             for task in _tasks(pid):
-                if int(task.name) == me:
+                name = pid, int(task.name)
+                if name[1] == me:
                     continue
                 runs = _runs(task)
                 if runs is None:
-                    return None
-                found[pid, int(task.name)] = runs
-        return found
+                    return Look({}, name)
+                found[name] = runs
+        return Look(found)
 
 
 def _tasks(pid: int) -> list[Path]:
@@ -72,3 +96,12 @@ def _runs(task: Path) -> str | None:
         return None
     state = status.partition("\nState:\t")[2][:1]
     return status[status.index("voluntary_ctxt") :] if state in "SI" else None
+
+
+def _worked(task: Task) -> float:
+    """Return for how many s a thread has computed, by the wall's clock if the kernel keeps none."""
+    try:
+        text = Path("/proc/{}/task/{}/schedstat".format(*task)).read_text(encoding="ascii")
+        return int(text.split()[0]) / 1e9
+    except (OSError, ValueError):
+        return time.monotonic()

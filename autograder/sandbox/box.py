@@ -10,20 +10,18 @@ from __future__ import annotations
 
 import os
 import secrets
-import signal
 import subprocess
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
 from autograder.files import scratch_folder
-from autograder.sandbox import network, seccomp, view
-from autograder.sandbox.host import fate_of, tethered, write_files
+from autograder.sandbox import environment, network, seccomp, view, warmth
+from autograder.sandbox.boxed import BoxedSubject, WarmSubject
+from autograder.sandbox.host import tethered, write_files
 from autograder.sandbox.limits import MIB, Limits
-from autograder.sandbox.watch import Watch
-from course.interfaces import cache
+from autograder.sandbox.place import Process
 
 USER = 1000
 """The subject's user id as it sees it, where it has a user namespace."""
@@ -31,17 +29,8 @@ USER = 1000
 EXAMINER_DATA = 3 * 1024 * MIB
 """Bytes of writable memory that an examiner may reserve."""
 
-DDS = {
-    # Two processes that share a network but not /dev/shm would find each other and then exchange
-    # nothing: Fast DDS takes shared memory for granted on one host. LOCALHOST switches it back on.
-    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
-    "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
-    "COURSE_DISCOVERY": "inherit",
-    "FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).with_name("fastdds.xml")),
-}
-KEPT = ("LANG", "LC_ALL", "LC_CTYPE", "TZ", "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE",
-        "AMENT_PREFIX_PATH", "PYTHONWARNINGS")  # fmt: skip
-"""What a subject gets of the grader's environment: no token, no path of the course."""
+HOLDER = ("sh", "-c", "echo up; exec sleep infinity >/dev/null 2>&1")
+"""What holds a sandbox open for a subject: it says that the sandbox is there, and only waits."""
 
 
 class Box:
@@ -50,29 +39,38 @@ class Box:
     domain_id = 1  # the network is ours alone, and so is every domain on it
     own_network = True
 
-    def __init__(self, limits: Limits | None = None, hidden: Iterable[Path] = ()) -> None:
+    def __init__(
+        self, limits: Limits | None = None, hidden: Iterable[Path] = (), *, warm: bool = False
+    ) -> None:
         """Prepare a sandbox.
 
         Args:
             limits: what the submission may use.
             hidden: folders that it must not see even if they lie within this Python's folders.
+            warm: examiner and subject are forked from processes that have imported everything.
         """
         self._limits = limits or Limits()
         self._hidden = tuple(hidden)
+        self._warm = warm
         self._namespaces: dict[str, int] = {}
 
-    def spawn(self, command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+    def spawn(self, command: Sequence[str], **options: Any) -> Process:
         """Make the network and start the examiner in it.
 
         Raises:
             BoxError: there is no such network to be had.
         """
-        self._namespaces = network.make()
-        options["env"] = {**(options.get("env") or os.environ), **DDS}
+        owner = warmth.subjects().pid if self._warm else None
+        self._namespaces = network.make(owner)
+        variables = {**(options.pop("env", None) or os.environ), **environment.DDS}
         # A flood of messages ends the examiner, not the machine.
+        if self._warm and (arguments := warmth.arguments_of(command, warmth.EXAMINER)) is not None:
+            return warmth.examiner(
+                arguments, options["pass_fds"], variables, self._namespaces, EXAMINER_DATA
+            )
         bound = ["prlimit", f"--data={EXAMINER_DATA}", "--"]
         joined = [*network.joining(self._namespaces), *tethered([*bound, *command])]
-        return network.start(joined, **options)
+        return network.start(joined, env=variables, **options)
 
     def start_subject(
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
@@ -82,33 +80,68 @@ class Box:
         Raises:
             BoxError: the sandbox's tools refuse.
         """
-        options = ["--limits", self._limits.to_json(), "--files", str(view.HANDED_IN)]
-        return self.start([*command, *options], files, fds)
+        command = [*command, "--limits", self._limits.to_json(), "--files", str(view.HANDED_IN)]
+        if self._warm and (arguments := warmth.arguments_of(command, warmth.SUBJECT)) is not None:
+            return self._fork(arguments, files, fds)
+        return self.start(command, files, fds)
 
     def start(
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
     ) -> BoxedSubject:
         """Start any command as `start_subject` does, without options for a subject."""
         with ExitStack() as stack:
-            user = secrets.choice(network.UIDS) if network.is_root() else USER
-            given = _Given(stack)
-            # Through a descriptor, so that the sandbox's process 1 does not tell them.
-            arguments = given.file("\0".join(self._arguments(given, user, files)).encode())
-            info, info_end = os.pipe()
-            sandbox = ["bwrap", "--args", arguments, "--info-fd", str(info_end), "--"]
-            command = [*sandbox, *(_as_user(user) if network.is_root() else []), *command]
-            try:
-                process = network.start(
-                    [*network.joining(self._namespaces), *command],
-                    env={"PATH": os.environ.get("PATH", os.defpath)}, start_new_session=True,
-                    pass_fds=[*given.descriptors, info_end, *fds],
-                    stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-                )  # fmt: skip
-            finally:
-                os.close(info_end)
-            return BoxedSubject(
-                process, network.child(info, process), self._limits, stack.pop_all()
+            user = _user()
+            process, init = self._enclose(
+                command, user, user, files, _Given(stack), fds, stdout=subprocess.DEVNULL
             )
+            return BoxedSubject(process, init, self._limits, stack.pop_all())
+
+    def _fork(
+        self, arguments: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
+    ) -> WarmSubject:
+        """Make the sandbox around a process that only waits, and fork the subject into it."""
+        with ExitStack() as stack:
+            user = _user()
+            # Root's subject is another user than what holds its sandbox, and cannot touch that.
+            process, init = self._enclose(
+                HOLDER, user, _user(), files, _Given(stack), (), stdout=subprocess.PIPE
+            )
+            subject = WarmSubject(process, init, self._limits, stack.pop_all())
+            stack.push(subject)
+            subject.fork(arguments, fds, user if network.is_root() else None)
+            stack.pop_all()
+            return subject
+
+    def _enclose(
+        self,
+        command: Sequence[str],
+        named: int,
+        user: int,
+        files: Mapping[str, bytes],
+        given: _Given,
+        fds: Sequence[int],
+        *,
+        stdout: int,
+    ) -> tuple[subprocess.Popen[bytes], int]:
+        """Start a command in the sandbox; return bwrap's process and the sandbox's process 1.
+
+        ``named`` is the user id that its files call the student's, ``user`` that of the command.
+        """
+        # Through a descriptor, so that the sandbox's process 1 does not tell them.
+        arguments = given.file("\0".join(self._arguments(given, named, files)).encode())
+        info, info_end = os.pipe()
+        sandbox = ["bwrap", "--args", arguments, "--info-fd", str(info_end), "--"]
+        command = [*sandbox, *(_as_user(user) if network.is_root() else []), *command]
+        try:
+            process = network.start(
+                [*network.joining(self._namespaces), *command],
+                env={"PATH": os.environ.get("PATH", os.defpath)}, start_new_session=True,
+                pass_fds=[*given.descriptors, info_end, *fds],
+                stdin=subprocess.DEVNULL, stdout=stdout, stderr=subprocess.PIPE,
+            )  # fmt: skip
+        finally:
+            os.close(info_end)
+        return process, network.child(info, process)
 
     def _arguments(self, given: _Given, user: int, files: Mapping[str, bytes]) -> Iterator[str]:
         """Yield bwrap's arguments."""
@@ -119,7 +152,7 @@ class Box:
         for path, text in view.written(user).items():
             yield from ("--perms", "0644", "--ro-bind-data", given.file(text.encode()), path)
         yield from view.arguments(self._limits, given.folder(files), self._hidden)
-        for name, value in _environment().items():
+        for name, value in environment.submission().items():
             yield from ("--setenv", name, value)
         yield from ("--seccomp", given.file(seccomp.program()))
 
@@ -158,60 +191,8 @@ class _Given:
         return folder
 
 
-class BoxedSubject:
-    """A running subject in its sandbox."""
-
-    def __init__(
-        self, process: subprocess.Popen[bytes], init: int, limits: Limits, held: ExitStack
-    ) -> None:
-        """Watch over the process namespace whose process 1 is ``init``."""
-        self._process = process
-        self._init = init
-        self._held = held
-        self._handle = os.pidfd_open(init)  # unlike its number, never another process's
-        held.callback(os.close, self._handle)
-        self._watch = Watch(init, self._handle, limits)
-        self.pid = 0
-
-    def ready(self) -> None:
-        """Find the subject's process: the only one that process 1 has, as yet."""
-        children = Path(f"/proc/{self._init}/task/{self._init}/children").read_text().split()
-        self.pid = int(children[0]) if children else 0
-
-    def fate(self) -> str:
-        """Return how the process ended, in words."""
-        try:
-            code = self._process.wait(timeout=5)
-        except subprocess.TimeoutExpired:
-            return "it closed its connection to the grader"
-        if self._watch.reason:
-            return self._watch.reason
-        # bwrap reports a signal as a shell does.
-        is_signal = code > 128 and code - 128 in set(signal.Signals)
-        return fate_of(128 - code if is_signal else code)
-
-    def failed(self) -> str:
-        """Return why it did not start, in words: how it ended, and what it last said."""
-        fate = self.fate()
-        if self._process.poll() is None:
-            return fate
-        assert self._process.stderr is not None
-        said = self._process.stderr.read(65536).decode(errors="replace").strip().splitlines()
-        return f"{fate} ({said[-1]})" if said else fate
-
-    def __enter__(self) -> Self:
-        """Return itself."""
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """End every process of the sandbox: they all go with process 1."""
-        self._watch.stop()
-        with suppress(ProcessLookupError):
-            signal.pidfd_send_signal(self._handle, signal.SIGKILL)
-        self._process.wait()
-        if self._process.stderr is not None:
-            self._process.stderr.close()
-        self._held.close()
+def _user() -> int:
+    return secrets.choice(network.UIDS) if network.is_root() else USER
 
 
 def _as_user(uid: int) -> list[str]:
@@ -219,16 +200,3 @@ def _as_user(uid: int) -> list[str]:
         "setpriv", "--reuid", str(uid), "--regid", str(uid), "--clear-groups",
         "--inh-caps=-all", "--bounding-set=-all", "--no-new-privs",
     ]  # fmt: skip
-
-
-def _environment() -> dict[str, str]:
-    kept = {name: os.environ[name] for name in KEPT if name in os.environ}
-    programs = f"{Path(sys.executable).parent}:/usr/local/bin:/usr/bin:/bin"
-    home = str(view.HOME)
-    return {
-        **kept, **DDS, "PATH": programs, "HOME": home, "USER": "student", "LOGNAME": "student",
-        "IPYTHONDIR": f"{home}/.ipython", "ROS_LOG_DIR": f"{home}/log", "MPLBACKEND": "Agg",
-        "COURSE_INTERFACES_CACHE": str(cache.root()), "TMPDIR": "/tmp",
-        # A numeric library's threads, one a processor of the machine, count as processes.
-        "OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2", "PYTHONDONTWRITEBYTECODE": "1",
-    }  # fmt: skip

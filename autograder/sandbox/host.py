@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from autograder.files import scratch_folder
+from autograder.sandbox.place import Process
 from course.domains import lease_domain
 
 
@@ -25,7 +26,7 @@ class Host:
         self._lease = lease_domain()
         self.domain_id = self._lease.domain_id
 
-    def spawn(self, command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+    def spawn(self, command: Sequence[str], **options: Any) -> Process:
         """Start the examiner."""
         return subprocess.Popen(tethered(command), **options)
 

@@ -2,10 +2,28 @@
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Mapping, Sequence
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import IO, Any, Protocol, Self
+
+
+class Process(Protocol):
+    """A process with pipes to its standard streams: what of `subprocess.Popen` is made use of."""
+
+    stdin: IO[bytes] | None
+    stdout: IO[bytes] | None
+    stderr: IO[bytes] | None
+    pid: int
+
+    @property
+    def returncode(self) -> int | Any:
+        """How it ended; a negative number is that of a signal; None if it has not."""
+
+    def poll(self) -> int | None:
+        """Return how it ended; None if it has not."""
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Return how it ended; raises `subprocess.TimeoutExpired` if it has not in time."""
 
 
 class RunningSubject(Protocol):
@@ -44,7 +62,7 @@ class Place(Protocol):
     own_network: bool
     """Whether the network is theirs alone, so that the examiner may make it lose packets."""
 
-    def spawn(self, command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+    def spawn(self, command: Sequence[str], **options: Any) -> Process:
         """Start the examiner; ``options`` are those of `subprocess.Popen`."""
 
     def start_subject(

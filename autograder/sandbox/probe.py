@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import shutil
+import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -15,6 +17,7 @@ from autograder.sandbox.box import Box
 from autograder.sandbox.host import Host
 from autograder.sandbox.network import BoxError
 from autograder.sandbox.place import Place
+from autograder.warm import ZygoteError
 from course.errors import CourseError
 
 TOOLS = {
@@ -34,11 +37,13 @@ class SandboxError(CourseError):
 class Abilities:
     """What this machine can do: ``problem`` says in a sentence why there is no sandbox, if so.
 
-    ``loss`` is whether a sandbox's network can be made to lose packets (it takes nftables).
+    ``loss`` is whether a sandbox's network can be made to lose packets (it takes nftables);
+    ``warm`` whether examiners and subjects can be forked from a process that is warm.
     """
 
     problem: str = ""
     loss: bool = False
+    warm: bool = False
 
     def mode(self, *, trust: bool) -> str:
         """Return in a word how submissions are run: outcomes of two modes may differ."""
@@ -66,7 +71,7 @@ def _abilities() -> Abilities:
             f"install it with `sudo apt install {packages}`, {TRUST}."
         )
     try:
-        return Abilities(loss=_try())
+        return Abilities(loss=_try(), warm=_try_warm())
     except BoxError as error:
         return Abilities(_advice(str(error)))
 
@@ -84,7 +89,7 @@ def place(*, trust: bool = False, hidden: Iterable[Path] = ()) -> Place:
     if trust:
         return Host()
     require()
-    return Box(hidden=hidden)
+    return Box(hidden=hidden, warm=abilities().warm)
 
 
 def require() -> None:
@@ -97,17 +102,45 @@ def _try() -> bool:
     """Run this Python in a sandbox; return whether its network can lose packets."""
     with Box() as box:
         nft = "nft add table inet probe" if shutil.which("nft") else "false"
-        outer = box.spawn(
-            ["sh", "-c", f"{nft} && echo yes; read -r _"],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        )  # fmt: skip
-        try:
-            with box.start([sys.executable, "-c", "import rclpy"], {}, ()) as subject:
-                if subject.fate() != "exit code 0":
-                    raise BoxError(subject.failed())
-        finally:
-            said, _ = outer.communicate(b"\n", timeout=60)
-    return said.strip() == b"yes"
+        with (
+            _in_the_network(box, f"{nft} && echo yes; read -r _") as said,
+            box.start([sys.executable, "-c", "import rclpy"], {}, ()) as subject,
+        ):
+            if subject.fate() != "exit code 0":
+                raise BoxError(subject.failed())
+    return said == [b"yes"]
+
+
+def _try_warm() -> bool:
+    """Return whether a subject can be forked: without anything to run it ends at once."""
+    command = [sys.executable, "-m", "autograder.subject"]
+    try:
+        with Box(warm=True) as box, _in_the_network(box, "read -r _"), ExitStack() as stack:
+            (engine, ours), (control, theirs) = socket.socketpair(), socket.socketpair()
+            for end in (engine, control, theirs):
+                stack.callback(end.close)
+            fds = [engine.fileno(), control.fileno()]
+            options = ["--engine", str(fds[0]), "--control", str(fds[1]), "--domain", "1"]
+            subject = stack.enter_context(box.start_subject([*command, *options], {}, fds))
+            ours.close()
+            return subject.fate() == "exit code 1"
+    except (BoxError, ZygoteError):
+        return False
+
+
+@contextmanager
+def _in_the_network(box: Box, script: str) -> Iterator[list[bytes]]:
+    """Make a box's network and run a script in it until the end; yield what it says by then."""
+    said: list[bytes] = []
+    outer = box.spawn(
+        ["sh", "-c", script],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    assert isinstance(outer, subprocess.Popen)
+    try:
+        yield said
+    finally:
+        said += outer.communicate(b"\n", timeout=60)[0].split()
 
 
 def _advice(said: str) -> str:

@@ -6,21 +6,22 @@ and the host's processes, which a /proc of its own hides.
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import site
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-import autograder
 import course
-import quizzes
 from autograder.sandbox.limits import Limits
 from course.interfaces import cache
 
 HOME = Path("/home/student")
 HANDED_IN = Path("/run/handed-in")
 """Where a submission's other files lie, read-only; the subject copies them to its home."""
+
+PACKAGES = ("autograder", "course", "quizzes")
 
 _MERGED = ("bin", "lib", "lib32", "lib64", "libx32", "sbin")
 _ETC = (
@@ -79,12 +80,18 @@ def python_folders() -> Iterator[Path]:
     named = [sys.base_prefix, sys.base_exec_prefix, sys.prefix, sys.exec_prefix]
     if site.ENABLE_USER_SITE:
         named.append(site.getusersitepackages())
-    packages = [Path(package.__path__[0]) for package in (autograder, course, quizzes)]
+    packages = [Path(place) for name in PACKAGES for place in _places(name)]
     wanted = [*(Path(os.path.abspath(name)) for name in named), *packages]  # noqa: PTH100 - links
     for folder in [variant for path in wanted for variant in (path, path.resolve())]:
         if folder.is_dir() and not _is_within(folder, seen):
             seen.append(folder)
             yield folder
+
+
+def _places(package: str) -> Sequence[str]:
+    """Return the folders of a package without importing it: a subject has no time for that."""
+    found = importlib.util.find_spec(package)
+    return (found and found.submodule_search_locations) or []
 
 
 def _bundled() -> list[Path]:

@@ -81,11 +81,13 @@ def stale_segments(folder: Path, locks: Path) -> Finding:
     name = "left-over segments"
     try:
         held = {line.split()[5].rpartition(":")[2] for line in _lock_lines(locks)}
-        files = [path for path in folder.glob("fastrtps_*_el") if "port" not in path.name]
-        stale = [path for path in files if str(path.stat().st_ino) not in held]
-        size = sum(p.stat().st_size for s in stale for p in folder.glob(f"{s.name[:-3]}*")) >> 20
-    except OSError as error:  # a program may end and sweep its own while we look
-        return ok(name, f"They could not be counted just now ({error.strerror or error})")
+    except OSError as error:
+        return ok(name, f"They could not be counted ({error.strerror or error})")
+    files = [path for path in folder.glob("fastrtps_*_el") if "port" not in path.name]
+    inodes = {path: str(found.st_ino) for path in files if (found := _stat(path))}
+    stale = [path for path, inode in inodes.items() if inode not in held]
+    parts = [_stat(part) for path in stale for part in folder.glob(f"{path.name[:-3]}*")]
+    size = sum(found.st_size for found in parts if found) >> 20
     if not stale:
         return ok(name, "none")
     return warning(
@@ -94,6 +96,14 @@ def stale_segments(folder: Path, locks: Path) -> Finding:
         "programs that were killed.",
         "When no ROS program runs: rm -f /dev/shm/fastrtps_* /dev/shm/sem.fastrtps_*",
     )
+
+
+def _stat(path: Path) -> os.stat_result | None:
+    """Look at a file, which its program may have removed in the meantime."""
+    try:
+        return path.stat()
+    except OSError:
+        return None
 
 
 def _lock_lines(locks: Path) -> Iterator[str]:

@@ -15,6 +15,7 @@ from course.graph.model import Exchange, Graph, Topic
 BOX_HEIGHT = 40  # px, with room for a name and a type below it
 _CHARACTER, _LEAST_WIDTH, _LONGEST_LABEL = 7.5, 80, 34
 _COLUMN_GAP, _ROW_GAP, _MARGIN = 70, 18, 8
+_SPREAD = 26  # px of a box's side over which the arrows that end there are spread
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,11 @@ def draw(graph: Graph) -> Drawing:
     places = _places(things, keys, links)
     boxes = tuple(_box(things[key], *places[key]) for key in keys)
     by_key = dict(zip(keys, boxes, strict=True))
-    lines = tuple(_line(link, by_key[link.source], by_key[link.target]) for link in links)
+    ends = _ends(links, by_key)
+    lines = tuple(
+        _line(link, by_key[link.source], by_key[link.target], end)
+        for link, end in zip(links, ends, strict=True)
+    )
     return Drawing(
         boxes, lines,
         max(box.x + box.width for box in boxes) + _MARGIN,
@@ -160,12 +165,13 @@ def _places(
     net = igraph.Graph(n=len(keys), edges=edges, directed=True)
     spots = net.layout_sugiyama(vgap=1, hgap=1, maxiter=200)[: len(keys)]
     columns = sorted({round(spot[1]) for spot in spots})
+    words_wide = max((len(link.bad) * _CHARACTER + 40 for link in links if link.bad), default=0.0)
     left, place = float(_MARGIN), {}
     for column in columns:
         inside = [n for n, spot in enumerate(spots) if round(spot[1]) == column]
         width = max(things[keys[n]].width for n in inside)
         place.update({n: left + (width - things[keys[n]].width) / 2 for n in inside})
-        left += width + _COLUMN_GAP
+        left += width + max(_COLUMN_GAP, words_wide)
     top = min(spot[0] for spot in spots)
     row = BOX_HEIGHT + _ROW_GAP
     return {key: (place[n], _MARGIN + (spots[n][0] - top) * row) for n, key in enumerate(keys)}
@@ -178,13 +184,30 @@ def _box(thing: _Thing, x: float, y: float) -> Box:
     )  # fmt: skip
 
 
-def _line(link: _Link, source: Box, target: Box) -> Line:
-    """Return a curve from the right side of ``source`` to the left of ``target``, or back."""
+def _ends(links: list[_Link], boxes: dict[tuple[str, str], Box]) -> list[float]:
+    """Return how far below the middle of its target's side each arrow ends: beside its fellows."""
+    arriving: dict[tuple[str, str], list[int]] = {}
+    for number, link in enumerate(links):
+        arriving.setdefault(link.target, []).append(number)
+    ends = [0.0] * len(links)
+    for numbers in arriving.values():
+        step = min(12.0, _SPREAD / len(numbers))
+        numbers.sort(key=lambda number: boxes[links[number].source].y)
+        for place, number in enumerate(numbers):
+            ends[number] = round((place - (len(numbers) - 1) / 2) * step, 1)
+    return ends
+
+
+def _line(link: _Link, source: Box, target: Box, end: float) -> Line:
+    """Return a curve from the right side of ``source`` to the left of ``target``, or back.
+
+    It ends ``end`` pixels below the middle of the side.
+    """
     forward = target.x >= source.x + source.width
     x1 = source.x + (source.width if forward else source.width / 2)
     y1 = source.y + (source.height / 2 if forward else source.height)
     x2 = target.x if forward else target.x + target.width / 2
-    y2 = target.y + (target.height / 2 if forward else target.height)
+    y2 = target.y + (target.height / 2 + end if forward else target.height)
     if forward:
         bend = max(30.0, (x2 - x1) / 2)
         path = f"M{x1:g},{y1:g} C{x1 + bend:g},{y1:g} {x2 - bend:g},{y2:g} {x2:g},{y2:g}"

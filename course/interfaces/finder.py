@@ -10,6 +10,7 @@ import importlib.abc
 import importlib.machinery
 import importlib.util
 import sys
+import threading
 from collections.abc import Sequence
 from types import ModuleType
 
@@ -29,9 +30,25 @@ class Finder(importlib.abc.MetaPathFinder):
             return packages.package_spec(fullname, BundledLoader())
         if packages.is_ours(fullname):  # importlib.reload asks again
             return packages.package_spec(fullname)
-        if fullname.isidentifier() and (names := cache.defined_before(fullname)):
+        if fullname.isidentifier() and (names := _defined_before(fullname)):
             return packages.package_spec(fullname, NotYetLoader(names))
         return None
+
+
+_asking = threading.local()
+
+
+def _defined_before(package: str) -> list[str]:
+    """Ask the cache, unless it is the cache that asks: something that it imports is missing."""
+    if getattr(_asking, "now", False):
+        return []
+    _asking.now = True
+    try:
+        return cache.defined_before(package)
+    except ImportError:  # without its dependencies there is no cache, and nothing in it
+        return []
+    finally:
+        _asking.now = False
 
 
 class BundledLoader(packages.MadeHere):

@@ -26,12 +26,13 @@ from rclpy.task import Future, Task
 
 from course.runtime import streams
 from course.runtime.gate import Gate
+from course.runtime.idleness import Idleness
 from course.runtime.jobs import Job, Report
 from course.runtime.tasks import CreatedTasks, find_owner
 from course.runtime.teardown import is_alive
 from course.runtime.threads import Threads
 from course.runtime.waiting import Pulse, poll
-from course.runtime.workers import Workers, sleeps
+from course.runtime.workers import Workers
 
 
 def _never() -> bool:
@@ -145,19 +146,26 @@ class BackgroundExecutor(Executor):
         """How many callbacks have begun, and await something."""
         return len(self._awaiting)
 
-    def busy_since(self, moment: float) -> bool:
-        """Return whether callbacks run that are neither done nor blocked.
+    def busy(self) -> bool:
+        """Return whether callbacks run that are neither done nor blocked; look once at each.
 
-        Args:
-            moment: a callback taken up before it (monotonic, s) that sleeps counts as blocked. With
-                one thread there is nobody to go on without it, so there it does not.
+        With one thread there is nobody to go on without a blocked callback, so there it counts,
+        too. Call it in a row, with `wait_for_a_job` in between: see `Idleness`.
         """
+        running = self.running.copy()
         if self._workers is None:
-            return bool(self.running)
-        return any(
-            job.since > moment or (job.thread_id and not sleeps(job.thread_id))
-            for job in self.running.copy()
-        )
+            return bool(running)
+        begun = [job for job in running if job.thread_id]
+        if len(begun) < len(running) and len({job.thread_id for job in begun}) < self.threads:
+            return True  # a worker is free, and has not come to it yet
+        blocked = [self._blocked(job) for job in begun]  # each is looked at
+        return not all(blocked)
+
+    @staticmethod
+    def _blocked(job: Job) -> bool:
+        if job.idleness is None:
+            job.idleness = Idleness(job.thread_id)
+        return job.idleness.blocked()
 
     def wait_for_a_job(self, timeout: float) -> None:
         """Return when a running callback has ended, or after `timeout` s; while `held`."""

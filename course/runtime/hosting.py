@@ -14,6 +14,7 @@ from course.errors import SessionError
 from course.runtime import arguments, logs
 from course.runtime.blocked import BlockedCallback, blocked_callbacks
 from course.runtime.callback_errors import CallbackError, ErrorLog
+from course.runtime.clocks import sleeps_in_own_context
 from course.runtime.crew import Crew
 from course.runtime.interruptible import SessionContext
 from course.runtime.jobs import Job
@@ -46,7 +47,7 @@ class Hosting:
         label = f"ROS domain {context.get_domain_id()}"
         self._crew = Crew(context, label, self._record, self._pulse)
         self._residents = Residents(context, self._crew, self._pulse, self.notices.append)
-        self._residents.on_made += [keep_every_level, self._claim_log]
+        self._residents.on_made += [keep_every_level, sleeps_in_own_context, self._claim_log]
         self._opened = time.time()
 
     @property

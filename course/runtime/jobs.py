@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from rclpy.node import Node
 from rclpy.task import Task
 
+from course.runtime.idleness import Idleness
 from course.runtime.log_store import note
 from course.runtime.names import node_name
 
@@ -47,7 +48,9 @@ class Job:
     One is made for every message that arrives, so it is kept small.
     """
 
-    __slots__ = ("entity", "home", "node", "shown", "since", "task", "thread_id", "unfinished")
+    __slots__ = (
+        "entity", "home", "idleness", "node", "shown", "since", "task", "thread_id", "unfinished",
+    )  # fmt: skip
 
     def __init__(
         self, task: Task, entity: object, node: Node | None, home: Home, shown: Any = None
@@ -64,6 +67,7 @@ class Job:
         self.shown = shown
         self.since = time.monotonic()
         self.thread_id = 0
+        self.idleness: Idleness | None = None  # once it has kept others waiting
         self.unfinished: dict[str, str] | None = None  # printed without a line end, by level
 
     @property

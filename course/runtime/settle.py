@@ -9,7 +9,6 @@ from collections.abc import Iterator, Sequence
 
 from course.runtime.executor import BackgroundExecutor
 
-_PATIENCE = 0.2  # s after which a callback that sleeps counts as blocked: on simulated time, say
 _NAP = 0.0005  # s between looks at callbacks that run in other threads
 
 
@@ -38,17 +37,23 @@ def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> boo
     deadline = time.monotonic() + timeout
     idle = 0
     while True:
-        moment = time.monotonic() - _PATIENCE
-        running = [executor for executor in executors if executor.busy_since(moment)]
-        if running:
+        if running := [executor for executor in executors if executor.busy()]:
             running[0].wait_for_a_job(_NAP)
+            idle = 0
         else:
             progress = [executor.run_ready() for executor in executors]
             idle = 0 if any(progress) else idle + 1
             # A coroutine that goes on may let another one go on, which only a further round shows.
-            if idle > sum(executor.awaiting for executor in executors) and not any(
-                executor.busy_since(moment) for executor in executors
-            ):
+            if idle > sum(executor.awaiting for executor in executors) and _nothing_runs(executors):
                 return True
         if time.monotonic() >= deadline:
             return False
+
+
+def _nothing_runs(executors: Sequence[BackgroundExecutor]) -> bool:
+    """Return whether each callback that has begun is done, or is blocked and remains so."""
+    if not any(executor.running for executor in executors):
+        return True
+    # What this round has set off may have woken it: let it show.
+    executors[0].wait_for_a_job(_NAP)
+    return not any(executor.busy() for executor in executors)

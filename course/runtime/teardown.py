@@ -10,6 +10,7 @@ from types import TracebackType
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.exceptions import InvalidHandle
+from rclpy.lifecycle import LifecycleNodeMixin
 from rclpy.node import Node
 
 
@@ -32,6 +33,18 @@ def destroy_node(node: Node) -> None:
         # An override that raised, or did not call the base method, must leave no ghost.
         with contextlib.suppress(InvalidHandle):
             Node.destroy_node(node)
+        _destroy_state_machine(node)
+
+
+def _destroy_state_machine(node: Node) -> None:
+    """Take the services of a managed node off the graph.
+
+    They belong to its state machine, which rclpy leaves to Python's garbage collection.
+    """
+    machine = getattr(node, "_state_machine", None)
+    if isinstance(node, LifecycleNodeMixin) and machine is not None:
+        with contextlib.suppress(InvalidHandle):  # destroyed already
+            machine.destroy_when_not_in_use()
 
 
 def destroy_half_made(tb: TracebackType | None) -> None:

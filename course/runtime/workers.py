@@ -10,7 +10,6 @@ import contextlib
 import queue
 import threading
 from collections.abc import Callable
-from pathlib import Path
 
 from rclpy.task import Task
 
@@ -73,15 +72,3 @@ class Workers:
             self._in_hand.pop(job.task, None)
             if not goes_on:
                 return
-
-
-def sleeps(thread_id: int) -> bool:
-    """Return whether the kernel has this thread sleeping, rather than running or waiting to run."""
-    thread = next((t for t in threading.enumerate() if t.ident == thread_id), None)
-    if thread is None:
-        return False
-    try:
-        status = Path(f"/proc/self/task/{thread.native_id}/stat").read_text(encoding="ascii")
-    except OSError:  # it has just ended
-        return False
-    return status.rpartition(")")[2].split()[0] == "S"

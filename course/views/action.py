@@ -16,6 +16,7 @@ from course.watch.goals import Goal, GoalBoard
 class ActionView(LiveView):
     """Shows all goals of an action, whoever sent them, and sends and cancels goals itself."""
 
+    label = "Action view"
     script = "action"
     shared = ("forms",)
 

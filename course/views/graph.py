@@ -22,6 +22,7 @@ class GraphView(LiveView):
     As text it is a list of every topic, service and action with their endpoints and QoS.
     """
 
+    label = "ROS graph"
     script = "graph"
     period = 0.5  # s: a graph changes when somebody runs a cell, not ten times a second
 
@@ -49,20 +50,28 @@ class GraphView(LiveView):
 
     def frame(self) -> Frame:
         """Return boxes and lines with their places."""
-        graph = self.graph
-        drawing = layout.draw(graph)
-        if len(drawing.boxes) > MAX_BOXES:
-            text = f"{len(drawing.boxes)} boxes are too many to draw: see the words."
-            return {"title": text, "boxes": [], "lines": [], "width": 0, "height": 0}
-        return {
-            "title": f"{len(graph.nodes)} nodes, {len(graph.topics)} topics, "
-            f"{len(graph.mismatches)} pairs that do not connect",
-            **asdict(drawing),
-        }
+        return _drawn(self.graph)
 
     def words(self) -> str:
         """Return the graph as text."""
         return words.describe(self.graph)
+
+    def look(self) -> tuple[Frame, str]:
+        """Return both from one look at the graph."""
+        graph = self.graph
+        return _drawn(graph), words.describe(graph)
+
+
+def _drawn(graph: Graph) -> Frame:
+    drawing = layout.draw(graph)
+    if len(drawing.boxes) > MAX_BOXES:
+        text = f"{len(drawing.boxes)} boxes are too many to draw: see the words."
+        return {"title": text, "boxes": [], "lines": [], "width": 0, "height": 0}
+    return {
+        "title": f"{len(graph.nodes)} nodes, {len(graph.topics)} topics, "
+        f"{len(graph.mismatches)} pairs that do not connect",
+        **asdict(drawing),
+    }
 
 
 class Mermaid:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from abc import ABC, abstractmethod
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -12,6 +13,7 @@ import anywidget
 import traitlets
 
 from course.runtime.session import Session
+from course.views.saved import saved
 from course.views.ticker import ticker_of
 
 FASTEST = 0.1
@@ -45,12 +47,15 @@ class LiveWidget(anywidget.AnyWidget):
     number = traitlets.Int().tag(sync=True)
 
 
-class LiveView:
+class LiveView(ABC):
     """A view of a session that keeps itself up to date while somebody looks at it.
 
     A subclass says what there is to see (`frame`, `words`) and what a control does (`control`).
     In a notebook it shows a widget; anywhere else, and for a screen reader, its words.
     """
+
+    label: ClassVar[str] = ""
+    """What people call the view."""
 
     script: ClassVar[str] = ""
     """Name of the view's own script and style in ``static``."""
@@ -69,15 +74,19 @@ class LiveView:
         self._last = ""
         self._drawn = 0
 
+    @abstractmethod
     def frame(self) -> Frame:
         """Return what is to be drawn now, as JSON data of a bounded size."""
-        raise NotImplementedError
 
+    @abstractmethod
     def words(self) -> str:
         """Return what there is to see now, as text."""
-        raise NotImplementedError
 
-    def control(self, message: dict[str, Any]) -> None:
+    def look(self) -> tuple[Frame, str]:
+        """Return both, of one and the same moment."""
+        return self.frame(), self.words()
+
+    def control(self, message: dict[str, Any]) -> None:  # noqa: B027 - some views have no controls
         """Do what a control in the browser asks for. Runs in the kernel's main thread."""
 
     @property
@@ -112,16 +121,26 @@ class LiveView:
         return self.words()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
+        if not _has_front_end():  # a script, a test, a grader: nobody could look at a widget
+            return {"text/plain": repr(self)}, {}
         bundle = self.widget._repr_mimebundle_(**kwargs)
         data, metadata = bundle if isinstance(bundle, tuple) else (bundle or {}, {})
         return {**data, "text/plain": repr(self)}, metadata
+
+    def _ipython_display_(self, **kwargs: Any) -> None:
+        from IPython.display import display
+
+        data, metadata = self._repr_mimebundle_(**kwargs)
+        display(data, metadata=metadata, raw=True)  # type: ignore[no-untyped-call]
+        if len(data) > 1:
+            display(saved(self.label, data["text/plain"]), raw=True)  # type: ignore[no-untyped-call]
 
     def _look(self) -> None:
         widget = self._widget
         if widget is None or widget.ended:
             return
         try:
-            frame, words = self.frame(), self.words()
+            frame, words = self.look()
             text = json.dumps([frame, words])
         except Exception as error:  # noqa: BLE001 - a view must never take its thread down
             if not self.session.closed:
@@ -143,6 +162,13 @@ class LiveView:
             self._widget.send({"here": True})
         else:
             self.control(message)
+
+
+def _has_front_end() -> bool:
+    """Return whether this code runs in a kernel."""
+    from IPython.core.getipython import get_ipython
+
+    return hasattr(get_ipython(), "kernel")
 
 
 @cache

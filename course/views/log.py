@@ -19,6 +19,7 @@ class LogPanel(LiveView):
     As text it is the table of `Session.logs`.
     """
 
+    label = "Log panel"
     script = "log"
     shared = ("forms",)
     period = 0.25  # s: nobody reads faster

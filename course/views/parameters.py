@@ -17,6 +17,7 @@ ASK_TIMEOUT = 2.0
 class ParameterPanel(LiveView):
     """Shows and changes the parameters of one node; what it refuses is shown with its reason."""
 
+    label = "Parameter panel"
     script = "parameters"
     shared = ("forms",)
     period = 0.5  # s: each look is three service calls

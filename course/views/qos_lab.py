@@ -45,6 +45,7 @@ class QoSLab(LiveView):
     of their own, where the machine allows it.
     """
 
+    label = "QoS lab"
     script = "qos_lab"
     shared = ("forms",)
     period = 0.2

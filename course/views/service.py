@@ -16,6 +16,7 @@ from course.watch.calls import Call, Calls
 class ServiceConsole(LiveView):
     """Calls a service by a form. ``calls`` has what was asked and answered."""
 
+    label = "Service console"
     script = "service"
     shared = ("forms",)
 

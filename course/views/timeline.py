@@ -27,6 +27,7 @@ class Timeline(LiveView):
     (on one machine: both stamps are of its clock), gaps, and messages that never arrived.
     """
 
+    label = "Timeline"
     script = "timeline"
     period = 0.25  # s
 

@@ -20,6 +20,13 @@ if TYPE_CHECKING:
 
 _HERE = Path(__file__).parent
 
+_GONE = "This quiz is not connected: run this cell again. Your answers and attempts are kept."
+_SAVED = f"""<div class="quiz-saved"><style>
+.jp-OutputArea-child:has(.quiz) + .jp-OutputArea-child:has(.quiz-saved) {{ display: none; }}
+.jp-OutputArea-child:has(+ .jp-OutputArea-child .quiz-saved):not(:has(.quiz)) {{ display: none; }}
+</style><p>{_GONE}</p></div>"""
+"""A second output, which takes the place of the first when no kernel has the widget any more."""
+
 
 class QuizWidget(anywidget.AnyWidget):
     """Shows one quiz. What the learner does arrives as messages; what to show are the traits.
@@ -44,6 +51,13 @@ class QuizWidget(anywidget.AnyWidget):
         self.layout.width = "100%"
         self.on_msg(self._on_message)
         self._update()
+
+    def _ipython_display_(self, **kwargs: Any) -> None:
+        from IPython.display import display
+
+        data, metadata = self._repr_mimebundle_(**kwargs) or ({}, {})
+        display(data, metadata=metadata, raw=True)  # type: ignore[no-untyped-call]
+        display({"text/html": _SAVED, "text/plain": _GONE}, raw=True)  # type: ignore[no-untyped-call]
 
     def _on_message(self, _widget: Any, content: Any, _buffers: Any) -> None:
         """Do what the browser asks; whatever else it sends is passed over."""

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from autograder import corpus, exams
+from autograder import corpus, exams, submission
+from autograder.cells import without_markers
 from autograder.corpus import Case, CorpusError, Trial, tables, trials
 from autograder.corpus.trials import Notebooks
 
@@ -110,6 +111,7 @@ def test_a_flip_between_repeats_is_found() -> None:
     ("name", "text", "message"),
     [
         ("case.py", "x = 1\n", r"case\.py must begin with"),
+        ("case.py", "# title: t\n# fails: x\n# in: the exemplar\n", "'# in:' can be 'the stub'"),
         ("mutants.toml", "[broken\n", r"mutants\.toml is not TOML"),
         ("mutants.toml", "[mutant]\ntitle = 'x'\n", r"mutant 'mutant' needs title, fails"),
     ],
@@ -122,6 +124,19 @@ def test_a_corpus_that_is_not_well_formed_is_named(
     (tmp_path / "qos" / name).write_text(text)
     with pytest.raises(CorpusError, match=message):
         corpus.load(tmp_path, "qos")
+
+
+def test_a_case_without_splices_is_the_exemplar(tmp_path: Path) -> None:
+    (tmp_path / "qos").mkdir()
+    (tmp_path / "qos" / "right.py").write_text("# title: t\n# fails: nothing\nx = 1\n")
+    table = "[right-exemplar]\ntitle = 'The exemplar'\nfails = []\nsplices = []\n"
+    (tmp_path / "qos" / "mutants.toml").write_text(table)
+    case = next(c for c in corpus.load(tmp_path, "qos") if c.name == "right-exemplar")
+    source, released = notebooks("qos")
+    handed_in = case.submission(source, released)
+    solution = next(c for c in handed_in.cells if submission.grade_id(c) == "qos-solution")
+    exemplar = next(c for c in source.cells if submission.grade_id(c) == "qos-solution")
+    assert solution.source == without_markers(exemplar.source)
 
 
 def test_a_missing_corpus_is_named(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from autograder import exams, points
-from autograder.bench import Bench, SubjectGone
+from autograder.bench import Bench, StudentError, SubjectGone
 from autograder.exam import Exam, ExamError, Failed, unexamined
 
 
@@ -126,3 +126,35 @@ def test_every_exam_and_the_table_of_points_agree(name: str) -> None:
         assert check.rationale, f"{check.name} must say why it matters on a robot"
         assert len(check.hints) == 3
         assert check.read
+
+
+@pytest.mark.parametrize(
+    "error", [StudentError("KeyError: 'x'", "line 3\n"), SubjectGone("It ended.")]
+)
+def test_what_the_students_code_raises_in_the_rig_fails_every_check_without_needs(
+    exam: Exam[list[str]], error: Exception
+) -> None:
+    @contextmanager
+    def rig(_bench: Any) -> Iterator[list[str]]:
+        raise error
+        yield []
+
+    exam.rig = rig
+    results = {check.name: check for check in exam.sit("visible", BENCH).checks}
+    assert {name: check.status for name, check in results.items()} == {
+        "first": "failed", "second": "not_checked", "third": "not_checked"
+    }  # fmt: skip
+    assert str(error) in results["first"].actual
+
+
+def test_an_error_of_the_students_code_in_a_check_is_not_the_graders(
+    exam: Exam[list[str]],
+) -> None:
+    @exam.check()
+    def last(rig: list[str]) -> None:
+        """It ends."""
+        raise StudentError("KeyError: 'x'", "  line 3, in tick\n")
+
+    check = exam.sit("hidden", BENCH).checks[0]
+    assert check.status == "failed"
+    assert check.actual == "It raised KeyError: 'x'. It happened here:\n  line 3, in tick\n"

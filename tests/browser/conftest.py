@@ -7,6 +7,7 @@ a test that is passed over proves nothing.
 from __future__ import annotations
 
 import shutil
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -38,6 +39,29 @@ def browser() -> Iterator[Browser]:
         browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
         yield browser
         browser.close()
+
+
+@pytest.fixture(scope="session")
+def course_lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Lab]:
+    """A JupyterLab that ``course lab`` has started on a working copy of its own."""
+    folder = tmp_path_factory.mktemp("course-lab")
+    with Lab(folder, folder / "mine", by_course=True) as running:
+        yield running
+
+
+@pytest.fixture
+def record_timing(record_property: Callable[[str, object], None]) -> Callable[[str, float], None]:
+    """Return a function that prints how long something took, and keeps it in a test report.
+
+    A timing is never asserted: this machine may be busy.
+    """
+
+    def record(what: str, started: float) -> None:
+        seconds = round(time.monotonic() - started, 1)
+        print(f"{what}: {seconds} s")  # noqa: T201 - for whoever reads the test's log
+        record_property(what, seconds)
+
+    return record
 
 
 OpenNotebook = Callable[[Path | str], NotebookPage]

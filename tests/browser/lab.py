@@ -21,11 +21,19 @@ import psutil
 START_TIMEOUT = 300.0
 
 
-class Lab:
-    """A running JupyterLab; ``work`` is its folder of notebooks. Use it as a context manager."""
+JUPYTERLAB = (sys.executable, "-m", "jupyterlab")
+COURSE_LAB = (sys.executable, "-c", "from course.launch import course; course()", "lab")
 
-    def __init__(self, folder: Path) -> None:
-        self.work = folder / "work"
+
+class Lab:
+    """A running JupyterLab; ``work`` is its folder of notebooks. Use it as a context manager.
+
+    With ``by_course`` it is started as a student does, by ``course lab``, which makes ``work``.
+    """
+
+    def __init__(self, folder: Path, work: Path | None = None, *, by_course: bool = False) -> None:
+        self.work = work or folder / "work"
+        self._by_course = by_course
         # Jupyter's connection files are Unix paths of at most 107 bytes: a short place of its own.
         self._runtime = tempfile.TemporaryDirectory(prefix="lab-")
         self._log = folder / "lab.log"
@@ -53,9 +61,10 @@ class Lab:
         (place / f"{plugin}.jupyterlab-settings").write_text(json.dumps(values))
 
     def __enter__(self) -> Lab:
+        start = (*COURSE_LAB, str(self.work)) if self._by_course else JUPYTERLAB
         command = [
-            sys.executable, "-m", "jupyterlab", "--no-browser", "--expose-app-in-browser",
-            f"--ServerApp.root_dir={self.work}", "--ip=127.0.0.1", f"--port={self.port}",
+            *start, "--no-browser", "--expose-app-in-browser",
+            "--ip=127.0.0.1", f"--port={self.port}",
             "--ServerApp.port_retries=0", "--IdentityProvider.token=", "--allow-root",
             "--ServerApp.password=", "--ServerApp.disable_check_xsrf=True",
             "--LabApp.news_url=None", "--LabApp.check_for_updates_class="

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
@@ -17,6 +18,23 @@ TIMEOUT = 240_000
 busy with much else."""
 
 LOCAL = {"127.0.0.1", "localhost"}
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What went to a page in a while, and how it coped.
+
+    Attributes:
+        seconds: how long it was watched.
+        updates: sizes in bytes of the widget updates that came in.
+        longest: the longest time in ms between two drawings of the page.
+        drawings: how often the page was drawn.
+    """
+
+    seconds: float
+    updates: list[int]
+    longest: float
+    drawings: int
 
 
 class NotebookPage:
@@ -39,6 +57,18 @@ class NotebookPage:
         """Open a notebook of the work folder and wait until its kernel is idle."""
         self.path = path
         self.page.goto(f"{self.lab.url}/lab/tree/{quote(path)}?reset")
+        self.wait_until_ready()
+
+    def open_first(self, name: str) -> None:
+        """Go where the server sends a browser at its start, and wait for the notebook ``name``."""
+        self.path = name
+        self.page.goto(f"{self.lab.url}/")
+        self.wait_until_ready()
+
+    def follow(self, link: Locator, path: str) -> None:
+        """Click on a link to a notebook of the work folder and wait for it."""
+        link.click()
+        self.path = path
         self.wait_until_ready()
 
     def reload(self) -> None:
@@ -68,6 +98,23 @@ class NotebookPage:
             [name, arguments or {}],
         )
 
+    def run_cell(self, number: int) -> None:
+        """Run one cell, counted from 0, and wait until the kernel has finished it."""
+        self.page.evaluate(
+            "number => { window.jupyterapp.shell.currentWidget.content.activeCellIndex = number }",
+            number,
+        )
+        self.command("notebook:run-cell")
+        self.wait_until_ready()
+
+    def write_cell(self, number: int, source: str) -> None:
+        """Replace what stands in a cell, counted from 0."""
+        self.page.evaluate(
+            "([number, source]) => { window.jupyterapp.shell.currentWidget.content.widgets[number]"
+            ".model.sharedModel.setSource(source) }",
+            [number, source],
+        )
+
     def run_all(self) -> None:
         """Run all cells and wait until the kernel has finished them."""
         self.command("notebook:run-all-cells")
@@ -95,6 +142,13 @@ class NotebookPage:
         content: dict[str, Any] = json.loads((self.lab.work / self.path).read_text())
         return content
 
+    def scroll_to(self, number: int) -> None:
+        """Bring a cell, counted from 0, into sight."""
+        self.page.evaluate(
+            "number => window.jupyterapp.shell.currentWidget.content.scrollToItem(number, 'start')",
+            number,
+        )
+
     def cell(self, number: int) -> Locator:
         """Return a cell of the notebook, counted from 0."""
         return self.page.locator(f'.jp-Notebook [data-windowed-list-index="{number}"]')
@@ -113,6 +167,27 @@ class NotebookPage:
             ".map(cell => cell.model.sharedModel.getSource())"
         )
         return sources
+
+    def watch(self, seconds: float) -> Watched:
+        """Look at the page for so many seconds; see `Watched`."""
+        self.frames.clear()
+        passed, longest, drawings = self.page.evaluate(
+            """most => new Promise(resolve => {
+                const start = performance.now();
+                let last = start, longest = 0, drawings = 0;
+                const tick = now => {
+                    longest = Math.max(longest, now - last);
+                    last = now;
+                    drawings += 1;
+                    if (now - start < most) requestAnimationFrame(tick);
+                    else resolve([(now - start) / 1000, longest, drawings]);
+                };
+                requestAnimationFrame(tick);
+            })""",
+            seconds * 1000,
+        )
+        updates = [f for f in self.frames if '"comm_msg"' in f and '"update"' in f]
+        return Watched(passed, [len(frame) for frame in updates], longest, drawings)
 
     def theme(self, name: str) -> None:
         """Choose a theme ("JupyterLab Dark") and wait until it is on."""

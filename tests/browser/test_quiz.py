@@ -246,6 +246,24 @@ def test_answers_are_there_after_a_reload_and_after_a_restart(sit: Sit) -> None:
     assert [error for error in learner.window.errors if cut_off not in error] == []
 
 
+def test_a_quiz_that_is_opened_again_without_its_kernel_says_what_to_do(sit: Sit) -> None:
+    learner = sit()
+    gone = learner.page.locator(".quiz-saved")
+    expect(gone).to_be_hidden()
+    item = learner.quiz.items[0]
+    learner.answer_by_keyboard(item, model.key(item))
+    learner.saved()
+    learner.window.save()
+    learner.window.restart_kernel()
+    learner.window.reload()
+    expect(gone).to_be_visible()
+    expect(gone).to_contain_text("run this cell again. Your answers and attempts are kept.")
+    expect(learner.page.get_by_text("model not found")).to_be_hidden()
+    learner.start()
+    expect(gone).to_be_hidden()
+    expect(learner.question(1).locator("input:checked")).to_have_value(str(model.key(item)))
+
+
 def test_a_second_window_shows_the_same_quiz_and_records_no_second_attempt(
     sit: Sit, open_notebook: OpenNotebook
 ) -> None:

@@ -9,14 +9,17 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from course import lab
 from course.content import content_root
 from course.errors import CourseError
+from course.journal.store import MANIFEST
 
 CHAPTER, EXERCISE = Path("ch05-building-blocks.ipynb"), Path("ch05/qos-design.ipynb")
+WELCOME = Path("start-here.ipynb")
 SOURCE = content_root() / "source"
 NOTEBOOKS = sorted(path.relative_to(SOURCE) for path in SOURCE.glob("*/*.ipynb"))
 """Every notebook of an assignment; `EXERCISE` is one of them."""
@@ -49,11 +52,19 @@ def everything(folder: Path) -> dict[Path, bytes]:
     return {path.relative_to(folder): path.read_bytes() for path in files}
 
 
+def without_output(notebook: bytes) -> Any:
+    """Return the first notebook's content without the progress that `course lab` puts into it."""
+    content = json.loads(notebook)
+    for cell in content["cells"]:
+        cell.pop("outputs", None)
+    return content
+
+
 def test_a_new_copy_has_the_chapters_and_the_student_versions(root: Path, folder: Path) -> None:
     copied = lab.make_copy(folder, root)
-    assert copied.new == [CHAPTER, *NOTEBOOKS]
+    assert copied.new == [CHAPTER, WELCOME, *NOTEBOOKS]
     assert not copied.beside
-    assert set(everything(folder)) == {CHAPTER, *NOTEBOOKS, Path(lab.MANIFEST)}
+    assert set(everything(folder)) == {CHAPTER, WELCOME, *NOTEBOOKS, Path(MANIFEST)}
     exercise = (folder / EXERCISE).read_text(encoding="utf-8")
     assert "# Your work goes here." in exercise
     assert "BEGIN SOLUTION" not in exercise
@@ -67,7 +78,9 @@ def test_a_students_work_stays_as_it_is(root: Path, folder: Path) -> None:
     before = everything(folder)
     copied = lab.make_copy(folder, root)
     assert (copied.new, copied.beside) == ([], {})
-    assert everything(folder) == before
+    after = everything(folder)
+    assert without_output(after.pop(WELCOME)) == without_output(before.pop(WELCOME))
+    assert after == before
 
 
 def test_a_newer_version_is_put_beside_once(root: Path, folder: Path) -> None:
@@ -95,7 +108,7 @@ def test_a_file_from_elsewhere_is_kept_and_a_deleted_one_comes_back(
     (folder / "ch05").mkdir(parents=True)
     (folder / EXERCISE).write_text("fetched elsewhere, and worked on")
     copied = lab.make_copy(folder, root)
-    assert copied.new == [CHAPTER, *(path for path in NOTEBOOKS if path != EXERCISE)]
+    assert copied.new == [CHAPTER, WELCOME, *(path for path in NOTEBOOKS if path != EXERCISE)]
     assert copied.beside == {EXERCISE: Path("ch05/qos-design.new.ipynb")}
     assert (folder / EXERCISE).read_text() == "fetched elsewhere, and worked on"
     (folder / CHAPTER).unlink()
@@ -106,10 +119,13 @@ def test_a_file_from_elsewhere_is_kept_and_a_deleted_one_comes_back(
 def test_a_damaged_record_costs_nothing(root: Path, folder: Path, damaged: str) -> None:
     lab.make_copy(folder, root)
     (folder / EXERCISE).write_text("my work")
-    (folder / lab.MANIFEST).write_text(damaged)
-    assert lab.make_copy(folder, root).beside == {EXERCISE: Path("ch05/qos-design.new.ipynb")}
+    (folder / MANIFEST).write_text(damaged)
+    assert lab.make_copy(folder, root).beside == {
+        EXERCISE: Path("ch05/qos-design.new.ipynb"),
+        WELCOME: Path("start-here.new.ipynb"),  # it shows the student's progress by now
+    }
     assert (folder / EXERCISE).read_text() == "my work"
-    assert json.loads((folder / lab.MANIFEST).read_text())
+    assert json.loads((folder / MANIFEST).read_text())
 
 
 def test_a_place_that_cannot_be_written_is_said(root: Path, folder: Path) -> None:
@@ -159,6 +175,24 @@ def test_the_command_copies_and_then_becomes_jupyterlab(tmp_path: Path) -> None:
     assert f"Your working copy is {copy}" in done.stdout
     assert done.stdout.splitlines()[-1][0].isdigit()  # JupyterLab's version
     assert {CHAPTER, EXERCISE} <= set(everything(copy))
+
+
+def test_jupyterlab_opens_the_progress_first_unless_told_otherwise(
+    folder: Path, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab.make_copy(folder, root)
+    started: list[list[str]] = []
+    monkeypatch.setattr(os, "execv", lambda _program, command: started.append(command))
+    monkeypatch.setenv("JUPYTER_CONFIG_PATH", "")
+    monkeypatch.chdir(folder)
+    first = f"--LabApp.default_url=/lab/tree/{WELCOME}"
+    lab.open_lab(folder, ["--port", "9000"])
+    assert started.pop()[3:] == [first, "--port", "9000"]
+    lab.open_lab(folder, ["--LabApp.default_url=/doc"])
+    assert started.pop()[3:] == ["--LabApp.default_url=/doc"]
+    (folder / WELCOME).unlink()
+    lab.open_lab(folder)
+    assert started.pop()[3:] == []
 
 
 def test_the_command_says_what_it_did_and_what_it_cannot_do(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import threading
 
 import pytest
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
@@ -60,6 +61,27 @@ def test_what_timers_set_off_has_happened_when_advance_returns(lab):
     for second in range(1, 6):
         lab.sim.advance(1.0)
         assert len(heard) == recorder.count == 11 * second + second // 2
+
+
+def test_a_nodes_clock_sleeps_without_being_told_its_context(lab):
+    class Sleeper(Node):
+        def __init__(self):
+            super().__init__("sleeper")
+            self.woke = []
+            self.thread = threading.Thread(target=self.sleep, daemon=True)
+            self.thread.start()
+
+        def sleep(self):
+            clock = self.get_clock()
+            start = clock.now()
+            for seconds in (1.0, 2.0):
+                self.woke.append(clock.sleep_until(start + Duration(seconds=seconds)))
+
+    with course.Session(threads=2) as other:  # neither is the process's default
+        sleeper = lab.run(Sleeper)
+        lab.until(lambda: lab.sim.advance(0.5) or len(sleeper.woke) == 2)
+        assert sleeper.woke == [True, True]
+        assert other.run(Node, "other").get_clock().sleep_for(Duration(seconds=0.001))
 
 
 def test_a_recorder_stamps_in_simulated_time(lab):

@@ -6,10 +6,12 @@ from collections.abc import Callable
 
 import pytest
 from rclpy.action import ActionServer
+from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
 from test_msgs.action import Fibonacci
 
 from course import Session
+from course.runtime.teardown import destroy_node
 
 
 class WithAction(Node):
@@ -57,6 +59,24 @@ def test_a_stopped_node_is_gone_with_its_action(kind: type[Node]) -> None:
         session.run(kind)
         session.stop(kind)
         session.until(alone(witness), timeout=20, what="the node and its action to be gone")
+        assert session.errors == []
+
+
+def test_a_stopped_managed_node_is_gone_with_its_services_while_somebody_keeps_it() -> None:
+    with Session() as session:
+        witness = session.run(Node, "witness")
+
+        def services() -> list[str]:
+            return [
+                name for name, _ in witness.get_service_names_and_types() if "/managed/" in name
+            ]
+
+        managed = session.run(LifecycleNode, "managed")
+        session.until(lambda: "/managed/change_state" in services())
+        session.stop(managed)
+        session.until(lambda: not services(), timeout=20, what="its services to be gone")
+        session.stop(managed)
+        destroy_node(managed)
         assert session.errors == []
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import importlib.util
 from pathlib import Path
 
 import pytest
+
+from course.interfaces import cache, finder
 
 NO_COMPILER = {"PATH": "/nonexistent", "CC": "", "CXX": ""}
 
@@ -199,3 +202,17 @@ print(GetPose.Response(x=1.0).x)
     )
     assert done.stderr == ""
     assert done.stdout == 2 * sentence + "ModuleNotFoundError\n1.0\n"
+
+
+def test_a_missing_dependency_of_the_cache_is_no_endless_recursion(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def root() -> Path:
+        importlib.import_module("platformdirs_that_nobody_installed")
+        raise AssertionError("it is not there")
+
+    finder.install()
+    monkeypatch.setattr(cache, "root", root)
+    assert importlib.util.find_spec("some_package_that_is_not_there") is None
+    with pytest.raises(ModuleNotFoundError, match="nobody_installed"):
+        cache.root()

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
+import pytest
 from rclpy.node import Node
 from std_msgs.msg import String
 
@@ -13,6 +16,8 @@ from course import Session
 from course.views import live
 from course.views.graph import GraphView
 from course.views.live import LiveView
+from course.views.saved import saved
+from tests.kernel import Kernel
 
 
 class Counter(LiveView):
@@ -27,6 +32,13 @@ class Counter(LiveView):
 
     def words(self) -> str:
         return f"{self.looks} looks"
+
+
+@pytest.fixture
+def kernel() -> Iterator[Kernel]:
+    running = Kernel()
+    yield running
+    running.close()
 
 
 def views_threads() -> list[threading.Thread]:
@@ -105,10 +117,25 @@ def test_a_view_that_fails_says_so_and_the_others_go_on(session: Session) -> Non
     session.until(lambda: sound.widget.number > before)
 
 
-def test_the_bundle_has_a_widget_and_words(session: Session) -> None:
-    data, _ = GraphView(session)._repr_mimebundle_()
-    assert data["text/plain"] == "No nodes."
-    assert "application/vnd.jupyter.widget-view+json" in data
+def test_without_a_front_end_a_view_is_words_and_makes_no_widget(session: Session) -> None:
+    view = GraphView(session)
+    assert view._repr_mimebundle_() == ({"text/plain": "No nodes."}, {})
+    assert views_threads() == []
+
+
+def test_in_a_kernel_a_view_leaves_its_words_for_a_reader_without_one(kernel: Kernel) -> None:
+    status, shown = kernel.run("import course\ncourse.session().graph()")
+    assert status == "ok"
+    (_, live_words), (_, note) = shown
+    assert live_words == "No nodes."
+    assert re.match(r"ROS graph as it was at .* not live: run this cell again", note)
+
+
+def test_saved_words_are_escaped_and_bounded() -> None:
+    data = saved("ROS graph", "<img src=x>" + "x" * 100_000)
+    assert "<img" not in data["text/html"]
+    assert "[the rest was not saved]" in data["text/html"]
+    assert len(data["text/html"]) < 30_000
 
 
 def test_messages_that_are_none_are_passed_over(session: Session) -> None:

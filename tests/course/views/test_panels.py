@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
-from rclpy.action import ActionServer, CancelResponse, GoalResponse
-from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.node import Node
 from rclpy.parameter import Parameter
-from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
 from test_msgs.msg import Nested
 
@@ -22,47 +16,7 @@ from course.runtime.actions import GoalState
 from course.values import MisfitError
 from course.views.live import LiveView
 from course.watch import forms
-
-
-class Robot(Node):
-    """Serves, acts, logs, and has parameters; `go` lets its goals end."""
-
-    def __init__(self) -> None:
-        super().__init__("robot")
-        limits = FloatingPointRange(from_value=0.0, to_value=2.0, step=0.5)
-        about = ParameterDescriptor(description="m/s", floating_point_range=[limits])
-        self.declare_parameter("speed", 0.5, about)
-        self.declare_parameter("name", "r2")
-        self.declare_parameter("lights", value=True)
-        self.declare_parameter("legs", 4)
-        self.add_on_set_parameters_callback(self._judge)
-        self.go = threading.Event()
-        group = ReentrantCallbackGroup()
-        self.create_service(SetBool, "lamp", self._switch, callback_group=group)
-        self._action = ActionServer(
-            self, Fibonacci, "count", self._count, callback_group=group,
-            goal_callback=self._accept, cancel_callback=lambda _goal: CancelResponse.ACCEPT,
-        )  # fmt: skip
-
-    def _judge(self, parameters: list[Any]) -> SetParametersResult:
-        bad = any(p.name == "legs" and p.value > 8 for p in parameters)
-        return SetParametersResult(successful=not bad, reason="no insect has so many" * bad)
-
-    def _switch(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        response.success, response.message = request.data, "lamp"
-        return response
-
-    def _accept(self, goal: Fibonacci.Goal) -> GoalResponse:
-        return GoalResponse.REJECT if goal.order < 0 else GoalResponse.ACCEPT
-
-    def _count(self, goal: Any) -> Fibonacci.Result:
-        goal.publish_feedback(Fibonacci.Feedback(sequence=[0, 1]))
-        while not self.go.wait(0.01):
-            if goal.is_cancel_requested:
-                goal.canceled()
-                return Fibonacci.Result()
-        goal.succeed()
-        return Fibonacci.Result(sequence=[0, 1, 1])
+from tests.robot import Robot
 
 
 @pytest.fixture

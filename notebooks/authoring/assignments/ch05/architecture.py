@@ -175,6 +175,10 @@ design
 # The next cell starts an examiner in a process of its own, which brings the design up and reads the
 # ROS graph. For each check it says what was observed, what was needed, and why it matters on a
 # robot. Ask for more help with `check("architecture", hint=2)` or `hint=3` in a cell of your own.
+#
+# **Look inside**, in cells of your own after `import course`: `design.run()`, and then
+# `course.session().graph()` draws the nodes as they really came up, with what is not connected in
+# red; `course.session().diagnose()` says in words what is wrong with it.
 
 # %% nbgrader={"grade": true, "grade_id": "architecture-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 from autograder import check

@@ -36,7 +36,7 @@
 #    examiner runs your robot on simulated time. Times in the task are in that time's seconds, and
 #    0.2 s more or less do no harm. Timers fire when they are due; a thread of your own sees the
 #    clock move in steps of 0.1 s or more, and sleeps on it with
-#    `self.get_clock().sleep_for(duration, context=self.context)`.
+#    `self.get_clock().sleep_for(duration)`.
 # 2. **Nothing blocks.** Each node runs in an executor with 4 threads. While a callback waits,
 #    everything else in its callback group waits too, and in the node's default group that is also
 #    the clock itself. The stubs therefore use a reentrant group, `self.group`.
@@ -435,6 +435,10 @@ class NavigationServer(Node):
 # it says what was observed, what was needed, and why it matters on a robot. Ask for more help with
 # `check("safety", hint=2)` or `hint=3` in a cell of your own. What your callbacks raised or printed
 # is in `course.logs()` after you ran the node yourself with `course.run(GripperClient, threads=4)`.
+#
+# **Look inside**, in cells of your own after `import course`: `course.session(threads=4).log_panel()`
+# shows live what all nodes log and raise. After `course.run(NavigationServer)` you are the dispatcher
+# in `course.session().action("drive")`: send goals, several at once, and cancel them.
 
 # %% nbgrader={"grade": true, "grade_id": "safety-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 from autograder import check

@@ -71,8 +71,7 @@ choices = {
 # | battery | `robot/battery` | Everyone who is interested knows a new level within 1 s. So does whoever joins later, within 1 s: the hardware reports the level only when it changes. |
 #
 # All times are those of the node's clock: `create_timer` and `self.get_clock()` go by it,
-# `time.sleep` does not. The examiner moves that clock faster than the one on the wall. (`sleep_for`
-# of the clock needs `context=self.context` in a notebook, where a session has a context of its own.)
+# `time.sleep` does not. The examiner moves that clock faster than the one on the wall.
 #
 # **Types.** Which one you need follows from the pattern that you choose.
 #
@@ -250,6 +249,11 @@ class RobotInterface(Robot):
 # The next cell starts an examiner in a process of its own. For each check it says what was
 # observed, what was needed, and why it matters on a robot. Ask for more help with
 # `check("patterns", hint=2)` or `hint=3` in a cell of your own.
+#
+# **Look inside**, in cells of your own after `import course`: `course.run(RobotInterface)`, and then
+# use it as an operator would. `course.session().service(name)` and `course.session().action(name)`
+# are forms for a service and an action, `course.session().timeline(name)` shows a topic's messages,
+# `course.session().parameters("robot_interface")` a node's parameters: whichever you chose.
 
 # %% nbgrader={"grade": true, "grade_id": "patterns-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 from autograder import check

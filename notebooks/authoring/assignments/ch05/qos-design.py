@@ -135,6 +135,11 @@ class SensorConsumers(Relay):
 # The next cell starts an examiner in a process of its own. It takes a few seconds. For each check
 # it says what was observed, what was needed, and why it matters on a robot. Ask for more help with
 # `check("qos", hint=2)` or `hint=3` in a cell of your own.
+#
+# **Look inside**, in cells of your own after `import course`.
+# `course.session().qos_lab(offered=lidar_qos, requested=lidar_qos)` tries two profiles on a late
+# joiner, a slow reader and a lossy link. And after `course.run(SensorDrivers)` and
+# `course.run(SensorConsumers)`, `course.session().graph()` shows in red what DDS refuses to connect.
 
 # %% nbgrader={"grade": true, "grade_id": "qos-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 from autograder import check

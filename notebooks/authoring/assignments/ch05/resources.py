@@ -358,6 +358,10 @@ class ManagedCamera(LifecycleNode):
 # The next cell starts an examiner in a process of its own. It takes a few seconds. For each check
 # it says what was observed, what was needed, and why it matters on a robot. Ask for more help with
 # `check("resources", hint=2)` or `hint=3` in a cell of your own.
+#
+# **Look inside**, in cells of your own after `import course` and `course.run(CameraDriver)`:
+# `course.session().diagnose()` names a callback that is stuck, with the line where it is, and
+# `%ros node info /camera_driver` lists what is left of the node on the graph.
 
 # %% nbgrader={"grade": true, "grade_id": "resources-visible", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 from autograder import check

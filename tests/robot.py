@@ -1,4 +1,7 @@
-"""The robot that the views look at: it is copied beside the notebook that a test opens."""
+"""The robot that the views look at.
+
+Browser tests copy this file beside the notebook that they open, so it imports nothing of ours.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ import threading
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
-from rclpy.action import ActionServer, CancelResponse
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
@@ -16,32 +19,43 @@ from test_msgs.action import Fibonacci
 
 
 class Robot(Node):
-    """Publishes at a rate that it is told, serves, acts, and has a parameter with a range."""
+    """Serves, acts, and has parameters; `go` lets its goals end. At a rate (Hz) it chatters."""
 
-    def __init__(self, rate: float = 20.0) -> None:
+    def __init__(self, rate: float = 0.0) -> None:
         super().__init__("robot")
         limits = FloatingPointRange(from_value=0.0, to_value=2.0, step=0.5)
         about = ParameterDescriptor(description="m/s", floating_point_range=[limits])
         self.declare_parameter("speed", 0.5, about)
+        self.declare_parameter("name", "r2")
+        self.declare_parameter("lights", value=True)
+        self.declare_parameter("legs", 4)
         self.add_on_set_parameters_callback(self._judge)
         group = ReentrantCallbackGroup()
-        publisher = self.create_publisher(String, "chatter", 10)
-        self.create_publisher(String, "scan", qos_profile_sensor_data)
-        self.create_timer(1 / rate, lambda: publisher.publish(String(data="hello")))
+        if rate:
+            publisher = self.create_publisher(String, "chatter", 10)
+            self.create_publisher(String, "scan", qos_profile_sensor_data)
+            self.create_timer(1 / rate, lambda: publisher.publish(String(data="hello")))
         self.create_service(SetBool, "lamp", self._switch, callback_group=group)
         self.go = threading.Event()
         self._action = ActionServer(
             self, Fibonacci, "count", self._count, callback_group=group,
-            cancel_callback=lambda _goal: CancelResponse.ACCEPT,
+            goal_callback=self._accept, cancel_callback=lambda _goal: CancelResponse.ACCEPT,
         )  # fmt: skip
 
     def _judge(self, parameters: list[Any]) -> SetParametersResult:
-        bad = any(p.name == "speed" and p.value > 1.5 for p in parameters)
-        return SetParametersResult(successful=not bad, reason="too fast for a corridor" * bad)
+        limits = {"speed": (1.5, "too fast for a corridor"), "legs": (8, "no insect has so many")}
+        for parameter in parameters:
+            most, reason = limits.get(parameter.name, (None, ""))
+            if most is not None and parameter.value > most:
+                return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
 
     def _switch(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         response.success, response.message = request.data, "lamp"
         return response
+
+    def _accept(self, goal: Fibonacci.Goal) -> GoalResponse:
+        return GoalResponse.REJECT if goal.order < 0 else GoalResponse.ACCEPT
 
     def _count(self, goal: Any) -> Fibonacci.Result:
         goal.publish_feedback(Fibonacci.Feedback(sequence=[0, 1]))

@@ -1,0 +1,140 @@
+"""A subject that runs in a sandbox, as whoever started it sees it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Self
+
+from autograder.sandbox import warmth
+from autograder.sandbox.host import fate_of
+from autograder.sandbox.limits import Limits
+from autograder.sandbox.network import BoxError
+from autograder.sandbox.watch import Watch
+from autograder.warm import ForkedProcess
+
+END_TIMEOUT = 10.0
+"""Seconds until a killed subject must have ended: the kernel takes a moment for its memory."""
+
+
+class BoxedSubject:
+    """A running subject in its sandbox."""
+
+    def __init__(
+        self, process: subprocess.Popen[bytes], init: int, limits: Limits, held: ExitStack
+    ) -> None:
+        """Watch over the process namespace whose process 1 is ``init``."""
+        self._process = process
+        self._init = init
+        self._held = held
+        self._handle = os.pidfd_open(init)  # unlike its number, never another process's
+        held.callback(os.close, self._handle)
+        self._watch = Watch(init, self._handle, limits)
+        self.pid = 0
+
+    def ready(self) -> None:
+        """Find the subject's process: the only one that process 1 has, as yet."""
+        children = Path(f"/proc/{self._init}/task/{self._init}/children").read_text().split()
+        self.pid = int(children[0]) if children else 0
+
+    def fate(self) -> str:
+        """Return how the process ended, in words."""
+        try:
+            code = self._process.wait(timeout=5)
+        except subprocess.TimeoutExpired:
+            return "it closed its connection to the grader"
+        if self._watch.reason:
+            return self._watch.reason
+        # bwrap reports a signal as a shell does.
+        is_signal = code > 128 and code - 128 in set(signal.Signals)
+        return fate_of(128 - code if is_signal else code)
+
+    def failed(self) -> str:
+        """Return why it did not start, in words: how it ended, and what it last said."""
+        fate = self.fate()
+        if self._process.poll() is None:
+            return fate
+        assert self._process.stderr is not None
+        return with_last_words(fate, self._process.stderr.read(65536))
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End every process of the sandbox: they all go with process 1."""
+        self._watch.stop()
+        self._kill()
+        self._process.wait()
+        for stream in (self._process.stdout, self._process.stderr):
+            if stream is not None:
+                stream.close()
+        self._held.close()
+
+    def _kill(self) -> None:
+        with suppress(ProcessLookupError):
+            signal.pidfd_send_signal(self._handle, signal.SIGKILL)
+
+
+class WarmSubject(BoxedSubject):
+    """A subject that is forked into a sandbox in which nothing else runs yet."""
+
+    _forked: ForkedProcess | None = None
+
+    def fork(self, arguments: Sequence[str], fds: Sequence[int], user: int | None) -> None:
+        """Fork the subject once the sandbox is complete.
+
+        Raises:
+            BoxError: the sandbox's tools refuse.
+            ZygoteError: there is no fork to be had.
+        """
+        assert self._process.stdout is not None
+        if not self._process.stdout.readline():
+            raise BoxError(self.failed())
+        self._forked = warmth.subject(arguments, fds, self._handle, user)
+        self.pid = self._forked.pid
+
+    def ready(self) -> None:
+        """Need nothing: the process is the one that was forked."""
+
+    def fate(self) -> str:
+        """Return how the process ended, in words."""
+        if self._forked is None:
+            return super().fate()
+        try:
+            code = self._forked.wait(timeout=5)
+        except subprocess.TimeoutExpired:
+            return "it closed its connection to the grader"
+        return self._watch.reason or fate_of(code)
+
+    def failed(self) -> str:
+        """Return why it did not start, in words: how it ended, and what it last said."""
+        if self._forked is None:
+            return super().failed()
+        fate = self.fate()
+        if self._forked.returncode is None:
+            return fate
+        assert self._forked.stderr is not None
+        return with_last_words(fate, self._forked.stderr.read(65536))
+
+    def __exit__(self, *details: object) -> None:
+        """End every process of the sandbox; the subject goes with the others."""
+        self._watch.stop()
+        self._kill()
+        if self._forked is not None:
+            # First: process 1 cannot go before everybody has, and been taken note of.
+            with suppress(subprocess.TimeoutExpired):
+                self._forked.wait(END_TIMEOUT)
+            if self._forked.stderr is not None:
+                self._forked.stderr.close()
+        super().__exit__(*details)
+
+
+def with_last_words(fate: str, said: bytes) -> str:
+    """Return how a process ended, with the last line that it wrote."""
+    lines = said.decode(errors="replace").strip().splitlines()
+    return f"{fate} ({lines[-1]})" if lines else fate

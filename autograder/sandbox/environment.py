@@ -1,0 +1,45 @@
+"""The environment variables of a submission and of its examiner."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+from autograder.sandbox import view
+from course.interfaces import cache
+
+DDS = {
+    # Two processes that share a network but not /dev/shm would find each other and then exchange
+    # nothing: Fast DDS takes shared memory for granted on one host. LOCALHOST switches it back on.
+    "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",
+    "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
+    "COURSE_DISCOVERY": "inherit",
+    "FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).with_name("fastdds.xml")),
+}
+KEPT = ("LANG", "LC_ALL", "LC_CTYPE", "TZ", "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE",
+        "AMENT_PREFIX_PATH", "PYTHONWARNINGS")  # fmt: skip
+"""What a subject gets of the grader's environment: no token, no path of the course."""
+
+
+def submission() -> dict[str, str]:
+    """Return a submission's whole environment."""
+    kept = {name: os.environ[name] for name in KEPT if name in os.environ}
+    programs = f"{Path(sys.executable).parent}:/usr/local/bin:/usr/bin:/bin"
+    home = str(view.HOME)
+    return {
+        **kept, **DDS, "PATH": programs, "HOME": home, "USER": "student", "LOGNAME": "student",
+        "IPYTHONDIR": f"{home}/.ipython", "ROS_LOG_DIR": f"{home}/log", "MPLBACKEND": "Agg",
+        "COURSE_INTERFACES_CACHE": str(cache.root()), "TMPDIR": "/tmp",
+        # A numeric library's threads, one a processor of the machine, count as processes.
+        "OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2", "PYTHONDONTWRITEBYTECODE": "1",
+    }  # fmt: skip
+
+
+def examiners() -> dict[str, str]:
+    """Return what an examiner's modules find in the environment when they are imported.
+
+    An examiner itself has all of the grader's environment.
+    """
+    kept = {name: os.environ[name] for name in (*KEPT, "PATH", "HOME") if name in os.environ}
+    return {**kept, **DDS, "COURSE_INTERFACES_CACHE": str(cache.root())}

@@ -1,0 +1,51 @@
+"""What nearly every subject and examiner imports: a zygote imports it for all of them.
+
+Only time is saved by what stands here. What is missing is imported when it is needed, as ever.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from importlib import import_module
+
+COURSE = (
+    "course.ambient", "course.design.declaration", "course.design.node", "course.graph.reader",
+    "course.interfaces.magic", "course.notebook", "course.ros.magic",
+)  # fmt: skip
+ROS = ("rclpy.action", "rclpy.lifecycle", "rclpy.parameter_client")
+INTERFACES = {
+    "action_msgs": ("msg", "srv"),
+    "builtin_interfaces": ("msg",),
+    "diagnostic_msgs": ("msg", "srv"),
+    "geometry_msgs": ("msg",),
+    "lifecycle_msgs": ("msg", "srv"),
+    "nav_msgs": ("msg", "srv"),
+    "rcl_interfaces": ("msg", "srv"),
+    "rosgraph_msgs": ("msg",),
+    "sensor_msgs": ("msg", "srv"),
+    "service_msgs": ("msg",),
+    "std_msgs": ("msg",),
+    "std_srvs": ("srv",),
+    "test_msgs": ("action",),
+    "type_description_interfaces": ("msg", "srv"),
+    "unique_identifier_msgs": ("msg",),
+}
+"""Interface packages of the ROS 2 wheels, and their modules."""
+
+
+def import_all(more: Iterable[str] = ()) -> None:
+    """Import the modules above and ``more``, and load the interfaces' libraries."""
+    for name in (*ROS, *COURSE, *more):
+        import_module(name)
+    for package, modules in INTERFACES.items():
+        for module in modules:
+            _load(import_module(f"{package}.{module}"))
+
+
+def _load(interfaces: object) -> None:
+    """Load the type support of interfaces, which rclpy else does when one is first used."""
+    for interface in vars(interfaces).values():
+        if isinstance(interface, type):
+            with suppress(AttributeError):  # not an interface
+                type(interface).__import_type_support__()  # type: ignore[attr-defined]

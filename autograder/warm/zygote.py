@@ -1,0 +1,140 @@
+"""The zygote: a process that imports what others need, and then only forks.
+
+Started as ``python -m autograder.warm.zygote --socket FD MODULE``. It says when it is ready; each
+packet that follows is a `Task`, with descriptors: first one to report over, then what the task
+names. A fork (the keeper) joins the namespaces, because a process that joins a process namespace
+is itself not in it, forks once more, reports that process and, when it has ended, how.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import os
+import select
+import signal
+import socket
+import sys
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from importlib import import_module
+from typing import Any, NoReturn
+
+from autograder.warm.task import Task, close_others
+
+MOST_DESCRIPTORS = 64
+LARGEST_TASK = 128 * 1024
+"""Bytes of a task's JSON; an environment is the largest part of it."""
+
+
+def serve(tasks: socket.socket) -> Task | None:
+    """Fork what is asked for until nobody asks any more.
+
+    Returns:
+        None in the zygote itself; in a fork that is to run a task, the task.
+    """
+    while True:
+        text, handed, _, _ = socket.recv_fds(tasks, LARGEST_TASK, MOST_DESCRIPTORS)
+        if not text:
+            return None
+        report = socket.socket(fileno=handed.pop(0))
+        if _fork(report) == 0:
+            tasks.close()
+            return _keep(Task.from_json(text), report, handed)
+        report.close()
+        for descriptor in handed:
+            os.close(descriptor)
+
+
+def _fork(report: socket.socket) -> int | None:
+    """Fork; if the machine refuses, report that and return None."""
+    try:
+        return os.fork()
+    except OSError as error:
+        _say(report, {"error": f"fork: {error.strerror}"})
+        return None
+
+
+def _keep(task: Task, report: socket.socket, handed: list[int]) -> Task:
+    """Join, and fork the task's process; return in that process only."""
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    try:
+        handed, holder = task.join(handed)
+    except OSError as error:
+        _say(report, {"error": str(error)})
+        os._exit(1)
+    pid = _fork(report)
+    if pid == 0:
+        report.detach()  # closed with everything else that is not the task's
+        task.become(handed)
+        return task
+    if pid is not None:
+        _stay(report, pid, holder)
+    os._exit(1)
+
+
+def _stay(report: socket.socket, pid: int, holder: int | None) -> NoReturn:
+    """Report a process and how it ended; its number is its own until whoever asked is done.
+
+    When whoever asked is gone, by ``kill -9`` too, nobody wants the process any more: it is killed.
+    With it ends the process of which ``holder`` is the pidfd, and so all that it has left behind.
+    """
+    handle = os.pidfd_open(pid)
+    with suppress(OSError):
+        socket.send_fds(report, [json.dumps({"pid": pid}).encode()], [handle])
+    # The others are the process's own: that it has closed one must be seen at the other end.
+    close_others({report.fileno(), handle, *([] if holder is None else [holder])})
+    select.select([handle, report.fileno()], [], [])  # it has ended, or nobody is at the other end
+    ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT | os.WNOHANG)
+    if ended is None:
+        signal.pidfd_send_signal(handle, signal.SIGKILL)
+        ended = os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+    assert ended is not None
+    code = ended.si_status if ended.si_code == os.CLD_EXITED else -ended.si_status
+    if holder is not None:
+        with suppress(ProcessLookupError):
+            signal.pidfd_send_signal(holder, signal.SIGKILL)
+    _say(report, {"code": code})
+    with suppress(OSError):
+        report.recv(1)
+    os.waitpid(pid, 0)
+    os._exit(0)
+
+
+def _say(report: socket.socket, message: dict[str, Any]) -> None:
+    with suppress(OSError):
+        report.send(json.dumps(message).encode())
+
+
+def _reap(*_: object) -> None:
+    with suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the process, and in a fork of it what that is to be; returns its exit code."""
+    parser = argparse.ArgumentParser(prog="autograder.warm.zygote")
+    parser.add_argument("--socket", type=int, required=True, help="file descriptor of the tasks")
+    parser.add_argument("module", help="the module whose main() is run")
+    options = parser.parse_args(arguments)
+    tasks = socket.socket(fileno=options.socket)
+    module: Any = import_module(options.module)
+    module.preload()
+    # A fork has no thread but the one that forked. What libraries keep in waiting does no harm: the
+    # workers of OpenBLAS are made anew in a fork, LTTng's only listen for a tracer.
+    if threading.active_count() > 1:
+        sys.exit(f"{options.module} starts threads when it is imported, which no fork would have")
+    # What is here now stays: nothing of it needs to be looked at, and so copied, by a fork.
+    gc.collect()
+    gc.freeze()
+    signal.signal(signal.SIGCHLD, _reap)
+    tasks.send(json.dumps({"ready": os.getpid()}).encode())
+    task = serve(tasks)
+    return 0 if task is None else task.run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,152 @@
+"""Progress as a page: Markdown, which JupyterLab draws in its own theme, and the same as text."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+if TYPE_CHECKING:
+    from course.journal.notebooks import Notebook
+    from course.journal.progress import Chapter, Exercise, Progress, QuizTaken
+
+NAMED = 4
+"""Sections or checks that are named; of more, the number is given."""
+
+_SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~$!&])")
+
+Row = tuple[str, ...]
+
+
+def markdown(progress: Progress, start: Path) -> str:
+    """Return the page as Markdown, with links to the notebooks relative to the folder ``start``."""
+    parts = [f"**{_escaped(_headline(progress))}**"]
+    if todo := _next(progress):
+        notebook, what = todo
+        parts.append(f"**Next:** {_link(progress, notebook, start)}: {_escaped(what)}.")
+    for head, rows in _tables(progress):
+        lines = [head, tuple("---" for _ in head)]
+        for notebook, row in rows:
+            lines.append((_link(progress, notebook, start), *map(_escaped, row)))
+        parts.append("\n".join(f"| {' | '.join(line)} |" for line in lines))
+    parts += [f"**Note:** {_escaped(notice)}" for notice in progress.notices]
+    parts.append(_escaped(_foot(progress)))
+    return "\n\n".join(parts)
+
+
+def text(progress: Progress) -> str:
+    """Return the page as plain text."""
+    lines = [_headline(progress)]
+    if todo := _next(progress):
+        notebook, what = todo
+        lines.append(f"Next: {notebook.path}: {what}.")
+    for head, rows in _tables(progress):
+        for notebook, row in rows:
+            lines += ["", f"{head[0]}: {notebook.title} ({notebook.path})"]
+            lines += [f"  {name}: {value}" for name, value in zip(head[1:], row, strict=True)]
+    lines += ["", *(f"Note: {notice}" for notice in progress.notices), _foot(progress)]
+    return "\n".join(lines)
+
+
+def _headline(progress: Progress) -> str:
+    parts = []
+    if progress.chapters:
+        done, total = (sum(getattr(c, n) for c in progress.chapters) for n in ("done", "total"))
+        parts.append(f"{done} of {total} cells of the chapters run")
+    if progress.exercises:
+        done = sum(exercise.done for exercise in progress.exercises)
+        parts.append(f"{done} of {len(progress.exercises)} exercises ready to hand in")
+    if progress.quizzes:
+        done = sum(quiz.passed for quiz in progress.quizzes)
+        several = f"{done} of {len(progress.quizzes)} quizzes passed"
+        one = "the quiz passed" if done else "the quiz not passed yet"
+        parts.append(several if len(progress.quizzes) > 1 else one)
+    return (", ".join(parts) or "There are no notebooks of the course here") + "."
+
+
+def _next(progress: Progress) -> tuple[Notebook, str] | None:
+    """Return the notebook to go on with and what to do there; None if all is done."""
+    for chapter in progress.chapters:
+        if chapter.left:
+            return chapter.notebook, f"go on at “{chapter.left[0].title}”"
+    for exercise in progress.exercises:
+        if exercise.checked is None:
+            return exercise.notebook, "do the task, then run its check cell"
+        if exercise.checked.open:
+            return exercise.notebook, f"“{exercise.checked.open[0]}” is still open"
+        if exercise.notebook.written is False:
+            return exercise.notebook, "write the explanation, and save"
+    for quiz in progress.quizzes:
+        if not quiz.passed:
+            return quiz.notebook, "take the quiz"
+    return None
+
+
+def _tables(progress: Progress) -> Iterator[tuple[Row, list[tuple[Notebook, Row]]]]:
+    if progress.chapters:
+        head: Row = ("Chapter", "Cells run", "Still to run")
+        yield head, [(chapter.notebook, _chapter(chapter)) for chapter in progress.chapters]
+    if progress.exercises:
+        head = ("Exercise", "Visible checks", "Still open", "Explanation")
+        yield head, [(e.notebook, _exercise(e, progress.moment)) for e in progress.exercises]
+    if progress.quizzes:
+        head = ("Quiz", "Passed", "Best attempt", "Attempts")
+        yield head, [(quiz.notebook, _quiz(quiz)) for quiz in progress.quizzes]
+
+
+def _chapter(chapter: Chapter) -> Row:
+    left = _named(section.title for section in chapter.left)
+    return f"{chapter.done} of {chapter.total}", left
+
+
+def _exercise(exercise: Exercise, now: datetime.datetime) -> Row:
+    written = {True: "written", False: "to be written", None: "none asked for"}
+    explanation = written[exercise.notebook.written]
+    found = exercise.checked
+    if found is None:
+        return "not checked yet", "all", explanation
+    best = f", best {found.best:g}" if found.best > found.score else ""
+    points = f"{found.score:g} of {found.max_score:g} points"
+    return f"{points} ({_when(found.when, now)}{best})", _named(found.open), explanation
+
+
+def _quiz(quiz: QuizTaken) -> Row:
+    best = quiz.best
+    score = f"{best.score:g} of {len(best.answers)}" if best else "none yet"
+    return "yes" if quiz.passed else "not yet", score, str(len(quiz.attempts))
+
+
+def _named(titles: Iterable[str]) -> str:
+    names = [title.rstrip(".") for title in titles]
+    more = f"; and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return "; ".join(names[:NAMED]) + more or "nothing"
+
+
+def _when(stamp: str, now: datetime.datetime) -> str:
+    moment = datetime.datetime.fromisoformat(stamp).astimezone(now.tzinfo)
+    if moment.date() == now.date():
+        return f"today, {moment:%H:%M}"
+    return f"{moment.day} {moment:%b %Y, %H:%M}"
+
+
+def _foot(progress: Progress) -> str:
+    return (
+        f"As of {progress.moment.day} {progress.moment:%b %Y, %H:%M}, from your saved notebooks "
+        "and the files beside them. Nothing of it leaves this machine. The visible checks are not "
+        "your grade: hidden checks and the explanation are graded when you hand in. Run this cell "
+        "again to see what has changed."
+    )
+
+
+def _link(progress: Progress, notebook: Notebook, start: Path) -> str:
+    address = quote(os.path.relpath(progress.folder / notebook.path, start))
+    return f"[{_escaped(notebook.title)}]({address})"
+
+
+def _escaped(value: str) -> str:
+    """Return text that Markdown shows as it is, on one line of a table."""
+    return _SPECIAL.sub(r"\\\1", " ".join(value.split()))

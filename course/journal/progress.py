@@ -1,0 +1,185 @@
+"""What is done and what is left in a working copy, as plain data."""
+
+from __future__ import annotations
+
+import datetime
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from course.journal import page
+from course.journal.notebooks import Notebook, Section, read
+from course.journal.store import (
+    MANIFEST,
+    Checked,
+    Entries,
+    Journal,
+    JournalError,
+    journal_here,
+)
+from quizzes.record import MAX_FILE, Attempt, filename, parse
+
+WELCOME = Path("start-here.ipynb")
+"""The notebook that `course lab` opens first; it is not a chapter."""
+
+
+@dataclass(frozen=True)
+class Chapter:
+    """A chapter; ``ran`` has for each of its sections how many of the cells have run."""
+
+    notebook: Notebook
+    ran: tuple[int, ...]
+
+    @property
+    def done(self) -> int:
+        """Cells that have run."""
+        return sum(self.ran)
+
+    @property
+    def total(self) -> int:
+        """Cells that there are."""
+        return sum(len(section.cells) for section in self.notebook.sections)
+
+    @property
+    def left(self) -> tuple[Section, ...]:
+        """The sections with cells that have not run."""
+        pairs = zip(self.notebook.sections, self.ran, strict=True)
+        return tuple(section for section, ran in pairs if ran < len(section.cells))
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """An exercise: what its visible checks found when they ran last (None: never)."""
+
+    notebook: Notebook
+    checked: Checked | None
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing is left that a student can do."""
+        passed = self.checked is not None and not self.checked.open
+        return passed and self.notebook.written is not False
+
+
+@dataclass(frozen=True)
+class QuizTaken:
+    """A quiz, and the attempts at it in the file beside its notebook."""
+
+    notebook: Notebook
+    attempts: tuple[Attempt, ...]
+    damaged: int = 0
+
+    @property
+    def best(self) -> Attempt | None:
+        """The attempt with the best score, the earliest of equal ones."""
+        return max(self.attempts, key=lambda a: (a.score, -a.attempt), default=None)
+
+    @property
+    def passed(self) -> bool:
+        """Whether an attempt was passed when it was submitted."""
+        return any(attempt.passed for attempt in self.attempts)
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What a student has done; a notebook shows it as a page, `print` as text.
+
+    Attributes:
+        folder: the working copy.
+        moment: when this was read.
+        notices: sentences about files that could not be read.
+    """
+
+    folder: Path
+    moment: datetime.datetime
+    chapters: tuple[Chapter, ...] = ()
+    exercises: tuple[Exercise, ...] = ()
+    quizzes: tuple[QuizTaken, ...] = ()
+    notices: tuple[str, ...] = field(default=())
+
+    def __repr__(self) -> str:
+        """Return it as text."""
+        return page.text(self)
+
+    def _repr_markdown_(self) -> str:
+        return page.markdown(self, Path.cwd())
+
+
+def progress(folder: Path | str | None = None) -> Progress:
+    """Return what is done and what is left, as the last expression of a cell shows it.
+
+    Args:
+        folder: a working copy, or a folder inside one; the current folder if left out.
+
+    Raises:
+        JournalError: there is no working copy there.
+    """
+    journal = journal_here(Path(folder) if folder else None)
+    if journal is None:
+        raise JournalError(
+            f"{Path(folder or '.').absolute()} is no working copy of the course: make one with "
+            "`course lab`, and open its notebooks there."
+        )
+    return progress_of(journal)
+
+
+def progress_of(journal: Journal) -> Progress:
+    """Return what is done and left in the working copy of ``journal``."""
+    entries = journal.read()
+    notebooks = [read(journal.folder, path) for path in handed_out(journal.folder)]
+    notices = [entries.notice] if entries.notice else []
+    notices += [f"{n.path} cannot be read: {n.problem}." for n in notebooks if n.problem]
+    sound = [notebook for notebook in notebooks if not notebook.problem]
+    quizzes = tuple(_quiz(journal.folder, n) for n in sound if n.quiz)
+    notices += [
+        f"{filename(quiz.notebook.quiz)} has {quiz.damaged} damaged lines: run the quiz again, "
+        "which keeps them aside."
+        for quiz in quizzes if quiz.damaged
+    ]  # fmt: skip
+    return Progress(
+        journal.folder,
+        datetime.datetime.now().astimezone(),
+        tuple(_chapter(n, entries) for n in sound if not (n.exam or n.quiz)),
+        tuple(
+            Exercise(n, entries.checks.get(n.exam))
+            for n in sorted(sound, key=lambda notebook: notebook.title)
+            if n.exam and not n.quiz
+        ),
+        quizzes,
+        tuple(notices),
+    )
+
+
+def handed_out(folder: Path) -> list[Path]:
+    """Return the course's notebooks in a working copy, chapters first."""
+    try:
+        names = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        paths = [Path(name) for name in names if isinstance(name, str)]
+    except (OSError, ValueError, TypeError):
+        paths = []
+    if not paths:  # a damaged record: look for what is there
+        found = [*folder.glob("*.ipynb"), *folder.glob("*/*.ipynb")]
+        paths = [path.relative_to(folder) for path in found if ".new" not in path.stem]
+    inside = [p for p in paths if p.suffix == ".ipynb" and not p.is_absolute()]
+    mine = [path for path in inside if path != WELCOME and ".." not in path.parts]
+    return sorted(mine, key=lambda path: (len(path.parts), path))
+
+
+def _chapter(notebook: Notebook, entries: Entries) -> Chapter:
+    return Chapter(
+        notebook,
+        tuple(sum(cell in entries.cells for cell in s.cells) for s in notebook.sections),
+    )
+
+
+def _quiz(folder: Path, notebook: Notebook) -> QuizTaken:
+    file = folder / notebook.path.parent / filename(notebook.quiz)
+    try:
+        if not file.is_file():
+            return QuizTaken(notebook, ())
+        with file.open("rb") as opened:
+            attempts, damaged = parse(opened.read(MAX_FILE + 1))
+    except OSError:
+        return QuizTaken(notebook, (), 1)
+    mine = tuple(attempt for attempt in attempts if attempt.quiz == notebook.quiz)
+    return QuizTaken(notebook, mine, damaged)

@@ -1,0 +1,95 @@
+"""Tell a callback that is blocked from one that works, or would if it were given the chance.
+
+A thread that the kernel shows as asleep may wait for what only the next moment of simulated time
+brings. Or it waits for the interpreter's lock, or has been kept from running by other processes:
+then it is about to go on, and time must not move on without it. One look cannot tell these apart;
+a row of looks can, with the lock let go in between (proc(5): `status`, `schedstat`).
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+PATIENCE = 0.2  # s that a callback must have slept
+LOOKS = 40  # that must have found it asleep: on a busy machine PATIENCE passes in a few
+WORK = 1e-3  # s of processor time a look: a loop that spins uses five times as much, a nap a tenth
+RESTLESS = 8  # looks in a row at which a blocked thread may have stirred: it looks at a clock
+
+
+class Look(NamedTuple):
+    """One look at a thread: whether it sleeps, how often it has run, and for how long (s)."""
+
+    asleep: bool
+    switches: str
+    worked: float
+
+
+def look_at(native_id: int) -> Look:
+    """Look at a thread of this process; one that has ended is not asleep."""
+    task = Path(f"/proc/self/task/{native_id}")
+    try:
+        status = (task / "status").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return Look(False, "", 0.0)
+    asleep = status.partition("\nState:\t")[2][:1] == "S"
+    return Look(asleep, status[status.index("voluntary_ctxt") :], _worked(task))
+
+
+def _worked(task: Path) -> float:
+    try:
+        return int((task / "schedstat").read_text(encoding="ascii").split()[0]) / 1e9
+    except (OSError, ValueError):  # a kernel without CONFIG_SCHED_INFO: sleeping must do
+        return 0.0
+
+
+class Idleness:
+    """What a row of looks has shown of the thread that runs one callback."""
+
+    def __init__(self, thread_id: int) -> None:
+        """Watch the thread with this identifier of Python's."""
+        threads = (t for t in threading.enumerate() if t.ident == thread_id)
+        self._native_id = next((t.native_id or 0 for t in threads), 0)
+        self._first = self._last = look_at(self._native_id)
+        self._begin(self._first)
+
+    def _begin(self, look: Look) -> None:
+        self._found = False
+        self._first, self._since = look, time.monotonic()
+        self._asleep = self._awake = self._stirs = 0
+
+    def blocked(self) -> bool:
+        """Look once more, and return whether the thread is blocked.
+
+        Between two calls the caller lets go of the interpreter's lock for a moment.
+        """
+        look, before = look_at(self._native_id), self._last
+        self._last = look
+        return self._still_blocked(look, before) if self._found else self._by_now_blocked(look)
+
+    def _by_now_blocked(self, look: Look) -> bool:
+        """Return whether it has been asleep, but for naps' ends, in enough looks by now."""
+        self._asleep += look.asleep
+        self._awake += not look.asleep
+        looks = self._asleep + self._awake
+        works = look.worked - self._first.worked > WORK * max(looks, LOOKS)
+        if works or self._awake > LOOKS + looks / 4:
+            self._begin(look)
+        elif self._asleep >= LOOKS and time.monotonic() - self._since >= PATIENCE:
+            self._found = look.asleep
+        return self._found
+
+    def _still_blocked(self, look: Look, before: Look) -> bool:
+        """Return whether it has not run since the last look, or does no more than take naps."""
+        if look.asleep and look.switches == before.switches:
+            self._stirs = 0
+            return True
+        if not self._stirs:
+            self._first = before
+        self._stirs += 1
+        if look.worked - self._first.worked > WORK * RESTLESS:
+            self._begin(look)  # it has gone on
+            return False
+        return look.asleep and self._stirs > RESTLESS

@@ -1,0 +1,38 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3 (ipykernel)
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # ROS 2 in a notebook: start here
+#
+# 1. Open the chapter, [ch05-building-blocks.ipynb](ch05-building-blocks.ipynb), and run its cells
+#    from top to bottom with **Shift+Enter**. Running a cell again is always safe.
+# 2. Do the five exercises in the folder `ch05`, in the file browser on the left. Their check cells
+#    tell you what your nodes do, what they should do, and why it matters on a robot.
+# 3. Take the quiz, [ch05-quiz/quiz.ipynb](ch05-quiz/quiz.ipynb), as often as you like.
+#
+# If nothing arrives, `session.diagnose()` says why; if the course itself does not run, type
+# `course doctor` in a terminal.
+#
+# ## Where you are
+#
+# This is how far you were when you started `course lab`. Run the cell again whenever you want to
+# know: it takes a second.
+
+# %% tags=["progress"]
+import course
+
+course.progress()
+
+# %% [markdown]
+# It counts the chapter's cells that have run, what the check cells have found, whether your
+# explanations are written (save the notebook first), and your attempts at the quiz. It stands in
+# the file `progress.json` in this folder and in your notebooks, and nowhere else.

@@ -1,0 +1,100 @@
+"""The formgrader on our assignment: listed, graded, opened, and given a point by hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbgrader.api import Gradebook
+from playwright.sync_api import Browser, FrameLocator, expect
+
+from autograder import corpus, submission
+from autograder.build import build
+from autograder.corpus.trials import one_notebook
+from autograder.release import release
+from autograder.sandbox import abilities
+from course.content import corpus_root
+
+from .lab import Lab, until
+from .notebook_page import TIMEOUT, NotebookPage
+
+expect.set_options(timeout=TIMEOUT)
+pytestmark = [
+    pytest.mark.timeout(900), pytest.mark.xdist_group("browser"),
+    pytest.mark.skipif(not abilities().loss, reason=abilities().problem or "no nft"),
+]  # fmt: skip
+
+ASSIGNMENT, NOTEBOOK, EXPLANATION = "ch05", "qos-design", "qos-explanation"
+
+
+@pytest.fixture
+def course_root(tmp_path: Path) -> Path:
+    """A course with one exercise, released, and one submission that has not been graded."""
+    root = one_notebook(tmp_path / "course", "qos")
+    build(root)
+    release(root, ASSIGNMENT)
+    source, released = (
+        submission.read(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+        for step in ("source", "release")
+    )
+    case = next(c for c in corpus.load(corpus_root(), "qos") if c.name == "wrong-lidar-deep")
+    folder = root / "submitted" / "ada" / ASSIGNMENT
+    folder.mkdir(parents=True)
+    nbformat.write(case.submission(source, released), folder / f"{NOTEBOOK}.ipynb")
+    return root
+
+
+@pytest.fixture
+def instructor(course_root: Path, tmp_path: Path, browser: Browser) -> Iterator[NotebookPage]:
+    """An instructor's window on a JupyterLab that runs in the course root."""
+    with Lab(tmp_path, course_root) as lab:
+        context = browser.new_context(viewport={"width": 1280, "height": 900})
+        yield NotebookPage(lab, context)
+        context.close()
+        lab.end_kernels()
+
+
+def formgrader(instructor: NotebookPage) -> FrameLocator:
+    """Open the formgrader by JupyterLab's menu."""
+    instructor.page.goto(f"{instructor.lab.url}/lab")
+    instructor.page.locator("#jupyterlab-splash").wait_for(state="detached")
+    instructor.page.get_by_role("menuitem", name="Nbgrader").click()
+    instructor.page.get_by_role("menuitem", name="Formgrader", exact=True).click()
+    return instructor.page.frame_locator("iframe")
+
+
+def points(root: Path) -> dict[str, float | None]:
+    with Gradebook(f"sqlite:///{root / 'gradebook.db'}") as book:
+        handed_in = book.find_submission_notebook(NOTEBOOK, ASSIGNMENT, "ada")
+        return {grade.name: grade.manual_score for grade in handed_in.grades}
+
+
+def test_an_instructor_grades_our_assignment_in_the_formgrader(
+    instructor: NotebookPage, course_root: Path
+) -> None:
+    frame = formgrader(instructor)
+    row = frame.get_by_role("row").filter(has=frame.get_by_role("link", name=ASSIGNMENT))
+    expect(row.locator(".num-submissions")).to_have_text("1")
+    row.locator(".num-submissions a").click()
+    ada = frame.get_by_role("row").filter(has_text="ada")
+    ada.locator(".autograde a").click()
+    said = frame.get_by_role("dialog")
+    expect(said).to_contain_text("Successfully autograded 'ch05' for student 'ada'.")
+    said.get_by_role("button", name="OK").click()
+    expect(ada.locator(".score")).to_have_text("13 / 20")
+    expect(ada.locator(".status")).to_contain_text("needs manual grading")
+
+    frame.get_by_role("link", name="Manual Grading").click()
+    for link in (ASSIGNMENT, NOTEBOOK, "Submission #1"):
+        frame.get_by_role("link", name=link, exact=True).click()
+    expect(frame.locator("body")).to_contain_text("qos: 8 of 10 points")
+    score = frame.locator(f"#{EXPLANATION}")
+    score.fill("4")
+    score.press("Tab")
+    until(
+        lambda: points(course_root)[EXPLANATION] == 4,
+        60, lambda: f"the point did not reach the gradebook: {points(course_root)}",
+    )  # fmt: skip
+    assert instructor.foreign_requests() == []
