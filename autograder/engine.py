@@ -245,6 +245,7 @@ class _Run:
         )
         if len(work.outcomes) == len(self._desk.notebooks):
             graded = self._enter(work)
+            work.outcomes.clear()
             self._progress.done(graded)
             self._graded.append(replace(graded, outcomes={}))
 
