@@ -28,6 +28,9 @@ REACH_TIMEOUT = 10.0
 CONNECT_TIMEOUT = 60.0
 """Seconds in which the scheduler must then answer; a busy one takes a while."""
 
+RETRIES = 3
+"""How often a job whose worker is closed begins anew."""
+
 CLOSE_TIMEOUT = 10.0
 """Seconds that saying good-bye may take."""
 
@@ -112,8 +115,14 @@ class Cluster:
             ClusterError: the scheduler is gone.
         """
         try:
+            # Again if a worker is closed in the middle; Dask sees to those that die.
             future = self._client.submit(
-                perform, job.to_json(), self._hidden, pure=False, key=f"{job.exams}-{key[:16]}"
+                perform,
+                job.to_json(),
+                self._hidden,
+                pure=False,
+                retries=RETRIES,
+                key=f"{'-'.join(job.exams)}-{key}",
             )
         except Exception as error:
             raise self._lost() from error
