@@ -28,6 +28,9 @@ REACH_TIMEOUT = 10.0
 CONNECT_TIMEOUT = 60.0
 """Seconds in which the scheduler must then answer; a busy one takes a while."""
 
+RETRIES = 3
+"""How often a job whose worker is closed begins anew."""
+
 CLOSE_TIMEOUT = 10.0
 """Seconds that saying good-bye may take."""
 
@@ -112,8 +115,14 @@ class Cluster:
             ClusterError: the scheduler is gone.
         """
         try:
+            # Again if a worker is closed in the middle; Dask sees to those that die.
             future = self._client.submit(
-                perform, job.to_json(), self._hidden, pure=False, key=f"{job.exams}-{key[:16]}"
+                perform,
+                job.to_json(),
+                self._hidden,
+                pure=False,
+                retries=RETRIES,
+                key=f"{'-'.join(job.exams)}-{key}",
             )
         except Exception as error:
             raise self._lost() from error
@@ -193,7 +202,7 @@ def _connect(address: str) -> Any:
         raise ClusterError(
             f"--scheduler needs Dask, which is not installed here: install it with `{EXTRA}`."
         ) from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # its own words are not for people
+    _silence()
     try:
         _reach(address)
         return Client(  # type: ignore[no-untyped-call]
@@ -208,6 +217,13 @@ def _connect(address: str) -> Any:
             f"There is no scheduler at {address} ({_first_line(error)}): start one with "
             "`dask scheduler`, or mend the address; nothing was graded."
         ) from None
+
+
+def _silence() -> None:
+    """Keep Dask's own log off the screen: what matters of it is said in a sentence."""
+    for name in ["distributed", *logging.root.manager.loggerDict]:
+        if name.split(".")[0] == "distributed":  # several have a level of their own
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
 def _reach(address: str) -> None:

@@ -9,23 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from autograder import files, ledger, points, roster, sandbox
+from autograder import files, roster, sandbox
 from autograder import nbgrader_bridge as bridge
-from autograder.desk import Desk, Piece, Work
-from autograder.gradebook import CourseGradebook, GradebookError
+from autograder.class_run import ClassRun, Graded
+from autograder.desk import Desk
+from autograder.gradebook import CourseGradebook
 from autograder.interruption import Interruption
 from autograder.jobs import Job, Result
-from autograder.ledger import Entry, Ledger, Standing
 from autograder.progress import Progress
-from autograder.runner import Outcome
 from autograder.store import OutcomeStore
-from autograder.workers import Done, LocalWorkers, Workers
+from autograder.workers import LocalWorkers, Workers
 from course.errors import CourseError
+
+__all__ = ["AssignmentError", "BusyError", "Graded", "grade"]
 
 STAGED = f"{bridge.WORK_FOLDER}/staged"
 LOCK = f"{bridge.WORK_FOLDER}/engine.lock"
@@ -37,29 +37,6 @@ class AssignmentError(CourseError):
 
 class BusyError(CourseError):
     """Another engine is grading in the same course."""
-
-
-@dataclass(frozen=True)
-class Graded:
-    """One student's submission, and what a person should know about it.
-
-    Attributes:
-        student: whose it is.
-        outcomes: by notebook; only what `Progress.done` is told has them, because a class's would
-            fill the memory.
-        points: automatic points, of ``max_points``.
-        seconds: wall time that its notebooks ran.
-        problem: what is wrong with it, in sentences.
-        entered: False if the gradebook did not take the scores.
-    """
-
-    student: str
-    outcomes: dict[str, Outcome]
-    points: float = 0.0
-    max_points: float = 0.0
-    seconds: float = 0.0
-    problem: str = ""
-    entered: bool = True
 
 
 QUIET = Progress()
@@ -116,167 +93,9 @@ def grade(
         workers = stack.enter_context(_workers(jobs, store, trust, scheduler, root, progress))
         interruption = stack.enter_context(Interruption(workers.wake))
         desk = Desk(gradebook, assignment, names, trust=trust)
-        run = _Run(desk, store, workers, interruption, progress, feedback=feedback, fresh=fresh)
+        run = ClassRun(desk, store, workers, interruption, progress, feedback=feedback, fresh=fresh)
         graded = [*refused, *run.grade(students, refused)]
     return sorted(graded, key=lambda item: item.student)
-
-
-class _Run:
-    """One run of the engine over the submissions of one assignment."""
-
-    def __init__(
-        self,
-        desk: Desk,
-        store: OutcomeStore,
-        workers: Workers,
-        interruption: Interruption,
-        progress: Progress,
-        *,
-        feedback: bool,
-        fresh: bool,
-    ) -> None:
-        self._desk = desk
-        self._store = store
-        self._workers = workers
-        self._interruption = interruption
-        self._progress = progress
-        self._feedback, self._fresh = feedback, fresh
-        self._ledger = Ledger(desk.work_folder, desk.assignment)
-        self._course = ledger.of_course(
-            desk.root, desk.folders, workers.modes[0], _exams(desk.assignment)
-        )
-        self._running: dict[str, list[Piece]] = {}
-        self._graded: list[Graded] = []
-
-    def grade(self, students: list[str], refused: list[Graded]) -> list[Graded]:
-        """Grade what needs it; return all that was looked at."""
-        standings = self._desk.gradebook.standings(self._desk.assignment)
-        changed: list[Work] = []
-        for student in students:
-            self._interruption.check()
-            work = self._desk.work(student, self._course)
-            if (left := self._unchanged(work, standings.get(student))) is not None:
-                self._graded.append(left)
-            else:
-                changed.append(work)
-        notebooks = len(changed) * len(self._desk.notebooks)
-        self._progress.begin(len(changed) + len(refused), notebooks, len(self._graded))
-        for graded in refused:
-            self._progress.done(graded)
-        self._run(self._pieces(changed))
-        return self._graded
-
-    def _unchanged(self, work: Work, standing: Standing | None) -> Graded | None:
-        """Return what is known of a submission that needs nothing, bar new feedback, or None."""
-        entry = None if self._fresh else self._ledger.get(work.student)
-        if entry is None or standing is None or entry.made_of != work.made_of:
-            return None
-        if entry.standing.automatic != standing.automatic or not self._desk.is_graded(work.student):
-            return None
-        if self._feedback and not (
-            entry.feedback and entry.standing == standing and self._desk.has_feedback(work.student)
-        ):
-            # A person has graded or commented since: that belongs into the feedback.
-            try:
-                self._desk.gradebook.generate_feedback(self._desk.assignment, work.student)
-            except GradebookError:
-                return None
-            self._ledger.put(work.student, replace(entry, standing=standing, feedback=True))
-        return Graded(
-            work.student, {}, entry.points, entry.max_points, entry.seconds, entry.problem
-        )
-
-    def _pieces(self, changed: list[Work]) -> Iterator[Piece]:
-        for work in changed:
-            yield from self._desk.pieces(work)
-
-    def _run(self, pieces: Iterator[Piece]) -> None:
-        more = True
-        while more or self._running:
-            while more and len(self._running) < self._workers.room():
-                self._interruption.check()
-                piece = next(pieces, None)
-                if piece is None:
-                    more = False
-                else:
-                    self._begin(piece)
-            if self._running:
-                self._interruption.check()
-                for done in self._workers.wait():
-                    self._finish(done)
-                    self._interruption.check()
-
-    def _begin(self, piece: Piece) -> None:
-        """Have a notebook run, unless its outcome is known or on its way."""
-        if piece.job is None:
-            assert piece.outcome is not None
-            self._take(piece, piece.outcome, waited=False)
-            return
-        keys = [piece.job.key(mode) for mode in self._workers.modes]
-        if keys[0] in self._running:
-            self._running[keys[0]].append(piece)
-            return
-        found = (None if self._fresh else self._store.named(key) for key in keys)
-        kept = next((outcome for outcome in found if outcome is not None), None)
-        if kept is not None:
-            self._take(piece, kept, waited=False)
-        else:
-            self._running[keys[0]] = [piece]
-            self._workers.submit(keys[0], piece.job)
-
-    def _finish(self, done: Done) -> None:
-        pieces = self._running.pop(done.key)
-        if isinstance(done.error, CourseError):
-            raise done.error  # no room, no sandbox: the next one would fare no better
-        for piece in pieces:
-            if done.result is not None:
-                outcome = done.result.outcome
-            else:
-                reason = f"{type(done.error).__name__}: {done.error}"
-                outcome = self._desk.refused(piece, reason[:500], "grader_error")
-            self._take(piece, outcome, waited=True)
-
-    def _take(self, piece: Piece, outcome: Outcome, *, waited: bool) -> None:
-        """Note a notebook's outcome; enter the student with the last of them."""
-        self._progress.ran(waited)
-        work = piece.work
-        work.outcomes[piece.notebook] = replace(
-            outcome, verdicts={**outcome.verdicts, **piece.marks}
-        )
-        if len(work.outcomes) == len(self._desk.notebooks):
-            graded = self._enter(work)
-            self._progress.done(graded)
-            self._graded.append(replace(graded, outcomes={}))
-
-    def _enter(self, work: Work) -> Graded:
-        graded = _summary(work, self._desk.notebooks)
-        self._ledger.remove(work.student)
-        try:
-            self._desk.enter(work, feedback=self._feedback)
-        except GradebookError as error:
-            return replace(graded, problem=f"{graded.problem} {error}".strip(), entered=False)
-        if not any(outcome.spoilt for outcome in work.outcomes.values()):
-            standing = self._desk.gradebook.standings(self._desk.assignment, work.student)
-            self._ledger.put(
-                work.student,
-                Entry(
-                    work.made_of, standing[work.student], graded.points, graded.max_points,
-                    graded.seconds, graded.problem, self._feedback,
-                ),
-            )  # fmt: skip
-        return graded
-
-
-def _summary(work: Work, notebooks: list[str]) -> Graded:
-    outcomes = {name: work.outcomes[name] for name in notebooks}
-    verdicts = [v for outcome in outcomes.values() for v in outcome.verdicts.values()]
-    problems = list(work.problems)
-    for outcome in outcomes.values():
-        problems += outcome.notes if outcome.unreadable else []
-    return Graded(
-        work.student, outcomes, sum(v.score for v in verdicts), sum(v.max_score for v in verdicts),
-        sum(outcome.seconds for outcome in outcomes.values()), " ".join(problems),
-    )  # fmt: skip
 
 
 def _workers(
@@ -305,11 +124,6 @@ def _alone(root: Path) -> Iterator[None]:
             f"Another `autograder grade` is at work in {root}: wait until it is done, or end it, "
             "and run the same command again."
         ) from None
-
-
-def _exams(assignment: str) -> tuple[str, ...]:
-    table = points.table()
-    return tuple(sorted(exam for exam, entry in table.items() if entry.assignment == assignment))
 
 
 def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:

@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bar
 
 if TYPE_CHECKING:
-    from autograder.engine import Graded
+    from autograder.class_run import Graded
 
 
 class Progress:
@@ -56,7 +56,7 @@ class Clock:
         """Return the time left in words, or an empty string while there is nothing to go by."""
         if not self.run or not self.left:
             return ""
-        return f"about {in_words((self.now() - self.started) / self.run * self.left)} left"
+        return f"{in_words((self.now() - self.started) / self.run * self.left)} left"
 
 
 class Lines(Progress):
@@ -137,9 +137,11 @@ def in_words(seconds: float) -> str:
     if seconds < 5:
         return "a few seconds"
     if seconds < 90:
-        return f"{round(seconds / 5) * 5} s"
+        return f"about {round(seconds / 5) * 5} s"
     minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 90 else f"{minutes // 60} h {minutes % 60:02} min"
+    if minutes < 90:
+        return f"about {minutes} min"
+    return f"about {minutes // 60} h {minutes % 60:02} min"
 
 
 def _unchanged(count: int) -> str:

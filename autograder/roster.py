@@ -48,7 +48,12 @@ def submissions(root: Path, assignment: str, roster: Roster) -> tuple[list[str],
 def remarks(folder: Path) -> list[str]:
     """Return what a person should know about how a submission's folder looks."""
     found = []
-    cut = sorted(path.name for path in folder.iterdir() if _is_partial_copy(path))
+    try:
+        cut = sorted(path.name for path in folder.iterdir() if _is_partial_copy(path))
+    except OSError as error:
+        return [
+            f"Its folder cannot be read ({error.strerror}): make it readable, then grade again."
+        ]
     if cut:
         found.append(
             f"{cut[0]} looks like a copy that was interrupted: copy the submission again, then "

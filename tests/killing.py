@@ -117,16 +117,20 @@ def fresh_copy(course: Path, folder: Path) -> Path:
     return Path(shutil.copytree(course, folder))
 
 
-def episode(engine: Engine, chance: random.Random, longest: float, signals: list[Signal]) -> int:
-    """Kill an engine once for each signal, or until it is done; return how often it was at work."""
-    kills = 0
+def episode(
+    engine: Engine, chance: random.Random, longest: float, signals: list[Signal]
+) -> list[str]:
+    """End an engine once with each signal, or until it is done; return what ended it at work.
+
+    ``kill -9`` is for the engine alone or for its whole process group, by chance.
+    """
+    ended: list[str] = []
     for signum in signals:
         group = signum is signal.SIGKILL and chance.random() < 0.5
-        at_work = engine.kill(chance.uniform(0.3, longest), signum, group=group)
-        kills += at_work
-        if not at_work:
+        if not engine.kill(chance.uniform(0.2, longest), signum, group=group):
             break
-    return kills
+        ended.append(f"{signum.name} of the group" if group else signum.name)
+    return ended
 
 
 def _frozen_children(process: subprocess.Popen[str]) -> list[psutil.Process]:

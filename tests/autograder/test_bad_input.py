@@ -26,7 +26,9 @@ from tests.killing import fresh_copy
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed, needs_sandbox
 
-pytestmark = [needs_sandbox, pytest.mark.xdist_group("class")]
+# The class is graded before the first test. nbgrader swallows a time-out that strikes inside it, as
+# it does any error, so it must be far off on a busy machine, too.
+pytestmark = [needs_sandbox, pytest.mark.xdist_group("class"), pytest.mark.timeout(900)]
 
 OUTCOMES = ".autograder/outcomes"
 
@@ -83,6 +85,8 @@ def test_folders_that_are_not_what_they_should_be_stop_nobody(
         "q?": "for a pattern: rename the folder",
         "x" * 129: "at most 128 characters",
     }
+    for student in (*class_.grades, "half-copied"):
+        assert graded[student].entered, graded[student].problem
     for student, problem in says.items():
         assert problem in graded[student].problem
         assert not graded[student].entered
@@ -181,7 +185,6 @@ cp "$1/gradebook.db" "$1/nbgrader_config.py" "$3"
 """
 
 
-@pytest.mark.timeout(600)
 def test_a_disk_that_fills_up_in_the_middle_is_one_sentence(
     course: Course, class_: Undisturbed, tmp_path: Path
 ) -> None:

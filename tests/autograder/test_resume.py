@@ -19,7 +19,8 @@ from tests.killing import Engine, episode, fresh_copy
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed, needs_sandbox
 
-pytestmark = [needs_sandbox, pytest.mark.xdist_group("class")]
+# Many engines are started, and nbgrader swallows a time-out that strikes inside it, as any error.
+pytestmark = [needs_sandbox, pytest.mark.xdist_group("class"), pytest.mark.timeout(900)]
 
 KILL, INT, TERM = signal.SIGKILL, signal.SIGINT, signal.SIGTERM
 OUTCOMES = ".autograder/outcomes"
@@ -29,7 +30,6 @@ def course_of(class_: Undisturbed, tmp_path: Path, *, graded: bool = True) -> Co
     return Course(fresh_copy(class_.graded if graded else class_.ungraded, tmp_path / "course"))
 
 
-@pytest.mark.timeout(900)  # it starts many engines, which takes long on a busy machine
 @pytest.mark.parametrize(
     ("kept", "signals"),
     [(False, [KILL, TERM, KILL]), (True, [KILL, INT, KILL])],
