@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 _HERE = Path(__file__).parent
 
 _GONE = "This quiz is not connected: run this cell again. Your answers and attempts are kept."
-_SAVED = f"""<div class="quiz-saved"><style>
-.jp-OutputArea-child:has(.quiz) + .jp-OutputArea-child:has(.quiz-saved) {{ display: none; }}
-.jp-OutputArea-child:has(+ .jp-OutputArea-child .quiz-saved):not(:has(.quiz)) {{ display: none; }}
+_SAVED = f"""<div class="quiz-gone"><style>
+.jp-OutputArea-child:has(.quiz) + .jp-OutputArea-child:has(.quiz-gone) {{ display: none; }}
+.jp-OutputArea-child:has(+ .jp-OutputArea-child .quiz-gone):not(:has(.quiz)) {{ display: none; }}
 </style><p>{_GONE}</p></div>"""
 """A second output, which takes the place of the first when no kernel has the widget any more."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import nbformat
 import pytest
@@ -97,4 +98,6 @@ def test_an_instructor_grades_our_assignment_in_the_formgrader(
         lambda: points(course_root)[EXPLANATION] == 4,
         60, lambda: f"the point did not reach the gradebook: {points(course_root)}",
     )  # fmt: skip
-    assert instructor.foreign_requests() == []
+    # nbgrader's own page asks for MathJax; nothing else leaves the machine, and it works without.
+    hosts = {urlsplit(url).hostname for url in instructor.foreign_requests()}
+    assert hosts <= {"cdnjs.cloudflare.com"}

@@ -248,7 +248,7 @@ def test_answers_are_there_after_a_reload_and_after_a_restart(sit: Sit) -> None:
 
 def test_a_quiz_that_is_opened_again_without_its_kernel_says_what_to_do(sit: Sit) -> None:
     learner = sit()
-    gone = learner.page.locator(".quiz-saved")
+    gone = learner.page.locator(".quiz-gone")
     expect(gone).to_be_hidden()
     item = learner.quiz.items[0]
     learner.answer_by_keyboard(item, model.key(item))
