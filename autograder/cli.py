@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sys
 from pathlib import Path
@@ -34,6 +35,8 @@ Root = Annotated[
     Path | None,
     typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
 ]
+IN_FLIGHT = 2 * (os.cpu_count() or 1)
+"""Notebooks that `grade` runs at a time: half of its time a subject waits, for DDS or a timer."""
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Notebooks run at a time.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
@@ -67,7 +70,7 @@ def release(assignment: str, root: Root = None) -> None:
 def grade(
     assignment: str,
     root: Root = None,
-    jobs: Jobs = 2,
+    jobs: Jobs = IN_FLIGHT,
     fresh: Annotated[bool, typer.Option("--fresh", help="Also run what did not change.")] = False,
     trust: Annotated[
         bool,
