@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import re
 import secrets
+import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -43,6 +44,8 @@ SETTLE = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
 ENDLESS = 3600 * 10**9
 """Nanoseconds: a lifespan of an hour or more is as good as none."""
+AHEAD, LAG = 4, 1.0
+"""Readings that may be on their way into a driver, and for how many seconds the next one waits."""
 PROBE_PERIOD = 0.1
 """Seconds between two probes while endpoints find each other."""
 
@@ -195,19 +198,33 @@ class ExaminerNode(Node):
 
 
 class Stream:
-    """Readings that come in at the sensor's rate until it is stopped or ``limit`` are out."""
+    """Readings that come in at the sensor's rate until it is stopped or ``limit`` are out.
+
+    No faster than the driver gets its turn: on a busy machine it would lose what it could not take.
+    """
 
     def __init__(self, node: ExaminerNode, sensor: Sensor, phase: str, limit: int = 2**31) -> None:
         """Begin at once."""
         self.sensor = sensor
         self.sent = 0
         self._node, self._phase, self._limit = node, phase, limit
+        self._since = time.monotonic()
         self._timer = node.create_timer(1 / sensor.rate, self._tick)
 
     def _tick(self) -> None:
-        if self.sent < self._limit:
+        if self.sent < self._limit and not self._ahead():
             self._node.publish(self.sensor, self._phase, self.sent)
             self.sent += 1
+            self._since = time.monotonic()
+
+    def _ahead(self) -> bool:
+        """Whether the driver has not yet come to what was sent; one that drops it is not it."""
+        if time.monotonic() - self._since > LAG:
+            return False
+        phase = self._node.phase(self._phase)
+        heard = self._node.witnessed[self.sensor.name]
+        newest = heard[-1].number if heard and heard[-1].phase == phase else -1
+        return self.sent - newest > AHEAD
 
     def stop(self) -> None:
         """Send no more."""
