@@ -61,8 +61,12 @@ class ParameterPanel(LiveView):
             self._sheet.set(message["set"], message.get("value"), ASK_TIMEOUT)
         except CourseError as error:
             problem = str(error)
+        try:
+            entries = self._sheet.entries(ASK_TIMEOUT)
+        except CourseError:
+            entries = self._entries
         with self._lock:
-            self._problem, self._changes = problem, self._changes + 1
+            self._entries, self._problem, self._changes = entries, problem, self._changes + 1
 
     def frame(self) -> Frame:
         """Return the parameters, and what the last change led to."""
@@ -82,8 +86,12 @@ class ParameterPanel(LiveView):
             threading.Thread(target=self._ask, name="ROS parameters", daemon=True).start()
 
     def _ask(self) -> None:
+        before = self._changes
         try:
-            self._entries, self._silent = self._sheet.entries(ASK_TIMEOUT), ""
+            entries, self._silent = self._sheet.entries(ASK_TIMEOUT), ""
+            with self._lock:
+                if self._changes == before:  # else these may be the values from before a change
+                    self._entries = entries
         except CourseError as error:
             self._silent = str(error)
         except Exception as error:  # noqa: BLE001 - the session may end meanwhile

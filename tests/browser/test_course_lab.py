@@ -15,9 +15,8 @@ from course.content import content_root, corpus_root
 from course.journal.progress import WELCOME
 
 from .lab import Lab
-from .notebook_page import TIMEOUT, NotebookPage
+from .notebook_page import NotebookPage
 
-expect.set_options(timeout=TIMEOUT)
 pytestmark = [pytest.mark.timeout(900), pytest.mark.xdist_group("browser")]
 
 CHAPTER, EXERCISE = "ch05-building-blocks.ipynb", "ch05/qos-design.ipynb"

@@ -19,9 +19,8 @@ from autograder.sandbox import abilities
 from course.content import corpus_root
 
 from .lab import Lab, until
-from .notebook_page import TIMEOUT, NotebookPage
+from .notebook_page import NotebookPage
 
-expect.set_options(timeout=TIMEOUT)
 pytestmark = [
     pytest.mark.timeout(900), pytest.mark.xdist_group("browser"),
     pytest.mark.skipif(not abilities().loss, reason=abilities().problem or "no nft"),

@@ -18,10 +18,8 @@ from tests.quizzes import sample
 
 from .conftest import OpenNotebook
 from .lab import Lab
-from .notebook_page import TIMEOUT
 from .quizzing import STUDENT, Learner, write_notebook
 
-expect.set_options(timeout=TIMEOUT)
 pytestmark = [pytest.mark.timeout(900), pytest.mark.xdist_group("browser")]
 
 Sit = Callable[..., Learner]

@@ -31,18 +31,22 @@ const view = {
 
 function row(entry, id, send) {
   const slider = entry.kind === "slider";
+  let drawn = -1; // answers of the node that were drawn, and that must come before more is drawn
+  let awaited = 0;
   const input = make("input", {
     id, type: slider ? "range" : entry.kind === "checkbox" ? "checkbox" : "text",
     min: entry.least, max: entry.most,
     step: slider ? entry.step ?? (Number.isInteger(entry.least) && Number.isInteger(entry.value) ? 1 : "any") : null,
     disabled: entry.read_only, "aria-describedby": `${id}-about`, spellcheck: "false",
-    onchange: () => send({ set: entry.name, value: valueOf(input) }),
+    onchange: () => {
+      awaited = Math.max(awaited, drawn) + 1;
+      send({ set: entry.name, value: valueOf(input) });
+    },
   });
   const shown = make("output", { for: id, class: "rosparam-value" });
   input.addEventListener("input", () => { if (slider) shown.textContent = input.value; });
   const about = [entry.description, range(entry), entry.read_only ? "read only" : ""]
     .filter(Boolean).join("; ");
-  let drawn = -1;
   return {
     elements: [
       make("label", { for: id }, entry.name),
@@ -50,9 +54,10 @@ function row(entry, id, send) {
         make("span", { class: "rosform-takes", id: `${id}-about` }, about)),
     ],
     draw(value, changes) {
-      // What somebody is typing is left alone, until the node has answered to it.
-      if (document.activeElement === input && drawn === changes && !slider) return;
-      drawn = changes;
+      // What somebody is typing, or moving, is left alone until the node has answered to it all.
+      const answered = drawn;
+      drawn = Math.max(drawn, changes);
+      if (document.activeElement === input && (changes < awaited || (answered === changes && !slider))) return;
       if (input.type === "checkbox") input.checked = value === true;
       else if (document.activeElement !== input || !slider || !input.matches(":active")) {
         input.value = Array.isArray(value) ? `[${value.join(", ")}]` : String(value ?? "");
