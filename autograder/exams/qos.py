@@ -31,13 +31,13 @@ from autograder.rigs.sensors import (
     sensor_rig,
     undemanding,
 )
-from autograder.rigs.stalling import backlog, few, require_kept
+from autograder.rigs.stalling import IMU_BURST, backlog, few, require_kept
 
 EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
 
 CAMERA_NEWEST = 10  # frames: 1 s at 10 Hz
 LIDAR_FRESH = 5  # scans: 0.5 s at 10 Hz
-IMU_BURST, IMU_BOUND = 5, 50  # readings: 50 ms and 0.5 s at 100 Hz
+IMU_BOUND = 50  # readings: 0.5 s at 100 Hz
 EVENTS = 5
 
 READ_RELIABILITY = "Chapter 5, “QoS profiles: reliability”"
