@@ -199,7 +199,15 @@ def _config(root: Path) -> Config:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep nbgrader's and SQLAlchemy's deprecation chatter off the screen."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
+    """Keep nbgrader's and SQLAlchemy's chatter off the screen.
+
+    What nbgrader logs of the database, traceback and all, it raises, too.
+    """
+    log = logging.getLogger("tornado.application")  # which nbgrader uses
+    was, log.disabled = log.disabled, True
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        log.disabled = was
