@@ -34,7 +34,7 @@ class StudentError(Exception):
     def told(self) -> str:
         """Return what was raised, and where in the student's own lines, as feedback tells it."""
         where = f" It happened here:\n{self.trace}" if self.trace else ""
-        return f"It raised {self}.{where}"
+        return f"It raised {str(self).rstrip('.')}.{where}"
 
 
 class Subject:

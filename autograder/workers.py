@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol, Self
 
-from autograder import jobs, sandbox
+from autograder import jobs, sandbox, warm
 from autograder.jobs import Job, Result
 
 TICK = 1.0
@@ -151,14 +151,15 @@ class LocalWorkers:
             for process in self._children():
                 with suppress(ProcessLookupError):
                     os.kill(process, signal.SIGKILL)
+            warm.shared.kill_forked()
             wait(set(self._running), timeout=0.1)
             rounds -= 1
 
     def _children(self) -> list[int]:
-        """Return the processes that the threads have started."""
+        """Return the processes that the threads have started, but for the zygotes."""
         found: list[int] = []
         for thread in self._threads:
             with suppress(OSError):
                 children = Path(f"/proc/self/task/{thread}/children").read_text()
                 found += map(int, children.split())
-        return found
+        return [process for process in found if process not in warm.shared.started]

@@ -61,10 +61,9 @@ def design_runs(rig: ArchitectureRig) -> str:
     try:
         rig.start()
     except StudentError as error:
-        where = f" It happened here:\n{error.trace}" if error.trace else ""
         raise Failed(
             expected="The notebook has a `design` whose nodes all come up.",
-            actual=f"It raised {str(error).rstrip('.')}.{where}",
+            actual=error.told,
         ) from None
     if not rig.graph.nodes:
         raise Failed(

@@ -66,10 +66,9 @@ def node_starts(rig: RobotRig) -> str:
     try:
         rig.start()
     except StudentError as error:
-        where = f" It happened here:\n{error.trace}" if error.trace else ""
         raise Failed(
             expected=f"{NODE}() makes a node without an error.",
-            actual=f"It raised {error}.{where}",
+            actual=error.told,
         ) from None
     found = offers.settle(rig, {scenario: tuple(WORKING[scenario]) for scenario in SCENARIOS})
     rig.memory["offers"] = found

@@ -62,10 +62,9 @@ def nodes_start(rig: SensorRig) -> None:
         try:
             rig.subject.start(name)
         except StudentError as error:
-            where = f" It happened here:\n{error.trace}" if error.trace else ""
             raise Failed(
                 expected=f"{name}() makes a node without an error.",
-                actual=f"It raised {error}.{where}",
+                actual=error.told,
             ) from None
     rig.wait(lambda: not any(line.startswith("There is no") for line in _faults(rig)))
     if faults := _faults(rig):

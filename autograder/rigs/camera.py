@@ -173,10 +173,9 @@ class CameraRig:
             return self.subject.start(name, *args)
         except StudentError as error:
             shown = ", ".join(repr(arg) for arg in args)
-            where = f" It happened here:\n{error.trace}" if error.trace else ""
             raise Failed(
                 expected=f"{name}({shown}) makes a node without an error.",
-                actual=f"It raised {error}.{where}",
+                actual=error.told,
             ) from None
 
     def stop(self, name: str) -> None:
@@ -196,10 +195,9 @@ class CameraRig:
         try:
             act()
         except StudentError as error:
-            where = f" It happened here:\n{error.trace}" if error.trace else ""
             raise Failed(
                 expected=f"destroy_node() of {name} ends without an error.",
-                actual=f"It raised {error}.{where}",
+                actual=error.told,
             ) from None
 
     def advance(self, seconds: float) -> None:

@@ -118,10 +118,9 @@ class Robot:
         try:
             bench.subject.start(name)
         except StudentError as error:
-            where = f" It happened here:\n{error.trace}" if error.trace else ""
             raise Failed(
                 expected=f"{name}() makes a node without an error.",
-                actual=f"It raised {error}.{where}",
+                actual=error.told,
             ) from None
         self.wait(lambda: not player.missing())
         if lacking := player.missing():

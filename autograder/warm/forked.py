@@ -8,6 +8,7 @@ import select
 import signal
 import socket
 import subprocess
+import threading
 from contextlib import suppress
 from typing import IO, Any
 
@@ -32,6 +33,7 @@ class ForkedProcess:
         """
         self._report = report
         self._what = what
+        self._ending = threading.Lock()  # its handle is closed by whoever waits, maybe elsewhere
         self.returncode: int | None = None
         self.stdin: IO[bytes] | None = None
         self.stdout: IO[bytes] | None = None
@@ -72,13 +74,15 @@ class ForkedProcess:
 
     def kill(self) -> None:
         """Kill the process, if it has not ended."""
-        if self.returncode is None:
-            with suppress(ProcessLookupError):
-                signal.pidfd_send_signal(self._handle, signal.SIGKILL)
+        with self._ending:
+            if self.returncode is None:
+                with suppress(ProcessLookupError):
+                    signal.pidfd_send_signal(self._handle, signal.SIGKILL)
 
     def _release(self, code: int) -> None:
-        self.returncode = code
-        os.close(self._handle)
+        with self._ending:
+            self.returncode = code
+            os.close(self._handle)
         self._report.close()
 
 

@@ -12,6 +12,7 @@ import tempfile
 import threading
 from collections.abc import Mapping, Sequence
 from typing import IO
+from weakref import WeakSet
 
 from autograder.warm.forked import ForkedProcess, ZygoteError
 from autograder.warm.task import Task
@@ -40,6 +41,7 @@ class Zygote:
         self.environment = dict(environment)
         self._tasks, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._sending = threading.Lock()
+        self._forked: WeakSet[ForkedProcess] = WeakSet()
         command = [
             sys.executable, "-P", "-m", "autograder.warm.zygote", "--socket", str(theirs.fileno()),
         ]  # fmt: skip
@@ -93,7 +95,22 @@ class Zygote:
                 ours.close()
                 reason = error.strerror
                 raise ZygoteError(f"{task.module} could not be forked ({reason})") from error
-        return ForkedProcess(ours, task.module)
+        forked = ForkedProcess(ours, task.module)
+        with self._sending:
+            self._forked.add(forked)
+        return forked
+
+    @property
+    def started(self) -> int:
+        """The process that was started for it: what goes before it, if anything does."""
+        return self._process.pid
+
+    def kill_forked(self) -> None:
+        """Kill what it has forked, and go on."""
+        with self._sending:
+            running = list(self._forked)
+        for process in running:
+            process.kill()
 
     def close(self) -> None:
         """Let it end; what it has forked goes on."""
@@ -127,6 +144,20 @@ class Nursery:
                     self._zygotes.pop(module).close()
                 known = self._zygotes[module] = Zygote(module, environment, before)
             return known
+
+    @property
+    def started(self) -> set[int]:
+        """The processes that were started for the zygotes."""
+        return {zygote.started for zygote in self._of_this_process()}
+
+    def kill_forked(self) -> None:
+        """Kill all that was forked; the zygotes go on."""
+        for zygote in self._of_this_process():
+            zygote.kill_forked()
+
+    def _of_this_process(self) -> list[Zygote]:
+        # Without the lock, which is held for as long as a zygote takes to start.
+        return list(self._zygotes.values()) if self._owner == os.getpid() else []
 
     def close(self) -> None:
         """Let all zygotes end; what they have forked goes on."""
