@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -303,6 +302,9 @@ def main() -> None:
             markup=False, highlight=False, soft_wrap=True,
         )  # fmt: skip
         sys.exit(1)
-    except KeyboardInterrupt as stop:
-        err.print("autograder: stopped; what was graded so far is kept.")
-        sys.exit(128 + (stop.signum if isinstance(stop, Stopped) else signal.SIGINT))
+    except Stopped as stop:
+        err.print(
+            "autograder: stopped; what was graded so far is kept, and the same command goes on.",
+            soft_wrap=True,
+        )
+        sys.exit(128 + stop.signum)

@@ -16,8 +16,11 @@ from typing import Any, Self
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
-class Stopped(KeyboardInterrupt):
-    """The run was told to stop by signal number ``signum``; what was graded is kept."""
+class Stopped(BaseException):
+    """The run was told to stop by signal number ``signum``; what was graded is kept.
+
+    No KeyboardInterrupt, which typer would end the program with, without a word.
+    """
 
     def __init__(self, signum: int) -> None:
         """Note the signal."""
