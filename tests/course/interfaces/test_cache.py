@@ -101,7 +101,8 @@ def test_a_build_that_is_killed_is_never_used(environment, python, tmp_path: Pat
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     )
-    wait_for(lambda: list(cache.rglob("scratch/sources/**/*.h")), "the generators have begun")
+    headers = "*/cache_msgs/.building-*/scratch/sources/**/*.h"
+    wait_for(lambda: list(cache.glob(headers)), "the generators have begun")
     victim.send_signal(signal.SIGKILL)
     victim.communicate()
     assert leftovers(cache)
