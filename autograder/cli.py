@@ -289,9 +289,6 @@ def _root(root: Path | None) -> Path:
 
 def main() -> None:
     """Run the command; a `CourseError` is printed as its sentence, with its exit code."""
-    # nbgrader starts alembic by name: it lies beside this Python, whose folder need not be known.
-    scripts = str(Path(sys.executable).parent)
-    os.environ["PATH"] = os.pathsep.join([scripts, os.environ.get("PATH", os.defpath)])
     try:
         app()
     except CourseError as error:

@@ -6,6 +6,7 @@ On a platform without ROS 2 wheels the import itself would fail, in a traceback.
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 
 from course.platform_check import UnsupportedPlatformError, require_supported_platform
@@ -27,4 +28,8 @@ def _run(name: str) -> None:
     except UnsupportedPlatformError as error:
         sys.stderr.write(f"{name}: {error}\n")
         sys.exit(error.exit_code)
+    # nbgrader starts alembic by name, a learner's terminal `course`: both lie beside this Python,
+    # whose folder need not be on the PATH (as with pipx).
+    scripts = os.path.dirname(sys.executable)  # noqa: PTH120 - nothing else is imported yet
+    os.environ["PATH"] = os.pathsep.join([scripts, os.environ.get("PATH", os.defpath)])
     importlib.import_module(f"{name}.cli").main()

@@ -67,13 +67,13 @@ def _stall(rig: SensorRig, phase: str) -> dict[str, Backlog]:
     rig.wait(lambda: all(stream.sent >= _least(stream.sensor) for stream in streams.values()), 60)
     # Camera and LIDAR go on, as on a robot. The IMU stops here, and last: its last readings are
     # counted, and must not grow old meanwhile.
-    counts, published = {}, {}
-    for sensor in (*(s for s in SENSORS if s is not IMU), IMU):
-        if sensor is IMU:
-            streams[IMU.name].stop()
-        counts[sensor.name] = streams[sensor.name].sent
-        stopped = time.monotonic()
-        published[sensor.name] = _published(rig, sensor, phase, counts[sensor.name])
+    others = [sensor for sensor in SENSORS if sensor is not IMU]
+    counts = {s.name: streams[s.name].sent for s in others}
+    published = {s.name: _published(rig, s, phase, counts[s.name]) for s in others}
+    streams[IMU.name].stop()
+    stopped = time.monotonic()
+    counts[IMU.name] = streams[IMU.name].sent
+    published[IMU.name] = _published(rig, IMU, phase, counts[IMU.name])
     rig.subject.resume(CONSUMERS)
     late = time.monotonic() - stopped
     for sensor in SENSORS:

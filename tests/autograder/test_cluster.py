@@ -7,7 +7,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from autograder import jobs
 from autograder.jobs import Job, JobError, Result
 from autograder.runner import Outcome
 from autograder.submission import Cell
+from tests.browser.lab import until
 from tests.killing import GONE, Engine, fresh_copy
 
 from .conftest import ASSIGNMENT, Undisturbed, needs_sandbox
@@ -71,15 +71,20 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 
 
 def wait_for(condition: Callable[[], object], what: str) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline, f"waited for {what} in vain"
-        time.sleep(0.05)
+    until(condition, PATIENCE, lambda: f"waited for {what} in vain")
 
 
 def children(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
     """Return a worker's examiners and subjects."""
     return psutil.Process(process.pid).children(recursive=True)
+
+
+def wait_for_work(engine: subprocess.Popen[str], cluster: Cluster) -> None:
+    """Wait until a worker has begun, or the engine has ended."""
+    wait_for(
+        lambda: engine.poll() is not None or any(map(children, cluster.workers)),
+        "a worker at work",
+    )
 
 
 def engine_of(class_: Undisturbed, tmp_path: Path, address: str) -> Engine:
@@ -92,10 +97,7 @@ def test_a_worker_that_is_killed_changes_no_grade(
 ) -> None:
     engine = engine_of(class_, tmp_path, cluster.address)
     with engine.start() as process:
-        wait_for(
-            lambda: process.poll() is not None or any(map(children, cluster.workers)),
-            "a worker at work",
-        )
+        wait_for_work(process, cluster)
         victim = next(worker for worker in cluster.workers if children(worker))
         started = children(victim)
         victim.send_signal(signal.SIGKILL)
@@ -112,10 +114,7 @@ def test_a_scheduler_that_goes_away_is_one_sentence(
 ) -> None:
     engine = engine_of(class_, tmp_path, cluster.address)
     with engine.start() as process:
-        wait_for(
-            lambda: process.poll() is not None or any(map(children, cluster.workers)),
-            "a worker at work",
-        )
+        wait_for_work(process, cluster)
         cluster.scheduler.send_signal(signal.SIGKILL)
         _, complaint = process.communicate()
     assert process.returncode == 1
