@@ -8,8 +8,6 @@ notebooks are committed, so `build` with ``check=True`` proves that they are in 
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -21,6 +19,7 @@ from nbformat import NotebookNode
 from autograder import cells
 from autograder.cells import BuildError
 from autograder.submission import grade_id
+from course.files import write_text
 
 SOLUTIONS_TAG = "solutions"
 """Tag of the chapters' cells that only an instructor's build keeps."""
@@ -152,15 +151,7 @@ def _write(path: Path, text: str) -> None:
     """Replace a file's text in one step: a full disk must not leave half a notebook."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        temporary = Path(name)
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-            temporary.chmod(0o644)  # mkstemp's own mode would hide it from everyone else
-            temporary.replace(path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        write_text(path, text)
     except OSError as error:
         raise BuildError(
             f"{path} cannot be written ({error.strerror or error}): make room there, or name a "

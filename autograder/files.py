@@ -16,8 +16,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-PARTIAL = ".partial"
+from course.files import PARTIAL, replacing
+
 SCRATCH = "ros2-course-scratch-"
+PRIVATE = 0o600
+"""Mode of what is written: grades are nobody else's business."""
+
 _OLD = 600.0
 """Seconds after which a partial file belongs to nobody: writing one takes a moment."""
 
@@ -29,15 +33,8 @@ def write_whole(path: Path, text: str) -> None:
         OSError: it cannot be written; what stood there before still does.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f"{path.name[:60]}.", suffix=PARTIAL, dir=path.parent)
-    partial = Path(name)
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", errors="replace") as file:
-            file.write(text)
-        partial.replace(path)
-    except BaseException:
-        partial.unlink(missing_ok=True)
-        raise
+    with replacing(path, PRIVATE) as file:
+        file.write(text.encode("utf-8", errors="replace"))
 
 
 def remove_partial(folder: Path) -> None:

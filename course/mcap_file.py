@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
@@ -15,6 +13,7 @@ from rclpy.serialization import serialize_message
 
 from course import values
 from course.errors import CourseError
+from course.files import replacing
 from course.runtime.names import type_name
 
 _RULE = "=" * 80
@@ -36,15 +35,8 @@ def write(path: Path, recordings: Mapping[str, tuple[Any, Sequence[tuple[int, An
     """
     path = path if path.suffix else path.with_suffix(".mcap")
     try:
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        temporary = Path(name)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                _write(file, recordings)
-            temporary.chmod(0o644)
-            temporary.replace(path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        with replacing(path) as file:
+            _write(file, recordings)
     except OSError as error:
         raise RecordingError(
             f"{path} cannot be written ({error.strerror or error}): choose another place."

@@ -17,6 +17,7 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from course.errors import CourseError
+from course.files import write_text
 
 FILE = "progress.json"
 MANIFEST = ".ros2-course.json"
@@ -120,7 +121,6 @@ class Journal:
         self._change(add)
 
     def _change(self, change: Callable[[Entries], None]) -> None:
-        temporary = self.path.with_name(f".{FILE}.{os.getpid()}")
         lock = self.path.with_name(f".{FILE}.lock")
         try:
             # Where no file can be made, say so at once: the library would wait or make folders.
@@ -128,11 +128,7 @@ class Journal:
             with FileLock(lock, timeout=LOCK_TIMEOUT):
                 entries = self.read()
                 change(entries)
-                try:
-                    temporary.write_text(_text(entries), encoding="utf-8")
-                    temporary.replace(self.path)
-                finally:
-                    temporary.unlink(missing_ok=True)
+                write_text(self.path, _text(entries))
         except Timeout:
             raise JournalError(
                 f"Your progress was not noted: another program has held {self.path} for "

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
+from course.files import write_text
 from course.journal import page
 from course.journal.progress import WELCOME, Progress, progress_of
 from course.journal.store import Journal
@@ -36,7 +36,7 @@ def refresh(folder: Path) -> bool:
         outputs = [_output(progress_of(Journal(folder)), folder)]
         for cell in cells:
             cell["outputs"], cell["execution_count"] = outputs, None
-        _replace(path, json.dumps(notebook, ensure_ascii=False, indent=1) + "\n")
+        write_text(path, json.dumps(notebook, ensure_ascii=False, indent=1) + "\n")
     return True
 
 
@@ -47,12 +47,3 @@ def _is_ours(cell: dict[str, Any]) -> bool:
 def _output(progress: Progress, folder: Path) -> dict[str, Any]:
     data = {"text/markdown": page.markdown(progress, folder), "text/plain": repr(progress)}
     return {"output_type": "display_data", "data": data, "metadata": {}}
-
-
-def _replace(path: Path, text: str) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

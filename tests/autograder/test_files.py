@@ -19,12 +19,11 @@ def scratch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> None:
+def test_what_is_written_is_whole_and_for_its_owner_only(tmp_path: Path) -> None:
     path = tmp_path / "deep" / "file.json"
-    files.write_whole(path, "old")
-    with pytest.raises(TypeError):
-        files.write_whole(path, None)  # type: ignore[arg-type]
-    assert path.read_text() == "old"
+    files.write_whole(path, "a lone surrogate: \ud800")
+    assert path.read_text() == "a lone surrogate: ?"
+    assert path.stat().st_mode & 0o777 == files.PRIVATE
     assert [file.name for file in path.parent.iterdir()] == ["file.json"]
 
 
