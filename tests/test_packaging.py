@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -55,6 +56,13 @@ def test_the_constraints_are_versions_and_nothing_else(project: dict[str, Any]) 
     for requirement in requirements(project):
         version = pinned[canonicalize_name(requirement.name)]
         assert requirement.specifier.contains(version), requirement
+
+
+@pytest.mark.skipif("PYTEST_XDIST_WORKER" not in os.environ, reason="one process runs all")
+@pytest.mark.xdist_group("together")
+def test_tests_of_one_group_share_a_process(request: pytest.FixtureRequest) -> None:
+    # pytest-xdist goes by the ending of the id, and says nothing when it can set none.
+    assert request.node.nodeid.endswith("@together")
 
 
 def test_no_lock_file_and_no_address_of_an_index_is_kept() -> None:

@@ -11,6 +11,7 @@ import statistics
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
@@ -234,10 +235,21 @@ class Running:
         raise AssertionError("".join(seen) + self.errors.read_text())
 
     def stop(self, number: signal.Signals) -> tuple[int, str]:
-        """Send a signal; return the exit code and what was printed from then on."""
+        """Send a signal; return the exit code and what was printed from then on.
+
+        What has no handler for it yet is not spinning yet, and would just die of it.
+        """
+        deadline, never = time.monotonic() + 60, threading.Event()
+        while not self._handles(number) and time.monotonic() < deadline:
+            never.wait(0.05)
         self.process.send_signal(number)
         output = "".join(self.lines())
         return self.process.wait(), output
+
+    def _handles(self, number: signal.Signals) -> bool:
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        [caught] = re.findall(r"^SigCgt:\s*([0-9a-f]+)$", status, re.MULTILINE)
+        return bool(int(caught, 16) >> (number - 1) & 1)
 
     def close(self) -> None:
         self._deadline.cancel()

@@ -15,7 +15,7 @@ for family, kind, address in [
         with socket.socket(family, kind) as sock:
             sock.settimeout(1)
             sock.connect(address)
-            sock.send(b"hello")
+            sock.send(b"hostile")
             reached.append(address)
     except OSError:
         pass
