@@ -31,7 +31,7 @@ from autograder.rigs.sensors import (
     sensor_rig,
     undemanding,
 )
-from autograder.rigs.stalling import IMU_BURST, backlog, few, require_kept
+from autograder.rigs.stalling import BURST, backlog, few, require_burst, require_fresh
 
 EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
 
@@ -176,7 +176,7 @@ def camera_newest(rig: SensorRig) -> None:
     robot drives on.
     """
     expected = f"After a pause at most the last {CAMERA_NEWEST} frames (1 s) are processed."
-    require_kept(rig, CAMERA, 0, CAMERA_NEWEST, expected)
+    require_fresh(rig, CAMERA, CAMERA_NEWEST, expected)
 
 
 @EXAM.check(
@@ -194,7 +194,7 @@ def lidar_fresh(rig: SensorRig) -> str:
     An old scan shows obstacles where they were: at 1 m/s half a second is half a metre.
     """
     expected = f"After a pause no scan older than 0.5 s (the last {LIDAR_FRESH}) is acted on."
-    require_kept(rig, LIDAR, 0, LIDAR_FRESH, expected)
+    require_fresh(rig, LIDAR, LIDAR_FRESH, expected)
     return _practice(rig, LIDAR)
 
 
@@ -215,7 +215,7 @@ def _practice(rig: SensorRig, sensor: Sensor) -> str:
     hints=(
         "Count how many readings come in while the consumer is busy for 50 ms, at 100 Hz.",
         "A queue that is too short drops part of the burst; an endless one replays the past.",
-        f"KEEP_LAST with a depth of {IMU_BURST} to {IMU_BOUND} fits; the chapter takes 10.",
+        f"KEEP_LAST with a depth of {BURST} to {IMU_BOUND} fits; the chapter takes 10.",
     ),
     read=READ_HISTORY,
 )
@@ -226,10 +226,11 @@ def imu_burst(rig: SensorRig) -> str:
     controller that works through seconds of old readings steers by the past.
     """
     expected = (
-        f"After a pause the last {IMU_BURST} readings (50 ms) at least are there, and at most "
-        f"{IMU_BOUND} (0.5 s)."
+        f"All {BURST} readings of a pause of 50 ms are processed, and after a longer one at most "
+        f"the last {IMU_BOUND} (0.5 s)."
     )
-    require_kept(rig, IMU, IMU_BURST, IMU_BOUND, expected)
+    require_fresh(rig, IMU, IMU_BOUND, expected)
+    require_burst(rig, expected)
     return _practice(rig, IMU)
 
 

@@ -1,8 +1,9 @@
-"""The experiment of a slow reader: what is left for a consumer that was busy for a while.
+"""The experiments of a slow reader: what is left for a consumer that was busy for a while.
 
 Depth and history of a queue cannot be read from the ROS graph: they show in what comes out of it.
 Readings come in at the sensors' own rates, as on the robot, so that a design may rest on a queue's
-depth, on a lifespan, or on the age of a reading.
+depth, on a lifespan, or on the age of a reading. Two pauses are needed for that: a long one shows
+what is too old, a short one what must not be lost, in so little time that nothing of it is old.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from autograder.rigs.sensors import (
     CONSUMERS,
     IMU,
     SENSORS,
+    SETTLE,
     STOP,
     Sensor,
     SensorRig,
@@ -24,11 +26,12 @@ from autograder.rigs.sensors import (
 PAUSE = 1.5  # s that the consumer is busy
 EVENTS = 100  # stop events in that time
 THINNED = 0.8  # a driver that publishes less than this share of the readings drops some
-IMU_BURST = 5  # readings that come in while the consumer is busy for 50 ms
-TRIES = 4
-LATE = 0.2
-"""Seconds from the last IMU reading to the end of the pause, beyond which a design that goes by the
-age of a reading (0.5 s is old) may rightly find it too old: then it is the machine that is slow."""
+BURST = 5  # IMU readings that come in while the consumer is busy for 50 ms
+PROMPT, YOUNG = 0.15, 0.35
+"""Seconds from the end of a short pause in which a burst comes out of an idle machine, and from
+its first reading on in which it must: a design that goes by the age of a reading (0.5 s is old) may
+rightly find a later one too old, and then it is the machine that is slow."""
+TRIES = 8
 
 
 @dataclass(frozen=True)
@@ -36,53 +39,43 @@ class Backlog:
     """One sensor's readings: how many came in during the pause, and what became of them.
 
     ``published`` is how many of these the driver put on the topic. ``kept`` has the numbers in the
-    order in which the consumer passed them on; those from ``count`` on came in after the pause,
-    which ended ``late`` seconds after the last IMU reading.
+    order in which the consumer passed them on; those from ``count`` on came in after the pause.
     """
 
     count: int
     published: int
     kept: list[int]
-    late: float
 
-    def missing(self, least: int) -> list[int]:
-        """Return which of the last ``least`` readings the consumer did not pass on."""
-        return [n for n in range(self.count - least, self.count) if n not in self.kept]
+
+@dataclass(frozen=True)
+class Burst:
+    """What a consumer passed on of a burst, in order; ``aged`` if a reading may have got old."""
+
+    kept: list[int]
+    aged: bool
+
+    @property
+    def missing(self) -> int:
+        """How many readings were lost."""
+        return BURST - len(set(self.kept))
 
 
 def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     """Stall the consumer while readings come in, let it go on, and see what it passes on."""
-    backlogs: dict[str, Backlog] = {}
-    for number in range(TRIES):
-        backlogs = _stall(rig, f"stall {number}")
-        imu = backlogs[IMU.name]
-        if imu.late <= LATE or not imu.missing(IMU_BURST):
-            break
-    return backlogs
-
-
-def _stall(rig: SensorRig, phase: str) -> dict[str, Backlog]:
+    phase = "long pause"
     rig.subject.pause(CONSUMERS)
     streams = {s.name: Stream(rig.node, s, phase, _limit(s)) for s in SENSORS}
     rig.wait(lambda: all(stream.sent >= _least(stream.sensor) for stream in streams.values()), 60)
-    # Camera and LIDAR go on, as on a robot. The IMU stops here, and last: its last readings are
-    # counted, and must not grow old meanwhile.
-    others = [sensor for sensor in SENSORS if sensor is not IMU]
-    counts = {s.name: streams[s.name].sent for s in others}
-    published = {s.name: _published(rig, s, phase, counts[s.name]) for s in others}
-    streams[IMU.name].stop()
-    stopped = time.monotonic()
-    counts[IMU.name] = streams[IMU.name].sent
-    published[IMU.name] = _published(rig, IMU, phase, counts[IMU.name])
+    # All but the events go on, as on a robot.
+    counts = {name: stream.sent for name, stream in streams.items()}
+    published = {s.name: _published(rig, s, phase, counts[s.name]) for s in SENSORS}
     rig.subject.resume(CONSUMERS)
-    late = time.monotonic() - stopped
     for sensor in SENSORS:
         _drain(rig, sensor, phase, counts[sensor.name])
     for stream in streams.values():
         stream.stop()
     return {
-        s.name: Backlog(counts[s.name], published[s.name], rig.consumed(s, phase), late)
-        for s in SENSORS
+        s.name: Backlog(counts[s.name], published[s.name], rig.consumed(s, phase)) for s in SENSORS
     }
 
 
@@ -113,6 +106,33 @@ def _drain(rig: SensorRig, sensor: Sensor, phase: str, count: int) -> None:
             return
 
 
+def short_pause(rig: SensorRig) -> Burst:
+    """Stall the consumer for as long as a burst of IMU readings takes, and see what it passes on.
+
+    Tried again while readings are missing that a slow machine may have let grow old.
+    """
+    for number in range(TRIES):
+        patience = SETTLE if number == TRIES - 1 else PROMPT
+        burst = _burst(rig, f"short pause {number}", patience)
+        if not (burst.missing and burst.aged):
+            break
+    return burst
+
+
+def _burst(rig: SensorRig, phase: str, patience: float) -> Burst:
+    rig.subject.pause(CONSUMERS)
+    started = time.monotonic()
+    stream = Stream(rig.node, IMU, phase, BURST)
+    _published(rig, IMU, phase, BURST)
+    rig.subject.resume(CONSUMERS)
+    rig.wait(lambda: len(set(rig.consumed(IMU, phase))) == BURST, patience)
+    stream.stop()
+    # Once a later reading has come out, all of the burst has been decided about.
+    silent = rig.probe([IMU], rig.node.consumed)
+    aged = bool(silent) or time.monotonic() - started > YOUNG
+    return Burst(rig.consumed(IMU, phase), aged)
+
+
 def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
     """Return what became of one sensor's readings; fail if the driver keeps readings back."""
     backlogs: dict[str, Backlog] = rig.once(busy_consumer)
@@ -125,23 +145,33 @@ def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
     return found
 
 
-def require_kept(rig: SensorRig, sensor: Sensor, least: int, most: int, expected: str) -> None:
-    """Fail unless the consumer then acts on the newest readings: ``least`` to ``most`` of them."""
+def require_fresh(rig: SensorRig, sensor: Sensor, most: int, expected: str) -> None:
+    """Fail unless the consumer goes on with the newest ``most`` readings after a long pause."""
     found = backlog(rig, sensor)
     count, kept = found.count, found.kept
-    if sensor is IMU and found.late > LATE and found.missing(least):
-        raise NotExaminable(
-            "This machine was too busy to tell a short queue from readings that had grown old. A "
-            "person will look at it."
-        )
     if max(kept, default=-1) < count - 1:
         actual = f"Of {count} readings in a pause the newest never came out: it got {few(kept)}."
     elif min(kept) < count - most:
         actual = f"It then worked through the last {count - min(kept)} of {count} readings."
-    elif missing := found.missing(least):
-        actual = f"Of the last {least} of {count} readings {len(missing)} were lost."
     elif kept != sorted(kept):
         actual = f"It passed them on out of order: {few(kept)}."
+    else:
+        return
+    raise Failed(expected=expected, actual=actual)
+
+
+def require_burst(rig: SensorRig, expected: str) -> None:
+    """Fail unless the consumer passes on every IMU reading of a short pause, in order."""
+    found: Burst = rig.once(short_pause)
+    if found.missing and found.aged:
+        raise NotExaminable(
+            "This machine was too busy to tell a short queue from readings that had grown old. A "
+            "person will look at it."
+        )
+    if found.missing:
+        actual = f"Of {BURST} readings that came in while it was busy {found.missing} were lost."
+    elif found.kept != sorted(found.kept):
+        actual = f"It passed them on out of order: {few(found.kept)}."
     else:
         return
     raise Failed(expected=expected, actual=actual)
