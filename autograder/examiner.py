@@ -2,8 +2,8 @@
 
 Started as ``python -m autograder.examiner --control FD --domain N``. It reads requests
 ``{"exam": ..., "part": ..., "moved_on": ..., "key": ..., "pid": ...}`` from standard input, one
-JSON object a line, and writes one verdict a line to standard output, with ``hangs`` in addition:
-why the subject cannot be expected to go on, if so. ``moved_on`` says that the
+JSON object a line, and answers each with ``{"verdict": ..., "hangs": ...}`` on standard output;
+``hangs`` says why the subject cannot be expected to go on, if so. ``moved_on`` says that the
 notebook ran cells since, ``key`` is the answer key of the part's hidden cell, ``pid`` the subject's
 process.
 File descriptor ``FD`` is the control channel to the subject's harness. With ``--own-network`` the
@@ -23,7 +23,7 @@ from typing import Any, TextIO
 
 from autograder import exams
 from autograder.bench import Bench, Subject
-from autograder.verdict import CheckResult
+from autograder.verdict import CheckResult, Verdict
 from autograder.wire import Channel
 from course import Session
 
@@ -46,21 +46,21 @@ def sit(
     sittings: Sittings,
     *,
     own_network: bool = False,
-) -> str:
-    """Run one part of an exam, let the subject go on, and return the verdict as JSON."""
+) -> Verdict:
+    """Run one part of an exam, let the subject go on, and return the verdict."""
     sitting = sittings.setdefault(request["exam"], Sitting())
     subject.pid = int(request["pid"])
     try:
         bench = Bench(session, subject, sitting.memory, request["key"], own_network)
         exam = exams.load(request["exam"])
-        return exam.sit(request["part"], bench, sitting.failed).to_json()
+        return exam.sit(request["part"], bench, sitting.failed)
     finally:
         subject.release()
 
 
 def serve(
     requests: TextIO,
-    verdicts: TextIO,
+    answers: TextIO,
     session: Session,
     subject: Subject,
     *,
@@ -73,8 +73,9 @@ def serve(
         if request["moved_on"]:
             sittings.clear()
         verdict = sit(request, session, subject, sittings, own_network=own_network)
-        verdicts.write(json.dumps({**json.loads(verdict), "hangs": subject.hangs}) + "\n")
-        verdicts.flush()
+        answer = {"verdict": verdict.as_data(), "hangs": subject.hangs}
+        answers.write(json.dumps(answer) + "\n")
+        answers.flush()
 
 
 def preload() -> None:

@@ -14,12 +14,13 @@ from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from autograder.verdict import MAX_BYTES, Verdict
+from autograder.verdict import Verdict, VerdictError
 from course.errors import CourseError
 
 if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
     from autograder.sandbox.place import Process
 
+MAX_ANSWER = 1024 * 1024
 EXAM_TIMEOUT = 120.0
 """Seconds one part of an exam may take in all: its own deadlines end it long before."""
 
@@ -114,8 +115,8 @@ class ExaminerProcess:
         """Return the verdict of the part that was asked for.
 
         Raises:
-            ExaminerError: the examiner ended or took longer than ``timeout`` seconds.
-            VerdictError: what it wrote is no verdict.
+            ExaminerError: the examiner ended, took longer than ``timeout`` seconds, or wrote what
+                is no verdict.
         """
         assert self._process.stdout is not None
         deadline = time.monotonic() + timeout
@@ -125,13 +126,16 @@ class ExaminerProcess:
             if not ready:
                 raise ExaminerError(f"The examiner gave no verdict within {timeout:.0f} s.")
             chunk = os.read(stream, 65536)
-            if not chunk or len(self._buffer) > MAX_BYTES:
+            if not chunk or len(self._buffer) > MAX_ANSWER:
                 raise ExaminerError(f"The examiner ended without a verdict: {self._last_words()}")
             self._buffer += chunk
         line, self._buffer = self._buffer.split(b"\n", 1)
-        verdict = Verdict.from_json(line.decode())
-        self.hangs = str(json.loads(line).get("hangs", ""))
-        return verdict
+        try:
+            answer = json.loads(line)
+            self.hangs = str(answer["hangs"])
+            return Verdict.from_data(answer["verdict"])
+        except (ValueError, KeyError, TypeError, VerdictError) as error:
+            raise ExaminerError(f"What the examiner wrote is no verdict: {error}") from None
 
     def _last_words(self) -> str:
         self._kill()

@@ -51,16 +51,14 @@ class Outcome:
 
     def to_json(self) -> str:
         """Return the outcome as JSON."""
-        verdicts = {name: json.loads(verdict.to_json()) for name, verdict in self.verdicts.items()}
+        verdicts = {name: verdict.as_data() for name, verdict in self.verdicts.items()}
         return json.dumps({**vars(self), "verdicts": verdicts}, ensure_ascii=False)
 
     @classmethod
     def from_json(cls, text: str) -> Outcome:
         """Read an outcome written by `to_json`; raises ValueError or VerdictError if it is none."""
         data = json.loads(text)
-        verdicts = {
-            name: Verdict.from_json(json.dumps(item)) for name, item in data["verdicts"].items()
-        }
+        verdicts = {name: Verdict.from_data(item) for name, item in data["verdicts"].items()}
         return cls(data["outputs"], verdicts, data["notes"], data["seconds"], data["unreadable"])
 
 

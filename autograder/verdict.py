@@ -8,14 +8,12 @@ needs had failed), was *not examined* (this machine cannot: a person decides), o
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
 from course.errors import CourseError
 
 VERSION = 1
-MAX_BYTES = 1024 * 1024
 
 Status = Literal["passed", "failed", "not_checked", "not_examined", "grader_error"]
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -87,21 +85,18 @@ class Verdict:
         """Points of the checks that could not be examined on this machine."""
         return sum(check.max_points for check in self.checks if check.status == "not_examined")
 
-    def to_json(self) -> str:
-        """Return the verdict as one line of JSON."""
-        return json.dumps(asdict(self), ensure_ascii=False)
+    def as_data(self) -> dict[str, Any]:
+        """Return the verdict as JSON knows it."""
+        return asdict(self)
 
     @classmethod
-    def from_json(cls, text: str) -> Verdict:
-        """Read a verdict.
+    def from_data(cls, data: Any) -> Verdict:
+        """Read what `as_data` returned, after a way through JSON.
 
         Raises:
-            VerdictError: the text is no verdict of this version.
+            VerdictError: it is no verdict of this version.
         """
-        if len(text) > MAX_BYTES:
-            raise VerdictError(f"A verdict of {len(text)} bytes was refused: at most {MAX_BYTES}.")
         try:
-            data = json.loads(text)
             if data["version"] != VERSION:
                 raise VerdictError(
                     f"A verdict of version {data['version']} cannot be read by this release, which "

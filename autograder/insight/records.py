@@ -59,7 +59,7 @@ def keep(work: Path, assignment: str, student: str, notebook: str, outcome: Outc
     """Write the record of an outcome in place of an earlier one; raises OSError if it cannot."""
     data = {
         "version": VERSION,
-        "verdicts": {name: json.loads(v.to_json()) for name, v in outcome.verdicts.items()},
+        "verdicts": {name: v.as_data() for name, v in outcome.verdicts.items()},
         "notes": list(outcome.notes),
         "seconds": outcome.seconds,
         "unreadable": outcome.unreadable,
@@ -85,10 +85,7 @@ def load(work: Path, assignment: str, student: str, notebook: str) -> Record | N
         seconds = float(data["seconds"])
         if not math.isfinite(seconds) or seconds < 0:
             raise ValueError(f"{seconds} s")
-        verdicts = {
-            str(name): Verdict.from_json(json.dumps(item))
-            for name, item in data["verdicts"].items()
-        }
+        verdicts = {str(name): Verdict.from_data(v) for name, v in data["verdicts"].items()}
         notes = tuple(str(note) for note in data["notes"])
         return Record(verdicts, notes, seconds, data["unreadable"] is True)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError, CourseError, OSError):
