@@ -6,6 +6,7 @@ once the last of their outcomes is there.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -16,9 +17,17 @@ from autograder.interruption import Interruption
 from autograder.ledger import Entry, Ledger, Standing
 from autograder.progress import Progress
 from autograder.runner import Outcome
+from autograder.sandbox import BoxError, SandboxError
 from autograder.store import OutcomeStore
+from autograder.warm import ZygoteError
 from autograder.workers import Done, Workers
 from course.errors import CourseError
+
+PASSING = (BoxError, ZygoteError)
+"""What may be over a moment later: a machine that has no process or no memory to spare just now."""
+
+MOST_STARTS = 3
+"""Times that a notebook is started in vain before the run ends with the reason."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +89,7 @@ class ClassRun:
             desk.root, desk.folders, workers.modes[0], _exams(desk.assignment)
         )
         self._running: dict[str, list[Piece]] = {}
+        self._starts: Counter[str] = Counter()
         self._graded: list[Graded] = []
 
     def grade(self, students: list[str], refused: list[Graded]) -> list[Graded]:
@@ -159,10 +169,24 @@ class ClassRun:
             self._take(piece, kept, waited=False)
         else:
             self._running[keys[0]] = [piece]
-            self._workers.submit(keys[0], piece.job)
+            self._start(keys[0], piece)
+
+    def _start(self, key: str, piece: Piece) -> None:
+        assert piece.job is not None
+        self._starts[key] += 1
+        self._workers.submit(key, piece.job)
 
     def _finish(self, done: Done) -> None:
+        if isinstance(done.error, PASSING) and self._starts[done.key] < MOST_STARTS:
+            self._start(done.key, self._running[done.key][0])
+            return
         pieces = self._running.pop(done.key)
+        if isinstance(done.error, PASSING):
+            raise SandboxError(
+                f"No sandbox could be made for {pieces[0].work.student}'s submission in "
+                f"{MOST_STARTS} tries ({done.error}): see what is wrong with `course doctor`; the "
+                "same command then goes on where this one ended."
+            ) from done.error
         if isinstance(done.error, CourseError):
             raise done.error  # no room, no sandbox: the next one would fare no better
         for piece in pieces:

@@ -4,7 +4,11 @@
 bubblewrap, with limits; the examiner shares nothing with the submission but that network.
 """
 
+from autograder.sandbox.network import BoxError
 from autograder.sandbox.place import Place, RunningSubject
 from autograder.sandbox.probe import Abilities, SandboxError, abilities, place, require
 
-__all__ = ["Abilities", "Place", "RunningSubject", "SandboxError", "abilities", "place", "require"]
+__all__ = [
+    "Abilities", "BoxError", "Place", "RunningSubject", "SandboxError", "abilities", "place",
+    "require",
+]  # fmt: skip

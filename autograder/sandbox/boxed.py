@@ -10,7 +10,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Self
 
-from autograder.sandbox import warmth
+from autograder.sandbox import network, warmth
 from autograder.sandbox.host import fate_of
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.network import BoxError
@@ -93,6 +93,7 @@ class WarmSubject(BoxedSubject):
             ZygoteError: there is no fork to be had.
         """
         assert self._process.stdout is not None
+        network.require_word(self._process.stdout, self._process)
         if not self._process.stdout.readline():
             raise BoxError(self.failed())
         self._forked = warmth.subject(arguments, fds, self._handle, user)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import select
 import subprocess
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from course.errors import CourseError
 
@@ -17,6 +18,9 @@ Namespaces = dict[str, int]
 
 UIDS = range(2**30, 2**31 - 2)
 """Where root takes a subject's user id from: above all that systems and containers hand out."""
+
+TOOL_TIMEOUT = 60.0
+"""Seconds that a tool may take over its part of a sandbox: an idle machine takes milliseconds."""
 
 _SET_UP = """
 ip -batch - <<END && echo "up $$" && read -r _
@@ -52,6 +56,7 @@ def make(owner: int | None = None) -> Namespaces:
         command = [*owning("--die-with-parent", "--dev-bind", "/", "/"), *command]
     with start(command, **pipes) as holder:
         assert holder.stdout is not None
+        require_word(holder.stdout, holder)
         said = holder.stdout.readline().split()
         if len(said) != 2:
             raise BoxError(_said(holder) or "no network namespace can be set up")
@@ -116,10 +121,22 @@ def child(info: int, process: subprocess.Popen[bytes]) -> int:
         BoxError: it fails before.
     """
     with os.fdopen(info) as stream:
+        require_word(stream, process)
         text = stream.read()
     if not text:
         raise BoxError(_said(process) or f"bwrap ended with exit code {process.returncode}")
     return int(json.loads(text)["child-pid"])
+
+
+def require_word(stream: IO[Any], process: subprocess.Popen[bytes]) -> None:
+    """Wait until one of the sandbox's tools has written to ``stream``, or closed it.
+
+    Raises:
+        BoxError: it does neither; it is killed.
+    """
+    if not select.select([stream], [], [], TOOL_TIMEOUT)[0]:
+        process.kill()
+        raise BoxError(f"it was not there after {TOOL_TIMEOUT:.0f} s")
 
 
 def _said(process: subprocess.Popen[bytes]) -> str:

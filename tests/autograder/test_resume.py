@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import shutil
 import signal
@@ -15,6 +16,7 @@ from autograder import engine, runner
 from autograder.engine import BusyError, Graded
 from autograder.gradebook import CourseGradebook
 from autograder.progress import Progress
+from autograder.sandbox import SandboxError
 from tests.killing import Engine, episode, fresh_copy
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed, needs_sandbox
@@ -24,6 +26,7 @@ pytestmark = [needs_sandbox, pytest.mark.xdist_group("class"), pytest.mark.timeo
 
 KILL, INT, TERM = signal.SIGKILL, signal.SIGINT, signal.SIGTERM
 OUTCOMES = ".autograder/outcomes"
+BUBBLEWRAP = shutil.which("bwrap")
 
 
 def course_of(class_: Undisturbed, tmp_path: Path, *, graded: bool = True) -> Course:
@@ -147,6 +150,44 @@ def test_a_mistake_of_the_grader_is_tried_again(
     assert "did not start" in feedback.read_text()
     seen = again(course)
     assert (seen.run, seen.entered) == (1, ["right"])
+
+
+def refuse(folder: Path, monkeypatch: pytest.MonkeyPatch, times: int) -> None:
+    """Have the next ``times`` sandboxes refused, as on a machine that is out of processes."""
+    (folder / "left").write_text(str(times))
+    bubblewrap = folder / "bwrap"
+    bubblewrap.write_text(
+        "#!/bin/sh\n"
+        f"left=$(cat {folder}/left)\n"
+        'if [ "$1" = --args ] && [ "$left" -gt 0 ]; then\n'
+        f"    echo $((left - 1)) > {folder}/left\n"
+        "    echo 'Creating new namespace failed: out of processes' >&2; exit 1\n"
+        f'fi\nexec {BUBBLEWRAP} "$@"\n'
+    )
+    bubblewrap.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{folder}:{os.environ['PATH']}")
+
+
+def test_a_machine_that_refuses_for_a_moment_costs_nobody_a_grade(
+    class_: Undisturbed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    course = course_of(class_, tmp_path, graded=False)
+    refuse(tmp_path, monkeypatch, 2)
+    engine.grade(course.root, ASSIGNMENT, jobs=1)
+    assert (tmp_path / "left").read_text() == "0\n"
+    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
+
+
+def test_a_machine_that_goes_on_refusing_ends_the_run_with_the_reason(
+    class_: Undisturbed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    course = course_of(class_, tmp_path, graded=False)
+    refuse(tmp_path, monkeypatch, 1000)
+    with pytest.raises(SandboxError, match=r"submission in 3 tries \(.*out of processes"):
+        engine.grade(course.root, ASSIGNMENT, jobs=1)
+    (tmp_path / "left").write_text("0")
+    engine.grade(course.root, ASSIGNMENT, jobs=1)
+    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
 
 
 def test_one_engine_at_a_time(class_: Undisturbed, tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -16,7 +17,7 @@ import pytest
 from autograder import engine, runner, sandbox
 from autograder.corpus import Case
 from autograder.gradebook import CourseGradebook
-from autograder.sandbox import SandboxError, probe, seccomp
+from autograder.sandbox import BoxError, SandboxError, network, probe, seccomp
 from autograder.sandbox.limits import Limits
 from autograder.store import OutcomeStore
 from autograder.submission import Cell
@@ -168,3 +169,12 @@ def test_the_filter_is_a_whole_number_of_instructions() -> None:
     program = seccomp.program()
     assert len(program) % 8 == 0
     assert len(program) // 8 < 4096, "more than the kernel takes"
+
+
+def test_a_tool_that_hangs_is_not_waited_for_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(network, "TOOL_TIMEOUT", 0.1)
+    with subprocess.Popen(["sleep", "infinity"], stdout=subprocess.PIPE) as tool:
+        assert tool.stdout is not None
+        with pytest.raises(BoxError, match="not there after"):
+            network.require_word(tool.stdout, tool)
+        assert tool.wait() == -signal.SIGKILL
