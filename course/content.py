@@ -70,7 +70,9 @@ def copy_authoring(root: Path, folder: Path) -> Path:
             raise ContentError(f"There is no {name} in {root}: it is not a course root.")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        shutil.copytree(root / "authoring", folder / "authoring", dirs_exist_ok=True)
+        left_out = shutil.ignore_patterns("__pycache__", ".*")  # of an editor, or of Python
+        sources = root / "authoring"
+        shutil.copytree(sources, folder / "authoring", ignore=left_out, dirs_exist_ok=True)
         shutil.copyfile(root / CONFIG, folder / CONFIG)
     except OSError as error:
         raise ContentError(

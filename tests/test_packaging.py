@@ -112,6 +112,16 @@ def test_the_course_root_to_work_in_is_never_the_installed_package(
         content.working_root()
 
 
+def test_copying_the_sources_leaves_out_what_nobody_wrote(tmp_path: Path) -> None:
+    mine = content.copy_authoring(content.content_root(), tmp_path / "mine")
+    for rubbish in ("__pycache__", ".ipynb_checkpoints"):
+        (mine / "authoring" / "assignments" / "ch05" / rubbish).mkdir()
+    copy = content.copy_authoring(mine, tmp_path / "copy")
+    names = {path.name for path in (copy / "authoring").rglob("*")}
+    assert "quiz.py" in names
+    assert not names & {"__pycache__", ".ipynb_checkpoints"}
+
+
 def test_copying_the_sources_says_what_is_wrong(tmp_path: Path) -> None:
     with pytest.raises(CourseError, match="it is not a course root"):
         content.copy_authoring(tmp_path, tmp_path / "new")

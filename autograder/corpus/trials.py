@@ -64,7 +64,7 @@ def notebooks_of(folder: Path, exams_: Iterable[str]) -> Path:
     kept = {(entry.assignment, entry.notebook) for entry in entries}
     root = copy_authoring(content_root(), folder)
     for path in (root / "authoring" / "assignments").glob("*/*"):
-        if (path.parent.name, path.stem) not in kept:
+        if path.is_file() and (path.parent.name, path.stem) not in kept:
             path.unlink()
     return root
 
