@@ -8,7 +8,6 @@ from typing import Any
 from course import values
 from course.errors import SessionError
 from course.interfaces import installed
-from course.interfaces.names import parse_name
 from course.runtime.offers import load_type
 
 NOUN = "interface"
@@ -38,12 +37,9 @@ def definition(name: str) -> list[str]:
         SessionError: there is no such interface here.
     """
     cls = load_type(name)
-    kind = parse_name(name).kind if name.count("/") == 2 else "msg"
-    parts = {
-        "msg": (cls,),
-        "srv": tuple(getattr(cls, part, None) for part in ("Request", "Response")),
-        "action": tuple(getattr(cls, part, None) for part in ("Goal", "Result", "Feedback")),
-    }[kind]
+    kinds = (("Goal", "Result", "Feedback"), ("Request", "Response"))
+    named = next((names for names in kinds if hasattr(cls, names[0])), ())
+    parts = [getattr(cls, part) for part in named] or [cls]
     lines: list[str] = []
     for number, part in enumerate(parts):
         lines += ["---"] if number else []

@@ -161,6 +161,7 @@ class Asking(Hosting):
         *,
         qos: QoSProfile | int | None = None,
         limit: int = 1000,
+        timeout: float = 5.0,
     ) -> Recorder:
         """Record a topic from now on.
 
@@ -169,6 +170,7 @@ class Asking(Hosting):
             msg_type: the message class; None takes the topic's type from the graph.
             qos: the QoS to request; None requests the strongest that every publisher offers now.
             limit: how many messages to keep.
+            timeout: seconds to wait for somebody to give the topic a type, without `msg_type`.
 
         Raises:
             WaitTimeout: `msg_type` is None, and the topic does not appear.
@@ -176,9 +178,10 @@ class Asking(Hosting):
         if msg_type is not None:
             arguments.ros_type(msg_type, "message")
         arguments.whole(limit, "limit", least=1, example=1000)
+        timeout = arguments.seconds(timeout)
         with self._explaining():
             profile = arguments.qos(qos)
-            return Recorder(self._probe, topic, msg_type, profile, limit, self._now_ns)
+            return Recorder(self._probe, topic, msg_type, profile, limit, self._now_ns, timeout)
 
     # Inside.
 

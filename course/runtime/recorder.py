@@ -19,8 +19,6 @@ from course.runtime.offers import fitting_qos, full_topic, type_on, why_no_messa
 from course.runtime.probe import Probe
 from course.runtime.waiting import poll
 
-_TYPE_TIMEOUT = 5.0  # s to wait for somebody to give the topic a type
-
 
 class Stamped(NamedTuple):
     """A message and when it was published.
@@ -46,12 +44,16 @@ class Recorder:
         qos: QoSProfile | None,
         limit: int,
         now_ns: Callable[[], int | None],
+        timeout: float,
     ) -> None:
-        """Record through `probe`; `now_ns` is simulated time, or None without it."""
+        """Record through `probe`; `now_ns` is simulated time, or None without it.
+
+        Without `msg_type`, wait `timeout` seconds for somebody to give the topic one.
+        """
         self._probe = probe
         self._now_ns = now_ns
         self.topic = full_topic(probe.node, topic)
-        self.msg_type = msg_type or self._wait_for_type()
+        self.msg_type = msg_type or self._wait_for_type(timeout)
         self.qos = qos or fitting_qos(probe.node, self.topic, limit)
         self._kept: deque[Stamped] = deque(maxlen=limit)
         self._count = 0
@@ -133,10 +135,8 @@ class Recorder:
             self._kept.append(Stamped(stamp, message))
             self._count += 1
 
-    def _wait_for_type(self) -> Any:
-        found = poll(
-            lambda: type_on(self._probe.node, self.topic), _TYPE_TIMEOUT, self._probe.pulse
-        )
+    def _wait_for_type(self, timeout: float) -> Any:
+        found = poll(lambda: type_on(self._probe.node, self.topic), timeout, self._probe.pulse)
         if found is None:
             raise WaitTimeout(
                 f"Nobody publishes on {self.topic}, so its type is unknown: "

@@ -14,8 +14,9 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from course.errors import SessionError
+from course.runtime import arguments
 from course.runtime.asking import Asking
-from course.runtime.offers import load_type
+from course.runtime.offers import full_action, full_node, full_service, load_type
 
 if TYPE_CHECKING:
     from course.diagnosis import Diagnosis
@@ -94,7 +95,10 @@ class Showing(Asking):
         """
         from course.views.service import ServiceConsole
 
-        full = str(self.observer.resolve_service_name(name))
+        if srv_type is not None:
+            arguments.ros_type(srv_type, "service")
+        timeout = arguments.seconds(timeout)
+        full = full_service(self.observer, name)
         known = self.observer.get_service_names_and_types()
         found = srv_type or self._type_of("service", full, known)
         return ServiceConsole(self._me, found, full, timeout)
@@ -111,7 +115,9 @@ class Showing(Asking):
         """
         from course.views.action import ActionView
 
-        full = str(self.observer.resolve_service_name(name))
+        if action_type is not None:
+            arguments.ros_type(action_type, "action")
+        full = full_action(self.observer, name)
         known = get_action_names_and_types(self.observer)
         found = action_type or self._type_of("action", full, known)
         return ActionView(self._me, found, full)
@@ -126,8 +132,7 @@ class Showing(Asking):
         from course.views.parameters import ParameterPanel
 
         self._require_open()
-        name = node if isinstance(node, str) else node.get_fully_qualified_name()
-        return ParameterPanel(self._me, name if name.startswith("/") else f"/{name}")
+        return ParameterPanel(self._me, full_node(node))
 
     def timeline(self, *topics: str | tuple[str, Any], window: float = 10.0) -> Timeline:
         """Return a live view of when messages were published, received and worked on.
@@ -208,4 +213,4 @@ class Showing(Asking):
             close = difflib.get_close_matches(name, types, n=1)
             guess = f" Is it {close[0]}?" if close else ""
             raise SessionError(f"Nobody offers the {what} {name}, so its type is unknown.{guess}")
-        return load_type(types[name][0], name)
+        return load_type(types[name][0], name, "srv" if what == "service" else what)

@@ -6,8 +6,8 @@ from dataclasses import asdict
 from typing import Any
 
 from course.errors import CourseError
+from course.plain import for_json, one_line
 from course.runtime.session import Session
-from course.values import one_line
 from course.views.live import Frame, LiveView
 from course.watch import forms
 from course.watch.calls import Call, Calls
@@ -56,7 +56,7 @@ class ServiceConsole(LiveView):
             "title": f"Service {self._model.name}",
             "fields": [asdict(field) for field in forms.fields(self._model.srv_type.Request)],
             "problem": self._problem,
-            "calls": [asdict(call) | {"time": _time(call)} for call in self.calls],
+            "calls": [for_json(asdict(call)) | {"time": _time(call)} for call in self.calls],
         }
 
     def words(self) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -14,6 +16,7 @@ from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
+from test_msgs.msg import BasicTypes
 
 import course
 from course.errors import CourseError
@@ -146,6 +149,33 @@ def test_interfaces(capsys: pytest.CaptureFixture[str], name: str, parts: list[s
         ("param set ghost speed 1", "There is no node /ghost"),
         ("interface show no_msgs/msg/Such", "There is no no_msgs/msg/Such here"),
         ("topic echo 'unfinished", "No closing quotation"),
+        ("topic echo /chatter -n -3", "-n is a whole number, at least 1, not -3"),
+        ("topic echo /chatter --timeout nan", "timeout is a number of seconds, 0 or more, not nan"),
+        ("topic echo 'bad name'", "'bad name' is not a topic name"),
+        ("topic pub 'bad name' '{}'", "'bad name' is not a topic name"),
+        (
+            "topic pub /b '{float32_value: 1.0e+300}' --type test_msgs/msg/BasicTypes",
+            "float32_value",
+        ),
+        (
+            "topic pub /s '{bounded_string_value: aaaaaaaaaaaaaaaaaaaaaaa}' --type "
+            "test_msgs/msg/Strings",
+            "at most 22 characters, not 23",
+        ),
+        (
+            "topic pub /b '{float64_value: %s}' --type test_msgs/msg/BasicTypes" % ("9" * 400),
+            "float64_value takes",
+        ),
+        ("topic pub /orders '{data: [}'", "is not YAML"),
+        ("topic pub /orders '{}' --type os/path/join", "'os/path/join' is not the name of"),
+        ("topic pub /orders '{}' --type std_srvs/srv/SetBool", "is no msg type"),
+        ("service call /lamp '{}' --type std_msgs/msg/String", "is no srv type: name one such as"),
+        ("service call /lamp '{}' --type os/srv/path", "There is no os/srv/path here"),
+        ("interface show ''", "'' is not the name of an interface: write package/kind/Name"),
+        ("interface show ../x/y", "'../x/y' is not the name of an interface"),
+        ("interface show a/b/c/d", "'a/b/c/d' is not the name of an interface"),
+        ("interface show String", "'String' is not the name of an interface"),
+        ("interface show std_msgs/msg/sys", "There is no std_msgs/msg/sys here"),
     ],
 )
 def test_a_mistake_is_a_sentence(robot: Robot, line: str, sentence: str) -> None:
@@ -153,6 +183,50 @@ def test_a_mistake_is_a_sentence(robot: Robot, line: str, sentence: str) -> None
         magic.ros(line)
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["evil/b/c/d", "evil/msg/D", "evil/D", "evil/os/D"])
+def test_no_file_of_the_learners_runs_for_the_name_of_a_type(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    (tmp_path / "evil.py").write_text("raise SystemExit('it ran')", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(CourseError, match="evil"):
+        magic.ros(f"interface show {name}")
+
+
+def test_parts_of_an_interface_and_short_names_are_shown(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert answer(capsys, "interface show test_msgs/action/Fibonacci_Goal") == "int32 order\n"
+    feedback = answer(capsys, "interface show test_msgs/action/Fibonacci_FeedbackMessage")
+    assert "\tint32[] sequence" in feedback
+    assert "goal" in answer(capsys, "interface show test_msgs/action/Fibonacci_SendGoal_Request")
+    assert answer(capsys, "interface show std_msgs/String") == "string data\n"
+    assert "string<=22 bounded_string_value" in answer(
+        capsys, "interface show test_msgs/msg/Strings"
+    )
+
+
+def test_numbers_are_read_as_people_type_them(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heard: list[Any] = []
+    robot.create_subscription(BasicTypes, "basic", heard.append, 10)
+    answer(capsys, "topic pub /basic '{float64_value: 1e-3, float32_value: 2}'")
+    course.until(lambda: heard)
+    assert (heard[0].float64_value, heard[0].float32_value) == (0.001, 2.0)
+
+
+def test_a_topic_that_is_not_there_is_waited_for_as_long_as_asked(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    later = threading.Timer(2.0, robot.create_publisher, (String, "nothing", 10))
+    later.start()  # too late for whoever asked for 0.2 s
+    with pytest.raises(CourseError, match="Nobody publishes on /nothing"):
+        magic.ros("topic echo /nothing --timeout 0.2")
+    assert later.is_alive()
+    later.cancel()
 
 
 def test_help_is_shown_and_ends_nothing(capsys: pytest.CaptureFixture[str]) -> None:

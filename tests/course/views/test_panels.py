@@ -172,6 +172,16 @@ def test_the_log_panel_has_the_latest_lines(session: Session) -> None:
         (lambda s: s.service("lampe"), "Nobody offers the service /lampe"),
         (lambda s: s.action("cont"), "Is it /count?"),
         (lambda s: s.log_panel(level="LOUD"), "no log level 'LOUD'"),
+        (lambda s: s.service("bad name"), "'bad name' is not a service name: "),
+        (lambda s: s.service(""), "'' is not a service name: "),
+        (lambda s: s.service(5), "The service is a string, such as '/reset', not 5."),
+        (lambda s: s.service("lamp", Fibonacci), "The type is a service class"),
+        (lambda s: s.service("lamp", timeout="long"), "timeout is a number of seconds"),
+        (lambda s: s.action("1 bad"), "'1 bad' is not an action name: "),
+        (lambda s: s.action("count", Nested), "The type is an action class"),
+        (lambda s: s.parameters("bad name"), "'bad name' is not a node name: "),
+        (lambda s: s.parameters(""), "'' is not a node name: node name must not be empty."),
+        (lambda s: s.parameters(5), "The name of a node is a string, such as '/camera', not 5."),
     ],
 )
 def test_what_is_not_there_is_named(session: Session, make: Any, sentence: str) -> None:
