@@ -24,6 +24,8 @@ _NOUNS = {
     "interface": ("show", "list"),
 }
 
+_PATIENCE = 1.0  # s that the Tab key waits for a node to answer
+
 
 def register(shell: Any) -> None:
     """Add ``%ros`` and its completion to an IPython shell. Idempotent."""
@@ -68,7 +70,7 @@ def _names(noun: str, verb: str, operands: list[str]) -> list[str]:
     if noun == "param" and len(operands) == 1:
         from course.ros.parameters import names_of
 
-        return names_of(operands[0])
+        return names_of(operands[0], _PATIENCE)
     if operands or verb == "list":
         return []
     graph = reader.read(ambient.session().observer)

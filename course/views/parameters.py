@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from course.errors import CourseError
+from course.plain import for_json, one_line
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
 from course.watch.parameters import Entry, ParameterSheet
@@ -75,7 +76,7 @@ class ParameterPanel(LiveView):
             problem, changes = self._problem or self._silent, self._changes
         return {
             "title": f"Parameters of {self._sheet.node}",
-            "entries": [asdict(entry) for entry in self._entries],
+            "entries": [_shown(entry) for entry in self._entries],
             "problem": problem,
             "changes": changes,
         }
@@ -105,5 +106,13 @@ class ParameterPanel(LiveView):
         for entry in self._entries:
             limits = f" ({entry.least:g} to {entry.most:g})" if entry.least is not None else ""
             about = f"  # {entry.description}" if entry.description else ""
-            lines.append(f"  {entry.name}: {entry.value}{limits}{about}")
+            value = "not set" if entry.value is None else one_line(entry.value)
+            lines.append(f"  {entry.name}: {value}{limits}{about}")
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
+
+
+def _shown(entry: Entry) -> Frame:
+    """Return what the browser draws: a list as the YAML that is typed to change it."""
+    value = entry.value
+    shown: Frame = for_json(asdict(entry))
+    return shown | {"value": one_line(value)} if isinstance(value, list) else shown

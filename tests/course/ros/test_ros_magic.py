@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rclpy
 from IPython.core.completer import IPCompleter, provisionalcompleter
 from IPython.core.interactiveshell import InteractiveShell
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.action import ActionServer
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
@@ -115,6 +117,37 @@ def test_parameters(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
     assert refused == "/robot refused speed = 2.0: at most 1 m/s\n"
 
 
+def test_parameters_of_odd_types(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    robot.declare_parameter("unset", Parameter.Type.STRING)
+    robot.declare_parameter("bytes", [b"\x01"])
+    assert "  unset" in answer(capsys, "param list robot")
+    assert answer(capsys, "param get robot unset") == "unset of /robot has no value yet.\n"
+    assert answer(capsys, "param get robot speed") == "0.5\n"
+    assert answer(capsys, "param set robot unset 5") == "/robot: unset is now 5\n"
+    assert answer(capsys, """param set robot unset '"7"'""") == "/robot: unset is now 7\n"
+    assert answer(capsys, "param set robot bytes '[2, 3]'") == "/robot: bytes is now [2, 3]\n"
+    assert answer(capsys, "param set robot speed 1e-1") == "/robot: speed is now 0.1\n"
+    assert answer(capsys, "param set robot use_sim_time false").endswith("is now false\n")
+
+
+def test_a_node_without_parameter_services_hides_no_other(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    course.run(lambda: Node("bare", start_parameter_services=False))
+    stuck = rclpy.create_node("forgotten", context=course.session().context)
+    try:
+        course.until(lambda: "/forgotten" in answer(capsys, "node list"))
+        text = answer(capsys, "param list")
+        assert "/bare:\n  (its parameter services do not answer, or it has none)" in text
+        assert "/forgotten:\n  (its parameter services do not answer" in text
+        assert "  speed" in text
+        assert magic.candidates(["param", "get", "forgotten", ""]) == []
+        with pytest.raises(CourseError, match="/bare has no parameter services"):
+            magic.ros("param list bare")
+    finally:
+        stuck.destroy_node()
+
+
 @pytest.mark.parametrize(
     ("name", "parts"),
     [
@@ -171,6 +204,10 @@ def test_interfaces(capsys: pytest.CaptureFixture[str], name: str, parts: list[s
         ("topic pub /orders '{}' --type std_srvs/srv/SetBool", "is no msg type"),
         ("service call /lamp '{}' --type std_msgs/msg/String", "is no srv type: name one such as"),
         ("service call /lamp '{}' --type os/srv/path", "There is no os/srv/path here"),
+        ("param set robot speed x", "speed takes a number, not 'x'."),
+        ("param set robot speed '{a: 1}'", "speed takes a number, not '{a: 1}'."),
+        ("param set robot ghost 1", "/robot has no parameter 'ghost': it has speed,"),
+        ("param get 'bad name' x", "'bad name' is not a node name"),
         ("interface show ''", "'' is not the name of an interface: write package/kind/Name"),
         ("interface show ../x/y", "'../x/y' is not the name of an interface"),
         ("interface show a/b/c/d", "'a/b/c/d' is not the name of an interface"),
@@ -243,6 +280,7 @@ def test_help_is_shown_and_ends_nothing(capsys: pytest.CaptureFixture[str]) -> N
         (["service", "call", ""], "/lamp"),
         (["action", "send_goal", ""], "/fibonacci"),
         (["param", "get", "/robot", ""], "speed"),
+        (["param", "get", "robot", ""], "speed"),
         (["interface", "show", ""], "std_msgs/msg/String"),
     ],
 )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from test_msgs.action import Fibonacci
 from test_msgs.msg import Nested
@@ -16,6 +19,7 @@ from course.runtime.actions import GoalState
 from course.values import MisfitError
 from course.views.live import LiveView
 from course.watch import forms
+from course.watch.parameter_values import ParameterError
 from tests.robot import Robot
 
 
@@ -135,7 +139,14 @@ def test_a_parameter_is_changed_and_a_refusal_has_its_reason(session: Session) -
         ("legs", "2.5", "legs takes a whole number, not '2.5'."),
         ("speed", "fast", "speed takes a number, not 'fast'."),
         ("speed", "9.0", "refused speed = 9.0"),
-        ("wings", "1", "/robot has no parameter 'wings'."),
+        ("wings", "1", "/robot has no parameter 'wings': it has legs, lights,"),
+        ("lights", "perhaps", "lights takes true or false, not 'perhaps'."),
+        ("legs", ".inf", "legs takes a whole number, not '.inf'."),
+        ("legs", str(2**70), f"legs takes {-(2**63)} to {2**63 - 1}, not {2**70}."),
+        ("legs", "9" * 5000, "legs takes a whole number, not '9999"),
+        ("legs", "", "legs takes a whole number, not ''."),
+        ("legs", "[a", "legs takes a whole number, not '[a'."),
+        ("name", "a\0b", "name takes text, not"),
     ],
 )
 def test_a_value_that_does_not_fit_is_a_sentence(
@@ -145,6 +156,64 @@ def test_a_value_that_does_not_fit_is_a_sentence(
     with pytest.raises(CourseError) as caught:
         session.parameters("robot").set(name, value)
     assert sentence in str(caught.value)
+
+
+class Odd(Node):
+    """Has parameters of every type, one without a value, and one that may change its type."""
+
+    def __init__(self) -> None:
+        super().__init__("odd")
+        for name, value in ODD.items():
+            self.declare_parameter(name, value)
+        self.declare_parameter("unset", Parameter.Type.INTEGER)
+        self.declare_parameter("any", None, ParameterDescriptor(dynamic_typing=True))
+
+
+ODD = {
+    "bytes": [b"\x01", b"\xff"],
+    "bools": [True, False],
+    "wholes": [1, 2**60],
+    "numbers": [0.5, float("inf")],
+    "texts": ["a, b", "5", "true"],
+    "limit": float("inf"),
+    "none": float("nan"),
+    "big": 2**62,
+}
+
+
+def test_parameters_of_every_type_are_shown_and_set_as_they_are_shown(session: Session) -> None:
+    node = session.run(Odd)
+    panel = session.parameters("odd")
+    frame = shown(panel)
+    json.dumps(frame, allow_nan=False)
+    entries = {entry["name"]: entry for entry in frame["entries"]}
+    assert set(entries) == {*ODD, "unset", "any"}
+    assert entries["bytes"]["value"] == "[1, 255]"
+    assert entries["texts"]["value"] == "['a, b', '5', 'true']"
+    assert entries["limit"]["value"] == ".inf"
+    assert entries["unset"]["value"] is None
+    assert "  unset: not set" in panel.words()
+    for name in ODD:
+        before = repr(node.get_parameter(name).get_parameter_value())
+        say(panel, set=name, value=str(entries[name]["value"]))
+        assert panel.frame()["problem"] == ""
+        assert repr(node.get_parameter(name).get_parameter_value()) == before, name
+    assert panel.widget.ended == ""
+
+
+def test_a_parameter_without_a_value_gets_one(session: Session) -> None:
+    node = session.run(Odd)
+    panel = session.parameters("odd")
+    with pytest.raises(ParameterError, match="unset takes a whole number, not 'soon'"):
+        panel.set("unset", "soon")
+    panel.set("unset", "3")
+    assert node.get_parameter("unset").value == 3
+    for typed, value in (("1e-3", 0.001), ("[1, 2]", [1, 2]), ("word", "word"), ("7", 7)):
+        panel.set("any", typed)
+        found = node.get_parameter("any").value
+        assert (list(found) if isinstance(value, list) else found) == value
+    with pytest.raises(ParameterError, match="any takes a value, or a list of one kind of value"):
+        panel.set("any", "{a: 1}")
 
 
 def test_a_change_from_elsewhere_is_shown(session: Session) -> None:
