@@ -82,12 +82,14 @@ class Recorder:
             WaitTimeout: fewer arrived within `timeout` seconds; it says why if none did.
         """
         n, timeout = arguments.whole(n, "n", least=0, example=1), arguments.seconds(timeout)
-        if poll(lambda: self._count >= n, timeout, self._probe.pulse):
-            return self.messages
-        message = f"{self._count} of {n} messages arrived on {self.topic} in {timeout:g} s."
-        if not self._count:
-            message += " " + why_no_message(self._probe.node, self.topic, self.msg_type, self.qos)
-        raise WaitTimeout(message)
+        with self._probe.explaining():
+            if poll(lambda: self._count >= n, timeout, self._probe.pulse):
+                return self.messages
+            message = f"{self._count} of {n} messages arrived on {self.topic} in {timeout:g} s."
+            if not self._count:
+                node = self._probe.node
+                message += f" {why_no_message(node, self.topic, self.msg_type, self.qos)}"
+            raise WaitTimeout(message)
 
     def rate(self) -> float:
         """Return the mean rate of the kept messages in Hz; 0.0 with fewer than two of them."""

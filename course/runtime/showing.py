@@ -192,16 +192,14 @@ class Showing(Asking):
         """Return the names of paused nodes."""
         return [resident.name for resident in self._residents.all() if resident.paused]
 
-    def _further_hints(self) -> list[str]:
-        from course.diagnosis import quick
+    def _further_hints(self, *, vague: bool) -> list[str]:
+        from course.diagnosis import likely
 
-        # A wait tells of stuck callbacks and nodes taken away by itself: this is what is left.
-        telling = [
-            finding
-            for finding in quick(self._me)
-            if finding.name in ("QoS", "type", "name") or "nobody spins it" in finding.message
-        ]
-        return [f"{finding.message} {finding.mend}" for finding in telling[:2]]
+        try:
+            found = likely(self._me, vague=vague)
+        except Exception:  # noqa: BLE001 - the session may end meanwhile; the wait has its own error
+            return []
+        return [f"{finding.message} {finding.mend}" for finding in found]
 
     @property
     def _me(self) -> Session:
