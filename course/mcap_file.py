@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
@@ -34,6 +36,8 @@ def write(path: Path, recordings: Mapping[str, tuple[Any, Sequence[tuple[int, An
         RecordingError: the file cannot be written.
     """
     try:
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         path = path if path.suffix else path.with_suffix(".mcap")
         with replacing(path) as file:
             _write(file, recordings)

@@ -16,7 +16,7 @@ from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
 from course.errors import WaitTimeout
 from course.runtime import arguments
-from course.runtime.offers import full_service, full_topic, why_no_service
+from course.runtime.offers import full_action, full_topic, why_no_service
 from course.runtime.probe import Probe
 from course.runtime.settle import settle
 from course.runtime.waiting import Deadline, poll
@@ -195,7 +195,7 @@ class Goals:
             WaitTimeout: no server, or no answer, within `timeout` seconds.
         """
         probe, deadline = self._probe, Deadline(timeout)
-        service = full_service(probe.node, f"{arguments.text(name, 'The action', '/dock')}{_SEND}")
+        service = f"{full_action(probe.node, name)}{_SEND}"
         action = self._actions.get((action_type, name))
         if action is None:
             action = self._actions[action_type, name] = _Action(probe, action_type, name)

@@ -106,8 +106,13 @@ class Asking(Hosting):
         Raises:
             WaitTimeout: nobody subscribes with a QoS that fits, or the topic has another type.
         """
+        arguments.message(message)
+        timeout = arguments.seconds(timeout)
         with self._explaining():
-            self._probe.publish(topic, message, qos, timeout)
+            profile = arguments.qos(qos)
+            if profile is None:
+                profile = QoSProfile(depth=10)
+            self._probe.publish(topic, message, profile, timeout)
 
     def wait_for_service(self, srv_type: Any, name: str, timeout: float = 5.0) -> None:
         """Return when a server of `name` is ready.

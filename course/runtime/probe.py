@@ -32,6 +32,7 @@ from course.runtime.offers import (
 from course.runtime.waiting import Deadline, Pulse, poll
 
 _LISTEN_DEPTH = 1000
+_LONGEST = 1e9  # s: a Duration counts nanoseconds in 64 bits
 
 
 class Probe:
@@ -95,7 +96,7 @@ class Probe:
         reason = why_no_message(self.node, topic, msg_type, better)
         raise WaitTimeout(f"No message on {topic} in {timeout:g} s. {reason}")
 
-    def publish(self, topic: str, message: Any, qos: QoSProfile | int, timeout: float) -> None:
+    def publish(self, topic: str, message: Any, qos: QoSProfile, timeout: float) -> None:
         """Publish one message as soon as a subscription matches; see `Session.publish`."""
         topic = full_topic(self.node, topic)
         require_type(topic, type(message), self.node.get_topic_names_and_types())
@@ -107,7 +108,7 @@ class Probe:
                     f"in {timeout:g} s."
                 )
             publisher.publish(message)
-            publisher.wait_for_all_acked(Duration(seconds=timeout))
+            publisher.wait_for_all_acked(Duration(seconds=min(timeout, _LONGEST)))
         finally:
             with self.executor.held():
                 self.node.destroy_publisher(publisher)

@@ -148,7 +148,7 @@ class Showing(Asking):
         from course.views.timeline import Timeline
 
         self._require_open()
-        named = [(topic, None) if isinstance(topic, str) else topic for topic in topics]
+        named = [_named(topic) for topic in topics]
         return Timeline(self._me, named, window)
 
     def qos_lab(
@@ -212,3 +212,17 @@ class Showing(Asking):
             guess = f" Is it {close[0]}?" if close else ""
             raise SessionError(f"Nobody offers the {what} {name}, so its type is unknown.{guess}")
         return load_type(types[name][0], name, "srv" if what == "service" else what)
+
+
+def _named(topic: Any) -> tuple[str, Any | None]:
+    """Return the name of a topic and, if it was given, its message class.
+
+    Raises:
+        SessionError: it is neither a name nor such a pair.
+    """
+    if not isinstance(topic, tuple) or len(topic) != 2:
+        return arguments.text(topic, "A topic", "/scan"), None
+    name, msg_type = topic
+    if msg_type is not None:
+        arguments.ros_type(msg_type, "message")
+    return arguments.text(name, "A topic", "/scan"), msg_type

@@ -8,6 +8,7 @@ from typing import Any
 
 from course.errors import CourseError
 from course.plain import for_json, one_line
+from course.runtime import arguments
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
 from course.watch.parameters import Entry, ParameterSheet
@@ -50,7 +51,7 @@ class ParameterPanel(LiveView):
             ParameterError: the node refused, for the reason in the message; or no such value.
             WaitTimeout: the node does not answer.
         """
-        self._sheet.set(name, value)
+        self._sheet.set(arguments.text(name, "The name of a parameter", "speed"), value)
         self._entries = self._sheet.entries()
 
     def control(self, message: dict[str, Any]) -> None:

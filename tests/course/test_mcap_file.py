@@ -107,7 +107,7 @@ def test_a_place_that_cannot_be_written_is_a_sentence(tmp_path: Path) -> None:
         mcap_file.write(tmp_path / "nowhere" / "x", {})
 
 
-@pytest.mark.parametrize("path", ["", ".", "a\0b"])
+@pytest.mark.parametrize("path", ["", ".", "/", "a\0b", "x" * 300])
 def test_a_name_that_is_none_is_a_sentence(session: Session, path: str) -> None:
     recorder = session.record("chatter", String)
     with pytest.raises(RecordingError, match="name a file"):
