@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -137,13 +138,19 @@ def _entry(name: str, value: Any, descriptor: Any) -> Entry:
     if like is bool:
         kind = "checkbox"
     elif like in (int, float):
-        kind = "slider" if limits and value is not None else "number"
+        kind = "slider" if limits and value is not None and _drawable(limits) else "number"
     else:
         kind = "text" if like is str else "yaml"
     least, most, step = (
         (limits.from_value, limits.to_value, limits.step or None) if limits else (None, None, None)
     )
     return Entry(name, value, kind, descriptor.description, least, most, step, descriptor.read_only)
+
+
+def _drawable(limits: Any) -> bool:
+    """Return whether a slider can have these ends: not infinity, nor what a browser rounds."""
+    ends = (limits.from_value, limits.to_value)
+    return all(math.isfinite(end) and plain.for_json(end) == end for end in ends)
 
 
 _LIKE = {

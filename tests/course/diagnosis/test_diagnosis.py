@@ -188,6 +188,14 @@ def test_a_client_without_a_server(session: Session) -> None:
     assert "/asker uses the service /lamp, and nobody offers it" in in_vain(session)
 
 
+def test_a_service_whose_name_is_nearly_right(session: Session) -> None:
+    node = session.run(Node, "asker")
+    node.create_client(SetBool, "lampe")
+    node.create_service(SetBool, "lamp", lambda _request, response: response)
+    session.until(lambda: "is it /lamp?" in about(session.diagnose(), "service"))
+    assert "/asker uses the service /lampe, and nobody offers it (is it /lamp?)" in in_vain(session)
+
+
 def test_a_wait_that_knows_its_reason_keeps_to_it(session: Session) -> None:
     node = session.run(listener, "scna")
     node.create_client(SetBool, "lampe")

@@ -277,6 +277,9 @@ def test_help_is_shown_and_ends_nothing(capsys: pytest.CaptureFixture[str]) -> N
         (["topic", ""], "echo"),
         (["topic", "info", ""], "/chatter"),
         (["topic", "info", "-v", ""], "/chatter"),
+        (["topic", "echo", "-n", "3", ""], "/chatter"),
+        (["topic", "pub", "--type", "std_msgs/msg/String", ""], "/chatter"),
+        (["topic", "pub", "/new", "{}", "--type", ""], "std_msgs/msg/String"),
         (["service", "call", ""], "/lamp"),
         (["action", "send_goal", ""], "/fibonacci"),
         (["param", "get", "/robot", ""], "speed"),
@@ -288,7 +291,16 @@ def test_the_tab_key_offers_what_may_follow(robot: Robot, words: list[str], expe
     assert expected in magic.candidates(words)
 
 
-@pytest.mark.parametrize("words", [["x", ""], ["topic", "x", "y", ""], ["param", "get", "/no", ""]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["x", ""],
+        ["topic", "x", "y", ""],
+        ["topic", "echo", "-n", ""],
+        ["param", "get", "/no", ""],
+        ["param", "get", "bad name!", ""],
+    ],
+)
 def test_the_tab_key_offers_nothing_where_nothing_can_follow(
     robot: Robot, words: list[str]
 ) -> None:

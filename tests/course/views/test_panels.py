@@ -7,17 +7,18 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from test_msgs.action import Fibonacci
 from test_msgs.msg import Nested
+from test_msgs.srv import Arrays
 
 from course import Session
 from course.errors import CourseError, SessionError, WaitTimeout
 from course.runtime.actions import GoalState
 from course.values import MisfitError
-from course.views.live import LiveView
+from course.views.live import MAX_FRAME, LiveView
 from course.watch import forms
 from course.watch.parameter_values import ParameterError
 from tests.robot import Robot
@@ -60,6 +61,29 @@ def test_a_service_that_is_gone_is_a_sentence_in_the_view(session: Session) -> N
     say(console, call={"data": True})
     session.until(lambda: [c["problem"] for c in shown(console)["calls"] if c["problem"]])
     assert "Nobody offers /lamp" in shown(console)["calls"][0]["problem"]
+
+
+def test_long_answers_still_fit_into_a_frame(session: Session) -> None:
+    def serve() -> Node:
+        node = Node("talkative")
+
+        def answer(_request: Arrays.Request, response: Arrays.Response) -> Arrays.Response:
+            response.string_values = ["z" * 300_000] * 3
+            response.float64_values = [float("nan"), float("inf"), 0.0]
+            return response
+
+        node.create_service(Arrays, "big", answer)
+        return node
+
+    session.run(serve)
+    console = session.service("big")
+    for _ in range(10):
+        say(console, call={})
+    session.until(lambda: sum(c["answer"] is not None for c in shown(console)["calls"]) == 10, 20)
+    assert len(json.dumps(shown(console), allow_nan=False)) < MAX_FRAME
+    assert len(console.words()) < MAX_FRAME
+    assert console.calls[0].answer is not None
+    assert console.calls[0].answer["string_values"][0].endswith("… 298000 more")
 
 
 def test_what_does_not_fit_is_said_beside_the_form(session: Session) -> None:
@@ -166,6 +190,9 @@ class Odd(Node):
         for name, value in ODD.items():
             self.declare_parameter(name, value)
         self.declare_parameter("unset", Parameter.Type.INTEGER)
+        endless = FloatingPointRange(from_value=0.0, to_value=float("inf"))
+        about = ParameterDescriptor(floating_point_range=[endless])
+        self.declare_parameter("endless", 1.0, about)
         self.declare_parameter("any", None, ParameterDescriptor(dynamic_typing=True))
 
 
@@ -187,7 +214,8 @@ def test_parameters_of_every_type_are_shown_and_set_as_they_are_shown(session: S
     frame = shown(panel)
     json.dumps(frame, allow_nan=False)
     entries = {entry["name"]: entry for entry in frame["entries"]}
-    assert set(entries) == {*ODD, "unset", "any"}
+    assert set(entries) == {*ODD, "unset", "any", "endless"}
+    assert entries["endless"]["kind"] == "number"
     assert entries["bytes"]["value"] == "[1, 255]"
     assert entries["texts"]["value"] == "['a, b', '5', 'true']"
     assert entries["limit"]["value"] == ".inf"
