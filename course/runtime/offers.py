@@ -134,7 +134,7 @@ def why_no_message(node: Node, topic: str, msg_type: Any, qos: QoSProfile) -> st
     """Return one sentence that says why a subscription got nothing."""
     publishers = node.get_publishers_info_by_topic(topic)
     if not publishers:
-        return f"Nobody publishes on {topic}{_alike(topic, _published(node))}."
+        return f"{nobody_publishes(node, topic)}."
     require_type(topic, msg_type, [(topic, [info.topic_type for info in publishers])])
     for info in publishers:
         verdict, reason = qos_check_compatible(info.qos_profile, qos)
@@ -147,6 +147,11 @@ def why_no_message(node: Node, topic: str, msg_type: Any, qos: QoSProfile) -> st
         f"{count} publisher{'s' if count > 1 else ''} on {topic} with a QoS that fits, "
         "but nothing was published while we listened."
     )
+
+
+def nobody_publishes(node: Node, topic: str) -> str:
+    """Return that nobody does, and the topic that may have been meant, as part of a sentence."""
+    return f"Nobody publishes on {topic}{_alike(topic, _published(node))}"
 
 
 def why_no_service(node: Node, name: str, srv_type: Any) -> str:

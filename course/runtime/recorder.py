@@ -15,7 +15,7 @@ from rclpy.qos import QoSProfile
 from course.errors import WaitTimeout
 from course.runtime import arguments
 from course.runtime.names import type_name
-from course.runtime.offers import fitting_qos, full_topic, type_on, why_no_message
+from course.runtime.offers import fitting_qos, full_topic, nobody_publishes, type_on, why_no_message
 from course.runtime.probe import Probe
 from course.runtime.waiting import poll
 
@@ -142,8 +142,9 @@ class Recorder:
     def _wait_for_type(self, timeout: float) -> Any:
         found = poll(lambda: type_on(self._probe.node, self.topic), timeout, self._probe.pulse)
         if found is None:
+            nobody = nobody_publishes(self._probe.node, self.topic)
             raise WaitTimeout(
-                f"Nobody publishes on {self.topic}, so its type is unknown: "
-                "name it, as in record(topic, String)."
+                f"{nobody}, so after {timeout:g} s its type is still unknown: name it, as in "
+                "record(topic, String)."
             )
         return found
