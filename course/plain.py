@@ -68,10 +68,12 @@ def read(text: str) -> Any:
         return yaml.load(text, _Loader)  # a SafeLoader that knows fewer types
     except yaml.YAMLError as error:
         raise ValueError(str(error).splitlines()[0].rstrip(".:")) from None
-    except RecursionError:
-        raise ValueError("it is nested too deeply") from None
     except ValueError as error:
         raise ValueError(str(error).partition(";")[0]) from None
+    except RecursionError:
+        raise ValueError("it is nested too deeply") from None
+    except Exception:  # noqa: BLE001 - "!!bool x" is a KeyError, "!!timestamp x" an AttributeError
+        raise ValueError("a tag and its value do not go together") from None
 
 
 def one_line(data: Any) -> str:

@@ -51,7 +51,7 @@ def echo(topic: str, count: int = 1, timeout: float = 5.0) -> str:
     deadline = Deadline(seconds(timeout))
     with ambient.record(topic, limit=count, timeout=timeout) as recorder:
         try:
-            messages = recorder.wait(count, deadline.left)
+            messages = recorder.wait(count, round(deadline.left, 2))
         except WaitTimeout:
             messages = recorder.messages
             if not messages:
@@ -66,7 +66,7 @@ def hz(topic: str, timeout: float = 5.0) -> str:
     deadline = Deadline(seconds(timeout))
     with ambient.record(topic, timeout=timeout) as recorder:
         try:
-            recorder.wait(_ENOUGH, deadline.left)
+            recorder.wait(_ENOUGH, round(deadline.left, 2))
         except WaitTimeout:
             if recorder.count < 3:
                 raise

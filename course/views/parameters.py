@@ -11,6 +11,7 @@ from course.plain import for_json, one_line
 from course.runtime import arguments
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
+from course.watch.parameter_values import ParameterError
 from course.watch.parameters import Entry, ParameterSheet
 
 ASK_TIMEOUT = 2.0
@@ -58,15 +59,15 @@ class ParameterPanel(LiveView):
         """Change a parameter as typed."""
         if not isinstance(message.get("set"), str):
             return
-        problem = ""
+        problem, entries = "", self._entries
         try:
-            self._sheet.set(message["set"], message.get("value"), ASK_TIMEOUT)
-        except CourseError as error:
-            problem = str(error)
-        try:
+            try:
+                self._sheet.set(message["set"], message.get("value"), ASK_TIMEOUT)
+            except ParameterError as error:
+                problem = str(error)
             entries = self._sheet.entries(ASK_TIMEOUT)
-        except CourseError:
-            entries = self._entries
+        except CourseError as error:  # it does not answer: asking again would only take longer
+            problem = problem or str(error)
         with self._lock:
             self._entries, self._problem, self._changes = entries, problem, self._changes + 1
 
