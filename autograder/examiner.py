@@ -100,6 +100,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     subject = Subject(Channel(socket.socket(fileno=options.control)))
     with Session(domain_id=options.domain) as session:
+        session.explains = False  # it asks whether something comes, and says itself what it means
         serve(sys.stdin, verdicts, session, subject, own_network=options.own_network)
     return 0
 

@@ -118,9 +118,10 @@ def record(
     *,
     qos: QoSProfile | int | None = None,
     limit: int = 1000,
+    timeout: float = 5.0,
 ) -> Recorder:
     """Record a topic from now on; see `Session.record`."""
-    return session().record(topic, msg_type, qos=qos, limit=limit)
+    return session().record(topic, msg_type, qos=qos, limit=limit, timeout=timeout)
 
 
 def pause(*what: Any) -> None:

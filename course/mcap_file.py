@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
@@ -33,13 +35,17 @@ def write(path: Path, recordings: Mapping[str, tuple[Any, Sequence[tuple[int, An
     Raises:
         RecordingError: the file cannot be written.
     """
-    path = path if path.suffix else path.with_suffix(".mcap")
     try:
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        path = path if path.suffix else path.with_suffix(".mcap")
         with replacing(path) as file:
             _write(file, recordings)
-    except OSError as error:
+    except (OSError, ValueError) as error:  # an empty name, or one with a NUL, is a ValueError
+        reason = getattr(error, "strerror", None) or str(error)
         raise RecordingError(
-            f"{path} cannot be written ({error.strerror or error}): choose another place."
+            f"The recording cannot be written to {str(path)!r} ({reason}): name a file, as in "
+            "'scan.mcap', in a folder that you may write to."
         ) from error
     return path
 

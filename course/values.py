@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
-import yaml
 from rosidl_parser.definition import (
     AbstractSequence,
     AbstractString,
@@ -23,18 +22,22 @@ from rosidl_parser.definition import (
     NamespacedType,
 )
 
+from course import plain
 from course.errors import CourseError
 from course.runtime.names import type_name
 
 LONGEST = 64
 """Elements of a sequence, or bytes, that `to_data` keeps by default; the rest is only counted."""
 
-_BYTES = ("octet", "uint8", "int8", "char")
+LONGEST_TEXT = 2000
+"""Characters of a text that it keeps then."""
+
 _INTEGERS = {
     f"{sign}int{bits}": (0 if sign else -(2 ** (bits - 1)), 2 ** (bits if sign else bits - 1) - 1)
     for sign in ("", "u")
     for bits in (8, 16, 32, 64)
-} | {"octet": (0, 255)}
+} | {"octet": (0, 255), "char": (0, 255)}
+_FLOATS = {"float": 3.4028234663852886e38, "double": 1.7976931348623157e308}  # IEEE 754
 
 
 class MisfitError(CourseError):
@@ -47,9 +50,26 @@ def to_data(message: Any, longest: int | None = LONGEST) -> dict[str, Any]:
     Args:
         message: any ROS message.
         longest: keep so many elements of each sequence, and say how many more there are in a
-            last element; None keeps all.
+            last element, and cut texts; None keeps all.
     """
-    return {name: _plain(getattr(message, name), longest) for name, _ in fields(type(message))}
+    return {name: to_plain(getattr(message, name), longest) for name, _ in fields(type(message))}
+
+
+def to_plain(value: Any, longest: int | None = LONGEST) -> Any:
+    """Return the value of a field as plain data; see `to_data`."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return to_data(value, longest)
+    if isinstance(value, bytes):
+        return value[0] if len(value) == 1 else list(value)
+    if isinstance(value, str):
+        more = 0 if longest is None else len(value) - LONGEST_TEXT
+        return f"{value[:LONGEST_TEXT]}… {more} more" if more > 0 else value
+    if isinstance(value, bool | int | float):
+        return value
+    items = value.tolist() if hasattr(value, "tolist") else list(value)
+    kept = items if longest is None else items[:longest]
+    shown = [to_plain(item, longest) for item in kept]
+    return shown if len(kept) == len(items) else [*shown, f"… {len(items) - len(kept)} more"]
 
 
 def from_text(msg_type: Any, text: str) -> Any:
@@ -59,11 +79,11 @@ def from_text(msg_type: Any, text: str) -> Any:
         MisfitError: it is no YAML, or a value does not fit; says which field, and what it takes.
     """
     try:
-        data = yaml.safe_load(text) if text.strip() else {}
-    except yaml.YAMLError as error:
-        reason = str(error).splitlines()[0]
+        data = plain.read(text) if text.strip() else {}
+    except ValueError as error:
         raise MisfitError(
-            f"{text!r} is not YAML ({reason}): write the fields as in {example(msg_type)!r}."
+            f"{plain.shown(text)} is not YAML ({error}): write the fields as in "
+            f"{example(msg_type)}."
         ) from None
     return from_data(msg_type, data)
 
@@ -93,15 +113,7 @@ def all_fields(msg_type: Any) -> Iterator[tuple[str, AbstractType]]:
 
 def example(msg_type: Any) -> str:
     """Return a message of ``msg_type`` with its defaults, as one line of YAML."""
-    return one_line(to_data(msg_type()))
-
-
-def one_line(data: Any) -> str:
-    """Return plain data as one line of YAML."""
-    text: str = yaml.safe_dump(
-        data, default_flow_style=True, width=10**6, sort_keys=False, allow_unicode=True
-    )
-    return text.strip().removesuffix("\n...")
+    return plain.one_line(to_data(msg_type()))
 
 
 def class_of(slot: NamespacedType) -> Any:
@@ -119,7 +131,9 @@ def in_words(slot: AbstractType) -> str:
         bound = getattr(slot, "maximum_size", None)
         return f"{in_words(slot.value_type)}[{f'<={bound}' if bound else ''}]"
     if isinstance(slot, AbstractString | AbstractWString):
-        return "string" if isinstance(slot, AbstractString) else "wstring"
+        bound = getattr(slot, "maximum_size", None)
+        kind = "string" if isinstance(slot, AbstractString) else "wstring"
+        return f"{kind}<={bound}" if bound else kind
     assert isinstance(slot, BasicType)
     name: str = slot.typename
     return {"boolean": "bool", "double": "float64", "float": "float32", "octet": "byte"}.get(
@@ -134,46 +148,42 @@ def _class(name: str) -> Any:
     return load_type(name)
 
 
-def _plain(value: Any, longest: int | None) -> Any:
-    if hasattr(value, "get_fields_and_field_types"):
-        return to_data(value, longest)
-    if isinstance(value, bytes):
-        return value[0] if len(value) == 1 else list(value)
-    if isinstance(value, str | bool | int | float):
-        return value
-    items = value.tolist() if hasattr(value, "tolist") else list(value)
-    kept = items if longest is None else items[:longest]
-    plain = [_plain(item, longest) for item in kept]
-    return plain if len(kept) == len(items) else [*plain, f"… {len(items) - len(kept)} more"]
-
-
 def _message(msg_type: Any, data: Any, where: str) -> Any:
     if not isinstance(data, Mapping):
         raise MisfitError(
-            f"{_named(where, type_name(msg_type))} takes fields, as in {example(msg_type)!r}, not "
-            f"{data!r}."
+            f"{_named(where, type_name(msg_type))} takes fields, as in {example(msg_type)}, not "
+            f"{plain.shown(data)}."
         )
     slots = dict(fields(msg_type))
     for name in data:
         if name not in slots:
             raise MisfitError(
-                f"{type_name(msg_type)} has no field {name!r}: it has {', '.join(slots) or 'none'}."
+                f"{type_name(msg_type)} has no field {plain.shown(name)}: it has "
+                f"{', '.join(slots) or 'none'}."
             )
     message = msg_type()
-    for name, value in data.items():
-        setattr(message, name, _value(slots[name], value, f"{where}.{name}" if where else name))
+    for name, given in data.items():
+        place = f"{where}.{name}" if where else name
+        fits = to_field(slots[name], given, place)
+        try:
+            setattr(message, name, fits)
+        except (AssertionError, TypeError, ValueError, OverflowError):  # rosidl's own rules
+            raise _misfit(place, slots[name], given) from None
     return message
 
 
-def _value(slot: AbstractType, value: Any, where: str) -> Any:
+def to_field(slot: AbstractType, value: Any, where: str) -> Any:
+    """Return what a field of the type ``slot`` holds for plain data.
+
+    Raises:
+        MisfitError: it does not fit; the message calls the field ``where``.
+    """
     if isinstance(slot, NamespacedType):
         return _message(class_of(slot), value, where)
     if isinstance(slot, Array | AbstractSequence):
         return _sequence(slot, value, where)
     if isinstance(slot, AbstractString | AbstractWString):
-        if isinstance(value, str):
-            return value
-        raise _misfit(where, slot, value)
+        return _string(slot, value, where)
     assert isinstance(slot, BasicType)
     return _basic(slot, value, where)
 
@@ -186,7 +196,21 @@ def _sequence(slot: Any, value: Any, where: str) -> Any:
         raise MisfitError(f"{where} takes exactly {size} elements, not {len(value)}.")
     if bound and len(value) > bound:
         raise MisfitError(f"{where} takes at most {bound} elements, not {len(value)}.")
-    return [_value(slot.value_type, item, f"{where}[{n}]") for n, item in enumerate(value)]
+    return [to_field(slot.value_type, item, f"{where}[{n}]") for n, item in enumerate(value)]
+
+
+def _string(slot: Any, value: Any, where: str) -> str:
+    if not isinstance(value, str):
+        raise _misfit(where, slot, value)
+    bound = getattr(slot, "maximum_size", None)
+    if bound and len(value) > bound:
+        raise MisfitError(f"{where} takes at most {bound} characters, not {len(value)}.")
+    if any(character == "\0" or "\ud800" <= character <= "\udfff" for character in value):
+        # DDS would end the text at a NUL, and has no way to write half a character.
+        raise MisfitError(
+            f"{where} takes text without NUL and surrogate characters, not {plain.shown(value)}."
+        )
+    return value
 
 
 def _basic(slot: BasicType, value: Any, where: str) -> Any:
@@ -195,20 +219,25 @@ def _basic(slot: BasicType, value: Any, where: str) -> Any:
         if isinstance(value, bool):
             return value
     elif name in _INTEGERS:
-        least, most = _INTEGERS[name]
         if isinstance(value, int) and not isinstance(value, bool):
+            least, most = _INTEGERS[name]
             if least <= value <= most:
                 return bytes([value]) if name == "octet" else value
-            raise MisfitError(f"{where} takes {least} to {most}, not {value}.")
+            raise MisfitError(f"{where} takes {least} to {most}, not {plain.shown(value)}.")
+        if name == "octet" and isinstance(value, bytes) and len(value) == 1:
+            return value
     elif isinstance(value, int | float) and not isinstance(value, bool):
-        return float(value)
+        most = _FLOATS.get(name, math.inf)
+        if -most <= value <= most or abs(value) == math.inf or value != value:
+            return float(value)
+        raise MisfitError(f"{where} takes {-most:.7g} to {most:.7g}, not {plain.shown(value)}.")
     elif isinstance(value, str) and value.lower().lstrip("+-.") in ("nan", "inf", "infinity"):
-        return float(value.replace(".", "")) if value else math.nan
+        return float(value.replace(".", ""))
     raise _misfit(where, slot, value)
 
 
 def _misfit(where: str, slot: AbstractType, value: Any) -> MisfitError:
-    return MisfitError(f"{where} takes {in_words(slot)}, not {value!r}.")
+    return MisfitError(f"{where} takes {in_words(slot)}, not {plain.shown(value)}.")
 
 
 def _named(where: str, name: str) -> str:

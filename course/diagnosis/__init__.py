@@ -10,7 +10,7 @@ from course.diagnosis import graph, nodes
 from course.doctor.finding import Finding
 from course.runtime.session import Session
 
-__all__ = ["Diagnosis", "diagnose", "quick"]
+__all__ = ["Diagnosis", "diagnose", "likely", "quick"]
 
 
 class Diagnosis(Sequence[Finding]):
@@ -63,8 +63,37 @@ def diagnose(session: Session) -> Diagnosis:
 
 def quick(session: Session) -> list[Finding]:
     """Return what can be found without waiting for anybody."""
-    checks = (
-        nodes.stuck, nodes.stolen, nodes.paused, nodes.unspun, nodes.on_another_domain,
-        graph.check,
-    )  # fmt: skip
+    return [*nodes.stuck(session), *nodes.moved(session), *_calm(session)]
+
+
+def likely(session: Session, *, vague: bool) -> list[Finding]:
+    """Return what may be why a wait of the session was in vain, the likeliest first.
+
+    Stuck callbacks and nodes in other executors are left out: a wait tells of them by itself. Nodes
+    of other processes are asked whether they answer, all at once, if nothing else explains it.
+
+    Args:
+        session: whose wait it was.
+        vague: nobody knows what was waited for; so an endpoint without anybody on the other side
+            may be the reason.
+    """
+    found = [f for f in _calm(session) if vague or f.name not in _LONELY]
+    if not any(finding.status == "problem" for finding in found):
+        found += nodes.silent(session)
+    return sorted(found, key=_rank)
+
+
+_LONELY = ("topic", "service", "action")
+
+
+def _calm(session: Session) -> list[Finding]:
+    checks = (nodes.stolen, nodes.paused, nodes.unspun, nodes.on_another_domain, graph.check)
     return [finding for check in checks for finding in check(session)]
+
+
+def _rank(finding: Finding) -> int:
+    if finding.status == "problem":
+        return 0
+    if finding.name == "pause" or graph.NEARLY in finding.message:
+        return 1
+    return 3 if finding.name == "domain" and "ROS_DOMAIN_ID" in finding.message else 2

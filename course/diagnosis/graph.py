@@ -10,6 +10,9 @@ from course.graph import reader, words
 from course.graph.model import Graph
 from course.runtime.session import Session
 
+NEARLY = " (is it "
+"""Stands in a message that names another topic, service or action, which may have been meant."""
+
 _MENDS = {
     "RELIABILITY": "Offer RELIABLE, or request BEST_EFFORT.",
     "DURABILITY": "Offer TRANSIENT_LOCAL, or request VOLATILE.",
@@ -83,4 +86,4 @@ def lonely_clients(graph: Graph, own: set[str]) -> Iterator[Finding]:
 
 def _alike(name: str, names: list[str]) -> str:
     close = difflib.get_close_matches(name, [other for other in names if other != name], n=1)
-    return f" (is it {close[0]}?)" if close else ""
+    return f"{NEARLY}{close[0]}?)" if close else ""

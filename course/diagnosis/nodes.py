@@ -6,14 +6,12 @@ from __future__ import annotations
 
 import gc
 import os
-import time
 from collections.abc import Iterator
 
 from rcl_interfaces.srv import ListParameters
 from rclpy.node import Node
 
 from course.doctor.finding import Finding, problem, warning
-from course.errors import CourseError
 from course.graph import reader
 from course.runtime import closing
 from course.runtime.names import node_name
@@ -40,6 +38,10 @@ def stolen(session: Session) -> Iterator[Finding]:
     session.take_back_stolen_nodes()
     for notice in session.notices[told:]:
         yield problem("executor", notice, "Leave rclpy.spin_once and its relatives out.")
+
+
+def moved(session: Session) -> Iterator[Finding]:
+    """Find nodes that an executor of the learner's own holds."""
     for name in session.moved_nodes():
         yield problem(
             "executor", f"{name} is in an executor of your own, so its callbacks run only while "
@@ -93,25 +95,21 @@ def on_another_domain(session: Session) -> Iterator[Finding]:
 
 
 def silent(session: Session) -> Iterator[Finding]:
-    """Find nodes of other processes that are on the graph and do not answer."""
+    """Find nodes of other processes that are on the graph and do not answer: all asked at once."""
     services = dict(session.observer.get_service_names_and_types())
-    asked = 0
-    for name in reader.read(session.observer).nodes:
-        service = f"{name}/list_parameters"
-        if name in session.nodes or service not in services or asked >= MOST_ASKED:
-            continue
-        asked += 1
-        started = time.monotonic()
-        try:
-            session.call(ListParameters, service, ListParameters.Request(), ANSWER)
-        except CourseError:
-            seconds = time.monotonic() - started
-            yield problem(
-                "node", f"{name} is on the graph, but did not answer within {seconds:.0f} s: its "
-                "services are dead. Its program hangs, is stopped, or does not spin it; or it has "
-                "died, and DDS has not noticed yet (that takes up to 20 s).",
-                "Look at the program that runs it, or restart it.",
-            )  # fmt: skip
+    others = {
+        f"{name}/list_parameters": name
+        for name in reader.read(session.observer).nodes
+        if name not in session.nodes and f"{name}/list_parameters" in services
+    }
+    asked = list(others)[:MOST_ASKED]
+    for service in session.unanswered(ListParameters, asked, ANSWER):
+        yield problem(
+            "node", f"{others[service]} is on the graph, but did not answer within {ANSWER:g} s: "
+            "its services are dead. Its program hangs, is stopped, or does not spin it; or it has "
+            "died, and DDS has not noticed yet (that takes up to 20 s).",
+            "Look at the program that runs it, or restart it.",
+        )  # fmt: skip
 
 
 def _name(node: Node) -> str:

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import yaml
-
-from course import ambient, values
+from course import ambient, plain, values
 from course.errors import SessionError
 from course.graph import reader
 from course.ros.arguments import timeout as add_timeout
@@ -31,7 +29,7 @@ def list_(show_types: bool = False) -> str:
 
 def send_goal(action: str, goal: str = "{}", feedback: bool = False, timeout: float = 30.0) -> str:
     """Send a goal, wait for its result, and show it; -f with the feedback on the way."""
-    action_type = load_type(_type_of(action))
+    action_type = load_type(_type_of(action), kind="action")
     run = ambient.send_goal(
         action_type, action, values.from_text(action_type.Goal, goal), timeout=timeout
     )
@@ -39,8 +37,8 @@ def send_goal(action: str, goal: str = "{}", feedback: bool = False, timeout: fl
         return "The goal was rejected."
     result = run.wait(timeout)
     lines = [f"feedback: {values.to_data(message)}" for message in run.feedback] if feedback else []
-    text: str = yaml.safe_dump(values.to_data(result), sort_keys=False, allow_unicode=True)
-    return "\n".join([*lines, f"result:\n{text.strip()}", f"state: {run.status.name}"])
+    text = plain.lines(values.to_data(result)).strip()
+    return "\n".join([*lines, f"result:\n{text}", f"state: {run.status.name}"])
 
 
 def _type_of(action: str) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
-from course import values
+from course import plain, values
 from course.errors import SessionError
 from course.interfaces import installed
-from course.interfaces.names import parse_name
+from course.runtime.names import type_name
 from course.runtime.offers import load_type
 
 NOUN = "interface"
@@ -38,12 +39,9 @@ def definition(name: str) -> list[str]:
         SessionError: there is no such interface here.
     """
     cls = load_type(name)
-    kind = parse_name(name).kind if name.count("/") == 2 else "msg"
-    parts = {
-        "msg": (cls,),
-        "srv": tuple(getattr(cls, part, None) for part in ("Request", "Response")),
-        "action": tuple(getattr(cls, part, None) for part in ("Goal", "Result", "Feedback")),
-    }[kind]
+    kinds = (("Goal", "Result", "Feedback"), ("Request", "Response"))
+    named = next((names for names in kinds if hasattr(cls, names[0])), ())
+    parts = [getattr(cls, part) for part in named] or [cls]
     lines: list[str] = []
     for number, part in enumerate(parts):
         lines += ["---"] if number else []
@@ -58,12 +56,26 @@ def _fields(msg_type: Any, indent: str) -> list[str]:
         inner = getattr(slot, "value_type", slot)
         if hasattr(inner, "namespaces"):
             lines += _fields(values.class_of(inner), indent + "\t")
-    constants = getattr(type(msg_type), f"_Metaclass_{msg_type.__name__}__constants", {})
-    return [f"{indent}{_constant(name, value)}" for name, value in constants.items()] + lines
+    return [indent + constant for constant in _constants(msg_type)] + lines
 
 
-def _constant(name: str, value: Any) -> str:
-    return f"{type(value).__name__} {name}={value}"
+def _constants(msg_type: Any) -> list[str]:
+    """Return a line for each constant; Python knows no more of its type than that it is an int."""
+    found = getattr(type(msg_type), f"_Metaclass_{msg_type.__name__}__constants", {})
+    package, kind, name = type_name(msg_type).split("/")
+    file = f"share/{package}/{kind}/{name.partition('_')[0]}.{kind}"
+    try:
+        text = (installed.prefix_of(package) / file).read_text(encoding="utf-8") if found else ""
+    except (LookupError, OSError):  # built on this machine
+        text = ""
+    types = {line["name"]: line["type"] for line in _CONSTANT.finditer(text)}
+    return [
+        f"{types.get(key) or type(value).__name__} {key}={plain.one_line(values.to_plain(value))}"
+        for key, value in found.items()
+    ]
+
+
+_CONSTANT = re.compile(r"^\s*(?P<type>[a-z]\S*)\s+(?P<name>[A-Z]\w*)\s*=", re.MULTILINE)
 
 
 def _declare_show(add: Callable[..., Any]) -> None:

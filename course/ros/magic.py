@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -23,6 +24,9 @@ _NOUNS = {
     "param": ("list", "get", "set"),
     "interface": ("show", "list"),
 }
+
+_VALUED = ("-n", "--count", "--timeout", "--type")  # options that a value follows
+_PATIENCE = 1.0  # s that the Tab key waits for a node to answer
 
 
 def register(shell: Any) -> None:
@@ -56,7 +60,16 @@ def candidates(words: list[str]) -> list[str]:
     if not rest:
         return list(_NOUNS.get(noun, ()))
     verb = rest[0]
-    operands = [word for word in rest[1:] if not word.startswith("-")]
+    if done[-1] == "--type":
+        noun, operands = "interface", []
+    elif done[-1] in _VALUED:
+        return []
+    else:
+        operands = [
+            word
+            for before, word in itertools.pairwise(done[1:])
+            if word and not word.startswith("-") and before not in _VALUED
+        ]
     with contextlib.suppress(CourseError):
         return _names(noun, verb, operands)
     return []
@@ -68,7 +81,7 @@ def _names(noun: str, verb: str, operands: list[str]) -> list[str]:
     if noun == "param" and len(operands) == 1:
         from course.ros.parameters import names_of
 
-        return names_of(operands[0])
+        return names_of(operands[0], _PATIENCE)
     if operands or verb == "list":
         return []
     graph = reader.read(ambient.session().observer)

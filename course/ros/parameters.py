@@ -1,84 +1,82 @@
 """Parameters: list a node's, read one, change one."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
-import yaml
-from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
-from rclpy.parameter import Parameter, parameter_value_to_python
-
-from course import ambient
-from course.errors import SessionError
+from course import ambient, plain
+from course.errors import CourseError, SessionError
 from course.graph import reader
+from course.runtime.offers import full_node
+from course.watch.parameter_values import RefusedError
+from course.watch.parameters import ParameterSheet
 
 NOUN = "param"
 
 
 def list_(node: str = "") -> str:
     """List the parameters of a node, or of all."""
-    names = [_full(node)] if node else list(reader.read(ambient.session().observer).nodes)
+    if node:
+        return "\n".join([f"{full_node(node)}:", *(f"  {name}" for name in names_of(node))])
     lines = []
-    for name in names:
+    for name in reader.read(ambient.session().observer).nodes:
         lines.append(f"{name}:")
-        lines += [f"  {parameter}" for parameter in names_of(name)]
+        try:
+            lines += [f"  {parameter}" for parameter in names_of(name, 1.0)]
+        except CourseError:  # one that is stuck, or has none, must not hide the others
+            lines.append("  (its parameter services do not answer, or it has none)")
     return "\n".join(lines) or "No nodes."
 
 
-def names_of(node: str) -> list[str]:
+def names_of(node: str, timeout: float = 5.0) -> list[str]:
     """Return the names of a node's parameters, sorted.
 
     Raises:
-        SessionError: there is no such node.
+        SessionError: there is no such node, or it has no parameter services.
+        WaitTimeout: it does not answer.
     """
-    _require(node)
-    response = ambient.call(ListParameters, f"{node}/list_parameters", ListParameters.Request())
-    return sorted(response.result.names)
+    return _sheet(node).names(timeout)
 
 
 def get(node: str, name: str) -> str:
     """Show a parameter's value."""
-    node = _full(node)
-    _require(node)
-    request = GetParameters.Request(names=[name])
-    (value,) = ambient.call(GetParameters, f"{node}/get_parameters", request).values or (None,)
-    if value is None or value.type == 0:
-        raise SessionError(
-            f"{node} has no parameter {name!r}: it has {', '.join(names_of(node)) or 'none'}."
-        )
-    return f"{parameter_value_to_python(value)}"
+    value = _sheet(node).get(name)
+    if value is None:
+        return f"{name} of {full_node(node)} has no value yet."
+    return value if isinstance(value, str) else plain.one_line(value)
 
 
 def set_(node: str, name: str, value: str) -> str:
     """Change a parameter; a value that the node refuses comes back with its reason."""
-    node = _full(node)
-    _require(node)
+    sheet = _sheet(node)
     try:
-        parameter = Parameter(name, value=yaml.safe_load(value)).to_parameter_msg()
-    except (TypeError, ValueError, yaml.YAMLError):
+        sheet.set(name, _unquoted(value))
+    except RefusedError as refusal:
+        return str(refusal)
+    return f"{sheet.node}: {name} is now {get(node, name)}"
+
+
+def _unquoted(value: str) -> str:
+    """Return a text without quotes of its own: to YAML '"5"' is the text 5, not a number."""
+    if value[:1] in ("'", '"'):
+        try:
+            return str(plain.read(value))
+        except ValueError:
+            pass
+    return value
+
+
+def _sheet(node: str) -> ParameterSheet:
+    session, name = ambient.session(), full_node(node)
+    if name not in reader.read(session.observer, everything=True).nodes:
+        shown = ", ".join(reader.read(session.observer).nodes)
+        raise SessionError(f"There is no node {name}: there are {shown or 'none'}.")
+    if not session.observer.count_services(f"{name}/list_parameters"):
         raise SessionError(
-            f"{value!r} is no value of a parameter: it takes true or false, a number, a text, or a "
-            "list of one of them."
-        ) from None
-    request = SetParameters.Request(parameters=[parameter])
-    (result,) = ambient.call(SetParameters, f"{node}/set_parameters", request).results
-    if result.successful:
-        return f"{node}: {name} is now {get(node, name)}"
-    return f"{node} refused {name} = {value}: {result.reason or 'it gave no reason'}"
-
-
-def _require(node: str) -> None:
-    nodes = reader.read(ambient.session().observer, everything=True).nodes
-    if node not in nodes:
-        shown = ", ".join(reader.read(ambient.session().observer).nodes)
-        raise SessionError(f"There is no node {node}: there are {shown or 'none'}.")
-
-
-def _full(node: str) -> str:
-    return node if node.startswith("/") else f"/{node}"
+            f"{name} has no parameter services: it was made with start_parameter_services=False."
+        )
+    return ParameterSheet(session, name)
 
 
 def _declare_list(add: Callable[..., Any]) -> None:

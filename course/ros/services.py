@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import yaml
-
-from course import ambient, values
+from course import ambient, plain, values
 from course.errors import SessionError
 from course.graph import reader
 from course.ros.arguments import timeout as add_timeout
@@ -31,10 +29,9 @@ def list_(show_types: bool = False, everything: bool = False) -> str:
 
 def call(service: str, request: str = "{}", type: str = "", timeout: float = 5.0) -> str:  # noqa: A002
     """Call a service and show its response."""
-    srv_type = load_type(type or type_of(service))
+    srv_type = load_type(type or type_of(service), kind="srv")
     response = ambient.call(srv_type, service, values.from_text(srv_type.Request, request), timeout)
-    text: str = yaml.safe_dump(values.to_data(response), sort_keys=False, allow_unicode=True)
-    return text.strip()
+    return plain.lines(values.to_data(response)).strip()
 
 
 def type_of(service: str) -> str:

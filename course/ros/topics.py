@@ -7,14 +7,14 @@ import statistics
 from collections.abc import Callable
 from typing import Any
 
-import yaml
-
-from course import ambient, values
+from course import ambient, plain, values
 from course.errors import SessionError, WaitTimeout
 from course.graph import reader, words
 from course.graph.model import Graph, Topic
 from course.ros.arguments import timeout as add_timeout
-from course.runtime.offers import load_type, type_on
+from course.runtime.arguments import seconds, whole
+from course.runtime.offers import full_topic, load_type, type_on
+from course.runtime.waiting import Deadline
 
 NOUN = "topic"
 _ENOUGH = 20  # messages for a rate that one late message does not spoil
@@ -47,21 +47,26 @@ def info(topic: str, verbose: bool = False) -> str:
 
 def echo(topic: str, count: int = 1, timeout: float = 5.0) -> str:
     """Show the next messages of a topic."""
-    with ambient.record(topic, limit=max(count, 1)) as recorder:
+    whole(count, "-n", least=1, example=1)
+    deadline = Deadline(seconds(timeout))
+    with ambient.record(topic, limit=count, timeout=timeout) as recorder:
         try:
-            messages = recorder.wait(count, timeout)
+            messages = recorder.wait(count, round(deadline.left, 2))
         except WaitTimeout:
             messages = recorder.messages
             if not messages:
                 raise
-    return "---\n".join(_as_yaml(stamped.message) for stamped in messages[:count])
+    return "---\n".join(
+        plain.lines(values.to_data(stamped.message)) for stamped in messages[:count]
+    )
 
 
 def hz(topic: str, timeout: float = 5.0) -> str:
     """Measure the rate at which messages are published."""
-    with ambient.record(topic) as recorder:
+    deadline = Deadline(seconds(timeout))
+    with ambient.record(topic, timeout=timeout) as recorder:
         try:
-            recorder.wait(_ENOUGH, timeout)
+            recorder.wait(_ENOUGH, round(deadline.left, 2))
         except WaitTimeout:
             if recorder.count < 3:
                 raise
@@ -78,7 +83,11 @@ def hz(topic: str, timeout: float = 5.0) -> str:
 def pub(topic: str, message: str, type: str = "") -> str:  # noqa: A002 - as the command line says
     """Publish one message, once a subscription is there to get it."""
     session = ambient.session()
-    msg_type = load_type(type) if type else type_on(session.observer, _full(topic))
+    msg_type = (
+        load_type(type, kind="msg")
+        if type
+        else type_on(session.observer, full_topic(session.observer, topic))
+    )
     if msg_type is None:
         raise SessionError(
             f"Nobody uses {topic}, so its type is unknown: name it with --type, as in "
@@ -87,11 +96,6 @@ def pub(topic: str, message: str, type: str = "") -> str:  # noqa: A002 - as the
     sent = values.from_text(msg_type, message)
     session.publish(topic, sent)
     return f"Published on {topic}: {values.to_data(sent)}"
-
-
-def _as_yaml(message: Any) -> str:
-    text: str = yaml.safe_dump(values.to_data(message), sort_keys=False, allow_unicode=True)
-    return text
 
 
 def _graph(everything: bool = False) -> Graph:

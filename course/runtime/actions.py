@@ -16,7 +16,7 @@ from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
 from course.errors import WaitTimeout
 from course.runtime import arguments
-from course.runtime.offers import full_service, full_topic, why_no_service
+from course.runtime.offers import full_action, full_topic, why_no_service
 from course.runtime.probe import Probe
 from course.runtime.settle import settle
 from course.runtime.waiting import Deadline, poll
@@ -91,14 +91,19 @@ class GoalRun:
             WaitTimeout: no result within `timeout` seconds.
         """
         timeout = arguments.seconds(timeout)
-        if not poll(lambda: self.done, timeout, self._probe.pulse):
-            raise WaitTimeout(
-                f"The goal on {self.name} has no result after {timeout:g} s; "
-                f"its state is {self.status.name}, with {len(self.feedback)} feedback messages."
-            )
+        with self._probe.explaining():
+            if not self.done_within(timeout):
+                raise WaitTimeout(
+                    f"The goal on {self.name} has no result after {timeout:g} s; "
+                    f"its state is {self.status.name}, with {len(self.feedback)} feedback messages."
+                )
         # Feedback and result come on separate topics: take what arrived before the result.
         settle([self._probe.executor])
         return self.result
+
+    def done_within(self, timeout: float) -> bool:
+        """Return whether the goal is `done`, as soon as it is, or after `timeout` seconds."""
+        return bool(poll(lambda: self.done, timeout, self._probe.pulse))
 
     def cancel(self, timeout: float = 5.0) -> bool:
         """Ask the server to cancel the goal; return whether it agreed.
@@ -113,9 +118,10 @@ class GoalRun:
             return False
         with self._probe.executor.held():  # as in Goals.send
             future = self._handle.cancel_goal_async()
-        response = self._probe.outcome(
-            future, Deadline(timeout), f"{self.name} did not answer the request to cancel"
-        )
+        with self._probe.explaining():
+            response = self._probe.outcome(
+                future, Deadline(timeout), f"{self.name} did not answer the request to cancel"
+            )
         mine = bytes(self._handle.goal_id.uuid)
         return any(bytes(info.goal_id.uuid) == mine for info in response.goals_canceling)
 
@@ -189,7 +195,7 @@ class Goals:
             WaitTimeout: no server, or no answer, within `timeout` seconds.
         """
         probe, deadline = self._probe, Deadline(timeout)
-        service = full_service(probe.node, f"{arguments.text(name, 'The action', '/dock')}{_SEND}")
+        service = f"{full_action(probe.node, name)}{_SEND}"
         action = self._actions.get((action_type, name))
         if action is None:
             action = self._actions[action_type, name] = _Action(probe, action_type, name)

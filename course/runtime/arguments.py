@@ -12,6 +12,8 @@ from rclpy.qos import QoSProfile
 
 from course.errors import SessionError
 
+_MOST = 2**31 - 1
+
 _KINDS = {
     "message": ("msg", "String from std_msgs.msg"),
     "service": ("srv", "Trigger from std_srvs.srv"),
@@ -36,12 +38,14 @@ def whole(value: Any, name: str, least: int, example: int) -> int:
     """Return a whole number.
 
     Raises:
-        SessionError: it is something else, or less than `least`.
+        SessionError: it is something else, less than `least`, or more than ROS can count (31 bits).
     """
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise SessionError(
             f"{name} is a whole number, at least {least}, not {shown(value)}: try {name}={example}."
         )
+    if value > _MOST:
+        raise SessionError(f"{name} is at most {_MOST}, not {shown(value)}: try {name}={example}.")
     return value
 
 
@@ -125,6 +129,19 @@ def ros_type(value: Any, kind: str) -> None:
         was = shown(value)
     article = "an" if kind == "action" else "a"
     raise SessionError(f"The type is {article} {kind} class, such as {example}; it was {was}.")
+
+
+def message(value: Any) -> None:
+    """Check that `value` is a message, not its class.
+
+    Raises:
+        SessionError: it is something else.
+    """
+    if isinstance(value, type) or _kind_of(type(value)) != "message":
+        raise SessionError(
+            "The message is made from its class, as in String(data='hello'); it was "
+            f"{shown(value)}."
+        )
 
 
 def instance(value: Any, wanted: type, what: str) -> None:

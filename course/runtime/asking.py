@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
 from rclpy.qos import QoSProfile
@@ -25,12 +25,21 @@ from course.runtime.waiting import Deadline, poll
 T = TypeVar("T")
 
 
+_MOST_HINTS = 3
+
+
 class Asking(Hosting):
-    """The part of a Session that waits and asks."""
+    """The part of a Session that waits and asks.
+
+    Attributes:
+        explains: whether a wait that times out says what `diagnose` finds. A program that only asks
+            whether something comes, and expects that it may not, switches it off.
+    """
 
     def __init__(self, context: SessionContext, threads: int) -> None:
         """Ask in `context`; see `Hosting`."""
         super().__init__(context, threads)
+        self.explains = True
         self._asking_lock = threading.Lock()
         self._probe_made: Probe | None = None
         self._goals_made: Goals | None = None
@@ -52,7 +61,7 @@ class Asking(Hosting):
         """
         arguments.function(condition, "The condition", "lambda: len(heard) > 3")
         timeout = arguments.seconds(timeout)
-        with self._explaining():
+        with self._explaining(vague=True):
             value = poll(condition, timeout, self._pulse)
             if value is None:
                 raise WaitTimeout(f"Waited {timeout:g} s in vain for {what}.")
@@ -97,8 +106,13 @@ class Asking(Hosting):
         Raises:
             WaitTimeout: nobody subscribes with a QoS that fits, or the topic has another type.
         """
+        arguments.message(message)
+        timeout = arguments.seconds(timeout)
         with self._explaining():
-            self._probe.publish(topic, message, qos, timeout)
+            profile = arguments.qos(qos)
+            if profile is None:
+                profile = QoSProfile(depth=10)
+            self._probe.publish(topic, message, profile, timeout)
 
     def wait_for_service(self, srv_type: Any, name: str, timeout: float = 5.0) -> None:
         """Return when a server of `name` is ready.
@@ -122,6 +136,13 @@ class Asking(Hosting):
         timeout = arguments.seconds(timeout)
         with self._explaining():
             return self._probe.call(srv_type, name, request, timeout)
+
+    def unanswered(self, srv_type: Any, names: Sequence[str], timeout: float = 1.0) -> list[str]:
+        """Return which of these services do not answer to an empty request in time.
+
+        All are asked at the same time, within `timeout` seconds.
+        """
+        return self._probe.unanswered(srv_type, names, timeout) if names else []
 
     def send_goal(
         self,
@@ -161,6 +182,7 @@ class Asking(Hosting):
         *,
         qos: QoSProfile | int | None = None,
         limit: int = 1000,
+        timeout: float = 5.0,
     ) -> Recorder:
         """Record a topic from now on.
 
@@ -169,6 +191,7 @@ class Asking(Hosting):
             msg_type: the message class; None takes the topic's type from the graph.
             qos: the QoS to request; None requests the strongest that every publisher offers now.
             limit: how many messages to keep.
+            timeout: seconds to wait for somebody to give the topic a type, without `msg_type`.
 
         Raises:
             WaitTimeout: `msg_type` is None, and the topic does not appear.
@@ -176,9 +199,10 @@ class Asking(Hosting):
         if msg_type is not None:
             arguments.ros_type(msg_type, "message")
         arguments.whole(limit, "limit", least=1, example=1000)
+        timeout = arguments.seconds(timeout)
         with self._explaining():
             profile = arguments.qos(qos)
-            return Recorder(self._probe, topic, msg_type, profile, limit, self._now_ns)
+            return Recorder(self._probe, topic, msg_type, profile, limit, self._now_ns, timeout)
 
     # Inside.
 
@@ -188,6 +212,7 @@ class Asking(Hosting):
         with self._asking_lock:
             if self._probe_made is None:
                 self._probe_made = Probe(self.context, self._crew, self._pulse)
+                self._probe_made.explaining = self._explaining
             return self._probe_made
 
     def _now_ns(self) -> int | None:
@@ -195,8 +220,13 @@ class Asking(Hosting):
         return None
 
     @contextlib.contextmanager
-    def _explaining(self) -> Iterator[None]:
-        """Add to a WaitTimeout what this session knows about its reasons."""
+    def _explaining(self, *, vague: bool = False) -> Iterator[None]:
+        """Add to a WaitTimeout what this session knows about its reasons.
+
+        Args:
+            vague: its message does not know what was waited for.
+        """
+        told = len(self.notices)
         self.take_back_stolen_nodes()
         known = sum(error.count for error in self.errors)
         try:
@@ -205,6 +235,7 @@ class Asking(Hosting):
             hints = [str(error)]
             if self.closed:
                 hints.append("The session is closed.")
+            hints += self.notices[told:]
             if sum(e.count for e in self.errors) > known:
                 latest = max(self.errors, key=lambda e: e.stamp)
                 hints.append(f"Meanwhile {latest}.")
@@ -216,12 +247,15 @@ class Asking(Hosting):
                     "while it spins; executor.remove_node(node) gives a node back."
                 )
             hints += [str(blocked) for blocked in self._held_up_by()[:2]]
-            if not self.closed:
-                hints += [hint for hint in self._further_hints() if hint not in hints[0]]
+            if self.explains and not self.closed:
+                found = self._further_hints(vague=vague)
+                hints += found[:_MOST_HINTS]
+                if (more := len(found) - _MOST_HINTS) > 0:
+                    hints.append(f"session.diagnose() names {more} more.")
             raise WaitTimeout(" ".join(hints)) from None
 
-    def _further_hints(self) -> list[str]:
-        """Return what else may be the reason that a wait was in vain, a sentence or two each."""
+    def _further_hints(self, *, vague: bool) -> list[str]:
+        """Return what else may be the reason that a wait was in vain, the likeliest first."""
         return []
 
     def _held_up_by(self) -> list[BlockedCallback]:

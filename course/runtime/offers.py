@@ -6,9 +6,12 @@ from __future__ import annotations
 
 import difflib
 import importlib
+import importlib.util
+import re
 from collections.abc import Callable
 from typing import Any
 
+from rclpy.exceptions import NameValidationException
 from rclpy.node import Node
 from rclpy.qos import (
     DurabilityPolicy,
@@ -17,10 +20,13 @@ from rclpy.qos import (
     ReliabilityPolicy,
     qos_check_compatible,
 )
+from rclpy.validate_namespace import validate_namespace
+from rclpy.validate_node_name import validate_node_name
 
-from course.errors import SessionError, WaitTimeout
+from course import plain
+from course.errors import CourseError, SessionError, WaitTimeout
 from course.runtime import arguments
-from course.runtime.names import type_name
+from course.runtime.names import node_name, type_name
 
 
 def full_topic(node: Node, topic: str) -> str:
@@ -42,12 +48,43 @@ def full_service(node: Node, name: str) -> str:
     return _resolved(node.resolve_service_name, name, "service")
 
 
+def full_action(node: Node, name: str) -> str:
+    """Return the action `name` as the graph spells it, seen from `node`.
+
+    Raises:
+        SessionError: it is not a name of an action.
+    """
+    name = arguments.text(name, "The action", "/dock")
+    return _resolved(node.resolve_service_name, name, "action")
+
+
+def full_node(node: Node | str) -> str:
+    """Return the fully qualified name of a node, or of the node of that name.
+
+    Raises:
+        SessionError: it is neither a node nor the name of one.
+    """
+    if isinstance(node, Node):
+        return node_name(node)
+    name = arguments.text(node, "The name of a node", "/camera")
+    name = name if name.startswith("/") else f"/{name}"
+    space, _, last = name.rpartition("/")
+    try:
+        validate_namespace(space or "/")
+        validate_node_name(last)
+    except NameValidationException as error:  # the rule, and then a drawing of where
+        reason = str(error).splitlines()[0].partition(": ")[2].rstrip(":")
+        raise SessionError(f"{plain.shown(node)} is not a node name: {reason}.") from None
+    return name
+
+
 def _resolved(resolve: Callable[[str], str], name: str, kind: str) -> str:
     try:
         return str(resolve(name))
     except RuntimeError as error:  # rclpy's RCLError: the reason, and a place in its C source
         reason = str(error).removeprefix("failed to resolve name: ").partition(", at ")[0]
-        raise SessionError(f"{name!r} is not a {kind} name: {reason}.") from None
+        article = "an" if kind == "action" else "a"
+        raise SessionError(f"{name!r} is not {article} {kind} name: {reason}.") from None
 
 
 def fitting_qos(node: Node, topic: str, depth: int) -> QoSProfile:
@@ -97,7 +134,7 @@ def why_no_message(node: Node, topic: str, msg_type: Any, qos: QoSProfile) -> st
     """Return one sentence that says why a subscription got nothing."""
     publishers = node.get_publishers_info_by_topic(topic)
     if not publishers:
-        return f"Nobody publishes on {topic}{_alike(topic, _published(node))}."
+        return f"{nobody_publishes(node, topic)}."
     require_type(topic, msg_type, [(topic, [info.topic_type for info in publishers])])
     for info in publishers:
         verdict, reason = qos_check_compatible(info.qos_profile, qos)
@@ -110,6 +147,11 @@ def why_no_message(node: Node, topic: str, msg_type: Any, qos: QoSProfile) -> st
         f"{count} publisher{'s' if count > 1 else ''} on {topic} with a QoS that fits, "
         "but nothing was published while we listened."
     )
+
+
+def nobody_publishes(node: Node, topic: str) -> str:
+    """Return that nobody does, and the topic that may have been meant, as part of a sentence."""
+    return f"Nobody publishes on {topic}{_alike(topic, _published(node))}"
 
 
 def why_no_service(node: Node, name: str, srv_type: Any) -> str:
@@ -135,26 +177,64 @@ def _reasons(reason: str) -> list[str]:
     return [p.removeprefix("ERROR:") for p in parts if p.startswith("ERROR:")] or [reason]
 
 
-def load_type(name: str, topic: str = "") -> Any:
+def load_type(name: str, who: str = "", kind: str = "") -> Any:
     """Return the class of an interface such as ``std_msgs/msg/String``.
 
     Args:
         name: package, kind and name; the kind may be left out for a message.
-        topic: who needs it, for the error.
+        who: the topic or service that needs it, for the error.
+        kind: "msg", "srv" or "action", if nothing else will do.
 
     Raises:
-        SessionError: it is not installed here, or that is no name of an interface.
+        SessionError: that is no name of an interface, of another kind, or not installed here.
     """
-    parts = name.split("/")
-    package, kind, cls = parts if len(parts) == 3 else (parts[0], "msg", parts[-1])
-    try:
-        return getattr(importlib.import_module(f"{package}.{kind}"), cls)
-    except (ImportError, AttributeError, ValueError):
-        why = (
-            f"{topic} carries {name}, which is not installed here"
-            if topic
-            else (f"There is no {name} here")
-        )
+    found = _TYPE_NAME.fullmatch(name)
+    if found is None:
         raise SessionError(
-            f"{why}: install its package, or define it with `%%interface {name}`."
-        ) from None
+            f"{plain.shown(name)} is not the name of an interface: write package/kind/Name, as in "
+            f"{_EXAMPLES[kind or 'msg']}."
+        )
+    package, actual, cls = found["package"], found["kind"] or "msg", found["name"]
+    if kind and actual != kind:
+        raise SessionError(f"{name} is no {kind} type: name one such as {_EXAMPLES[kind]}.")
+    try:
+        # An interface package is a folder: a file of the learner's that has its name stays unread.
+        spec = importlib.util.find_spec(package)
+        if spec is not None and spec.submodule_search_locations is not None:
+            interface = _member(importlib.import_module(f"{package}.{actual}"), cls)
+            if any(hasattr(interface, part) for part in _PARTS):
+                return interface
+    except CourseError:
+        raise  # a package of the learner's own that is not built yet: it says what to do
+    except (ImportError, AttributeError, ValueError):
+        pass
+    why = (
+        f"{who} carries {name}, which is not installed here" if who else f"There is no {name} here"
+    )
+    raise SessionError(
+        f"{why}: install its package, or define it with `%%interface {package}/{actual}/{cls}`."
+    )
+
+
+def _member(module: Any, name: str) -> Any:
+    """Return an interface of a module, or a part of one, as ``Fibonacci_FeedbackMessage`` is."""
+    found = getattr(module, name, None)
+    if found is not None:
+        return found
+    first, *parts = name.split("_")
+    found = getattr(module, first)
+    for part in parts:
+        holder = found if hasattr(found, part) else getattr(found, "Impl", found)
+        found = getattr(holder, part, None) or getattr(holder, f"{part}Service")
+    return found
+
+
+_TYPE_NAME = re.compile(
+    r"(?P<package>[A-Za-z][A-Za-z0-9_]*)/(?:(?P<kind>msg|srv|action)/)?(?P<name>[A-Za-z][A-Za-z0-9_]*)"
+)
+_EXAMPLES = {
+    "msg": "std_msgs/msg/String",
+    "srv": "std_srvs/srv/SetBool",
+    "action": "example_interfaces/action/Fibonacci",
+}
+_PARTS = ("get_fields_and_field_types", "Request", "Goal")

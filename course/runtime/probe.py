@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from typing import Any
 
 from rclpy.client import Client
@@ -31,18 +32,21 @@ from course.runtime.offers import (
 from course.runtime.waiting import Deadline, Pulse, poll
 
 _LISTEN_DEPTH = 1000
+_LONGEST = 1e9  # s: a Duration counts nanoseconds in 64 bits
 
 
 class Probe:
     """Subscribes, calls services and sends goals without disturbing the session's own nodes.
 
     It has its own single-threaded executor: a callback that blocks cannot keep it from listening.
-    The leading underscore of its name makes the ROS tools hide it.
+    The leading underscore of its name makes the ROS tools hide it. What waits on its own, as a
+    recorder does, waits in a block of `explaining`, so that the session can say why it was in vain.
     """
 
     def __init__(self, context: Context, crew: Crew, pulse: Pulse) -> None:
         """Make the hidden node in `context`."""
         self.pulse = pulse
+        self.explaining: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext
         self.node = Node(
             f"_course_{os.getpid()}_{id(self):x}",
             context=context,
@@ -92,7 +96,7 @@ class Probe:
         reason = why_no_message(self.node, topic, msg_type, better)
         raise WaitTimeout(f"No message on {topic} in {timeout:g} s. {reason}")
 
-    def publish(self, topic: str, message: Any, qos: QoSProfile | int, timeout: float) -> None:
+    def publish(self, topic: str, message: Any, qos: QoSProfile, timeout: float) -> None:
         """Publish one message as soon as a subscription matches; see `Session.publish`."""
         topic = full_topic(self.node, topic)
         require_type(topic, type(message), self.node.get_topic_names_and_types())
@@ -104,7 +108,7 @@ class Probe:
                     f"in {timeout:g} s."
                 )
             publisher.publish(message)
-            publisher.wait_for_all_acked(Duration(seconds=timeout))
+            publisher.wait_for_all_acked(Duration(seconds=min(timeout, _LONGEST)))
         finally:
             with self.executor.held():
                 self.node.destroy_publisher(publisher)
@@ -137,6 +141,25 @@ class Probe:
             return self.outcome(
                 future, deadline, f"The service {client.service_name} did not answer"
             )
+
+    def unanswered(self, srv_type: Any, names: Sequence[str], timeout: float) -> list[str]:
+        """Return the services that do not answer in time; see `Session.unanswered`."""
+        clients = {name: self.node.create_client(srv_type, name) for name in names}
+        futures: dict[str, Future] = {}
+
+        def all_answered() -> bool:
+            for name, client in clients.items():
+                if name not in futures and client.service_is_ready():
+                    futures[name] = client.call_async(srv_type.Request())
+            done = [name for name, future in futures.items() if future.done()]
+            return len(done) == len(clients)
+
+        try:
+            poll(all_answered, timeout, self.pulse)
+            return [name for name in names if name not in futures or not futures[name].done()]
+        finally:
+            for client in clients.values():
+                self.drop(client)
 
     def outcome(self, future: Future, deadline: Deadline, complaint: str) -> Any:
         """Return the result of `future`.

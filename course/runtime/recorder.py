@@ -15,11 +15,9 @@ from rclpy.qos import QoSProfile
 from course.errors import WaitTimeout
 from course.runtime import arguments
 from course.runtime.names import type_name
-from course.runtime.offers import fitting_qos, full_topic, type_on, why_no_message
+from course.runtime.offers import fitting_qos, full_topic, nobody_publishes, type_on, why_no_message
 from course.runtime.probe import Probe
 from course.runtime.waiting import poll
-
-_TYPE_TIMEOUT = 5.0  # s to wait for somebody to give the topic a type
 
 
 class Stamped(NamedTuple):
@@ -46,12 +44,16 @@ class Recorder:
         qos: QoSProfile | None,
         limit: int,
         now_ns: Callable[[], int | None],
+        timeout: float,
     ) -> None:
-        """Record through `probe`; `now_ns` is simulated time, or None without it."""
+        """Record through `probe`; `now_ns` is simulated time, or None without it.
+
+        Without `msg_type`, wait `timeout` seconds for somebody to give the topic one.
+        """
         self._probe = probe
         self._now_ns = now_ns
         self.topic = full_topic(probe.node, topic)
-        self.msg_type = msg_type or self._wait_for_type()
+        self.msg_type = msg_type or self._wait_for_type(timeout)
         self.qos = qos or fitting_qos(probe.node, self.topic, limit)
         self._kept: deque[Stamped] = deque(maxlen=limit)
         self._count = 0
@@ -80,12 +82,14 @@ class Recorder:
             WaitTimeout: fewer arrived within `timeout` seconds; it says why if none did.
         """
         n, timeout = arguments.whole(n, "n", least=0, example=1), arguments.seconds(timeout)
-        if poll(lambda: self._count >= n, timeout, self._probe.pulse):
-            return self.messages
-        message = f"{self._count} of {n} messages arrived on {self.topic} in {timeout:g} s."
-        if not self._count:
-            message += " " + why_no_message(self._probe.node, self.topic, self.msg_type, self.qos)
-        raise WaitTimeout(message)
+        with self._probe.explaining():
+            if poll(lambda: self._count >= n, timeout, self._probe.pulse):
+                return self.messages
+            message = f"{self._count} of {n} messages arrived on {self.topic} in {timeout:g} s."
+            if not self._count:
+                node = self._probe.node
+                message += f" {why_no_message(node, self.topic, self.msg_type, self.qos)}"
+            raise WaitTimeout(message)
 
     def rate(self) -> float:
         """Return the mean rate of the kept messages in Hz; 0.0 with fewer than two of them."""
@@ -107,6 +111,8 @@ class Recorder:
         """
         from course import mcap_file
 
+        if not isinstance(path, Path):
+            path = arguments.text(path, "The path", "scan.mcap")
         return mcap_file.write(Path(path), {self.topic: (self.msg_type, self.messages)})
 
     def stop(self) -> None:
@@ -133,13 +139,12 @@ class Recorder:
             self._kept.append(Stamped(stamp, message))
             self._count += 1
 
-    def _wait_for_type(self) -> Any:
-        found = poll(
-            lambda: type_on(self._probe.node, self.topic), _TYPE_TIMEOUT, self._probe.pulse
-        )
+    def _wait_for_type(self, timeout: float) -> Any:
+        found = poll(lambda: type_on(self._probe.node, self.topic), timeout, self._probe.pulse)
         if found is None:
+            nobody = nobody_publishes(self._probe.node, self.topic)
             raise WaitTimeout(
-                f"Nobody publishes on {self.topic}, so its type is unknown: "
-                "name it, as in record(topic, String)."
+                f"{nobody}, so after {timeout:g} s its type is still unknown: name it, as in "
+                "record(topic, String)."
             )
         return found

@@ -14,8 +14,9 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from course.errors import SessionError
+from course.runtime import arguments
 from course.runtime.asking import Asking
-from course.runtime.offers import load_type
+from course.runtime.offers import full_action, full_node, full_service, load_type
 
 if TYPE_CHECKING:
     from course.diagnosis import Diagnosis
@@ -94,7 +95,10 @@ class Showing(Asking):
         """
         from course.views.service import ServiceConsole
 
-        full = str(self.observer.resolve_service_name(name))
+        if srv_type is not None:
+            arguments.ros_type(srv_type, "service")
+        timeout = arguments.seconds(timeout)
+        full = full_service(self.observer, name)
         known = self.observer.get_service_names_and_types()
         found = srv_type or self._type_of("service", full, known)
         return ServiceConsole(self._me, found, full, timeout)
@@ -111,7 +115,9 @@ class Showing(Asking):
         """
         from course.views.action import ActionView
 
-        full = str(self.observer.resolve_service_name(name))
+        if action_type is not None:
+            arguments.ros_type(action_type, "action")
+        full = full_action(self.observer, name)
         known = get_action_names_and_types(self.observer)
         found = action_type or self._type_of("action", full, known)
         return ActionView(self._me, found, full)
@@ -126,8 +132,7 @@ class Showing(Asking):
         from course.views.parameters import ParameterPanel
 
         self._require_open()
-        name = node if isinstance(node, str) else node.get_fully_qualified_name()
-        return ParameterPanel(self._me, name if name.startswith("/") else f"/{name}")
+        return ParameterPanel(self._me, full_node(node))
 
     def timeline(self, *topics: str | tuple[str, Any], window: float = 10.0) -> Timeline:
         """Return a live view of when messages were published, received and worked on.
@@ -143,7 +148,7 @@ class Showing(Asking):
         from course.views.timeline import Timeline
 
         self._require_open()
-        named = [(topic, None) if isinstance(topic, str) else topic for topic in topics]
+        named = [_named(topic) for topic in topics]
         return Timeline(self._me, named, window)
 
     def qos_lab(
@@ -187,16 +192,14 @@ class Showing(Asking):
         """Return the names of paused nodes."""
         return [resident.name for resident in self._residents.all() if resident.paused]
 
-    def _further_hints(self) -> list[str]:
-        from course.diagnosis import quick
+    def _further_hints(self, *, vague: bool) -> list[str]:
+        from course.diagnosis import likely
 
-        # A wait tells of stuck callbacks and nodes taken away by itself: this is what is left.
-        telling = [
-            finding
-            for finding in quick(self._me)
-            if finding.name in ("QoS", "type", "name") or "nobody spins it" in finding.message
-        ]
-        return [f"{finding.message} {finding.mend}" for finding in telling[:2]]
+        try:
+            found = likely(self._me, vague=vague)
+        except Exception:  # noqa: BLE001 - the session may end meanwhile; the wait has its own error
+            return []
+        return [f"{finding.message} {finding.mend}" for finding in found]
 
     @property
     def _me(self) -> Session:
@@ -208,4 +211,18 @@ class Showing(Asking):
             close = difflib.get_close_matches(name, types, n=1)
             guess = f" Is it {close[0]}?" if close else ""
             raise SessionError(f"Nobody offers the {what} {name}, so its type is unknown.{guess}")
-        return load_type(types[name][0], name)
+        return load_type(types[name][0], name, "srv" if what == "service" else what)
+
+
+def _named(topic: Any) -> tuple[str, Any | None]:
+    """Return the name of a topic and, if it was given, its message class.
+
+    Raises:
+        SessionError: it is neither a name nor such a pair.
+    """
+    if not isinstance(topic, tuple) or len(topic) != 2:
+        return arguments.text(topic, "A topic", "/scan"), None
+    name, msg_type = topic
+    if msg_type is not None:
+        arguments.ros_type(msg_type, "message")
+    return arguments.text(name, "A topic", "/scan"), msg_type

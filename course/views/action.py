@@ -6,8 +6,8 @@ from dataclasses import asdict
 from typing import Any
 
 from course.errors import CourseError
+from course.plain import one_line
 from course.runtime.session import Session
-from course.values import one_line
 from course.views.live import Frame, LiveView
 from course.watch import forms
 from course.watch.goals import Goal, GoalBoard

@@ -7,8 +7,11 @@ from dataclasses import asdict
 from typing import Any
 
 from course.errors import CourseError
+from course.plain import for_json, one_line
+from course.runtime import arguments
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
+from course.watch.parameter_values import ParameterError
 from course.watch.parameters import Entry, ParameterSheet
 
 ASK_TIMEOUT = 2.0
@@ -49,22 +52,22 @@ class ParameterPanel(LiveView):
             ParameterError: the node refused, for the reason in the message; or no such value.
             WaitTimeout: the node does not answer.
         """
-        self._sheet.set(name, value)
+        self._sheet.set(arguments.text(name, "The name of a parameter", "speed"), value)
         self._entries = self._sheet.entries()
 
     def control(self, message: dict[str, Any]) -> None:
         """Change a parameter as typed."""
         if not isinstance(message.get("set"), str):
             return
-        problem = ""
+        problem, entries = "", self._entries
         try:
-            self._sheet.set(message["set"], message.get("value"), ASK_TIMEOUT)
-        except CourseError as error:
-            problem = str(error)
-        try:
+            try:
+                self._sheet.set(message["set"], message.get("value"), ASK_TIMEOUT)
+            except ParameterError as error:
+                problem = str(error)
             entries = self._sheet.entries(ASK_TIMEOUT)
-        except CourseError:
-            entries = self._entries
+        except CourseError as error:  # it does not answer: asking again would only take longer
+            problem = problem or str(error)
         with self._lock:
             self._entries, self._problem, self._changes = entries, problem, self._changes + 1
 
@@ -75,7 +78,7 @@ class ParameterPanel(LiveView):
             problem, changes = self._problem or self._silent, self._changes
         return {
             "title": f"Parameters of {self._sheet.node}",
-            "entries": [asdict(entry) for entry in self._entries],
+            "entries": [_shown(entry) for entry in self._entries],
             "problem": problem,
             "changes": changes,
         }
@@ -105,5 +108,13 @@ class ParameterPanel(LiveView):
         for entry in self._entries:
             limits = f" ({entry.least:g} to {entry.most:g})" if entry.least is not None else ""
             about = f"  # {entry.description}" if entry.description else ""
-            lines.append(f"  {entry.name}: {entry.value}{limits}{about}")
+            value = "not set" if entry.value is None else one_line(entry.value)
+            lines.append(f"  {entry.name}: {value}{limits}{about}")
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
+
+
+def _shown(entry: Entry) -> Frame:
+    """Return what the browser draws: a list as the YAML that is typed to change it."""
+    value = entry.value
+    shown: Frame = for_json(asdict(entry))
+    return shown | {"value": one_line(value)} if isinstance(value, list) else shown

@@ -6,11 +6,16 @@ from dataclasses import asdict
 from typing import Any
 
 from course.errors import CourseError
+from course.plain import for_json, one_line
 from course.runtime.session import Session
-from course.values import one_line
 from course.views.live import Frame, LiveView
 from course.watch import forms
 from course.watch.calls import Call, Calls
+
+LONGEST = 4000
+"""Characters of an answer that are shown; ``calls`` has the rest."""
+
+_CUT = " … (cut: see .calls)"
 
 
 class ServiceConsole(LiveView):
@@ -56,16 +61,31 @@ class ServiceConsole(LiveView):
             "title": f"Service {self._model.name}",
             "fields": [asdict(field) for field in forms.fields(self._model.srv_type.Request)],
             "problem": self._problem,
-            "calls": [asdict(call) | {"time": _time(call)} for call in self.calls],
+            "calls": [_shown(call) for call in self.calls],
         }
 
     def words(self) -> str:
         """Return the calls as text."""
         lines = [f"Service {self._model.name}, {len(self.calls)} calls"]
         for call in self.calls:
-            outcome = "waiting" if call.waiting else call.problem or one_line(call.answer)
-            lines.append(f"  {call.number}: {one_line(call.request)} -> {outcome}")
+            outcome = "waiting" if call.waiting else call.problem or _text(call.answer)
+            lines.append(f"  {call.number}: {_text(call.request)} -> {outcome}")
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
+
+
+def _shown(call: Call) -> Frame:
+    """Return what the browser draws of a call: ten long answers must still fit into a frame."""
+    shown: Frame = for_json(asdict(call))
+    for part in ("request", "answer"):
+        if shown[part] is not None:
+            text = _text(shown[part])
+            shown[part] = {"cut": text} if text.endswith(_CUT) else shown[part]
+    return shown | {"time": _time(call)}
+
+
+def _text(data: Frame | None) -> str:
+    text = one_line(data)
+    return text if len(text) <= LONGEST else text[:LONGEST] + _CUT
 
 
 def _time(call: Call) -> str:

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import yaml
 from rosidl_parser.definition import AbstractString, AbstractWString, BasicType, NamespacedType
 
-from course import values
+from course import plain, values
+from course.runtime.names import type_name
 
 MAX_FIELDS = 60
 """Inputs that a form has at most; what a larger type nests deeper is typed as YAML."""
@@ -38,16 +38,21 @@ def message(msg_type: Any, typed: Mapping[str, Any]) -> Any:
     """Return a message of what was typed into the inputs, by path; what is missing is default.
 
     Raises:
-        MisfitError: a text that does not fit its field; the message names it.
+        MisfitError: there is no such input, or a text does not fit its field; the message names
+            it.
     """
+    known = {field.path: field for field in fields(msg_type)}
     data: dict[str, Any] = {}
-    for field in fields(msg_type):
-        if field.path in typed:
-            *above, last = field.path.split(".")
-            place = data
-            for name in above:
-                place = place.setdefault(name, {})
-            place[last] = _parsed(field, typed[field.path])
+    for path, value in typed.items():
+        if path not in known:
+            raise values.MisfitError(
+                f"{type_name(msg_type)} has no field {path!r}: it has {', '.join(known) or 'none'}."
+            )
+        *above, last = path.split(".")
+        place = data
+        for name in above:
+            place = place.setdefault(name, {})
+        place[last] = _parsed(known[path], value)
     return values.from_data(msg_type, data)
 
 
@@ -72,19 +77,20 @@ def _field(slot: Any, value: Any, path: str) -> Field:
     if isinstance(slot, BasicType):
         if slot.typename == "boolean":
             return Field(path, takes, "checkbox", "true" if value else "false")
-        plain = value[0] if isinstance(value, bytes) else value
-        return Field(path, takes, "number", f"{plain}")
-    plain = values.to_data(value) if isinstance(slot, NamespacedType) else list(value)
-    text = yaml.safe_dump(plain, default_flow_style=True, width=10**6)
-    return Field(path, takes, "yaml", text.strip())
+        return Field(path, takes, "number", plain.one_line(values.to_plain(value)))
+    return Field(path, takes, "yaml", plain.one_line(values.to_plain(value, None)))
 
 
 def _parsed(field: Field, typed: Any) -> Any:
-    if field.kind == "checkbox":
-        return typed in (True, "true")
+    """Return what was typed as plain data; what is no text has been given by a program."""
+    if not isinstance(typed, str):
+        return typed
     if field.kind == "text":
-        return str(typed)
+        return typed
     try:
-        return yaml.safe_load(str(typed))
-    except yaml.YAMLError:
-        raise values.MisfitError(f"{field.path} takes {field.takes}, not {typed!r}.") from None
+        read = plain.read(typed)
+    except ValueError:
+        read = None
+    if read is None:
+        raise values.MisfitError(f"{field.path} takes {field.takes}, not {plain.shown(typed)}.")
+    return read

@@ -128,9 +128,9 @@ class GoalBoard:
     def _await(self, run: GoalRun, kept: Goal) -> None:
         while not self._session.closed:
             try:
-                result = run.wait(timeout=1.0)
-            except CourseError:
-                continue  # not yet
+                if not run.done_within(1.0):
+                    continue
+                result = run.wait()
             except Exception:  # noqa: BLE001 - the session has ended
                 return
             kept.result = values.to_data(result) if result is not None else None

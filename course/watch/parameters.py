@@ -4,20 +4,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
-import yaml
+from rcl_interfaces.msg import Parameter, ParameterDescriptor, ParameterType, ParameterValue
 from rcl_interfaces.srv import (
     DescribeParameters,
     GetParameters,
+    GetParameterTypes,
     ListParameters,
     SetParameters,
 )
-from rclpy.parameter import Parameter, parameter_value_to_python
 
-from course.errors import CourseError
+from course import plain
 from course.runtime.session import Session
+from course.watch.parameter_values import ParameterError, RefusedError, to_plain, to_value
 
 _HIDDEN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 
@@ -26,7 +28,8 @@ _HIDDEN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 class Entry:
     """One parameter; ``least``, ``most`` and ``step`` are None without a range in its descriptor.
 
-    ``kind`` is "checkbox", "slider", "number", "text" or "yaml".
+    ``value`` is plain data, or None while it has none. ``kind`` is "checkbox", "slider", "number",
+    "text" or "yaml".
     """
 
     name: str
@@ -39,10 +42,6 @@ class Entry:
     read_only: bool = False
 
 
-class ParameterError(CourseError):
-    """A parameter that cannot be changed as asked; the message has the node's own reason."""
-
-
 class ParameterSheet:
     """The parameters of one node, over its parameter services."""
 
@@ -51,46 +50,80 @@ class ParameterSheet:
         self.node = node
         self._session = session
 
-    def entries(self, timeout: float = 5.0) -> list[Entry]:
-        """Return the parameters as they are now, by name.
+    def names(self, timeout: float = 5.0) -> list[str]:
+        """Return the names of all parameters, sorted.
 
         Raises:
             WaitTimeout: the node has no parameter services, or does not answer.
         """
         found = self._call(ListParameters, ListParameters.Request(), timeout).result.names
-        names = sorted(name for name in found if not name.startswith(_HIDDEN))
-        if not names:
-            return []
-        got = self._call(GetParameters, GetParameters.Request(names=names), timeout).values
-        described = self._call(
-            DescribeParameters, DescribeParameters.Request(names=names), timeout
-        ).descriptors
-        return [
-            _entry(name, parameter_value_to_python(value), descriptor)
-            for name, value, descriptor in zip(names, got, described, strict=True)
-        ]
+        return sorted(found)
+
+    def entries(self, timeout: float = 5.0) -> list[Entry]:
+        """Return the parameters as they are now, by name; without those that ROS adds itself.
+
+        Raises:
+            WaitTimeout: the node has no parameter services, or does not answer.
+        """
+        names = [name for name in self.names(timeout) if not name.startswith(_HIDDEN)]
+        described = self._descriptors(names, timeout)
+        held = self._values([name for name in names if name in described], timeout)
+        return [_entry(name, to_plain(value), described[name]) for name, value in held.items()]
+
+    def get(self, name: str, timeout: float = 5.0) -> Any:
+        """Return a parameter's value as plain data; None while it has none.
+
+        Raises:
+            ParameterError: there is no such parameter.
+            WaitTimeout: the node does not answer.
+        """
+        self._require(name, timeout)
+        return to_plain(self._values([name], timeout)[name])
 
     def set(self, name: str, typed: Any, timeout: float = 5.0) -> None:
         """Change a parameter to what was typed (text is read as YAML).
 
         Raises:
-            ParameterError: the node refused it, for the reason in the message; or no such value.
+            RefusedError: the node refused it, for the reason in the message.
+            ParameterError: there is no such parameter, or it does not take such a value.
             WaitTimeout: the node does not answer.
         """
-        entry = next((e for e in self.entries(timeout) if e.name == name), None)
-        if entry is None:
-            raise ParameterError(f"{self.node} has no parameter {name!r}.")
-        try:
-            value = _typed(entry, typed)
-            parameter = Parameter(name, value=value).to_parameter_msg()
-        except (TypeError, ValueError, yaml.YAMLError):
-            raise ParameterError(f"{name} takes {_takes(entry)}, not {typed!r}.") from None
-        request = SetParameters.Request(parameters=[parameter])
+        value = to_value(name, typed, self._require(name, timeout).type)
+        request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
         (result,) = self._call(SetParameters, request, timeout).results
         if not result.successful:
-            raise ParameterError(
-                f"{self.node} refused {name} = {value!r}: {result.reason or 'it gave no reason'}"
-            )
+            shown = plain.one_line(to_plain(value))
+            reason = " ".join(result.reason.split()) or "it gave no reason"
+            raise RefusedError(f"{self.node} refused {name} = {shown}: {reason}")
+
+    def _require(self, name: str, timeout: float) -> ParameterDescriptor:
+        found = self._descriptors([name], timeout).get(name)
+        if found is None:
+            known = ", ".join(self.names(timeout)) or "none"
+            raise ParameterError(f"{self.node} has no parameter {name!r}: it has {known}.")
+        return found
+
+    def _descriptors(self, names: list[str], timeout: float) -> dict[str, ParameterDescriptor]:
+        request = DescribeParameters.Request(names=names)
+        found = self._call(DescribeParameters, request, timeout).descriptors if names else []
+        if len(found) != len(names) > 1:  # one of them has gone, so rclpy tells of none
+            return {k: v for name in names for k, v in self._descriptors([name], timeout).items()}
+        for descriptor in found:
+            if descriptor.dynamic_typing:
+                descriptor.type = ParameterType.PARAMETER_NOT_SET  # it takes any
+        return dict(zip(names, found, strict=False))
+
+    def _values(self, names: list[str], timeout: float) -> dict[str, ParameterValue]:
+        asked = names
+        found = self._call(GetParameters, GetParameters.Request(names=asked), timeout).values
+        if len(found) != len(asked):  # one of them has no value yet, so rclpy tells of none
+            request = GetParameterTypes.Request(names=names)
+            types = self._call(GetParameterTypes, request, timeout).types
+            asked = [name for name, type_ in zip(names, types, strict=False) if type_]
+            request = GetParameters.Request(names=asked)
+            found = self._call(GetParameters, request, timeout).values
+        held = dict(zip(asked, found, strict=False))
+        return {name: held.get(name, ParameterValue()) for name in names}
 
     def _call(self, srv_type: Any, request: Any, timeout: float) -> Any:
         # ListParameters -> list_parameters, as every node names its parameter services.
@@ -101,32 +134,28 @@ class ParameterSheet:
 def _entry(name: str, value: Any, descriptor: Any) -> Entry:
     ranges = [*descriptor.floating_point_range, *descriptor.integer_range]
     limits = ranges[0] if ranges else None
-    if isinstance(value, bool):
+    like = type(value) if value is not None else _LIKE.get(descriptor.type)
+    if like is bool:
         kind = "checkbox"
-    elif isinstance(value, int | float):
-        kind = "slider" if limits else "number"
+    elif like in (int, float):
+        kind = "slider" if limits and value is not None and _drawable(limits) else "number"
     else:
-        kind = "text" if isinstance(value, str) else "yaml"
-    plain = value if value is None or isinstance(value, bool | int | float | str) else list(value)
+        kind = "text" if like is str else "yaml"
     least, most, step = (
         (limits.from_value, limits.to_value, limits.step or None) if limits else (None, None, None)
     )
-    return Entry(name, plain, kind, descriptor.description, least, most, step, descriptor.read_only)
+    return Entry(name, value, kind, descriptor.description, least, most, step, descriptor.read_only)
 
 
-def _typed(entry: Entry, typed: Any) -> Any:
-    if isinstance(entry.value, bool):
-        return typed in (True, "true")
-    if isinstance(entry.value, str):
-        return str(typed)
-    value = yaml.safe_load(typed) if isinstance(typed, str) else typed
-    if isinstance(entry.value, float):
-        return float(value)
-    if isinstance(entry.value, int) and (isinstance(value, bool) or int(value) != value):
-        raise ValueError(value)
-    return int(value) if isinstance(entry.value, int) else value
+def _drawable(limits: Any) -> bool:
+    """Return whether a slider can have these ends: not infinity, nor what a browser rounds."""
+    ends = (limits.from_value, limits.to_value)
+    return all(math.isfinite(end) and plain.for_json(end) == end for end in ends)
 
 
-def _takes(entry: Entry) -> str:
-    names = {bool: "true or false", int: "a whole number", float: "a number", str: "text"}
-    return names.get(type(entry.value), "a list")
+_LIKE = {
+    ParameterType.PARAMETER_BOOL: bool,
+    ParameterType.PARAMETER_INTEGER: int,
+    ParameterType.PARAMETER_DOUBLE: float,
+    ParameterType.PARAMETER_STRING: str,
+}

@@ -213,3 +213,35 @@ def test_an_action_that_is_not_there_is_one_sentence(any_session):
     any_session.run(Counter)
     with pytest.raises(WaitTimeout, match=r"count_up was not ready.*Nobody offers /count_up"):
         any_session.send_goal(Fibonacci, "count_up", Fibonacci.Goal(order=1), timeout=0.1)
+
+
+@pytest.mark.parametrize(
+    ("ask", "sentence"),
+    [
+        (lambda s: s.publish("x", 5), "The message is made from its class"),
+        (lambda s: s.publish("x", String), "The message is made from its class"),
+        (lambda s: s.publish("x", SetBool.Request()), "The message is made from its class"),
+        (lambda s: s.publish("x", String(), qos="a"), "qos is a whole number"),
+        (lambda s: s.publish("x", String(), qos=0), "qos is a whole number, at least 1"),
+        (lambda s: s.publish("x", String(), timeout="a"), "timeout is a number of seconds"),
+        (lambda s: s.record("x", String, qos=2**40), "qos is at most 2147483647"),
+        (lambda s: s.record("x", String, limit=2**70), "limit is at most 2147483647"),
+        (lambda s: s.record("x", timeout=-1), "timeout is a number of seconds, 0 or more"),
+        (lambda s: s.record("x", String).save(5), "The path is a string, such as 'scan.mcap'"),
+        (lambda s: s.send_goal(Fibonacci, "1 bad", Fibonacci.Goal()), "'1 bad' is not an action"),
+        (lambda s: s.send_goal(Fibonacci, "", Fibonacci.Goal()), "'' is not an action name"),
+        (lambda s: s.timeline(("x", 5)), "The type is a message class"),
+        (lambda s: s.timeline(("x", String, 5)), "A topic is a string, such as '/scan', not"),
+        (lambda s: s.timeline(5), "A topic is a string, such as '/scan', not 5."),
+    ],
+)
+def test_what_cannot_be_asked_is_a_sentence(session, ask, sentence):
+    with pytest.raises(course.SessionError) as caught:
+        ask(session)
+    assert sentence in str(caught.value)
+
+
+def test_a_wait_without_end_publishes_all_the_same(session):
+    with session.record("words", String) as recorder:
+        session.publish("words", String(data="now"), timeout=float("inf"))
+        assert recorder.wait(1)[0].message.data == "now"

@@ -60,9 +60,9 @@ function row(entry, id, send) {
       if (document.activeElement === input && (changes < awaited || (answered === changes && !slider))) return;
       if (input.type === "checkbox") input.checked = value === true;
       else if (document.activeElement !== input || !slider || !input.matches(":active")) {
-        input.value = Array.isArray(value) ? `[${value.join(", ")}]` : String(value ?? "");
+        input.value = String(value ?? "");
       }
-      shown.textContent = String(value);
+      shown.textContent = String(value ?? "");
     },
   };
 }

@@ -15,17 +15,34 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
+from test_msgs.action import Fibonacci
 from test_msgs.msg import Empty
 
 from course import Session
 from course.diagnosis import Diagnosis
 from course.errors import WaitTimeout
 from course.graph import reader
+from tests.robot import Robot
+
+
+@pytest.fixture(autouse=True)
+def _no_domain_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
 
 
 def about(found: Diagnosis, name: str) -> str:
     """Return the findings of that name as one text."""
     return "\n".join(finding.text() for finding in found if finding.name == name)
+
+
+def in_vain(session: Session) -> str:
+    """Return what a wait says that times out now, knowing nothing of what it waits for."""
+    with pytest.raises(WaitTimeout) as caught:
+        session.until(lambda: False, timeout=0)
+    text = str(caught.value)
+    assert text.startswith("Waited 0 s in vain for the condition.")
+    assert "\n" not in text
+    return text
 
 
 def talker(qos: object = 10, topic: str = "scan", name: str = "talker") -> Node:
@@ -40,14 +57,12 @@ def listener(topic: str = "scan") -> Node:
     return node
 
 
-def test_where_nothing_is_wrong_nothing_is_found(
-    session: Session, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+def test_where_nothing_is_wrong_nothing_is_found(session: Session) -> None:
     session.run(talker)
     session.run(listener)
     session.until(lambda: len(session.diagnose()) == 0)
     assert repr(session.diagnose()) == "Nothing is wrong that can be seen from here."
+    assert in_vain(session) == "Waited 0 s in vain for the condition."
 
 
 def test_nobody_publishes_and_a_name_is_nearly_right(session: Session) -> None:
@@ -57,6 +72,8 @@ def test_nobody_publishes_and_a_name_is_nearly_right(session: Session) -> None:
     text = about(session.diagnose(), "topic")
     assert "/listener reads /scna, and nobody publishes on it (is it /scan?)." in text
     assert "/talker publishes on /scan, and nobody reads it (is it /scna?)." in text
+    said = in_vain(session)
+    assert "/listener reads /scna, and nobody publishes on it (is it /scan?). Start the" in said
 
 
 def test_qos_that_does_not_fit(session: Session) -> None:
@@ -66,6 +83,7 @@ def test_qos_that_does_not_fit(session: Session) -> None:
     text = about(session.diagnose(), "QoS")
     assert "offers BEST_EFFORT, requests RELIABLE" in text
     assert "-> Offer RELIABLE, or request BEST_EFFORT." in text
+    assert "do not connect on /scan: reliability" in in_vain(session)
 
 
 def test_a_type_that_differs(session: Session) -> None:
@@ -75,6 +93,7 @@ def test_a_type_that_differs(session: Session) -> None:
         node.create_publisher(Empty, "scan", 10)
         session.until(lambda: about(session.diagnose(), "type"))
         assert "One topic carries one type" in about(session.diagnose(), "type")
+        assert "One topic carries one type" in in_vain(session)
 
 
 def test_a_deadlock_is_named_with_its_line(session: Session) -> None:
@@ -91,6 +110,9 @@ def test_a_deadlock_is_named_with_its_line(session: Session) -> None:
     assert "Deadlock: it waits for the answer of lamp" in text
     assert "client.call(SetBool.Request(), timeout_sec=8)" in text
     assert "call_async()" in text
+    said = in_vain(session)
+    assert said.count("Deadlock: it waits for the answer of lamp") == 1
+    assert "client.call(SetBool.Request(), timeout_sec=8)" in said
 
 
 def test_a_node_that_nobody_spins(session: Session) -> None:
@@ -100,8 +122,7 @@ def test_a_node_that_nobody_spins(session: Session) -> None:
         session.until(lambda: about(session.diagnose(), "executor"))
         text = about(session.diagnose(), "executor")
         assert "/forgotten was made, and nobody spins it" in text
-        with pytest.raises(WaitTimeout, match="nobody spins it"):
-            session.until(lambda: False, timeout=0.1)
+        assert "/forgotten was made, and nobody spins it" in in_vain(session)
     finally:
         made.destroy_node()
     assert about(session.diagnose(), "executor") == ""
@@ -115,12 +136,28 @@ def test_a_stolen_node_is_taken_back_and_explained(session: Session) -> None:
     assert node.executor is not None
 
 
+@pytest.mark.parametrize("when", ["before the wait", "in the wait"])
+def test_a_wait_tells_that_a_node_was_stolen(session: Session, when: str) -> None:
+    node = session.run(listener)
+    thief = SingleThreadedExecutor(context=session.context)
+
+    def steal() -> None:
+        rclpy.spin_once(node, timeout_sec=0, executor=thief)
+
+    if when == "before the wait":
+        steal()
+    with pytest.raises(WaitTimeout, match="/listener was taken out of this session"):
+        session.until(steal if when == "in the wait" else lambda: None, timeout=0)
+    assert node.executor is not None
+
+
 def test_a_node_in_an_executor_of_ones_own(session: Session) -> None:
     node = session.run(listener)
     own = SingleThreadedExecutor(context=session.context)
     own.add_node(node)
     session.until(lambda: about(session.diagnose(), "executor"))
     assert "/listener is in an executor of your own" in about(session.diagnose(), "executor")
+    assert in_vain(session).count("in an executor of your own") == 1
     own.remove_node(node)
 
 
@@ -128,6 +165,7 @@ def test_a_paused_node(session: Session) -> None:
     session.run(listener)
     session.pause("listener")
     assert "/listener is paused" in about(session.diagnose(), "pause")
+    assert "/listener is paused" in in_vain(session)
 
 
 def test_a_ghost_of_an_earlier_run(session: Session) -> None:
@@ -137,6 +175,7 @@ def test_a_ghost_of_an_earlier_run(session: Session) -> None:
         session.until(lambda: about(session.diagnose(), "name"))
         text = about(session.diagnose(), "name")
         assert "Several nodes are called /talker. One is in this session" in text
+        assert "Several nodes are called /talker" in in_vain(session)
     finally:
         ghost.destroy_node()
 
@@ -146,6 +185,60 @@ def test_a_client_without_a_server(session: Session) -> None:
     node.create_client(SetBool, "lamp")
     session.until(lambda: about(session.diagnose(), "service"))
     assert "uses the service /lamp, and nobody offers it" in about(session.diagnose(), "service")
+    assert "/asker uses the service /lamp, and nobody offers it" in in_vain(session)
+
+
+def test_a_service_whose_name_is_nearly_right(session: Session) -> None:
+    node = session.run(Node, "asker")
+    node.create_client(SetBool, "lampe")
+    node.create_service(SetBool, "lamp", lambda _request, response: response)
+    session.until(lambda: "is it /lamp?" in about(session.diagnose(), "service"))
+    assert "/asker uses the service /lampe, and nobody offers it (is it /lamp?)" in in_vain(session)
+
+
+def test_a_wait_that_knows_its_reason_keeps_to_it(session: Session) -> None:
+    node = session.run(listener, "scna")
+    node.create_client(SetBool, "lampe")
+    session.run(talker)
+    session.until(lambda: len(session.diagnose()) == 3)
+    with pytest.raises(WaitTimeout) as caught:
+        session.next_message(String, "scann", timeout=0)
+    assert str(caught.value) == (
+        "No message on /scann in 0 s. Nobody publishes on /scann (is it /scan?)."
+    )
+
+
+def test_more_than_three_reasons_are_counted(session: Session) -> None:
+    node = session.run(Node, "eager")
+    for number in range(5):
+        node.create_client(SetBool, f"nobody_{number}")
+    session.until(lambda: len(session.diagnose()) == 5)
+    said = in_vain(session)
+    assert said.count("nobody offers it") == 3
+    assert said.endswith("session.diagnose() names 2 more.")
+
+
+def test_a_session_that_need_not_explain_says_what_it_waited_for_alone(session: Session) -> None:
+    session.run(listener)
+    session.until(lambda: about(session.diagnose(), "topic"))
+    session.explains = False
+    assert in_vain(session) == "Waited 0 s in vain for the condition."
+    session.explains = True
+    assert "nobody publishes on it" in in_vain(session)
+
+
+def test_a_recorder_and_a_goal_say_it_too(session: Session) -> None:
+    robot = session.run(Robot)
+    assert isinstance(robot, Robot)
+    goal = session.send_goal(Fibonacci, "count", Fibonacci.Goal(order=3))
+    session.pause("robot")
+    try:
+        with pytest.raises(WaitTimeout, match=r"has no result.*/robot is paused"):
+            goal.wait(timeout=0)
+        with pytest.raises(WaitTimeout, match=r"0 of 1 messages.*/robot is paused"):
+            session.record("chatter", String).wait(timeout=0)
+    finally:
+        robot.go.set()
 
 
 REMOTE = """
@@ -172,6 +265,7 @@ def test_a_dead_service_in_another_process(
         session.until(lambda: about(session.diagnose(), "node"), 30)
         text = about(session.diagnose(), "node")
         assert "/remote is on the graph, but did not answer" in text
+        assert "/remote is on the graph, but did not answer within 1 s" in in_vain(session)
     finally:
         os.kill(process.pid, signal.SIGCONT)
 
@@ -183,6 +277,9 @@ def test_two_domains_in_one_kernel_and_one_set_in_vain(
     with Session() as other:
         other.run(talker)
         text = about(session.diagnose(), "domain")
+        said = in_vain(session)
+    assert f"another one of this kernel, with /talker, is on {other.domain_id}" in said
+    assert said.index("another one of this kernel") < said.index("ROS_DOMAIN_ID is 111")
     assert f"another one of this kernel, with /talker, is on {other.domain_id}" in text
     assert "ROS_DOMAIN_ID is 111" in text
 

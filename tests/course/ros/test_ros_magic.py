@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+import rclpy
 from IPython.core.completer import IPCompleter, provisionalcompleter
 from IPython.core.interactiveshell import InteractiveShell
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.action import ActionServer
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
+from test_msgs.msg import BasicTypes
 
 import course
 from course.errors import CourseError
@@ -112,13 +116,46 @@ def test_parameters(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
     assert refused == "/robot refused speed = 2.0: at most 1 m/s\n"
 
 
+def test_parameters_of_odd_types(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    robot.declare_parameter("unset", Parameter.Type.STRING)
+    robot.declare_parameter("bytes", [b"\x01"])
+    assert "  unset" in answer(capsys, "param list robot")
+    assert answer(capsys, "param get robot unset") == "unset of /robot has no value yet.\n"
+    assert answer(capsys, "param get robot speed") == "0.5\n"
+    assert answer(capsys, "param set robot unset 5") == "/robot: unset is now 5\n"
+    assert answer(capsys, """param set robot unset '"7"'""") == "/robot: unset is now 7\n"
+    assert answer(capsys, "param set robot bytes '[2, 3]'") == "/robot: bytes is now [2, 3]\n"
+    assert answer(capsys, "param set robot speed 1e-1") == "/robot: speed is now 0.1\n"
+    assert answer(capsys, "param set robot use_sim_time false").endswith("is now false\n")
+
+
+def test_a_node_without_parameter_services_hides_no_other(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    course.run(lambda: Node("bare", start_parameter_services=False))
+    stuck = rclpy.create_node("forgotten", context=course.session().context)
+    try:
+        course.until(lambda: "/forgotten" in answer(capsys, "node list"))
+        course.until(lambda: "  speed" in answer(capsys, "param list"), 30)
+        text = answer(capsys, "param list")
+        assert "/bare:\n  (its parameter services do not answer, or it has none)" in text
+        assert "/forgotten:\n  (its parameter services do not answer" in text
+        assert magic.candidates(["param", "get", "forgotten", ""]) == []
+        with pytest.raises(CourseError, match="/bare has no parameter services"):
+            magic.ros("param list bare")
+    finally:
+        stuck.destroy_node()
+
+
 @pytest.mark.parametrize(
     ("name", "parts"),
     [
         ("geometry_msgs/msg/PoseStamped", ["std_msgs/Header header", "\tstring frame_id"]),
         ("std_srvs/srv/SetBool", ["bool data", "---", "bool success", "string message"]),
         ("test_msgs/action/Fibonacci", ["int32 order", "---", "int32[] sequence"]),
-        ("sensor_msgs/msg/BatteryState", ["int POWER_SUPPLY_STATUS_CHARGING=1"]),
+        ("sensor_msgs/msg/BatteryState", ["uint8 POWER_SUPPLY_STATUS_CHARGING=1"]),
+        ("test_msgs/msg/Constants", ["byte BYTE_CONST=50", "float32 FLOAT32_CONST=1.125"]),
+        ("test_msgs/msg/Constants", ["bool BOOL_CONST=true"]),
     ],
 )
 def test_interfaces(capsys: pytest.CaptureFixture[str], name: str, parts: list[str]) -> None:
@@ -146,6 +183,37 @@ def test_interfaces(capsys: pytest.CaptureFixture[str], name: str, parts: list[s
         ("param set ghost speed 1", "There is no node /ghost"),
         ("interface show no_msgs/msg/Such", "There is no no_msgs/msg/Such here"),
         ("topic echo 'unfinished", "No closing quotation"),
+        ("topic echo /chatter -n -3", "-n is a whole number, at least 1, not -3"),
+        ("topic echo /chatter --timeout nan", "timeout is a number of seconds, 0 or more, not nan"),
+        ("topic echo 'bad name'", "'bad name' is not a topic name"),
+        ("topic pub 'bad name' '{}'", "'bad name' is not a topic name"),
+        (
+            "topic pub /b '{float32_value: 1.0e+300}' --type test_msgs/msg/BasicTypes",
+            "float32_value",
+        ),
+        (
+            "topic pub /s '{bounded_string_value: aaaaaaaaaaaaaaaaaaaaaaa}' --type "
+            "test_msgs/msg/Strings",
+            "at most 22 characters, not 23",
+        ),
+        (
+            "topic pub /b '{float64_value: %s}' --type test_msgs/msg/BasicTypes" % ("9" * 400),
+            "float64_value takes",
+        ),
+        ("topic pub /orders '{data: [}'", "is not YAML"),
+        ("topic pub /orders '{}' --type os/path/join", "'os/path/join' is not the name of"),
+        ("topic pub /orders '{}' --type std_srvs/srv/SetBool", "is no msg type"),
+        ("service call /lamp '{}' --type std_msgs/msg/String", "is no srv type: name one such as"),
+        ("service call /lamp '{}' --type os/srv/path", "There is no os/srv/path here"),
+        ("param set robot speed x", "speed takes a number, not 'x'."),
+        ("param set robot speed '{a: 1}'", "speed takes a number, not '{a: 1}'."),
+        ("param set robot ghost 1", "/robot has no parameter 'ghost': it has speed,"),
+        ("param get 'bad name' x", "'bad name' is not a node name"),
+        ("interface show ''", "'' is not the name of an interface: write package/kind/Name"),
+        ("interface show ../x/y", "'../x/y' is not the name of an interface"),
+        ("interface show a/b/c/d", "'a/b/c/d' is not the name of an interface"),
+        ("interface show String", "'String' is not the name of an interface"),
+        ("interface show std_msgs/msg/sys", "There is no std_msgs/msg/sys here"),
     ],
 )
 def test_a_mistake_is_a_sentence(robot: Robot, line: str, sentence: str) -> None:
@@ -153,6 +221,48 @@ def test_a_mistake_is_a_sentence(robot: Robot, line: str, sentence: str) -> None
         magic.ros(line)
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["evil/b/c/d", "evil/msg/D", "evil/D", "evil/os/D"])
+def test_no_file_of_the_learners_runs_for_the_name_of_a_type(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    (tmp_path / "evil.py").write_text("raise SystemExit('it ran')", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(CourseError, match="evil"):
+        magic.ros(f"interface show {name}")
+
+
+def test_parts_of_an_interface_and_short_names_are_shown(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert answer(capsys, "interface show test_msgs/action/Fibonacci_Goal") == "int32 order\n"
+    feedback = answer(capsys, "interface show test_msgs/action/Fibonacci_FeedbackMessage")
+    assert "\tint32[] sequence" in feedback
+    assert "goal" in answer(capsys, "interface show test_msgs/action/Fibonacci_SendGoal_Request")
+    assert answer(capsys, "interface show std_msgs/String") == "string data\n"
+    assert "string<=22 bounded_string_value" in answer(
+        capsys, "interface show test_msgs/msg/Strings"
+    )
+
+
+def test_numbers_are_read_as_people_type_them(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    heard: list[Any] = []
+    robot.create_subscription(BasicTypes, "basic", heard.append, 10)
+    answer(capsys, "topic pub /basic '{float64_value: 1e-3, float32_value: 2}'")
+    course.until(lambda: heard)
+    assert (heard[0].float64_value, heard[0].float32_value) == (0.001, 2.0)
+
+
+@pytest.mark.parametrize("command", ["echo", "hz"])
+def test_a_topic_that_is_not_there_is_waited_for_as_long_as_asked(
+    robot: Robot, command: str
+) -> None:
+    with pytest.raises(CourseError) as caught:
+        magic.ros(f"topic {command} /chattr --timeout 0.2")
+    assert "Nobody publishes on /chattr (is it /chatter?), so after 0.2 s" in str(caught.value)
 
 
 def test_help_is_shown_and_ends_nothing(capsys: pytest.CaptureFixture[str]) -> None:
@@ -166,17 +276,30 @@ def test_help_is_shown_and_ends_nothing(capsys: pytest.CaptureFixture[str]) -> N
         (["topic", ""], "echo"),
         (["topic", "info", ""], "/chatter"),
         (["topic", "info", "-v", ""], "/chatter"),
+        (["topic", "echo", "-n", "3", ""], "/chatter"),
+        (["topic", "pub", "--type", "std_msgs/msg/String", ""], "/chatter"),
+        (["topic", "pub", "/new", "{}", "--type", ""], "std_msgs/msg/String"),
         (["service", "call", ""], "/lamp"),
         (["action", "send_goal", ""], "/fibonacci"),
         (["param", "get", "/robot", ""], "speed"),
+        (["param", "get", "robot", ""], "speed"),
         (["interface", "show", ""], "std_msgs/msg/String"),
     ],
 )
 def test_the_tab_key_offers_what_may_follow(robot: Robot, words: list[str], expected: str) -> None:
-    assert expected in magic.candidates(words)
+    course.until(lambda: expected in magic.candidates(words), 30)
 
 
-@pytest.mark.parametrize("words", [["x", ""], ["topic", "x", "y", ""], ["param", "get", "/no", ""]])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["x", ""],
+        ["topic", "x", "y", ""],
+        ["topic", "echo", "-n", ""],
+        ["param", "get", "/no", ""],
+        ["param", "get", "bad name!", ""],
+    ],
+)
 def test_the_tab_key_offers_nothing_where_nothing_can_follow(
     robot: Robot, words: list[str]
 ) -> None:

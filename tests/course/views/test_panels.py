@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from test_msgs.action import Fibonacci
 from test_msgs.msg import Nested
+from test_msgs.srv import Arrays
 
 from course import Session
 from course.errors import CourseError, SessionError, WaitTimeout
 from course.runtime.actions import GoalState
 from course.values import MisfitError
-from course.views.live import LiveView
+from course.views.live import MAX_FRAME, LiveView
 from course.watch import forms
+from course.watch.parameter_values import ParameterError
 from tests.robot import Robot
 
 
@@ -56,6 +61,29 @@ def test_a_service_that_is_gone_is_a_sentence_in_the_view(session: Session) -> N
     say(console, call={"data": True})
     session.until(lambda: [c["problem"] for c in shown(console)["calls"] if c["problem"]])
     assert "Nobody offers /lamp" in shown(console)["calls"][0]["problem"]
+
+
+def test_long_answers_still_fit_into_a_frame(session: Session) -> None:
+    def serve() -> Node:
+        node = Node("talkative")
+
+        def answer(_request: Arrays.Request, response: Arrays.Response) -> Arrays.Response:
+            response.string_values = ["z" * 300_000] * 3
+            response.float64_values = [float("nan"), float("inf"), 0.0]
+            return response
+
+        node.create_service(Arrays, "big", answer)
+        return node
+
+    session.run(serve)
+    console = session.service("big")
+    for _ in range(10):
+        say(console, call={})
+    session.until(lambda: sum(c["answer"] is not None for c in shown(console)["calls"]) == 10, 20)
+    assert len(json.dumps(shown(console), allow_nan=False)) < MAX_FRAME
+    assert len(console.words()) < MAX_FRAME
+    assert console.calls[0].answer is not None
+    assert console.calls[0].answer["string_values"][0].endswith("… 298000 more")
 
 
 def test_what_does_not_fit_is_said_beside_the_form(session: Session) -> None:
@@ -135,7 +163,14 @@ def test_a_parameter_is_changed_and_a_refusal_has_its_reason(session: Session) -
         ("legs", "2.5", "legs takes a whole number, not '2.5'."),
         ("speed", "fast", "speed takes a number, not 'fast'."),
         ("speed", "9.0", "refused speed = 9.0"),
-        ("wings", "1", "/robot has no parameter 'wings'."),
+        ("wings", "1", "/robot has no parameter 'wings': it has legs, lights,"),
+        ("lights", "perhaps", "lights takes true or false, not 'perhaps'."),
+        ("legs", ".inf", "legs takes a whole number, not '.inf'."),
+        ("legs", str(2**70), f"legs takes {-(2**63)} to {2**63 - 1}, not {2**70}."),
+        ("legs", "9" * 5000, "legs takes a whole number, not '9999"),
+        ("legs", "", "legs takes a whole number, not ''."),
+        ("legs", "[a", "legs takes a whole number, not '[a'."),
+        ("name", "a\0b", "name takes text, not"),
     ],
 )
 def test_a_value_that_does_not_fit_is_a_sentence(
@@ -145,6 +180,68 @@ def test_a_value_that_does_not_fit_is_a_sentence(
     with pytest.raises(CourseError) as caught:
         session.parameters("robot").set(name, value)
     assert sentence in str(caught.value)
+
+
+class Odd(Node):
+    """Has parameters of every type, one without a value, and one that may change its type."""
+
+    def __init__(self) -> None:
+        super().__init__("odd")
+        for name, value in ODD.items():
+            self.declare_parameter(name, value)
+        self.declare_parameter("unset", Parameter.Type.INTEGER)
+        endless = FloatingPointRange(from_value=0.0, to_value=float("inf"))
+        about = ParameterDescriptor(floating_point_range=[endless])
+        self.declare_parameter("endless", 1.0, about)
+        self.declare_parameter("any", None, ParameterDescriptor(dynamic_typing=True))
+
+
+ODD = {
+    "bytes": [b"\x01", b"\xff"],
+    "bools": [True, False],
+    "wholes": [1, 2**60],
+    "numbers": [0.5, float("inf")],
+    "texts": ["a, b", "5", "true"],
+    "limit": float("inf"),
+    "none": float("nan"),
+    "big": 2**62,
+}
+
+
+def test_parameters_of_every_type_are_shown_and_set_as_they_are_shown(session: Session) -> None:
+    node = session.run(Odd)
+    panel = session.parameters("odd")
+    frame = shown(panel)
+    json.dumps(frame, allow_nan=False)
+    entries = {entry["name"]: entry for entry in frame["entries"]}
+    assert set(entries) == {*ODD, "unset", "any", "endless"}
+    assert entries["endless"]["kind"] == "number"
+    assert entries["bytes"]["value"] == "[1, 255]"
+    assert entries["texts"]["value"] == "['a, b', '5', 'true']"
+    assert entries["limit"]["value"] == ".inf"
+    assert entries["unset"]["value"] is None
+    assert "  unset: not set" in panel.words()
+    for name in ODD:
+        before = repr(node.get_parameter(name).get_parameter_value())
+        say(panel, set=name, value=str(entries[name]["value"]))
+        assert panel.frame()["problem"] == ""
+        assert repr(node.get_parameter(name).get_parameter_value()) == before, name
+    assert panel.widget.ended == ""
+
+
+def test_a_parameter_without_a_value_gets_one(session: Session) -> None:
+    node = session.run(Odd)
+    panel = session.parameters("odd")
+    with pytest.raises(ParameterError, match="unset takes a whole number, not 'soon'"):
+        panel.set("unset", "soon")
+    panel.set("unset", "3")
+    assert node.get_parameter("unset").value == 3
+    for typed, value in (("1e-3", 0.001), ("[1, 2]", [1, 2]), ("word", "word"), ("7", 7)):
+        panel.set("any", typed)
+        found = node.get_parameter("any").value
+        assert (list(found) if isinstance(value, list) else found) == value
+    with pytest.raises(ParameterError, match="any takes a value, or a list of one kind of value"):
+        panel.set("any", "{a: 1}")
 
 
 def test_a_change_from_elsewhere_is_shown(session: Session) -> None:
@@ -172,6 +269,16 @@ def test_the_log_panel_has_the_latest_lines(session: Session) -> None:
         (lambda s: s.service("lampe"), "Nobody offers the service /lampe"),
         (lambda s: s.action("cont"), "Is it /count?"),
         (lambda s: s.log_panel(level="LOUD"), "no log level 'LOUD'"),
+        (lambda s: s.service("bad name"), "'bad name' is not a service name: "),
+        (lambda s: s.service(""), "'' is not a service name: "),
+        (lambda s: s.service(5), "The service is a string, such as '/reset', not 5."),
+        (lambda s: s.service("lamp", Fibonacci), "The type is a service class"),
+        (lambda s: s.service("lamp", timeout="long"), "timeout is a number of seconds"),
+        (lambda s: s.action("1 bad"), "'1 bad' is not an action name: "),
+        (lambda s: s.action("count", Nested), "The type is an action class"),
+        (lambda s: s.parameters("bad name"), "'bad name' is not a node name: "),
+        (lambda s: s.parameters(""), "'' is not a node name: node name must not be empty."),
+        (lambda s: s.parameters(5), "The name of a node is a string, such as '/camera', not 5."),
     ],
 )
 def test_what_is_not_there_is_named(session: Session, make: Any, sentence: str) -> None:
