@@ -37,7 +37,7 @@ def load_bank(name: str, folder: Path = BANKS) -> Bank:
         close = difflib.get_close_matches(str(name), known, n=1)
         guess = f" Did you mean '{close[0]}'?" if close else ""
         raise BankError(
-            f"There is no quiz '{name}': there are {', '.join(known) or 'none'}.{guess}"
+            f"There is no quiz {str(name)!r}: there are {', '.join(known) or 'none'}.{guess}"
         )
     path = folder / f"{name}.yaml"
     status = path.stat()
