@@ -106,7 +106,7 @@ def test_every_proof_exists_and_every_proof_is_named_by_a_variant() -> None:
     }
     named = {
         proof for concept in BANK.concepts for variant in concept.variants
-        for proof in variant.proofs
+        for proof in variant.proof
     }  # fmt: skip
     assert named == written
 

@@ -191,7 +191,7 @@ def test_a_new_question_says_what_it_still_needs() -> None:
         ("False", True, "Right."),
     ]
     assert now["options"][0]["misconception"] == merge.UNNAMED
-    assert now["proof"] == merge.UNPROVEN
+    assert now["proof"] == [merge.UNPROVEN]
     assert merged.notes == ["'qos-purpose-6' is new: name its proofs, misconceptions and cells."]
 
 
@@ -258,7 +258,15 @@ def test_a_bad_file_is_one_sentence_with_file_line_and_question(content: str, pr
         ("$CATEGORY: ch05/qos-purpose\n\n::My question::How?{=a ~b}",
          "question 'My question': a new question's name becomes its id"),
         ("::qos-purpose-2::Which?{~%100%a#f ~%100%b#f}",
-         "question 'qos-purpose-2', field multiple: at least one option must be correct"),
+         "question 'qos-purpose-2', field options: at least one option must be correct"),
+        ("::qos-purpose-1::Which?{=a ~b ~b}",
+         "question 'qos-purpose-1', field options 3 text: the text 'b' stands there twice"),
+        ("::qos-purpose-1::Which?{=a ~b#![](assets/ch05-camera.svg)}",
+         "question 'qos-purpose-1', field options 2 feedback: the image"),
+        ("$CATEGORY: ch05/qos-purpose\n\n::pattern-camera::How?{=a ~b}",
+         "question 'pattern-camera', field id: this id is used twice"),
+        ("::pattern-camera-5::Which?{=a -> x =b -> x = -> y}",
+         "question 'pattern-camera-5', field pairs: all have the same right side"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_the_bank_is_one_sentence(content: str, problem: str) -> None:
