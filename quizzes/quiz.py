@@ -110,9 +110,14 @@ class Quiz:
         return self.attempts[0] if self.attempts else None
 
     @property
+    def counted(self) -> list[Attempt]:
+        """The attempts that count; what comes after them is practice (see `quizzes.regrade`)."""
+        return [attempt for attempt in self.attempts if attempt.attempt <= regrade.COUNTED]
+
+    @property
     def best(self) -> Attempt | None:
-        """The attempt with the best score, the earliest of equal ones."""
-        return max(self.attempts, key=lambda a: (a.score, -a.attempt), default=None)
+        """The attempt with the best score of those that count, the earliest of equal ones."""
+        return max(self.counted, key=lambda a: (a.score, -a.attempt), default=None)
 
     @property
     def open_questions(self) -> list[int]:
