@@ -24,6 +24,9 @@ from pydantic import (
 MIN_VARIANTS = 4
 """Variants a concept has at least: with fewer, a retry is too soon the same quiz again."""
 
+DEAL = 2
+"""How `quizzes.model` deals letters: answers saved under another number mean nothing."""
+
 Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
 Code = Annotated[str, StringConstraints(min_length=1)]
 Id = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=60)]
@@ -274,7 +277,7 @@ class Bank(Part):
 
     @property
     def edition(self) -> str:
-        """A digest of all that saved answers refer to: the ids, and the texts behind letters.
+        """A digest of all that saved answers refer to: the deal, the ids, the texts behind letters.
 
         Mending a key, a stem or a feedback keeps it, so saved answers can be marked anew.
         """
@@ -283,7 +286,7 @@ class Bank(Part):
                           for variant in concept.variants]]
             for concept in self.concepts
         ]  # fmt: skip
-        return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps([DEAL, content]).encode()).hexdigest()[:16]
 
     def concept(self, name: str) -> Concept | None:
         """Return the concept with the id ``name``, if there is one."""

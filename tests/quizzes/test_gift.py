@@ -149,8 +149,8 @@ def variant(bank: Bank, name: str) -> dict[str, Any]:
 def test_an_edited_option_keeps_its_misconception_and_its_cell() -> None:
     merged = changed("To store the messages of a topic", "To keep the messages of a topic")
     was, now = variant(BANK, "qos-purpose-1"), variant(merged.bank, "qos-purpose-1")
-    assert now["options"][1]["text"].startswith("To keep the messages")
-    was["options"][1]["text"] = now["options"][1]["text"]
+    assert now["options"][0]["text"].startswith("To keep the messages")
+    was["options"][0]["text"] = now["options"][0]["text"]
     assert now == was
     assert merged.notes == ["'qos-purpose-1' has changed: see that its proofs still prove its key."]
 
