@@ -2,7 +2,8 @@
 
 A grade cell whose grade id is ``quiz-NAME`` stands for the quiz NAME. The scores in a student's
 attempts file are not looked at: its best attempt is marked again (see `quizzes.regrade`), so a
-file that was written by hand earns what its answers earn.
+file that was written by hand earns what its answers earn. How many attempts there are stands in
+the feedback; a file that looks machine-made is marked for a person, with the reason.
 """
 
 from __future__ import annotations
@@ -74,6 +75,10 @@ def verdict(bank: Bank, folder: Path, student: str) -> Verdict:
     if marked.best is None:
         return _none_counts(bank, name, marked)
     checks = tuple(_check(mark) for mark in marked.best.marks)
+    if marked.doubt:  # its points stand below; whether they count is for a person to say
+        title = "The attempts were made by a person"
+        doubt = CheckResult("attempts", title, "not_examined", 0.0, 0.0, actual=marked.doubt)
+        checks = (*checks, doubt)
     return Verdict(f"{PREFIX}{bank.quiz}", PART, checks, tuple(_notes(marked, student)))
 
 
@@ -107,10 +112,11 @@ def _check(mark: Mark) -> CheckResult:
 def _notes(marked: regrade.Marked, student: str) -> Iterator[str]:
     assert marked.best is not None
     paper = marked.best.paper
-    yield (
-        f"The best of {len(marked.results)} attempts counts: number {paper.attempt}. "
-        f"{marked.best.headline}"
+    count = len(marked.results)
+    which = (
+        f"The best of {count} attempts counts:" if count > 1 else "The one attempt that counts is"
     )
+    yield f"{which} number {paper.attempt}. {marked.best.headline}"
     if paper.student != student:
         yield f"It was made under the login '{paper.student}'."
     yield from _remarks(marked)
@@ -132,6 +138,8 @@ def _none_counts(bank: Bank, name: str, marked: regrade.Marked) -> Verdict:
             "installed here, so a person has to mark them."
         )
         return _unmarked(bank, reason, remarks, "grader_error")
+    if marked.doubt:
+        return _unmarked(bank, marked.doubt, remarks, "not_examined")
     return _unmarked(bank, f"{name} holds no attempt that counts.", remarks)
 
 

@@ -73,7 +73,7 @@ class Verdict:
     @property
     def needs_human(self) -> bool:
         """Whether a check was left to a person: it could not be examined, or the grader failed."""
-        return bool(self.unexamined) or self.spoilt
+        return self.spoilt or any(check.status == "not_examined" for check in self.checks)
 
     @property
     def spoilt(self) -> bool:

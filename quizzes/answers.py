@@ -7,9 +7,10 @@ its right one, ``-`` where none is chosen yet). ``""`` is no answer yet.
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping
+from collections.abc import Set as AnySet
+from numbers import Real
 from typing import Any
 
 from quizzes.bank import Matching, Multiple, Numeric, Ordering
@@ -21,6 +22,9 @@ Answer = str | float
 NOTHING = ""
 OPEN = "-"
 """Stands in a matching for a left side that has no right one yet."""
+
+MAX_NUMBER = 1e300
+"""Numbers beyond this are no answers, neither when given nor when read from a file."""
 
 
 def normal(item: Item, given: Any) -> Answer:
@@ -37,11 +41,14 @@ def normal(item: Item, given: Any) -> Answer:
     if given is None or (isinstance(given, str) and not given.strip()):
         return NOTHING
     if isinstance(item.variant, Numeric):
-        return _number(item, given)
+        try:
+            return number(given)
+        except ValueError:
+            raise _wrong(item, given) from None
     letters = _letters(item, given)
     unknown = sorted(set(letters) - set(item.letters) - {OPEN})
     if unknown:
-        raise AnswerError(f"Question {item.number} has no '{unknown[0]}': {fits(item)}.")
+        raise AnswerError(f"Question {item.number} has no {unknown[0]!r}: {fits(item)}.")
     if isinstance(item.variant, Matching):
         if len(letters) != len(item.variant.pairs):
             raise _wrong(item, given)
@@ -54,6 +61,24 @@ def normal(item: Item, given: Any) -> Answer:
     if len(letters) != wanted:
         raise _wrong(item, given)
     return letters
+
+
+def number(given: Any) -> float:
+    """Return a numeric answer: any real number (also numpy's) or its text, up to `MAX_NUMBER`.
+
+    Raises:
+        ValueError: it is none.
+    """
+    text = isinstance(given, str) and "_" not in given  # Python reads "1_000", people do not
+    if not text and (isinstance(given, bool | str) or not isinstance(given, Real)):
+        raise ValueError("no number")
+    try:
+        found = float(given)
+    except OverflowError:
+        raise ValueError("too large") from None
+    if not abs(found) <= MAX_NUMBER:  # nor is nan
+        raise ValueError("too large")
+    return found
 
 
 def complete(item: Item, answer: Answer) -> bool:
@@ -78,18 +103,6 @@ def fits(item: Item) -> str:
     return f"answer with one letter from {first} to {last}"
 
 
-def _number(item: Item, given: Any) -> float:
-    if isinstance(given, bool) or not isinstance(given, int | float | str):
-        raise _wrong(item, given)
-    try:
-        number = float(given)
-    except (ValueError, OverflowError):
-        raise _wrong(item, given) from None
-    if not math.isfinite(number):
-        raise _wrong(item, given)
-    return number
-
-
 def _letters(item: Item, given: Any) -> str:
     if isinstance(given, Mapping) and isinstance(item.variant, Matching):
         lefts = range(1, len(item.variant.pairs) + 1)
@@ -99,7 +112,9 @@ def _letters(item: Item, given: Any) -> str:
                 f"{sorted(set(given) - set(lefts), key=str)[0]!r}."
             )
         given = [given.get(left, OPEN) for left in lefts]
-    elif isinstance(given, set | frozenset):
+    elif isinstance(given, AnySet):
+        if isinstance(item.variant, Ordering | Matching):
+            raise _wrong(item, given)  # a set has no order
         given = sorted(given, key=str)
     if not isinstance(given, str):
         if not isinstance(given, Iterable) or isinstance(given, bytes | Mapping):

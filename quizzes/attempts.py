@@ -68,7 +68,7 @@ class AttemptsFile:
             return attempts, str(error)
 
     def append(self, attempt: Attempt) -> None:
-        """Add an attempt for good: it is on the disk when this returns.
+        """Add an attempt for good: it is on the disk when this returns, and its draft is gone.
 
         Raises:
             UnwritableError: the folder cannot be written.
@@ -76,33 +76,53 @@ class AttemptsFile:
         """
         try:
             with self._locked():
-                known, damaged = parse(self._content())
+                content = self._content()
+                known, damaged = parse(content)
                 if damaged:
                     known, _ = self._mend()
+                    content = b""
                 if any((a.student, a.attempt) == (attempt.student, attempt.attempt) for a in known):
-                    raise AttemptsError(
-                        f"Attempt {attempt.attempt} has been submitted already, in another window: "
-                        "run this cell again to see its result."
-                    )
-                self._add(f"{attempt.to_json()}\n".encode())
+                    raise self._over(attempt.attempt)
+                # The last line may have lost its end, to an editor or to a copy that was cut short.
+                ended = content.endswith(b"\n") or not content
+                self._add(f"{'' if ended else chr(10)}{attempt.to_json()}\n".encode())
+                if self.read_draft().get("student") == attempt.student:
+                    self._draft.unlink(missing_ok=True)
         except OSError as error:
             raise self._unwritable(error) from None
 
-    def save_draft(self, draft: Mapping[str, Any]) -> None:
-        """Keep unsubmitted answers, in place of those kept before.
+    def save_draft(
+        self, student: str, attempt: int, edition: str, answers: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Keep answers that are not submitted yet, beside those kept of the same attempt.
+
+        Another window may have answered other questions: the answers of both are returned.
 
         Raises:
             UnwritableError: the folder cannot be written.
+            AttemptsError: another window has submitted this attempt already, or is writing for
+                long.
         """
+        whose = {"quiz": self._quiz, "student": student, "attempt": attempt, "edition": edition}
         temporary = self._draft.with_name(f"{self._draft.name}.{os.getpid()}")
         try:
-            try:
-                temporary.write_text(json.dumps(draft, ensure_ascii=False), encoding="utf-8")
-                temporary.replace(self._draft)
-            finally:
-                temporary.unlink(missing_ok=True)
+            with self._locked():
+                known, _ = parse(self._content())
+                if any(a.student == student and a.attempt >= attempt for a in known):
+                    raise self._over(attempt)
+                kept = self.read_draft()
+                same = {name: kept.get(name) for name in whose} == whose
+                before = kept.get("answers") if same else {}
+                merged = {**(before if isinstance(before, dict) else {}), **answers}
+                try:
+                    draft = json.dumps({**whose, "answers": merged}, ensure_ascii=False)
+                    temporary.write_text(draft, encoding="utf-8")
+                    temporary.replace(self._draft)
+                finally:
+                    temporary.unlink(missing_ok=True)
         except OSError as error:
             raise self._unwritable(error) from None
+        return merged
 
     def read_draft(self) -> dict[str, Any]:
         """Return the unsubmitted answers; empty if there are none that can be read."""
@@ -111,11 +131,6 @@ class AttemptsFile:
         except (OSError, ValueError, RecursionError):
             return {}
         return draft if isinstance(draft, dict) else {}
-
-    def drop_draft(self) -> None:
-        """Forget the unsubmitted answers."""
-        with suppress(OSError):
-            self._draft.unlink(missing_ok=True)
 
     def _content(self) -> bytes:
         try:
@@ -191,6 +206,12 @@ class AttemptsFile:
             yield
         finally:
             lock.release()
+
+    def _over(self, attempt: int) -> AttemptsError:
+        return AttemptsError(
+            f"Attempt {attempt} has been submitted already, in another window: run this cell again "
+            "to see its result."
+        )
 
     def _unwritable(self, error: OSError) -> UnwritableError:
         return UnwritableError(

@@ -11,15 +11,43 @@ import json
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, StringConstraints, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    StringConstraints,
+    model_validator,
+)
 
 MIN_VARIANTS = 4
 """Variants a concept has at least: with fewer, a retry is too soon the same quiz again."""
+
+DEAL = 2
+"""How `quizzes.model` deals letters: answers saved under another number mean nothing."""
 
 Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
 Code = Annotated[str, StringConstraints(min_length=1)]
 Id = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=60)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+def _as_list(value: object) -> object:
+    return [value] if isinstance(value, str) else value
+
+
+Proofs = Annotated[list[Text], Field(min_length=1), BeforeValidator(_as_list)]
+"""Names of tests; a single one may stand alone."""
+
+
+class FieldError(ValueError):
+    """What is wrong with one field of a part that does not hold together."""
+
+    def __init__(self, field: str, problem: str) -> None:
+        """Say ``problem`` of ``field``, whose parts are parted by spaces: "options 2 text"."""
+        super().__init__(problem)
+        self.field = field
 
 
 class Part(BaseModel):
@@ -43,9 +71,9 @@ class Option(Part):
     @model_validator(mode="after")
     def _wrong_ones_have_a_reason(self) -> Self:
         if not self.correct and self.misconception is None:
-            raise ValueError("a wrong option needs a misconception")
+            raise FieldError("misconception", "a wrong option needs a misconception")
         if self.correct and self.misconception is not None:
-            raise ValueError("a right option has no misconception")
+            raise FieldError("misconception", "a right option has no misconception")
         return self
 
 
@@ -53,12 +81,8 @@ class _Variant(Part):
     id: Id
     stem: Text
     code: Code | None = None
-    proof: Text | list[Text]
-
-    @property
-    def proofs(self) -> tuple[str, ...]:
-        """The names of the tests that prove the key on real endpoints."""
-        return (self.proof,) if isinstance(self.proof, str) else tuple(self.proof)
+    proof: Proofs
+    """The names of the tests that prove the key on real endpoints."""
 
 
 class _Choice(_Variant):
@@ -79,7 +103,8 @@ class _OneRight(_Choice):
     @model_validator(mode="after")
     def _one_key(self) -> Self:
         if len(self.right) != 1:
-            raise ValueError(f"exactly one option must be correct, not {len(self.right)}")
+            problem = f"exactly one option must be correct, not {len(self.right)}"
+            raise FieldError("options", problem)
         return self
 
 
@@ -104,7 +129,7 @@ class Multiple(_Choice):
     @model_validator(mode="after")
     def _some_right_some_wrong(self) -> Self:
         if not 0 < len(self.right) < len(self.options):
-            raise ValueError("at least one option must be correct and one wrong")
+            raise FieldError("options", "at least one option must be correct and one wrong")
         return self
 
 
@@ -155,9 +180,10 @@ class Numeric(_Variant):
 
     @model_validator(mode="after")
     def _traps_are_wrong(self) -> Self:
-        for trap in self.traps:
+        for number, trap in enumerate(self.traps, start=1):
             if self.holds(trap.value):
-                raise ValueError(f"the trap {trap.value:g} lies within the tolerance of the answer")
+                problem = f"the trap {trap.value:g} lies within the tolerance of the answer"
+                raise FieldError(f"traps {number} value", problem)
         return self
 
 
@@ -195,12 +221,16 @@ class Matching(_Built):
     @model_validator(mode="after")
     def _something_to_choose(self) -> Self:
         lefts = [pair.left for pair in self.pairs]
-        if len(set(lefts)) < len(lefts):
-            raise ValueError("a left side stands there twice")
-        if set(self.extras) & {pair.right for pair in self.pairs}:
-            raise ValueError("an extra is the right side of a pair, too")
-        if len(self.texts) < 2:
-            raise ValueError("there must be two different right sides to choose from")
+        rights = {pair.right for pair in self.pairs}
+        for number, left in enumerate(lefts, start=1):
+            if left in lefts[: number - 1]:
+                raise FieldError(f"pairs {number} left", f"the left side {left!r} is there twice")
+        for number, extra in enumerate(self.extras, start=1):
+            if extra in rights:
+                problem = "an extra is the right side of a pair, too"
+                raise FieldError(f"extras {number}", problem)
+        if len(rights) < 2:
+            raise FieldError("pairs", "all have the same right side, so there is nothing to match")
         return self
 
 
@@ -247,7 +277,7 @@ class Bank(Part):
 
     @property
     def edition(self) -> str:
-        """A digest of all that saved answers refer to: the ids, and the texts behind letters.
+        """A digest of all that saved answers refer to: the deal, the ids, the texts behind letters.
 
         Mending a key, a stem or a feedback keeps it, so saved answers can be marked anew.
         """
@@ -256,7 +286,7 @@ class Bank(Part):
                           for variant in concept.variants]]
             for concept in self.concepts
         ]  # fmt: skip
-        return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+        return hashlib.sha256(json.dumps([DEAL, content]).encode()).hexdigest()[:16]
 
     def concept(self, name: str) -> Concept | None:
         """Return the concept with the id ``name``, if there is one."""

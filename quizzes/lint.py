@@ -27,14 +27,23 @@ LEARNERS = 400
 """How many quizzes are dealt to see where the keys come to stand."""
 BALANCE = 0.35
 """How far a place may be from its fair share of the keys, as a part of that share."""
-MIN_FEEDBACK = 30
-"""Characters below which a feedback cannot say why."""
+MIN_FEEDBACK = 25
+"""Letters and digits below which a feedback cannot say why."""
 
-_ALL_OF_THE_ABOVE = re.compile(
-    r"\b(all|none|both|neither|any|some)\s+of\s+(the\s+)?(above|these|those|them|others?)\b"
-    r"|\b(a|b|c|d)\s+and\s+(a|b|c|d)\b",
-    re.IGNORECASE,
+_REFERS = re.compile(
+    r"""\b(?:all|any|some|most|none|both|neither|either|each|every(?:\s+one)?)\s+(?:
+            (?:of\s+)?(?:the\s+)?above\b
+          | of\s+(?:the\s+)?(?:these|those|them|others?)\b
+          | (?:of\s+)?(?:the\s+|these\s+|other\s+)*
+            (?:answers|options|choices|alternatives|statements)
+            \s+(?:above|below|are|is|hold|apply|fit)\b
+        )
+      | \b(?:answers?|options?|choices?)\s+\(?[a-f]\)?(?![\w'])
+      | \b[a-f]\)?\s*(?:,|&|\+|/|\band\b|\bor\b)\s*\(?[a-f]\b(?!['\w])
+    """,
+    re.IGNORECASE | re.VERBOSE,
 )
+"""An option that speaks of others: by what stands above it, or by letter."""
 _CODE = re.compile(r"```.*?```|`[^`]*`", re.DOTALL)
 _TASK = re.compile(r"(?:^|[.!?]\s+)(Match|Put)\b")
 
@@ -113,7 +122,7 @@ def _of_variant(variant: Variant) -> Iterator[Finding]:
     elif not asked and not _TASK.search(prose):
         yield finding("stem", "it asks nothing: end it with a question, or say what to do")
     for text in variant.texts:
-        if _ALL_OF_THE_ABOVE.search(text):
+        if _REFERS.search(_CODE.sub("", text)):
             yield finding("options", f"{text!r} refers to other options, which are shuffled")
     if isinstance(variant, Single | Predict | Multiple):
         yield from (finding("options", problem) for problem in _option_lengths(variant))
@@ -123,8 +132,23 @@ def _of_variant(variant: Variant) -> Iterator[Finding]:
         name = answer.where.removeprefix(f"{variant.id} ")
         if answer.show is None:
             yield finding(name, "it has no cell that shows what really happens")
-        if len(answer.feedback or "") < MIN_FEEDBACK:
+    for name, feedback in _feedback(variant):
+        if sum(character.isalnum() for character in feedback) < MIN_FEEDBACK:
             yield finding(name, "its feedback is too short to say why")
+
+
+def _feedback(variant: Variant) -> Iterator[tuple[str, str]]:
+    """Yield (where, text) for every feedback that a learner may get."""
+    if isinstance(variant, Single | Predict | Multiple):
+        for number, option in enumerate(variant.options, start=1):
+            yield f"option {number}", option.feedback
+        return
+    yield "feedback", variant.feedback
+    if variant.wrong_feedback is not None:
+        yield "wrong_feedback", variant.wrong_feedback
+    if isinstance(variant, Numeric):
+        for number, trap in enumerate(variant.traps, start=1):
+            yield f"trap {number}", trap.feedback
 
 
 def _option_lengths(variant: Single | Predict | Multiple) -> Iterator[str]:
@@ -180,14 +204,30 @@ def _of_key_lengths(bank: Bank) -> Iterator[Finding]:
 
 
 def _of_key_places(bank: Bank) -> Iterator[Finding]:
-    """Find out whether keys come to stand in some places more often than in others."""
-    places: defaultdict[int, Counter[int]] = defaultdict(Counter)
+    """Find out whether keys stand in some places more often: in the bank, and as they are dealt.
+
+    What a learner sees is the deal, from which no place may be read. The bank's own order shows
+    through in exports that are not shuffled, and to whoever looks over an author's shoulder.
+    """
+    written: defaultdict[int, Counter[int]] = defaultdict(Counter)
+    for variant in (variant for concept in bank.concepts for variant in concept.variants):
+        if isinstance(variant, Single | Predict):
+            written[len(variant.options)][variant.right[0]] += 1
+    for count, seen in sorted(written.items()):
+        for place, times in sorted(seen.items()):
+            if seen.total() > count and times > HABIT * seen.total():
+                problem = (
+                    f"the key is option {place + 1} of {count} in {times} of {seen.total()} "
+                    "questions, as they stand in the bank"
+                )
+                yield Finding(bank.quiz, "options", problem)
+    dealt: defaultdict[int, Counter[int]] = defaultdict(Counter)
     for learner in range(LEARNERS):
         for item in model.draw(bank, f"learner {learner}", 1 + learner % 3).items:
             if isinstance(item.variant, Single | Predict):
                 [key] = item.variant.right
-                places[len(item.order)][item.order.index(key)] += 1
-    for count, seen in sorted(places.items()):
+                dealt[len(item.order)][item.order.index(key)] += 1
+    for count, seen in sorted(dealt.items()):
         fair = seen.total() / count
         for place in range(count):
             if fair >= 50 and abs(seen[place] - fair) > BALANCE * fair:

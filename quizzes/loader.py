@@ -12,7 +12,7 @@ import yaml
 from pydantic import ValidationError
 
 from quizzes import rendering
-from quizzes.bank import Bank, Variant
+from quizzes.bank import Bank, FieldError, Ordering, Variant
 from quizzes.errors import BankError
 
 BANKS = Path(__file__).resolve().parent / "banks"
@@ -37,7 +37,7 @@ def load_bank(name: str, folder: Path = BANKS) -> Bank:
         close = difflib.get_close_matches(str(name), known, n=1)
         guess = f" Did you mean '{close[0]}'?" if close else ""
         raise BankError(
-            f"There is no quiz '{name}': there are {', '.join(known) or 'none'}.{guess}"
+            f"There is no quiz {str(name)!r}: there are {', '.join(known) or 'none'}.{guess}"
         )
     path = folder / f"{name}.yaml"
     status = path.stat()
@@ -55,14 +55,50 @@ def read_bank(path: Path) -> Bank:
     Raises:
         BankError: it cannot be read, is no YAML, or does not hold together.
     """
-    data = _parse(path)
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise BankError(f"There is no bank {path}.") from None
+    except (OSError, UnicodeError) as error:
+        raise BankError(f"{path} cannot be read as UTF-8 text: {error}.") from None
+    return bank_of(text, path.name, path.parent)
+
+
+def bank_of(text: str, name: str, folder: Path) -> Bank:
+    """Return the bank in the text of a file called ``name``, whose pictures lie in ``folder``.
+
+    Raises:
+        BankError: it is no YAML, or does not hold together.
+    """
+    try:
+        data = yaml.load(text, _Loader)
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        problem = " ".join(str(error).split())
+        raise BankError(f"{name} is not valid YAML: {problem[:300]}.") from None
+    return sound(data, name, Path(name).stem, folder)
+
+
+def sound(data: Any, source: str, quiz: str, folder: Path, noun: str = "item") -> Bank:
+    """Return the bank that ``data`` makes, if all of it holds together.
+
+    Args:
+        data: what stands in the YAML file.
+        source: the file that a message names.
+        quiz: what the bank must be called.
+        folder: where the pictures are.
+        noun: what a message calls a variant.
+
+    Raises:
+        BankError: it does not; the message names source, item and field.
+    """
     try:
         bank = Bank.model_validate(data)
     except ValidationError as error:
-        raise BankError(_sentence(path, data, error)) from None
-    bank._folder = path.parent
-    for where, problem in _problems(bank, path):
-        raise BankError(f"{path.name}, {where}: {problem}.")
+        item, field, problem = _first(data, error)
+        raise BankError(_sentence(source, noun, item, field, problem)) from None
+    bank._folder = folder
+    for item, field, problem in _problems(bank, quiz):
+        raise BankError(_sentence(source, noun, item, field, problem))
     return bank
 
 
@@ -80,20 +116,13 @@ class _Loader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def _parse(path: Path) -> Any:
-    try:
-        return yaml.load(path.read_text(encoding="utf-8"), _Loader)
-    except FileNotFoundError:
-        raise BankError(f"There is no bank {path}.") from None
-    except (OSError, UnicodeError) as error:
-        raise BankError(f"{path} cannot be read as UTF-8 text: {error}.") from None
-    except (yaml.YAMLError, RecursionError, ValueError) as error:
-        problem = " ".join(str(error).split())
-        raise BankError(f"{path.name} is not valid YAML: {problem[:300]}.") from None
+def _sentence(source: str, noun: str, item: str, field: str, problem: str) -> str:
+    where = source + (f", {noun} '{item}'" if item else "") + (f", field {field}" if field else "")
+    return f"{where}: {problem}."
 
 
-def _sentence(path: Path, data: Any, error: ValidationError) -> str:
-    """Say the first problem in one sentence, with the item's id rather than its position."""
+def _first(data: Any, error: ValidationError) -> tuple[str, str, str]:
+    """Return item, field and text of the first problem, with the item's id, not its position."""
     problems = error.errors(include_url=False)
     first = problems[0]
     item, here = "", data
@@ -106,11 +135,15 @@ def _sentence(path: Path, data: Any, error: ValidationError) -> str:
             item, fields = here["id"], []
         else:
             fields.append(str(step + 1) if isinstance(step, int) else str(step))
-    where = f"{path.name}" + (f", item '{item}'" if item else "")
-    where += f", field {' '.join(fields)}" if fields else ""
-    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     message = first["msg"].removeprefix("Value error, ")
-    return f"{where}: {message[:1].lower()}{message[1:].rstrip('.')}{more}."
+    cause = first.get("ctx", {}).get("error")
+    if isinstance(cause, FieldError):
+        fields.append(cause.field)
+    elif first["type"].startswith("union_tag"):  # the kind is missing, or there is none like it
+        fields.append("kind")
+        message = f"it must be one of {', '.join(_KINDS)}"
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    return item, " ".join(fields), f"{message[:1].lower()}{message[1:].rstrip('.')}{more}"
 
 
 def _inside(data: Any, step: Any) -> Any:
@@ -120,22 +153,22 @@ def _inside(data: Any, step: Any) -> Any:
         return None
 
 
-def _problems(bank: Bank, path: Path) -> Iterator[tuple[str, str]]:
-    """Yield (where, what) for what the schema alone cannot see."""
-    if bank.quiz != path.stem:
-        yield "field quiz", f"it says '{bank.quiz}', but the file's name says '{path.stem}'"
+def _problems(bank: Bank, quiz: str) -> Iterator[tuple[str, str, str]]:
+    """Yield (item, field, problem) for what the schema alone cannot see."""
+    if bank.quiz != quiz:
+        yield "", "quiz", f"it says '{bank.quiz}', but the file's name says '{quiz}'"
     if bank.pass_mark > len(bank.concepts):
-        yield "field pass_mark", f"{bank.pass_mark} of {len(bank.concepts)} concepts is impossible"
+        yield "", "pass_mark", f"{bank.pass_mark} of {len(bank.concepts)} concepts is impossible"
     seen: set[str] = set()
     for concept in bank.concepts:
         for name in (concept.id, *(variant.id for variant in concept.variants)):
             if name in seen:
-                yield f"item '{name}', field id", "this id is used twice"
+                yield name, "id", "this id is used twice"
             seen.add(name)
     for concept in bank.concepts:
         for variant in concept.variants:
             for field, problem in _variant_problems(bank, variant):
-                yield f"item '{variant.id}', field {field}", problem
+                yield variant.id, field, problem
 
 
 def _variant_problems(bank: Bank, variant: Variant) -> Iterator[tuple[str, str]]:
@@ -148,14 +181,15 @@ def _variant_problems(bank: Bank, variant: Variant) -> Iterator[tuple[str, str]]
                 compile(value, variant.id, "exec")
             except (SyntaxError, ValueError) as error:
                 yield field, f"this is no Python ({error})"
-        elif not field.endswith(("id", "kind", "proof", "unit")):
+        elif field.split()[0] not in ("id", "kind", "unit", "proof"):
             try:
                 rendering.check(value, bank.folder)
             except rendering.RenderError as error:
                 yield field, str(error)
-    repeated = {text for text in variant.texts if variant.texts.count(text) > 1}
-    for text in sorted(repeated):
-        yield "options", f"the text {text!r} stands there twice"
+    for number, text in enumerate(variant.texts, start=1):
+        if text in variant.texts[: number - 1]:
+            place = f"items {number}" if isinstance(variant, Ordering) else f"options {number} text"
+            yield place, f"the text {text!r} stands there twice"
 
 
 def _leaves(data: Any, path: str = "") -> Iterator[tuple[str, str]]:

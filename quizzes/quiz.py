@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import datetime
 import functools
+import os
 import threading
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
@@ -49,9 +51,13 @@ class Quiz:
     """
 
     def __init__(self, bank: Bank, *, student: str = "", folder: Path | None = None) -> None:
-        """Take the quiz of ``bank`` as ``student`` and keep attempts in ``folder``."""
+        """Take the quiz of ``bank`` as ``student`` and keep attempts in ``folder``.
+
+        Raises:
+            QuizError: the student's name is no text that can be saved.
+        """
         self.bank = bank
-        self.student = (student or login())[:100]
+        self.student = _name(student or login())
         self._file = AttemptsFile((folder or Path.cwd()).absolute(), bank.quiz)
         self._lock = threading.RLock()
         self.notice = ""
@@ -104,9 +110,14 @@ class Quiz:
         return self.attempts[0] if self.attempts else None
 
     @property
+    def counted(self) -> list[Attempt]:
+        """The attempts that count; what comes after them is practice (see `quizzes.regrade`)."""
+        return [attempt for attempt in self.attempts if attempt.attempt <= regrade.COUNTED]
+
+    @property
     def best(self) -> Attempt | None:
-        """The attempt with the best score, the earliest of equal ones."""
-        return max(self.attempts, key=lambda a: (a.score, -a.attempt), default=None)
+        """The attempt with the best score of those that count, the earliest of equal ones."""
+        return max(self.counted, key=lambda a: (a.score, -a.attempt), default=None)
 
     @property
     def open_questions(self) -> list[int]:
@@ -148,6 +159,7 @@ class Quiz:
         Raises:
             AnswerError: no such question, an answer that does not fit it, or one that comes after
                 the quiz was submitted.
+            AttemptsError: another window has submitted this attempt, or keeps the file busy.
         """
         item = self.item(which)
         if self._result is not None:
@@ -157,8 +169,7 @@ class Quiz:
             )
         answer = answers.normal(item, given)
         if self._answers.get(item.concept.id, answers.NOTHING) != answer:
-            self._answers[item.concept.id] = answer
-            self._save_draft()
+            self._save_draft({item.concept.id: answer})
 
     @_alone
     def submit(self) -> Result:
@@ -180,8 +191,6 @@ class Quiz:
             self.notice = ""
         except UnwritableError as error:
             self.notice = str(error)
-        else:
-            self._file.drop_draft()
         self.attempts.append(attempt)
         self._result = result
         return result
@@ -198,7 +207,7 @@ class Quiz:
                 f"Attempt {self.attempt} is still open: submit it with quiz.submit() first."
             )
         self._begin(self._next_number())
-        self._save_draft()
+        self._save_draft({})
 
     def demo(self, which: int | str) -> None:
         """Put a cell below this one that shows on live nodes what a question was about.
@@ -251,19 +260,26 @@ class Quiz:
             result.score, result.right, result.passed,
         )  # fmt: skip
 
-    def _save_draft(self) -> None:
-        draft = {
-            "quiz": self.bank.quiz, "student": self.student, "attempt": self.attempt,
-            "edition": self.bank.edition, "answers": self._answers,
-        }  # fmt: skip
+    def _save_draft(self, changed: Mapping[str, Answer]) -> None:
+        """Keep changed answers, and take up what another window has answered meanwhile."""
         try:
-            self._file.save_draft(draft)
+            kept = self._file.save_draft(self.student, self.attempt, self.bank.edition, changed)
             self.notice = ""
         except UnwritableError as error:
             self.notice = str(error)
+            kept = dict(changed)
+        self._take_up(kept)
+
+    def _take_up(self, given: Mapping[str, Any]) -> None:
+        """Take up saved answers; one that does not fit any more is left out."""
+        for item in self.items:
+            if item.concept.id in given:
+                with suppress(AnswerError):
+                    answer = answers.normal(item, given[item.concept.id])
+                    self._answers[item.concept.id] = answer
 
     def _restore_draft(self) -> bool:
-        """Take up the attempt that was begun; an answer that does not fit any more is left out."""
+        """Take up the attempt that was begun, if there is one."""
         draft = self._file.read_draft()
         mine = (draft.get("quiz"), draft.get("student"), draft.get("edition"))
         number, given = draft.get("attempt"), draft.get("answers")
@@ -272,16 +288,16 @@ class Quiz:
         if number != self._next_number() or not isinstance(given, Mapping):
             return False
         self._begin(self._next_number())
-        for item in self.items:
-            try:
-                self._answers[item.concept.id] = answers.normal(item, given.get(item.concept.id))
-            except AnswerError:
-                continue
+        self._take_up({item.concept.id: given.get(item.concept.id) for item in self.items})
         return True
 
 
 def load(
-    name: str, *, student: str = "", folder: Path | None = None, banks: Path | None = None
+    name: str,
+    *,
+    student: str = "",
+    folder: str | os.PathLike[str] | None = None,
+    banks: str | os.PathLike[str] | None = None,
 ) -> Quiz:
     """Return the quiz called ``name``, with what this learner has done of it so far.
 
@@ -294,6 +310,30 @@ def load(
     Raises:
         BankError: there is no such quiz (the message names the ones there are), or its bank is
             not sound.
+        QuizError: ``student`` is no name, or ``folder`` or ``banks`` is no path.
     """
-    bank = loader.load_bank(name, banks or loader.BANKS)
-    return Quiz(bank, student=student, folder=folder)
+    bank = loader.load_bank(name, loader.BANKS if banks is None else _path("banks", banks))
+    return Quiz(bank, student=student, folder=None if folder is None else _path("folder", folder))
+
+
+def _path(argument: str, given: Any) -> Path:
+    try:
+        path = Path(given)
+        with suppress(OSError):
+            path.stat()  # refuses what no system takes for a name
+    except (TypeError, ValueError):
+        raise QuizError(
+            f"{argument}={given!r} is no folder: give its path, such as {argument}='my-quizzes'."
+        ) from None
+    return path
+
+
+def _name(student: Any) -> str:
+    try:
+        str.encode(student)
+    except (TypeError, UnicodeError):
+        raise QuizError(
+            f"student={student!r} is no name that can be saved: give it as plain text, such as "
+            "student='ada'."
+        ) from None
+    return str(student)[:100]

@@ -5,15 +5,15 @@ A reader takes nothing on trust: sizes, types and ranges are checked before anyt
 
 from __future__ import annotations
 
+import codecs
 import json
-import math
 import os
 import stat
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from quizzes.answers import Answer
+from quizzes.answers import Answer, number
 
 VERSION = 1
 MAX_LINE = 64 * 1024
@@ -80,7 +80,8 @@ def handed_in(folder: Path, quiz: str) -> bytes:
 def parse(content: bytes) -> tuple[list[Attempt], int]:
     """Return the attempts in a file's content, and how many of its lines are none."""
     attempts, damaged = [], 0
-    for line in content[:MAX_FILE].split(b"\n"):
+    # An editor may have put a byte order mark in front.
+    for line in content[:MAX_FILE].removeprefix(codecs.BOM_UTF8).split(b"\n"):
         if not line.strip():
             continue
         try:
@@ -101,7 +102,8 @@ def _attempt(line: bytes) -> Attempt:
     for name in ("attempt", "right"):
         _must(type(data[name]) is int and 0 <= data[name] < 10**6)
     _must(data["attempt"] > 0 and type(data["passed"]) is bool)
-    _must(type(data["score"]) in (int, float) and math.isfinite(data["score"]))
+    _must(type(data["score"]) in (int, float))
+    number(data["score"])
     answers = {str(name): _given(given) for name, given in data["answers"].items()}
     return Attempt(**{**data, "answers": answers})
 
@@ -110,8 +112,7 @@ def _given(data: Any) -> Given:
     variant, answer = data["variant"], data["answer"]
     _must(data.keys() == {"variant", "answer"} and isinstance(variant, str))
     if type(answer) in (int, float):
-        _must(abs(answer) < 1e300)
-        answer = float(answer)
+        answer = number(answer)
     _must(isinstance(answer, float) or (isinstance(answer, str) and len(answer) <= MAX_TEXT))
     return Given(variant, answer)
 

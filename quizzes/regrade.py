@@ -3,12 +3,21 @@
 An attempt counts if it is one that could have been dealt: to its student, for its number, the
 questions that it names. The letters in it mean nothing without that deal: under another name they
 are guesses. A file that was copied whole still says under which login it was made.
+
+Nobody is kept from practising, but the best of thousands of guesses would be full marks. So the
+first `COUNTED` attempts of a file count, by their number and in the order of the file, whoever
+made them. That is four times through all variants of a concept with five, and who guesses has one
+chance in some hundreds to get everything right in it. A file that goes on from there, or in which
+attempts follow one another faster than anybody reads (`HASTE`), is for a person to look at, with
+the reason: what it earns is what its first attempts earn. Time stamps are easily forged, so they
+only ever add a reason to look.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 
 from quizzes import answers, marking, model, record
 from quizzes.answers import Answer
@@ -17,8 +26,10 @@ from quizzes.errors import AnswerError
 from quizzes.marking import Result
 from quizzes.record import Attempt
 
-MAX_ATTEMPT = 10_000
-"""Highest number of an attempt that is believed; nobody takes a quiz that often."""
+COUNTED = 20
+"""How many attempts count; those with a higher number are practice."""
+HASTE, WITHIN = 5, 60.0
+"""More attempts than `HASTE` within so many seconds are not made by hand."""
 
 
 @dataclass(frozen=True)
@@ -27,13 +38,15 @@ class Marked:
 
     ``results`` are those that count, in the order of the file; ``problems`` says of each other one
     why it does not count; ``other_edition`` is how many were made with another edition of the
-    bank, which cannot be marked with this one; ``damaged`` is how many lines are no attempt.
+    bank, which cannot be marked with this one; ``damaged`` is how many lines are no attempt;
+    ``doubt`` says why a person should look at them, or is empty.
     """
 
     results: tuple[Result, ...]
     problems: tuple[str, ...]
     other_edition: int
     damaged: int
+    doubt: str = ""
 
     @property
     def best(self) -> Result | None:
@@ -62,30 +75,55 @@ def mark_all(bank: Bank, found: Iterable[Attempt], damaged: int = 0) -> Marked:
     results: list[Result] = []
     problems: list[str] = []
     seen: set[tuple[str, int]] = set()
-    other_edition = 0
+    stamps: list[float] = []
+    other_edition = surplus = 0
     for attempt in found:
         name = f"Attempt {attempt.attempt} of '{attempt.student}'"
         who = (attempt.student, attempt.attempt)
-        result = again(bank, attempt)
+        stamps.append(_seconds(attempt.submitted))
         if attempt.quiz != bank.quiz:
             problems.append(f"{name} belongs to the quiz '{attempt.quiz}'.")
         elif attempt.edition != bank.edition:
             other_edition += 1
-        elif result is None:
-            problems.append(f"{name} answers questions that were not asked in it.")
         elif who in seen:
             problems.append(f"{name} is there more than once; the first one counts.")
+        elif attempt.attempt > COUNTED or len(results) == COUNTED:
+            surplus += 1
+        elif (result := again(bank, attempt)) is None:
+            problems.append(f"{name} answers questions that were not asked in it.")
         else:
             seen.add(who)
             results.append(result)
-    return Marked(tuple(results), tuple(problems), other_edition, damaged)
+    doubt = _doubt(stamps, surplus)
+    return Marked(tuple(results), tuple(problems), other_edition, damaged, doubt)
+
+
+def _doubt(stamps: list[float], surplus: int) -> str:
+    """Say why attempts may not have been made by a person; empty if nothing speaks for it."""
+    reasons = []
+    if surplus:
+        reasons.append(
+            f"of {len(stamps)} attempts {surplus} are beyond the first {COUNTED}, which alone count"
+        )
+    ordered = sorted(stamps)
+    spans = [last - first for first, last in zip(ordered, ordered[HASTE:], strict=False)]
+    if spans and min(spans) < WITHIN:
+        reasons.append(f"more than {HASTE} attempts were submitted within {WITHIN:.0f} seconds")
+    return f"A person should look at the attempts: {', and '.join(reasons)}." if reasons else ""
+
+
+def _seconds(submitted: str) -> float:
+    """Return when an attempt was submitted; all without a time that can be read are of one time."""
+    try:
+        moment = datetime.fromisoformat(submitted)
+        return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+    except (ValueError, OverflowError):
+        return 0.0
 
 
 def again(bank: Bank, attempt: Attempt) -> Result | None:
     """Mark an attempt again; None if this edition of the bank could not have dealt it."""
     if (attempt.quiz, attempt.edition) != (bank.quiz, bank.edition):
-        return None
-    if attempt.attempt > MAX_ATTEMPT:
         return None
     paper = model.draw(bank, attempt.student, attempt.attempt)
     given: dict[str, Answer] = {}

@@ -68,6 +68,6 @@ def _of_record(record: Record, notebook: str, student: str) -> Iterator[tuple[bo
         return
     for verdict in record.verdicts.values():
         for result in verdict.checks:
-            if result.status == "grader_error":
+            if result.status in ("grader_error", "not_examined"):
                 what = feedback.stripped(result.actual, [student])
                 yield True, f"{notebook}, “{result.title}”: {what}"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from quizzes import loader
 from quizzes.bank import Bank
+from quizzes.errors import BankError
 from quizzes.exchange import gift, merge, questions
 from quizzes.exchange.questions import ExchangeError
 
@@ -62,6 +63,7 @@ def import_gift(path: Path, bank: Bank, to: Path | None = None) -> tuple[Path, m
 
     Raises:
         ExchangeError: a file cannot be read or written, is no GIFT, or does not fit the bank.
+        BankError: what would be written is no sound bank.
     """
     try:
         with path.open("rb") as file:
@@ -76,7 +78,18 @@ def import_gift(path: Path, bank: Bank, to: Path | None = None) -> tuple[Path, m
     target = to or Path(f"{bank.quiz}.yaml")
     if to is None and target.exists():
         raise ExchangeError(f"{target} is there already: name the file to write with --to.")
-    _write(target, merged.to_yaml().encode())
+    if target.name != f"{bank.quiz}.yaml":
+        raise ExchangeError(
+            f"{target}: a bank is named like its quiz, so call the file {bank.quiz}.yaml, in "
+            "another folder if need be."
+        )
+    content = merged.to_yaml()
+    loader.bank_of(content, target.name, bank.folder)  # what is written can be read again
+    _write(target, content.encode())
+    try:
+        loader.bank_of(content, target.name, target.parent)
+    except BankError:
+        merged.notes.append(f"Its pictures are not beside it: copy {bank.folder / 'assets'} there.")
     return target, merged
 
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import yaml
-from pydantic import ValidationError
 
+from quizzes import loader
 from quizzes.bank import Bank, Concept
+from quizzes.errors import BankError
 from quizzes.exchange.questions import (
     BOTH,
     POSITION,
@@ -87,7 +88,11 @@ def merge(bank: Bank, questions: Sequence[Question], source: str) -> Merged:
         notes.append(f"{source} does not have {', '.join(sorted(missing))}: kept as they are.")
     if UNNAMED in str(data["concepts"]):
         data["misconceptions"][UNNAMED] = "Imported: name the belief behind this answer."
-    return Merged(_checked(data, bank, source), notes, changed)
+    try:
+        merged = loader.sound(data, source, bank.quiz, bank.folder, noun="question")
+    except BankError as error:
+        raise ExchangeError(str(error)) from None
+    return Merged(merged, notes, changed)
 
 
 def dump(bank: Bank) -> str:
@@ -151,7 +156,7 @@ def _built(question: Question, before: Question | None, old: dict[str, Any]) -> 
         data |= _numbers(question, old)
     else:
         data |= _pairs(question, old)
-    data["proof"] = old.get("proof", UNPROVEN)
+    data["proof"] = old.get("proof", [UNPROVEN])
     return data
 
 
@@ -258,27 +263,3 @@ def _pairs(question: MatchQuestion, old: dict[str, Any]) -> dict[str, Any]:
         for left, right in question.pairs
     ]
     return {"pairs": pairs, "extras": [_kept(e, *rights) for e in question.extras], **fields}
-
-
-def _checked(data: dict[str, Any], bank: Bank, source: str) -> Bank:
-    try:
-        merged = Bank.model_validate(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        problem = first["msg"].removeprefix("Value error, ").rstrip(".")
-        where = f"{source}, question '{_item(data, first['loc'])}', field {first['loc'][-1]}"
-        raise ExchangeError(f"{where}: {problem[:1].lower()}{problem[1:]}.") from None
-    merged._folder = bank.folder
-    return merged
-
-
-def _item(data: Any, steps: Sequence[int | str]) -> str:
-    """Return the id of the innermost thing that has one on the way to a field."""
-    item, here = str(data["quiz"]), data
-    for step in steps:
-        if isinstance(here, dict) and step not in here:
-            continue  # pydantic names the kind of a variant as if it were a field
-        here = here[step]
-        if isinstance(here, dict) and "id" in here:
-            item = here["id"]
-    return item

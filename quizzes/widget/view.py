@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from quizzes import marking, model, rendering, text
+from quizzes import marking, model, regrade, rendering, text
 from quizzes.bank import Matching, Multiple, Numeric
 from quizzes.model import Item
 
@@ -31,10 +31,16 @@ def _standing(quiz: Quiz) -> str:
     if first is None or best is None:
         return ""
     most = len(quiz.bank.concepts)
-    passed = "passed" if any(attempt.passed for attempt in quiz.attempts) else "not passed yet"
+    passed = "passed" if any(attempt.passed for attempt in quiz.counted) else "not passed yet"
+    practice = quiz.attempt > regrade.COUNTED
     return (
         f"First attempt: {first.score:g} of {most}. Best: {best.score:g} of {most} "
         f"(attempt {best.attempt}). So far: {passed}."
+        + (
+            f" The first {regrade.COUNTED} attempts count: this one is practice."
+            if practice
+            else ""
+        )
     )
 
 

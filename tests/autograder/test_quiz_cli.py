@@ -62,6 +62,7 @@ def test_there_and_back_again(tmp_path: Path, autograder: Run) -> None:
     said, _ = autograder("quiz", "import", "ch05.gift", "--into", "ch05")
     assert "Written: ch05.yaml (1 new or changed)" in said
     assert "'pattern-camera-3' has changed" in said
+    assert "Its pictures are not beside it: copy " in said
     shutil.copytree(BANK.folder / "assets", tmp_path / "assets")
     assert "ch05: 0 to mend" in autograder("quiz", "lint", "ch05.yaml")[0]
     _, error = autograder("quiz", "import", "ch05.gift", "--into", "ch05", code=1)
@@ -84,6 +85,8 @@ def test_qti_is_a_zip_file(tmp_path: Path, autograder: Run) -> None:
         ("import . --into ch05", ". cannot be read: Is a directory"),
         ("import bytes.gift --into ch05", "bytes.gift, line 2: this is not UTF-8 text."),
         ("import bad.gift --into ch05", "bad.gift, line 2, question 'q': it is an essay"),
+        ("import twice.gift --into ch05", "field options 3 text: the text 'b' stands there twice."),
+        ("import fine.gift --into ch05 --to new.yaml", "so call the file ch05.yaml"),
         ("lint broken.yaml", "broken.yaml, field quiz: "),
         ("lint none.yaml", "There is no bank none.yaml."),
     ],
@@ -93,10 +96,14 @@ def test_what_is_wrong_is_one_sentence(
 ) -> None:
     (tmp_path / "bytes.gift").write_bytes(b"// fine\n\xff\xfe\n")
     (tmp_path / "bad.gift").write_text("// fine\n::q::Why?{}\n")
+    (tmp_path / "fine.gift").write_text("::qos-purpose-1::Why?{=a#f ~b#f}\n")
+    (tmp_path / "twice.gift").write_text("::qos-purpose-1::Why?{=a#f ~b#f ~b#f}\n")
     (tmp_path / "broken.yaml").write_text("quiz: 5\n")
+    before = sorted(tmp_path.iterdir())
     _, error = autograder("quiz", *arguments.split(), code=1)
     assert sentence in error
     assert len(error.strip().splitlines()) == 1
+    assert sorted(tmp_path.iterdir()) == before, "nothing was written"
 
 
 def test_a_bank_with_something_to_mend_fails(tmp_path: Path, autograder: Run) -> None:

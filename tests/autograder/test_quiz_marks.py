@@ -18,6 +18,8 @@ from autograder import engine, quiz_marks, submission
 from autograder.build import build
 from autograder.engine import Graded
 from autograder.gradebook import CourseGradebook, Grade
+from autograder.insight.collect import collect
+from autograder.insight.needs import people_needed
 from autograder.progress import Collecting
 from autograder.release import release
 from autograder.verdict import Verdict
@@ -103,6 +105,7 @@ def test_the_best_attempt_becomes_points(root: Path, hand_in: HandIn) -> None:
     forged = hand_in("forged", 0) / FILE
     line = json.loads(forged.read_text())
     forged.write_text(json.dumps({**line, "score": 5.0, "right": 5, "passed": True}) + "\n")
+    hand_in("hasty", *[1] * 6)
     lost = hand_in("lost", 3)
     (lost / f"{NOTEBOOK}.ipynb").unlink()
     crashed = hand_in("crashed", 3)
@@ -124,7 +127,14 @@ def test_the_best_attempt_becomes_points(root: Path, hand_in: HandIn) -> None:
     assert found["copied"] == 5.0, "answers are right whoever copied them, but the feedback says so"
     assert found["crashed"] == verdict(crashed).score >= 3
     assert grades(root)["lost"].score == verdict(lost).score >= 3
-    assert {name for name, grade in grades(root).items() if grade.needs_manual_grade} == {"lost"}
+    assert {name for name, grade in grades(root).items() if grade.needs_manual_grade} == {
+        "hasty",
+        "lost",
+    }
+    needs = {
+        student: n.why for n in people_needed(collect(root, ASSIGNMENT)) for student in n.students
+    }
+    assert "more than # attempts were submitted within # seconds" in needs["hasty"]
     for student, says in {
         "alan": "The best of 3 attempts counts: number 2.",
         "copied": "made under the login 'ada'",
@@ -167,6 +177,23 @@ def test_a_changed_grade_cell_earns_nothing(root: Path, hand_in: HandIn) -> None
     nbformat.write(notebook, folder / f"{NOTEBOOK}.ipynb")
     engine.grade(root, ASSIGNMENT)
     assert points(root)["ada"] == verdict(folder).score < 2
+
+
+def test_attempts_that_look_machine_made_go_to_a_person_with_the_reason(tmp_path: Path) -> None:
+    take(tmp_path, "ada", 2, 5)
+    assert (verdict(tmp_path).score, verdict(tmp_path).needs_human) == (5.0, False)
+    lines = (tmp_path / FILE).read_text().splitlines()
+    far = [json.dumps({**json.loads(lines[1]), "attempt": number}) for number in (21, 22)]
+    (tmp_path / FILE).write_text("\n".join([lines[0], *far]))
+    found = verdict(tmp_path)
+    assert 2 <= found.score < 5
+    assert (found.max_score, found.needs_human) == (5.0, True)
+    assert found.notes[0].startswith("The one attempt that counts is number 1.")
+    assert "of 3 attempts 2 are beyond the first 20" in found.checks[-1].actual
+    (tmp_path / FILE).write_text("\n".join(far))
+    found = verdict(tmp_path)
+    assert (found.score, found.needs_human) == (0.0, True)
+    assert "of 2 attempts 2 are beyond the first 20" in found.checks[0].actual
 
 
 @pytest.mark.parametrize("kind", ["link", "folder", "pipe", "rubbish", "empty"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from quizzes import answers, model
@@ -25,6 +26,7 @@ def items(bank: Bank) -> dict[str, Item]:
         ("predict", None, ""), ("predict", "", ""),
         ("multiple", "ca", "ac"), ("multiple", ["c", "a"], "ac"), ("multiple", {"c", "a"}, "ac"),
         ("multiple", "c, a", "ac"), ("multiple", ("d",), "d"),
+        ("numeric", np.int64(2), 2.0), ("numeric", np.float32(0.5), 0.5), ("numeric", 1e300, 1e300),
         ("numeric", 3, 3.0), ("numeric", 3.5, 3.5), ("numeric", "-3.5e1", -35.0),
         ("ordering", "dcba", "dcba"), ("ordering", ["d", "c", "b", "a"], "dcba"),
         ("matching", "bca", "bca"), ("matching", "b-a", "b-a"), ("matching", "---", ""),
@@ -44,7 +46,9 @@ def test_an_answer_gets_its_saved_form(
         ("predict", b"a"), ("predict", object()), ("predict", [["a"]]), ("predict", {"a": 1}),
         ("multiple", "aa"), ("multiple", "ae"), ("multiple", [1, 2]),
         ("numeric", "three"), ("numeric", float("nan")), ("numeric", "inf"), ("numeric", True),
-        ("numeric", [1.0]), ("numeric", "3,5"),
+        ("numeric", [1.0]), ("numeric", "3,5"), ("numeric", "1_000"), ("numeric", np.bool_(True)),
+        ("numeric", 1e305), ("numeric", "-1e305"), ("numeric", 3j), ("numeric", np.float64("nan")),
+        ("ordering", {"d", "c", "b", "a"}), ("matching", frozenset("bca")), ("predict", "\udcff"),
         ("ordering", "abc"), ("ordering", "abca"), ("ordering", "abcde"),
         ("matching", "ab"), ("matching", "abcd"), ("matching", {4: "a"}), ("matching", {1: "z"}),
         ("matching", {"1": "a"}), ("predict", "a" * 10_000),

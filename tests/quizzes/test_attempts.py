@@ -119,6 +119,9 @@ def test_a_crash_at_any_moment_loses_nothing_that_was_recorded(tmp_path: Path) -
         attempt(2).to_json().replace('"attempt": 2', '"attempt": -2').encode(),
         attempt(2).to_json().replace('"attempt": 2', '"attempt": true').encode(),
         attempt(2).to_json().replace('"score": 1.0', '"score": NaN').encode(),
+        attempt(2).to_json().replace('"score": 1.0', '"score": 1' + "0" * 400).encode(),
+        attempt(2).to_json().replace('"b"', "1e305").encode(),
+        attempt(2).to_json().replace('"b"', "1" + "0" * 400).encode(),
         attempt(2).to_json().replace('"b"', '["b"]').encode(),
         attempt(2).to_json().replace('"b"', "1" + "0" * 5000).encode(),
         attempt(2).to_json().replace("ada", "a" * 300).encode(),
@@ -139,6 +142,26 @@ def test_a_damaged_file_is_kept_aside_and_its_sound_part_stays_in_use(
         "use."
     )
     assert (file.path.parent / asides(file)[0]).read_bytes() == damaged
+    file.append(attempt(2))
+    assert file.read() == ([attempt(1), attempt(2)], "")
+
+
+def test_a_file_cut_anywhere_never_joins_lines(file: AttemptsFile) -> None:
+    file.append(attempt(1))
+    first = file.path.read_bytes()
+    file.append(attempt(2))
+    whole = file.path.read_bytes()
+    for end in range(len(first) - 1, len(whole)):
+        file.path.write_bytes(whole[:end])
+        file.append(attempt(3))
+        kept = [1, 2, 3] if end == len(whole) - 1 else [1, 3]
+        found, notice = file.read()
+        assert ([a.attempt for a in found], notice) == (kept, "")
+
+
+def test_a_byte_order_mark_costs_no_attempt(file: AttemptsFile) -> None:
+    file.append(attempt(1))
+    file.path.write_bytes(b"\xef\xbb\xbf" + file.path.read_bytes().replace(b"\n", b"\r\n"))
     file.append(attempt(2))
     assert file.read() == ([attempt(1), attempt(2)], "")
 
@@ -186,8 +209,7 @@ def test_a_folder_that_takes_no_files_is_one_sentence(folder: str) -> None:
     with pytest.raises(UnwritableError, match=rf"Nothing can be saved in {folder} \(.+\): you can"):
         file.append(attempt(1))
     with pytest.raises(UnwritableError, match="do not count until"):
-        file.save_draft({"quiz": "sample"})
-    file.drop_draft()
+        file.save_draft("ada", 1, "edition", {})
 
 
 @pytest.fixture
@@ -235,15 +257,32 @@ def test_something_else_in_the_place_of_the_file_is_one_sentence(
         file.append(attempt(1))
 
 
-def test_unsubmitted_answers_are_kept_and_forgotten(file: AttemptsFile) -> None:
+def test_unsubmitted_answers_are_kept_until_their_attempt_is_recorded(file: AttemptsFile) -> None:
     assert file.read_draft() == {}
-    file.save_draft({"answers": {"one": "b"}})
-    file.save_draft({"answers": {"one": "ü"}})
-    assert file.read_draft() == {"answers": {"one": "ü"}}
-    file.drop_draft()
-    file.drop_draft()
+    file.save_draft("ada", 1, "edition", {"one": "b"})
+    assert file.save_draft("ada", 1, "edition", {"two": "ü"}) == {"one": "b", "two": "ü"}
+    assert file.read_draft() == {
+        "quiz": "sample", "student": "ada", "attempt": 1, "edition": "edition",
+        "answers": {"one": "b", "two": "ü"},
+    }  # fmt: skip
+    file.append(attempt(1, "grace"))
+    assert file.read_draft()["student"] == "ada"
+    file.append(attempt(1))
     assert file.read_draft() == {}
-    assert list(file.path.parent.iterdir()) == []
+    with pytest.raises(AttemptsError, match="Attempt 1 has been submitted already"):
+        file.save_draft("ada", 1, "edition", {"one": "c"})
+    assert file.save_draft("ada", 2, "edition", {"one": "c"}) == {"one": "c"}
+    assert file.save_draft("ada", 2, "another", {"two": "d"}) == {"two": "d"}
+
+
+def test_windows_that_answer_at_the_same_time_lose_nothing(tmp_path: Path) -> None:
+    def answer(number: int) -> None:
+        AttemptsFile(tmp_path, "sample").save_draft("ada", 1, "edition", {f"c{number}": "a"})
+
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(answer, range(40)))
+    kept = AttemptsFile(tmp_path, "sample").read_draft()["answers"]
+    assert kept == {f"c{number}": "a" for number in range(40)}
 
 
 def test_a_huge_file_is_read_in_part_and_not_mistaken_for_whole() -> None:

@@ -14,6 +14,8 @@ from quizzes import lint, loader
 from quizzes.bank import Bank, Predict
 from tests.kernel import Kernel
 
+from .shown_ch05 import SHOWN
+
 BANK = loader.load_bank("ch05")
 PROOFS = Path(__file__).parent / "proofs"
 
@@ -43,6 +45,18 @@ def show_cells(bank: Bank) -> dict[str, str]:
 
 
 SHOWS = show_cells(BANK)
+
+
+def beliefs_of(bank: Bank) -> dict[str, set[str]]:
+    """Every different `show` cell, with the misconceptions that it is offered for."""
+    names = {source: name for name, source in show_cells(bank).items()}
+    beliefs: dict[str, set[str]] = {name: set() for name in names.values()}
+    for place in lint.wrong_answers(bank):
+        if place.show is not None:
+            beliefs[names[place.show]].add(str(place.misconception))
+    return beliefs
+
+
 PREDICTIONS = {
     variant.id: variant
     for concept in BANK.concepts
@@ -106,14 +120,31 @@ def test_every_proof_exists_and_every_proof_is_named_by_a_variant() -> None:
     }
     named = {
         proof for concept in BANK.concepts for variant in concept.variants
-        for proof in variant.proofs
+        for proof in variant.proof
     }  # fmt: skip
     assert named == written
 
 
+def test_for_every_belief_it_is_said_what_its_cell_must_print() -> None:
+    assert {name: set(beliefs) for name, beliefs in SHOWN.items()} == beliefs_of(BANK)
+
+
 @pytest.mark.parametrize("name", SHOWS)
-def test_a_show_cell_runs_and_prints_what_happens(kernel: Kernel, name: str) -> None:
-    clean_output(kernel, SHOWS[name])
+def test_a_show_cell_prints_what_corrects_its_beliefs(kernel: Kernel, name: str) -> None:
+    printed = clean_output(kernel, SHOWS[name]).strip()
+    for belief, pattern in SHOWN[name].items():
+        assert re.search(pattern, printed, re.DOTALL), (belief, printed)
+
+
+@pytest.mark.parametrize("name", SHOWS)
+def test_no_show_cell_prints_its_conclusion_as_a_fixed_sentence(name: str) -> None:
+    """What corrects a belief comes from live nodes: the code alone does not hold it."""
+    fixed = [
+        node.value for node in ast.walk(ast.parse(SHOWS[name]))
+        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]  # fmt: skip
+    for pattern in SHOWN[name].values():
+        assert not any(re.search(pattern, text, re.DOTALL) for text in fixed)
 
 
 @pytest.mark.parametrize("name", PREDICTIONS)

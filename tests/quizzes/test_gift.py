@@ -149,8 +149,8 @@ def variant(bank: Bank, name: str) -> dict[str, Any]:
 def test_an_edited_option_keeps_its_misconception_and_its_cell() -> None:
     merged = changed("To store the messages of a topic", "To keep the messages of a topic")
     was, now = variant(BANK, "qos-purpose-1"), variant(merged.bank, "qos-purpose-1")
-    assert now["options"][1]["text"].startswith("To keep the messages")
-    was["options"][1]["text"] = now["options"][1]["text"]
+    assert now["options"][0]["text"].startswith("To keep the messages")
+    was["options"][0]["text"] = now["options"][0]["text"]
     assert now == was
     assert merged.notes == ["'qos-purpose-1' has changed: see that its proofs still prove its key."]
 
@@ -191,7 +191,7 @@ def test_a_new_question_says_what_it_still_needs() -> None:
         ("False", True, "Right."),
     ]
     assert now["options"][0]["misconception"] == merge.UNNAMED
-    assert now["proof"] == merge.UNPROVEN
+    assert now["proof"] == [merge.UNPROVEN]
     assert merged.notes == ["'qos-purpose-6' is new: name its proofs, misconceptions and cells."]
 
 
@@ -258,7 +258,15 @@ def test_a_bad_file_is_one_sentence_with_file_line_and_question(content: str, pr
         ("$CATEGORY: ch05/qos-purpose\n\n::My question::How?{=a ~b}",
          "question 'My question': a new question's name becomes its id"),
         ("::qos-purpose-2::Which?{~%100%a#f ~%100%b#f}",
-         "question 'qos-purpose-2', field multiple: at least one option must be correct"),
+         "question 'qos-purpose-2', field options: at least one option must be correct"),
+        ("::qos-purpose-1::Which?{=a ~b ~b}",
+         "question 'qos-purpose-1', field options 3 text: the text 'b' stands there twice"),
+        ("::qos-purpose-1::Which?{=a ~b#![](assets/ch05-camera.svg)}",
+         "question 'qos-purpose-1', field options 2 feedback: the image"),
+        ("$CATEGORY: ch05/qos-purpose\n\n::pattern-camera::How?{=a ~b}",
+         "question 'pattern-camera', field id: this id is used twice"),
+        ("::pattern-camera-5::Which?{=a -> x =b -> x = -> y}",
+         "question 'pattern-camera-5', field pairs: all have the same right side"),
     ],
 )  # fmt: skip
 def test_what_does_not_fit_the_bank_is_one_sentence(content: str, problem: str) -> None:

@@ -42,8 +42,18 @@ def test_a_sound_bank_has_no_findings() -> None:
         ({"stem": BANK.concepts[1].variants[0].stem}, "the same text stands in pattern-camera-1"),
         ({"options": option(1, text="All of the above.")}, "refers to other options"),
         ({"options": option(1, text="Both A and B, for all the endpoints.")}, "refers to other"),
+        *(({"options": option(1, text=text)}, "refers to other options") for text in (
+            "All the above, for every endpoint.", "All above answers, for every endpoint.",
+            "All answers are correct, for every endpoint.", "Both a & b, for every endpoint.",
+            "Every one of the above, for every endpoint.", "None of the above, for any endpoint.",
+            "None of these options is right for it.", "Options a and c, for every endpoint.",
+            "Either B or C, but never both at once.", "a, b and c, whatever the endpoint.",
+            "Answer (c), but with another depth in it.", "Some of the others, but not the first.",
+        )),
         ({"options": option(0, text="x" * 200)}, "the longest option has 200 characters"),
         ({"options": option(1, feedback="No.")}, "option 2: its feedback is too short"),
+        ({"options": option(1, feedback="?!." * 30)}, "option 2: its feedback is too short"),
+        ({"options": option(2, feedback="--- " * 30)}, "option 3: its feedback is too short"),
         ({"options": option(1, show=None)}, "option 2: it has no cell"),
         (
             {"options": option(2, text="To store the messages of a topic until each of its "
@@ -91,6 +101,35 @@ def test_keys_that_can_be_guessed_by_length_are_found(length: int, name: str) ->
     assert text in problems(Bank.model_validate(data))
 
 
-def test_keys_that_stand_in_one_place_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    "text",
+    [
+        "All the answers from the server, as they come.", "All topics above 5 Hz on the robot.",
+        "`a and b`: both of the topics are heard.", "A service, a topic and an action together.",
+        "Every one of the subscribers, in any order.", "Both sides must offer the same depth.",
+    ],
+)  # fmt: skip
+def test_what_only_sounds_like_it_is_no_finding(text: str) -> None:
+    assert not [one for one in problems(changed(options=option(1, text=text))) if "refers" in one]
+
+
+def test_keys_that_are_dealt_to_one_place_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lint.model, "_shuffled", lambda count, seed: list(range(count)))
-    assert any("stand in place 1" in text for text in problems(BANK))
+    data = BANK.model_dump()
+    keys_first(data)
+    assert any("stand in place 1" in text for text in problems(Bank.model_validate(data)))
+
+
+def keys_first(data: dict[str, Any]) -> None:
+    for variant in [one for concept in data["concepts"] for one in concept["variants"]]:
+        if variant["kind"] in ("single", "predict"):
+            variant["options"].sort(key=lambda option: not option["correct"])
+
+
+def test_keys_that_stand_first_in_the_bank_are_found_whatever_is_dealt() -> None:
+    data = BANK.model_dump()
+    keys_first(data)
+    assert problems(Bank.model_validate(data)) == [
+        "item 'ch05', field options: the key is option 1 of 4 in 16 of 16 questions, as they stand "
+        "in the bank."
+    ]

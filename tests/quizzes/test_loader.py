@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 import quizzes
+from quizzes import loader
 from quizzes.errors import BankError
 from quizzes.loader import load_bank, read_bank
 
@@ -60,14 +62,21 @@ def twice(data: dict[str, Any]) -> None:
 
 BROKEN: list[tuple[Change, list[str]]] = [
     (option("predict", feedback=None), ["'predict-2'", "options 2 feedback", "required"]),
-    (option("predict", misconception=None), ["'predict-2'", "a wrong option needs a misconc"]),
+    (option("predict", misconception=None), ["options 2 misconception: a wrong option needs"]),
     (option("predict", misconception="nobody"), ["'predict-2'", "no misconception 'nobody'"]),
     (option("predict", text=42), ["'predict-2'", "options 2 text", "valid string"]),
     (option("predict", correct="yes"), ["'predict-2'", "options 2 correct", "boolean"]),
     (option("predict", show="print("), ["'predict-2'", "options 2 show", "no Python"]),
-    (option("predict", misconception=None, correct=True), ["'predict-2'", "exactly one option"]),
+    (option("predict", misconception=None, correct=True), ["'predict-2', field options: exactly"]),
+    (change("multiple", options=[sample.option("a"), sample.option("b")]),
+     ["'multiple-2'", "field options: at least one"]),
+    (option("predict", text="**alpha** $x^2$ <b>predict</b>"),
+     ["'predict-2'", "field options 2 text: the text"]),
+    (change("predict", kind=None), ["'predict-2', field kind: it must be one of single"]),
+    (change("predict", proof=[]), ["'predict-2', field proof: list should have"]),
+    (change("predict", proof=[" "]), ["'predict-2', field proof 1: string should"]),
     (change("predict", code=None), ["'predict-2'", "code", "required"]),
-    (change("predict", kind="guess"), ["'predict-2'", "guess"]),
+    (change("predict", kind="guess"), ["'predict-2'", "field kind: it must be one of"]),
     (change("predict", hint="x"), ["'predict-2'", "hint", "not permitted"]),
     (change("predict", stem="![](assets/dot.svg)"), ["'predict-2'", "stem", "description"]),
     (change("predict", stem="![x](assets/no.svg)"), ["'predict-2'", "stem", "cannot be read"]),
@@ -76,12 +85,16 @@ BROKEN: list[tuple[Change, list[str]]] = [
     (change("predict", stem="![x](sample.yaml)"), ["'predict-2'", "none of SVG"]),
     (change("predict", stem=" "), ["'predict-2'", "stem", "at least 1 character"]),
     (change("numeric", answer=float("nan")), ["'numeric-2'", "answer", "finite"]),
-    (change("numeric", answer=100.05), ["'numeric-2'", "within the tolerance"]),
+    (change("numeric", answer=100.05), ["'numeric-2'", "traps 1 value: the trap 100 lies within"]),
     (change("numeric", tolerance=-1.0), ["'numeric-2'", "tolerance", "greater"]),
     (change("ordering", items=["a", "b"]), ["'ordering-2'", "items", "at least 3"]),
-    (change("ordering", items=["a", "b", "a"]), ["'ordering-2'", "'a' stands there twice"]),
-    (change("matching", extras=["right x"]), ["'matching-2'", "right side of a pair, too"]),
-    (change("multiple", proof=None), ["'multiple-2'", "proof", "required"]),
+    (change("ordering", items=["a", "b", "a"]), ["'ordering-2', field items 3: the text 'a'"]),
+    (change("matching", extras=["right x"]), ["'matching-2'", "extras 1: an extra is"]),
+    (change("matching", pairs=[{"left": "a", "right": "x"}, {"left": "a", "right": "y"}]),
+     ["'matching-2'", "field pairs 2 left: the left side 'a' is there twice"]),
+    (change("matching", pairs=[{"left": "a", "right": "x"}, {"left": "b", "right": "x"}]),
+     ["'matching-2'", "field pairs: all have the same right side"]),
+    (change("multiple", proof=None), ["'multiple-2'", "field proof: ", "required"]),
     (top(quiz="other"), ["field quiz", "file's name says 'sample'"]),
     (top(pass_mark=6), ["field pass_mark", "6 of 5 concepts is impossible"]),
     (top(pass_mark=0), ["field pass_mark"]),
@@ -104,6 +117,17 @@ def test_a_broken_bank_is_one_sentence(broken: Change, says: list[str], tmp_path
     assert "\n" not in sentence
     for part in says:
         assert part in sentence, sentence
+
+
+@pytest.mark.parametrize("proof", [[], "", [""], None])
+def test_no_variant_of_the_real_quiz_can_lose_its_proofs(proof: Any) -> None:
+    data = yaml.safe_load((loader.BANKS / "ch05.yaml").read_text(encoding="utf-8"))
+    for target in [one for concept in data["concepts"] for one in concept["variants"]]:
+        before, target["proof"] = target["proof"], proof
+        with pytest.raises(BankError, match=rf"^ch05\.yaml, item '{target['id']}', field proof"):
+            loader.sound(data, "ch05.yaml", "ch05", loader.BANKS)
+        target["proof"] = before
+    loader.sound(data, "ch05.yaml", "ch05", loader.BANKS)
 
 
 @pytest.mark.parametrize(

@@ -33,15 +33,15 @@ DEALT: list[list[tuple[str, tuple[int, ...]]]] = [
         ("predict-2", (3, 0, 2, 1)),
         ("multiple-4", (2, 3, 0, 1)),
         ("numeric-4", ()),
-        ("ordering-4", (0, 1, 3, 2)),
-        ("matching-3", (1, 3, 0, 2)),
+        ("ordering-4", (3, 0, 1, 2)),
+        ("matching-3", (0, 2, 3, 1)),
     ],
     [
         ("predict-4", (2, 0, 3, 1)),
         ("multiple-3", (0, 3, 2, 1)),
         ("numeric-2", ()),
-        ("ordering-3", (0, 3, 1, 2)),
-        ("matching-4", (3, 1, 0, 2)),
+        ("ordering-3", (3, 1, 0, 2)),
+        ("matching-4", (2, 0, 3, 1)),
     ],
 ]
 

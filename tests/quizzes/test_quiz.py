@@ -6,14 +6,17 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from IPython.testing.globalipapp import start_ipython
 
 import quizzes
-from quizzes import model
+from quizzes import model, regrade
+from quizzes.bank import Bank
 from quizzes.errors import AnswerError, AttemptsError, QuizError
 from quizzes.identity import login
+from quizzes.widget import view
 
 from . import sample
 from .conftest import MakeQuiz, answer_all, wrong
@@ -55,6 +58,20 @@ def test_the_first_and_the_best_score_are_kept(make_quiz: MakeQuiz) -> None:
     assert (again.first.score, again.best.score, again.best.attempt) == (2, 5, 2)
     assert again.points() == 5.0
     assert again.attempt == 5
+
+
+def test_practice_goes_on_but_only_the_first_attempts_count(make_quiz: MakeQuiz) -> None:
+    quiz = make_quiz()
+    for number in range(1, regrade.COUNTED + 2):
+        answer_all(quiz, right=3 if number == 7 else 1 if number <= regrade.COUNTED else 5)
+        quiz.submit()
+        quiz.retry()
+    again = make_quiz()
+    assert len(again.attempts) == regrade.COUNTED + 1
+    assert again.best is not None
+    assert (again.best.attempt, again.points()) == (7, 3.0)
+    standing = view.paper(again)["standing"]
+    assert "So far: not passed yet. The first 20 attempts count: this one is practice." in standing
 
 
 def test_a_retry_is_another_quiz(make_quiz: MakeQuiz) -> None:
@@ -119,6 +136,63 @@ def test_of_two_windows_on_one_attempt_the_second_is_told(make_quiz: MakeQuiz) -
     other.reload()
     assert other.result is not None
     assert other.result.score == 2
+
+
+def test_two_windows_answer_different_questions_of_one_attempt(make_quiz: MakeQuiz) -> None:
+    one, other = make_quiz(), make_quiz()
+    one.answer("predict", "a")
+    one.answer("numeric", 1.0)
+    other.answer("multiple", "b")
+    other.answer("numeric", 2.5)
+    one.answer("ordering", "abcd")
+    both = {"predict": "a", "multiple": "b", "numeric": 2.5, "ordering": "abcd"}
+    assert {**make_quiz().given, "matching": ""} == {**both, "matching": ""}
+    assert one.given == both, "a window shows what is saved, once it saves something itself"
+    other.answer("predict", None)
+    assert make_quiz().given["predict"] == ""
+
+
+def test_a_window_on_an_attempt_that_is_over_spoils_no_newer_one(make_quiz: MakeQuiz) -> None:
+    one, stale, mirror = make_quiz(), make_quiz(), make_quiz()
+    answer_all(one, right=2)
+    one.submit()
+    mirror.reload()
+    one.retry()
+    one.answer("predict", "a")
+    with pytest.raises(AttemptsError, match=r"Attempt 1 has been submitted already.*run this cell"):
+        stale.answer("multiple", "b")
+    mirror.retry()
+    assert mirror.given["predict"] == "a", "a retry in two windows is one retry"
+    again = make_quiz()
+    assert (again.attempt, again.given["predict"], again.given["multiple"]) == (2, "a", "")
+
+
+def test_a_number_that_can_be_submitted_can_be_read_again(make_quiz: MakeQuiz) -> None:
+    quiz = make_quiz()
+    answer_all(quiz, right=5)
+    with pytest.raises(AnswerError, match=r"1e\+305 does not fit question 3: answer with a number"):
+        quiz.answer("numeric", 1e305)
+    assert quiz.given["numeric"] == model.key(quiz.item("numeric"))
+    quiz.answer("numeric", -1e300)
+    quiz.submit()
+    again = make_quiz()
+    assert (again.notice, again.points()) == ("", 4.0)
+
+
+def test_folders_may_be_text_and_what_is_none_is_told(tmp_path: Path, bank: Bank) -> None:
+    quiz = quizzes.load("sample", student="ada", folder=str(tmp_path), banks=str(bank.folder))
+    quiz.answer("numeric", 2)
+    assert (tmp_path / ".quiz-sample.draft.json").is_file()
+    for name, value in (("folder", 5), ("banks", b"x"), ("folder", "a\0b"), ("banks", ["x"])):
+        with pytest.raises(QuizError, match=rf"^{name}=.* is no folder: give its path") as caught:
+            quizzes.load("ch05", **{name: value})  # type: ignore[arg-type]
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("student", [5, "\udcff", b"ada", ["ada"]])
+def test_a_student_without_a_name_is_told(student: Any, tmp_path: Path) -> None:
+    with pytest.raises(QuizError, match="is no name that can be saved: give it as plain text"):
+        quizzes.load("ch05", student=student, folder=tmp_path)
 
 
 def test_an_unanswered_question_is_not_submitted(make_quiz: MakeQuiz) -> None:

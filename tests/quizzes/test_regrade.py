@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import json
+import random
 from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from quizzes import regrade
+from quizzes import model, record, regrade
+from quizzes.answers import Answer
 from quizzes.bank import Bank
+from quizzes.loader import read_bank
+from quizzes.record import Attempt, Given
 from quizzes.regrade import Marked
 
+from . import sample
 from .conftest import MakeQuiz, answer_all
 
 Line = dict[str, Any]
@@ -74,15 +80,11 @@ def other_number(line: Line) -> None:
     line["attempt"] = 3
 
 
-def far_number(line: Line) -> None:
-    line["attempt"] = 999_999
-
-
 @pytest.mark.parametrize(
     "forge",
     [
         other_variant, no_such_variant, no_answer, impossible_answer, number_for_letters,
-        other_number, far_number,
+        other_number,
     ],
 )  # fmt: skip
 def test_an_attempt_that_was_never_dealt_does_not_count(
@@ -130,6 +132,71 @@ def test_attempts_on_another_quiz_do_not_count(bank: Bank, honest: list[Line]) -
     found = marked(bank, [{**line, "quiz": "ch06"} for line in honest])
     assert found.best is None
     assert "belongs to the quiz 'ch06'" in found.problems[0]
+
+
+def guesses(bank: Bank, count: int, *, seconds: int, logins: int = 1, first: int = 1) -> bytes:
+    """Return a file of random guesses, so many seconds apart, under one login or in turns."""
+    dice = random.Random(5)
+    lines = []
+    for number in range(count):
+        student, turn = f"guesser-{number % logins}", first + number // logins
+        given = {}
+        for item in model.draw(bank, student, turn).items:
+            answer: Answer = dice.choice([2.5, 5.0, 7.5, 10.0])
+            if item.letters:
+                length = {"multiple": dice.randint(1, 4), "ordering": 4, "matching": 3}
+                letters = dice.sample(item.letters, length.get(item.variant.kind, 1))
+                answer = "".join(sorted(letters) if item.variant.kind == "multiple" else letters)
+            given[item.concept.id] = Given(item.variant.id, answer)
+        moment = datetime(2026, 1, 1, tzinfo=UTC) + timedelta(seconds=seconds * number)
+        lines.append(Attempt(bank.quiz, student, turn, bank.edition, moment.isoformat(), given,
+                             5.0, 5, True).to_json())  # fmt: skip
+    return "\n".join(lines).encode()
+
+
+@pytest.mark.parametrize(("logins", "first"), [(1, 1), (4, 1), (300, 1), (1, 21)])
+def test_thousands_of_guesses_earn_no_full_marks_and_are_for_a_person(
+    tmp_path: Path, logins: int, first: int
+) -> None:
+    bank = read_bank(sample.write(tmp_path, sample.data(("single", "predict", "multiple"))))
+    content = guesses(bank, 1000, seconds=600, logins=logins, first=first)
+    attempts, damaged = record.parse(content)
+    everything = [regrade.again(bank, attempt) for attempt in attempts]
+    assert damaged == 0
+    assert max(result.score for result in everything if result) == 3.0, "guesses do come true"
+    found = regrade.mark_file(bank, content)
+    assert len(found.results) == (0 if first > regrade.COUNTED else regrade.COUNTED)
+    assert all(result.score < 3.0 for result in found.results)
+    beyond = 1000 - len(found.results)
+    assert found.doubt == (
+        f"A person should look at the attempts: of 1000 attempts {beyond} are beyond the first 20, "
+        "which alone count."
+    )
+
+
+@pytest.mark.parametrize("seconds", [0, 1, 11])
+def test_attempts_that_follow_one_another_too_fast_are_for_a_person(
+    bank: Bank, seconds: int
+) -> None:
+    found = regrade.mark_file(bank, guesses(bank, 6, seconds=seconds))
+    assert len(found.results) == 6
+    assert found.doubt == (
+        "A person should look at the attempts: more than 5 attempts were submitted within 60 "
+        "seconds."
+    )
+    assert regrade.mark_file(bank, guesses(bank, 5, seconds=seconds)).doubt == ""
+
+
+def test_stamps_that_are_none_are_no_way_around(bank: Bank) -> None:
+    lines = [json.loads(line) for line in guesses(bank, 6, seconds=600).splitlines()]
+    for line in lines:
+        line["submitted"] = "some day"
+    assert "more than 5 attempts" in marked(bank, lines).doubt
+
+
+def test_a_learner_who_tries_often_is_not_doubted(bank: Bank) -> None:
+    found = regrade.mark_file(bank, guesses(bank, regrade.COUNTED, seconds=13))
+    assert (len(found.results), found.doubt) == (regrade.COUNTED, "")
 
 
 @pytest.mark.parametrize("content", [b"", b"\n\n", b"\x00" * 1000, b"null\n3\n", b"{}" * 9])

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from quizzes import rendering
+from quizzes import model, rendering
+from quizzes.bank import Bank
 from quizzes.loader import load_bank, names, read_bank
 from quizzes.quiz import Quiz
 from quizzes.rendering import RenderError
@@ -52,18 +53,40 @@ def other_keys(data: dict[str, Any]) -> dict[str, Any]:
                 ]
             elif "answer" in variant:
                 variant["answer"] += 1
+            elif "items" in variant:
+                variant["items"] = [*variant["items"][1:], variant["items"][0]]
+            else:
+                rights = [pair["right"] for pair in variant["pairs"]]
+                for pair, right in zip(variant["pairs"], [*rights[1:], rights[0]], strict=True):
+                    pair["right"] = right
     return changed
 
 
+def turned(bank: Bank, student: str) -> bool:
+    """Whether an ordering was turned by one, as those are that would show the right order."""
+    item = model.draw(bank, student, 1).item("ordering")
+    assert item is not None
+    return [item.order[-1], *item.order[:-1]] == sorted(item.order)
+
+
 def test_the_state_is_the_same_whatever_the_key_is(tmp_path: Path) -> None:
-    kinds = ("single", "predict", "multiple", "numeric")
+    kinds = ("single", "predict", "multiple", "numeric", "ordering", "matching")
     data = sample.data(kinds)
-    states = set()
-    for number, content in enumerate((data, other_keys(data))):
-        bank = read_bank(sample.write(tmp_path / str(number), content))
-        widgets = [QuizWidget(Quiz(bank, student=f"s{n}", folder=tmp_path)) for n in range(20)]
-        states.add(tuple(traits(widget) for widget in widgets))
-    assert len(states) == 1
+    banks = [
+        read_bank(sample.write(tmp_path / name, content))
+        for name, content in (("these", data), ("others", other_keys(data)))
+    ]
+    students = [f"student-{n}" for n in range(30)]
+    students = [name for name in students if not any(turned(bank, name) for bank in banks)]
+    assert len(students) > 15
+    for student in students:
+        keys, states = set(), set()
+        for number, bank in enumerate(banks):
+            quiz = Quiz(bank, student=student, folder=tmp_path / str(number))
+            states.add(traits(QuizWidget(quiz)))
+            keys.update((item.concept.id, model.key(item)) for item in quiz.items)
+        assert len(states) == 1
+        assert len(keys) == 2 * len(kinds)
 
 
 @pytest.mark.parametrize("name", names())

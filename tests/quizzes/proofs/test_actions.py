@@ -144,6 +144,16 @@ def test_a_cancelled_goal_runs_on_until_the_server_looks(ros):
     ros.until(lambda: drive.all_feedback == [[1], [2]], "what the server did after it had agreed")
 
 
+def test_a_goal_is_aborted_by_its_server_alone(ros):
+    def give_up(handle):
+        handle.abort()
+        return Fibonacci.Result()
+
+    _, given_up = Drive(ros, give_up).send()
+    ros.until(given_up.done, "the result")
+    assert given_up.result().status == GoalStatus.STATUS_ABORTED
+
+
 def test_an_accepted_goal_has_no_result_when_its_server_ends(ros):
     drive = Drive(ros, handle_accepted_callback=lambda goal_handle: None)
     _, result = drive.send()

@@ -109,11 +109,9 @@ def test_depths_that_differ_match(ros, offered, requested):
     assert (end.qos_profile.history, end.qos_profile.depth) == (HistoryPolicy.UNKNOWN, 0)
 
 
-def heard_after_a_stall(ros, requested, sent=30):
+def heard_after_a_stall(ros, offered, requested, sent=30):
     """Send while the subscriber's node is not spun, then spin it; return what it hears."""
-    publisher = ros.node("sender").create_publisher(
-        String, "topic", profile(history=HistoryPolicy.KEEP_ALL)
-    )
+    publisher = ros.node("sender").create_publisher(String, "topic", offered)
     listener = ros.node("listener", spun=False)
     heard = listen(listener, "topic", requested)
     ros.matched(publisher)
@@ -125,9 +123,10 @@ def heard_after_a_stall(ros, requested, sent=30):
     return heard
 
 
+@pytest.mark.parametrize("history", [HistoryPolicy.KEEP_LAST, HistoryPolicy.KEEP_ALL])
 @pytest.mark.parametrize("depth", [1, 10, 25])
-def test_each_side_keeps_as_many_messages_as_its_own_depth(ros, depth):
-    heard = heard_after_a_stall(ros, profile(depth))
+def test_each_side_keeps_as_many_messages_as_its_own_depth(ros, depth, history):
+    heard = heard_after_a_stall(ros, profile(depth, history=history), profile(depth))
     assert heard == [str(number) for number in range(31 - depth, 31)]
     # And the publisher's side: a late joiner with room for fifty is given what its depth held.
     keeper = ros.main.nodes[0].create_publisher(String, "map", profile(depth, durability=LOCAL))
