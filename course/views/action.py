@@ -22,8 +22,9 @@ class ActionView(LiveView):
 
     def __init__(self, session: Session, action_type: Any, name: str) -> None:
         """Watch the action ``name``."""
-        super().__init__(session)
+        super().__init__(session, name)
         self._board = GoalBoard(session, action_type, name)
+        self.resources.callback(self._board.stop)
         self._problem = ""
 
     @property
@@ -86,7 +87,7 @@ def _shown(goal: Goal) -> dict[str, Any]:
         "number": goal.number,
         "states": [[state.name, f"{when:.1f} s"] for state, when in goal.states],
         "text": asked + feedback,
-        "outcome": goal.problem or result,
-        "bad": bool(goal.problem),
+        "outcome": goal.problem or result or goal.note,
+        "bad": bool(goal.problem or goal.note),
         "over": goal.over,
     }

@@ -28,7 +28,7 @@ class GraphView(LiveView):
 
     def __init__(self, session: Session, *, everything: bool = False) -> None:
         """Show the graph of ``session``, with all that the ROS tools hide if ``everything``."""
-        super().__init__(session)
+        super().__init__(session, everything)
         self._everything = everything
         self._events = IncompatibleQoS()
         self._events.watch(session.nodes.values())

@@ -26,7 +26,7 @@ class LogPanel(LiveView):
 
     def __init__(self, session: Session, level: str = "DEBUG") -> None:
         """Show lines of at least ``level``."""
-        super().__init__(session)
+        super().__init__(session, level)
         self._level = level
         session.logs(level=level, last=1)  # an unknown level is an error at once
 

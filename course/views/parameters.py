@@ -28,7 +28,7 @@ class ParameterPanel(LiveView):
         Raises:
             WaitTimeout: there is no such node, or it does not answer.
         """
-        super().__init__(session)
+        super().__init__(session, node)
         self._sheet = ParameterSheet(session, node)
         self._entries = self._sheet.entries()
         self._problem = ""

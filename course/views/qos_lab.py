@@ -54,7 +54,7 @@ class QoSLab(LiveView):
         self, session: Session, offered: QoSProfile | None, requested: QoSProfile | None
     ) -> None:
         """Begin with two profiles; None is the default one."""
-        super().__init__(session)
+        super().__init__(session, offered, requested)
         self._offered = Profile.of(offered) if offered else Profile()
         self._requested = Profile.of(requested) if requested else Profile()
         self._trials: list[Trial] = []

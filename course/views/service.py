@@ -22,7 +22,7 @@ class ServiceConsole(LiveView):
 
     def __init__(self, session: Session, srv_type: Any, name: str, timeout: float = 5.0) -> None:
         """Call ``name``, and wait ``timeout`` s for each answer."""
-        super().__init__(session)
+        super().__init__(session, name)
         self._model = Calls(session, srv_type, name)
         self._timeout = timeout
         self._problem = ""

@@ -8,6 +8,7 @@ from typing import Any
 
 from course import mcap_file
 from course.errors import SessionError
+from course.runtime import arguments
 from course.runtime.recorder import Recorder
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
@@ -40,19 +41,21 @@ class Timeline(LiveView):
             SessionError: no topic, too many, or a window that is not positive.
             WaitTimeout: a topic without a class that nobody uses.
         """
-        super().__init__(session)
+        super().__init__(session, *topics, window)
         if not 0 < len(topics) <= MOST_TOPICS:
             raise SessionError(f"A timeline shows 1 to {MOST_TOPICS} topics, not {len(topics)}.")
+        window = arguments.seconds(window, "window")
         if not 0 < window <= 60:
             raise SessionError(f"A timeline shows up to 60 s, not {window:g} s.")
         self._window = round(window * 1e9)
         self._rows: list[tuple[Trace, CallbackTap, Recorder]] = []
-        for name, msg_type in topics:
-            trace = Trace(session, name, msg_type)
-            recorder = session.record(trace.topic, trace.msg_type)
-            self._rows.append((trace, CallbackTap(trace.topic), recorder))
+        try:
+            for name, msg_type in topics:
+                self._add(name, msg_type)
+        except BaseException:
+            self.stop()
+            raise
         self._tap()
-        session.on_close(self.stop)
 
     def figures(self) -> dict[str, Figures]:
         """Return the figures of each topic over the window that ends now."""
@@ -77,14 +80,6 @@ class Timeline(LiveView):
         }
         return mcap_file.write(Path(path), recordings)
 
-    def stop(self) -> None:
-        """Trace no more, and leave callbacks as they were. Idempotent."""
-        for trace, tap, recorder in self._rows:
-            tap.stop()
-            if not self.session.closed:
-                trace.stop()
-                recorder.stop()
-
     def frame(self) -> Frame:
         """Return lanes as counts a column, and figures in words."""
         self._tap()
@@ -106,6 +101,15 @@ class Timeline(LiveView):
             for node, count in self._nodes(topic).items():
                 lines.append(f"    callbacks of {node}: {count}")
         return "\n".join(lines)
+
+    def _add(self, name: str, msg_type: Any | None) -> None:
+        trace = Trace(self.session, name, msg_type)
+        self.resources.callback(trace.stop)
+        tap = CallbackTap(trace.topic)
+        self.resources.callback(tap.stop)
+        recorder = self.session.record(trace.topic, trace.msg_type)
+        self.resources.callback(lambda: None if self.session.closed else recorder.stop())
+        self._rows.append((trace, tap, recorder))
 
     def _tap(self) -> None:
         nodes = list(self.session.nodes.values())

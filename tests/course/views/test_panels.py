@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 from test_msgs.action import Fibonacci
 from test_msgs.msg import Nested
@@ -15,7 +19,7 @@ from course.errors import CourseError, SessionError, WaitTimeout
 from course.runtime.actions import GoalState
 from course.values import MisfitError
 from course.views.live import LiveView
-from course.watch import forms
+from course.watch import forms, goals
 from tests.robot import Robot
 
 
@@ -103,6 +107,72 @@ def test_a_rejected_goal_is_said(busy: Session) -> None:
     busy.until(lambda: view.goals)
     assert view.goals[0].problem == "The server rejected this goal."
     assert view.goals[0].over
+
+
+class Server(Node):
+    """Serves an action whose goals end when `go` is set, and which nobody can cancel."""
+
+    def __init__(self) -> None:
+        super().__init__("server")
+        self.go = threading.Event()
+        self._action = ActionServer(
+            self, Fibonacci, "fib", self._execute, callback_group=ReentrantCallbackGroup(),
+            cancel_callback=lambda _goal: CancelResponse.REJECT,
+        )  # fmt: skip
+
+    def _execute(self, goal: Any) -> Fibonacci.Result:
+        self.go.wait()
+        goal.succeed()
+        return Fibonacci.Result(sequence=[goal.request.order])
+
+
+def test_a_refused_cancel_is_said_until_the_goal_ends(busy: Session) -> None:
+    server = busy.run(Server)
+    assert isinstance(server, Server)
+    view = busy.action("fib")
+    view.send(order=3)
+    busy.until(lambda: view.goals and view.goals[0].state == GoalState.EXECUTING)
+    view.cancel(1)
+    (goal,) = view.frame()["goals"]
+    assert (goal["over"], goal["outcome"]) == (False, "The server refused to cancel.")
+    server.go.set()
+    busy.until(lambda: view.goals[0].over and view.goals[0].result)
+    (goal,) = view.frame()["goals"]
+    assert (goal["over"], goal["outcome"]) == (True, "result: {sequence: [3]}")
+
+
+def test_several_goals_at_once_are_told_apart(busy: Session) -> None:
+    busy.run(Robot)
+    view = busy.action("count")
+    for order in (1, 2):
+        view.send(order=order)
+    busy.until(lambda: [g.state for g in view.goals] == [GoalState.EXECUTING] * 2)
+    busy.until(lambda: {g.asked["order"] for g in view.goals if g.asked} == {1, 2})
+    first = view.goals[0].number
+    view.cancel(first)
+    busy.until(lambda: view.goals[0].state == GoalState.CANCELED)
+    assert [g.state for g in view.goals[1:]] == [GoalState.EXECUTING]
+
+
+def test_goals_that_were_let_go_of_do_not_come_back(
+    busy: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(goals, "KEPT", 8)
+    server = busy.run(Server)
+    assert isinstance(server, Server)
+    server.go.set()
+    view = busy.action("fib")
+    for order in range(30):  # the server lists all of them for minutes, in each status message
+        run = busy.send_goal(Fibonacci, "fib", Fibonacci.Goal(order=order))
+        run.wait()
+    busy.until(lambda: len(view.goals) == 8 and all(goal.over for goal in view.goals))
+    assert [goal.number for goal in view.goals] == list(range(23, 31))
+    server.go.clear()
+    busy.send_goal(Fibonacci, "fib", Fibonacci.Goal(order=1))
+    busy.until(lambda: view.goals[-1].state == GoalState.EXECUTING)
+    server.go.set()
+    busy.until(lambda: all(goal.over for goal in view.goals))
+    assert [goal.number for goal in view.goals] == list(range(24, 32))
 
 
 def test_parameters_have_controls_from_their_descriptors(session: Session) -> None:
