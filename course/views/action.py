@@ -8,9 +8,13 @@ from typing import Any
 from course.errors import CourseError
 from course.runtime.session import Session
 from course.values import one_line
+from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch import forms
 from course.watch.goals import Goal, GoalBoard
+
+LONGEST = 700
+"""Bytes of a goal, its feedback and its result that are shown of each."""
 
 
 class ActionView(LiveView):
@@ -80,9 +84,9 @@ class ActionView(LiveView):
 
 
 def _shown(goal: Goal) -> dict[str, Any]:
-    asked = f"asked: {one_line(goal.asked)} " if goal.asked is not None else ""
-    feedback = f"feedback {goal.feedback}: {one_line(goal.latest)}" if goal.feedback else ""
-    result = f"result: {one_line(goal.result)}" if goal.result is not None else ""
+    asked = f"asked: {_line(goal.asked)} " if goal.asked is not None else ""
+    feedback = f"feedback {goal.feedback}: {_line(goal.latest)}" if goal.feedback else ""
+    result = f"result: {_line(goal.result)}" if goal.result is not None else ""
     return {
         "number": goal.number,
         "states": [[state.name, f"{when:.1f} s"] for state, when in goal.states],
@@ -91,3 +95,7 @@ def _shown(goal: Goal) -> dict[str, Any]:
         "bad": bool(goal.problem or goal.note),
         "over": goal.over,
     }
+
+
+def _line(data: Any) -> str:
+    return one_line(brief.data(data, LONGEST))

@@ -15,6 +15,7 @@ import anywidget
 import traitlets
 
 from course.runtime.session import Session
+from course.views import brief
 from course.views.saved import saved
 from course.views.shelf import shelf_of
 from course.views.ticker import ticker_of
@@ -26,7 +27,10 @@ PATIENCE = 20
 """Frames that may be on their way before a browser that confirms none gets one a second only."""
 
 MAX_FRAME = 256 * 1024
-"""Bytes of JSON that a frame may have; a view bounds its model to stay far below."""
+"""Bytes of JSON that a frame may have; a view cuts what it shows to stay below (see `brief`)."""
+
+MAX_WORDS = 15_000
+"""Characters of its words that a view sends along."""
 
 CLOSED = "The session has been closed."
 
@@ -42,6 +46,7 @@ class LiveWidget(anywidget.AnyWidget):
         frame: what to draw; JSON data.
         words: the same as text, for screen readers.
         ended: why nothing comes any more; empty while the view is live.
+        notice: what else should be known of what is shown.
         number: counts frames; the browser sends back the number that it has drawn.
     """
 
@@ -49,6 +54,7 @@ class LiveWidget(anywidget.AnyWidget):
     frame = traitlets.Dict().tag(sync=True)
     words = traitlets.Unicode().tag(sync=True)
     ended = traitlets.Unicode().tag(sync=True)
+    notice = traitlets.Unicode().tag(sync=True)
     number = traitlets.Int().tag(sync=True)
 
 
@@ -139,15 +145,15 @@ class LiveView(ABC):
         it left in its output (see `saved`) are shown in its place.
         """
         with self._looking:  # nothing is sent after this
-            if self._why:
-                return
-            self._why = why
-        shelf_of(self.session).forget(self)
-        ticker_of(self.session).forget(self)
-        self.resources.close()
-        if self._widget is not None:
-            self._widget.ended = why
-            if close:
+            first, self._why = not self._why, self._why or why
+        if first:
+            ticker_of(self.session).forget(self)
+            self.resources.close()
+            if self._widget is not None:
+                self._widget.ended = why
+        if close or self._widget is None:
+            shelf_of(self.session).forget(self)
+            if self._widget is not None:
                 self._widget.close()
 
     def stop(self) -> None:
@@ -181,20 +187,28 @@ class LiveView(ABC):
                 return
             try:
                 frame, words = self.look()
+                words = brief.text(words, MAX_WORDS)
                 text = json.dumps([frame, words])
             except Exception as error:  # noqa: BLE001 - a view must never take its thread down
                 failed = f"This view has stopped ({type(error).__name__}: {error})."
                 self.end(CLOSED if self.session.closed else failed)
                 return
-            if text != self._last and len(text) <= MAX_FRAME:
-                self._last = text
-                with widget.hold_sync():
-                    widget.frame, widget.words = frame, words
-                    widget.number += 1
+            if text == self._last:
+                return
+            self._last = text
+            if len(text) > MAX_FRAME:
+                widget.notice = (
+                    f"What there is to see now is too large to draw ({len(text) // 1024} KiB), so "
+                    "this is older. In a cell, the view's words() has all of it."
+                )
+                return
+            with widget.hold_sync():
+                widget.frame, widget.words, widget.notice = frame, words, ""
+                widget.number += 1
 
     def _closed(self, _change: Any) -> None:
         """End when somebody has closed the widget, here or in the browser."""
-        self.end("Its widget has been closed.")
+        self.end("Its widget has been closed.", close=True)
 
     def _heard(self, _widget: Any, message: Any, _buffers: Any) -> None:
         if not isinstance(message, dict):

@@ -8,10 +8,14 @@ from typing import Any
 
 from course.errors import CourseError
 from course.runtime.session import Session
+from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch.parameters import Entry, ParameterSheet
 
 ASK_TIMEOUT = 2.0
+
+LONGEST = 2000
+"""Bytes of a value that are shown."""
 
 
 class ParameterPanel(LiveView):
@@ -75,7 +79,7 @@ class ParameterPanel(LiveView):
             problem, changes = self._problem or self._silent, self._changes
         return {
             "title": f"Parameters of {self._sheet.node}",
-            "entries": [asdict(entry) for entry in self._entries],
+            "entries": [_shown(entry) for entry in self._entries],
             "problem": problem,
             "changes": changes,
         }
@@ -105,5 +109,17 @@ class ParameterPanel(LiveView):
         for entry in self._entries:
             limits = f" ({entry.least:g} to {entry.most:g})" if entry.least is not None else ""
             about = f"  # {entry.description}" if entry.description else ""
-            lines.append(f"  {entry.name}: {entry.value}{limits}{about}")
-        return "\n".join([*lines, *([self._problem] if self._problem else [])])
+            value = brief.data(entry.value, LONGEST)
+            lines.append(f"  {entry.name}: {value}{limits}{about}")
+        with self._lock:
+            problem = self._problem or self._silent
+        return "\n".join([*lines, *([problem] if problem else [])])
+
+
+def _shown(entry: Entry) -> dict[str, Any]:
+    shown = asdict(entry)
+    shown["value"] = brief.data(entry.value, LONGEST)
+    if shown["value"] != entry.value:  # what is typed into a part of it would replace the whole
+        shown["read_only"] = True
+        shown["description"] = f"too long to be edited here; {entry.description}".rstrip("; ")
+    return shown

@@ -8,9 +8,13 @@ from typing import Any
 from course.errors import CourseError
 from course.runtime.session import Session
 from course.values import one_line
+from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch import forms
 from course.watch.calls import Call, Calls
+
+LONGEST = 3000
+"""Bytes of a request, and of an answer, that are shown."""
 
 
 class ServiceConsole(LiveView):
@@ -56,17 +60,24 @@ class ServiceConsole(LiveView):
             "title": f"Service {self._model.name}",
             "fields": [asdict(field) for field in forms.fields(self._model.srv_type.Request)],
             "problem": self._problem,
-            "calls": [asdict(call) | {"time": _time(call)} for call in self.calls],
+            "calls": [_shown(call) for call in self.calls],
         }
 
     def words(self) -> str:
         """Return the calls as text."""
         lines = [f"Service {self._model.name}, {len(self.calls)} calls"]
         for call in self.calls:
-            outcome = "waiting" if call.waiting else call.problem or one_line(call.answer)
-            lines.append(f"  {call.number}: {one_line(call.request)} -> {outcome}")
+            shown = _shown(call)
+            outcome = "waiting" if call.waiting else shown["problem"] or one_line(shown["answer"])
+            lines.append(f"  {call.number}: {one_line(shown['request'])} -> {outcome}")
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
 
 
-def _time(call: Call) -> str:
-    return "" if call.seconds is None else f"{call.seconds * 1000:.1f} ms"
+def _shown(call: Call) -> dict[str, Any]:
+    return {
+        "number": call.number,
+        "request": brief.data(call.request, LONGEST),
+        "answer": brief.data(call.answer, LONGEST),
+        "problem": brief.text(call.problem, LONGEST),
+        "time": "" if call.seconds is None else f"{call.seconds * 1000:.1f} ms",
+    }

@@ -59,7 +59,7 @@ class Shelf:
             other.end(TOO_MANY, close=True)
 
     def forget(self, view: Shown) -> None:
-        """Let go of a view that has ended. Idempotent."""
+        """Let go of a view that has ended and has no widget any more. Idempotent."""
         with self._lock:
             self._views.pop(view, None)
 
@@ -67,6 +67,7 @@ class Shelf:
         """End all views."""
         with self._lock:
             views = list(self._views)
+            self._views.clear()
         for view in views:
             view.end(why)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections.abc import Iterator
 from typing import Any
@@ -11,6 +12,7 @@ from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 from test_msgs.msg import Nested
 
@@ -18,7 +20,7 @@ from course import Session
 from course.errors import CourseError, SessionError, WaitTimeout
 from course.runtime.actions import GoalState
 from course.values import MisfitError
-from course.views.live import LiveView
+from course.views.live import MAX_FRAME, LiveView
 from course.watch import forms, goals
 from tests.robot import Robot
 
@@ -234,6 +236,70 @@ def test_the_log_panel_has_the_latest_lines(session: Session) -> None:
     assert len(shown(panel)["rows"]) == 200
     assert shown(panel)["rows"][-1][1:3] == ["INFO", "/robot"]
     assert "line 299" in panel.words()
+
+
+def test_the_log_panel_filters_before_it_cuts(session: Session) -> None:
+    robot = session.run(Robot)
+    panel = session.log_panel()
+    robot.get_logger().error("the battery is empty")
+    for number in range(1200):
+        robot.get_logger().info(f"line {number}")
+    session.until(lambda: shown(panel)["rows"] and shown(panel)["rows"][-1][3] == "line 1199")
+    say(panel, filter={"level": "ERROR", "search": ""})
+    session.until(lambda: [row[3] for row in shown(panel)["rows"]] == ["the battery is empty"])
+    assert "the battery is empty" in panel.words()
+    say(panel, filter={"level": "INFO", "search": "Line 100"})
+    session.until(lambda: len(shown(panel)["rows"]) == 10)  # 200 to 1199 are kept
+    assert shown(panel)["rows"][0][3] == "line 1000"
+    for message in ({"filter": {"level": []}}, {"filter": {"level": "LOUD"}}, {"filter": 3}):
+        say(panel, **message)
+    assert panel.widget.ended == ""
+
+
+def test_long_lines_and_answers_are_cut_with_a_mark_and_fit_a_frame(session: Session) -> None:
+    robot = session.run(Robot)
+    panel = session.log_panel()
+    for _ in range(25):
+        robot.get_logger().info("y" * 20_000)
+    for _ in range(200):
+        robot.get_logger().info("\N{SNOWMAN}" * 600)
+    robot.get_logger().info("later")
+    session.until(lambda: shown(panel)["rows"] and shown(panel)["rows"][-1][3] == "later")
+    assert shown(panel)["rows"][-2][3].endswith("… [100 more characters]")
+    assert "more characters]" in panel.words()
+    assert len(json.dumps(panel.look())) < MAX_FRAME
+
+    def big() -> Node:
+        node = Node("big")
+
+        def answer(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.message = "\N{SNOWMAN}" * 300_000
+            return response
+
+        node.create_service(Trigger, "big", answer)
+        node.declare_parameter("map", "m" * 100_000)
+        return node
+
+    session.run(big)
+    console = session.service("big")
+    for _ in range(10):
+        say(console, call={})
+    session.until(lambda: [c["time"] for c in shown(console)["calls"] if c["time"]][9:])
+    assert shown(console)["calls"][0]["answer"]["message"].endswith("more characters]")
+    assert len(json.dumps(console.look())) < MAX_FRAME
+    sheet = session.parameters("big")
+    (entry,) = shown(sheet)["entries"]
+    assert (len(entry["value"]) < 3000, entry["read_only"]) == (True, True)
+    assert "too long to be edited here" in entry["description"]
+
+
+def test_a_panel_of_a_node_that_has_gone_says_so_in_words(session: Session) -> None:
+    session.run(Robot)
+    panel = session.parameters("robot")
+    assert shown(panel)["problem"] == ""
+    session.stop("robot")
+    session.until(lambda: shown(panel)["problem"])
+    assert "Nobody offers" in panel.words()
 
 
 @pytest.mark.parametrize(
