@@ -35,8 +35,8 @@ class LogPanel(LiveView):
 
     def __init__(self, session: Session, level: str = "DEBUG") -> None:
         """Show lines of at least ``level``."""
-        super().__init__(session, level)
         session.logs(level=level, last=1)  # an unknown level is an error at once
+        super().__init__(session, level)
         self._least = level
         self._level = _named(level) if SEVERITIES[_named(level)] > SEVERITIES["INFO"] else "INFO"
         self._search = ""

@@ -32,9 +32,11 @@ class ParameterPanel(LiveView):
         Raises:
             WaitTimeout: there is no such node, or it does not answer.
         """
+        sheet = ParameterSheet(session, node)
+        entries = sheet.entries()
         super().__init__(session, node)
-        self._sheet = ParameterSheet(session, node)
-        self._entries = self._sheet.entries()
+        self._sheet = sheet
+        self._entries = entries
         self._problem = ""
         self._changes = 0
         self._silent = ""
