@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 from rclpy.action.graph import (
     get_action_client_names_and_types_by_node,
@@ -18,16 +18,26 @@ from rclpy.qos import HistoryPolicy, QoSCompatibility, QoSProfile, qos_check_com
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from course.graph.model import QOS_POLICIES, Endpoint, Exchange, Graph, Mismatch, Topic
-
-ForEvent = Callable[[str, str], str | None]
-"""Tells which policy DDS has named for (topic, subscribing node), if it has raised an event."""
+from course.runtime import qos_events
 
 _PLUMBING = ("/rosout", "/parameter_events", "/clock")
 _PLUMBING_TYPES = ("rcl_interfaces/", "type_description_interfaces/")
 
 
-Queues = dict[tuple[str, str, str], QoSProfile]
-"""{(node, topic, role): profile}: history and depth, which only the process itself knows."""
+End = tuple[str, str, str]
+"""An endpoint of this process: (node, topic, role)."""
+
+
+class Own(NamedTuple):
+    """What only the process itself knows of its endpoints.
+
+    Attributes:
+        queues: profiles with history and depth.
+        broken: policies that DDS has named in an incompatible-QoS event.
+    """
+
+    queues: dict[End, QoSProfile]
+    broken: dict[End, set[str]]
 
 
 def read(
@@ -35,7 +45,6 @@ def read(
     *,
     everything: bool = False,
     own: Iterable[Node] = (),
-    event: ForEvent | None = None,
 ) -> Graph:
     """Return what ``node`` can see now.
 
@@ -43,10 +52,10 @@ def read(
         node: any node of the context whose graph is wanted.
         everything: keep what the ROS tools hide, too: names that begin with an underscore,
             /rosout, /parameter_events, /clock, parameter services, and the topics of actions.
-        own: nodes of this process: their history and depth are shown, too, which DDS never tells.
-        event: says what DDS's own events have reported.
+        own: nodes of this process: their history and depth are shown, too, which DDS never tells,
+            and what DDS's own events have reported to them.
     """
-    queues = _queues(own)
+    known = _known(own)
     names = [
         (name, namespace)
         for name, namespace in node.get_node_names_and_namespaces()
@@ -55,32 +64,32 @@ def read(
     services, actions = _exchanges(node, names, everything)
     return Graph(
         nodes=tuple(sorted(_full(name, namespace) for name, namespace in names)),
-        topics=tuple(_topics(node, everything, queues, event)),
+        topics=tuple(_topics(node, everything, known)),
         services=services,
         actions=actions,
     )
 
 
-def _queues(nodes: Iterable[Node]) -> Queues:
-    found: Queues = {}
+def _known(nodes: Iterable[Node]) -> Own:
+    own = Own({}, defaultdict(set))
     for node in nodes:
         name = node.get_fully_qualified_name()
-        for publisher in node.publishers:
-            found[name, publisher.topic_name, "publisher"] = publisher.qos_profile
-        for subscription in node.subscriptions:
-            found[name, subscription.topic_name, "subscription"] = subscription.qos_profile
-    return found
+        ends: list[tuple[str, Any]] = [("publisher", end) for end in node.publishers]
+        ends += [("subscription", end) for end in node.subscriptions]
+        for role, end in ends:
+            where = (name, end.topic_name, role)
+            own.queues[where] = end.qos_profile
+            own.broken[where] |= qos_events.policies(end)
+    return own
 
 
-def _topics(
-    node: Node, everything: bool, queues: Queues, event: ForEvent | None
-) -> Iterable[Topic]:
+def _topics(node: Node, everything: bool, own: Own) -> Iterable[Topic]:
     for name, _ in sorted(node.get_topic_names_and_types()):
         if not everything and (name in _PLUMBING or _hidden(name)):
             continue
         pairs = [
             [
-                (info, _endpoint(info, role, name, queues))
+                (info, _endpoint(info, role, name, own.queues))
                 for info in infos
                 if everything or not _hidden(info.node_name)
             ]
@@ -95,7 +104,7 @@ def _topics(
                 name,
                 tuple(sorted(end for _, end in publishers)),
                 tuple(sorted(end for _, end in subscriptions)),
-                tuple(_mismatches(name, publishers, subscriptions, event)),
+                tuple(_mismatches(name, publishers, subscriptions, own.broken)),
             )
 
 
@@ -103,7 +112,7 @@ def _mismatches(
     topic: str,
     publishers: list[tuple[TopicEndpointInfo, Endpoint]],
     subscriptions: list[tuple[TopicEndpointInfo, Endpoint]],
-    event: ForEvent | None,
+    broken: dict[End, set[str]],
 ) -> Iterable[Mismatch]:
     for offered, writer in publishers:
         for requested, reader in subscriptions:
@@ -114,10 +123,12 @@ def _mismatches(
             reasons = incompatibilities(offered.qos_profile, requested.qos_profile)
             if reasons:
                 policies = tuple(reasons)
-                named = event(topic, reader.node) if event else None
+                named = broken.get((writer.node, topic, "publisher"), set()) | broken.get(
+                    (reader.node, topic, "subscription"), set()
+                )
                 yield Mismatch(
                     writer.node, reader.node, tuple(reasons.values()), policies,
-                    from_event=named in policies,
+                    from_event=not named.isdisjoint(policies),
                 )  # fmt: skip
 
 
@@ -152,7 +163,9 @@ def _only(profile: QoSProfile, policies: tuple[str, ...]) -> QoSProfile:
     return QoSProfile(depth=1, **{policy: getattr(profile, policy) for policy in policies})
 
 
-def _endpoint(info: TopicEndpointInfo, role: Any, topic: str, queues: Queues) -> Endpoint:
+def _endpoint(
+    info: TopicEndpointInfo, role: Any, topic: str, queues: dict[End, QoSProfile]
+) -> Endpoint:
     node = _full(info.node_name, info.node_namespace)
     words = _words(info.qos_profile) | _queue(queues.get((node, topic, role), info.qos_profile))
     qos = {policy: words[policy] for policy in QOS_POLICIES if policy in words}

@@ -28,8 +28,9 @@ def run(experiment: Experiment) -> Outcome:
         raise LabError(
             f"There is no scenario {experiment.scenario!r}: choose {', '.join(SCENARIOS)}."
         )
-    if not 0 <= experiment.loss <= 90:
-        raise LabError(f"A link loses 0 to 90 % of its packets, not {experiment.loss}.")
+    loss: object = experiment.loss
+    if not isinstance(loss, int) or not 0 <= loss <= 90:
+        raise LabError(f"A link loses 0 to 90 % of its packets, a whole number, not {loss!r}.")
     remark = link.problem() if experiment.loss else ""
     lossy = bool(experiment.loss and not remark)
     command = [sys.executable, "-m", "course.qoslab.bench"]

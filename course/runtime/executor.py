@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from rclpy.context import Context
+from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import (
     ConditionReachedException,
@@ -24,7 +25,7 @@ from rclpy.executors import (
 from rclpy.node import Node
 from rclpy.task import Future, Task
 
-from course.runtime import streams
+from course.runtime import qos_events, streams
 from course.runtime.gate import Gate
 from course.runtime.idleness import Idleness
 from course.runtime.jobs import Job, Report
@@ -269,6 +270,8 @@ class BackgroundExecutor(Executor):
         shown = None
         if entity is None:
             node, shown = self._created.owner(task)
+        elif isinstance(entity, EventHandler):
+            qos_events.listen(entity)
         job = Job(task, entity, node, self, shown)
         self.running.add(job)
         return job

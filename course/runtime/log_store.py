@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import deque
+from collections import OrderedDict, deque
 from typing import NamedTuple
 
-_KEPT = 1000  # rows of one logger
+_KEPT = 1000  # rows of one logger, and as many of its warnings and errors
+_MOST_LOGGERS = 200
+_MOST_BYTES = 16 * 2**20  # of all messages together
 
 SEVERITIES = {
     "DEBUG": 10,
@@ -53,7 +55,10 @@ class LogStore:
 
     def __init__(self) -> None:
         """Start empty."""
-        self._rings: dict[str, deque[_Entry]] = {}
+        # A flood of information does not push out the errors, which have a ring of their own. The
+        # ring that nothing came into for the longest time is the first.
+        self._rings: OrderedDict[tuple[str, bool], deque[_Entry]] = OrderedDict()
+        self._bytes = 0
         self._owners: dict[str, set[int]] = {}
         self._lock = threading.Lock()
 
@@ -70,11 +75,17 @@ class LogStore:
         name = level if isinstance(level, str) else _NAMES.get(level, str(level))
         severity = SEVERITIES.get(name, level if isinstance(level, int) else 0)
         entry = _Entry(stamp, severity, name, logger, message, home)
+        key = (logger, severity >= SEVERITIES["WARN"])
         with self._lock:
-            ring = self._rings.get(logger)
-            if ring is None:
-                ring = self._rings[logger] = deque(maxlen=_KEPT)
+            ring = self._rings.setdefault(key, deque())
+            self._rings.move_to_end(key)
             ring.append(entry)
+            self._bytes += len(message)
+            if len(ring) > _KEPT:
+                self._drop_first(ring)
+            while len(self._rings) > 2 * _MOST_LOGGERS or self._bytes > _MOST_BYTES:
+                if not self._make_room(key):
+                    break
 
     def claim(self, node: str, home: object) -> None:
         """Note that `home` runs the node of this fully qualified name."""
@@ -106,6 +117,24 @@ class LogStore:
                 row = LogRow(entry.stamp, entry.level, node, entry.message)
                 rows.append((entry.severity, row))
         return rows
+
+    def _make_room(self, key: tuple[str, bool]) -> bool:
+        """Drop other information, then what is older in the ring of ``key``, then other errors."""
+        ring = self._rings[key]
+        others = [other for other in self._rings if other != key]
+        rested = next((other for other in others if not other[1]), None)
+        if rested is None and len(ring) > 1:
+            for _ in range(len(ring) // 2):
+                self._drop_first(ring)
+            return True
+        if not others:
+            return False  # one message, however long, is kept
+        dropped = self._rings.pop(rested or others[0])
+        self._bytes -= sum(len(entry.message) for entry in dropped)
+        return True
+
+    def _drop_first(self, ring: deque[_Entry]) -> None:
+        self._bytes -= len(ring.popleft().message)
 
 
 store = LogStore()

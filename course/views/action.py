@@ -8,9 +8,13 @@ from typing import Any
 from course.errors import CourseError
 from course.plain import one_line
 from course.runtime.session import Session
+from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch import forms
 from course.watch.goals import Goal, GoalBoard
+
+LONGEST = 700
+"""Bytes of a goal, its feedback and its result that are shown of each."""
 
 
 class ActionView(LiveView):
@@ -22,8 +26,9 @@ class ActionView(LiveView):
 
     def __init__(self, session: Session, action_type: Any, name: str) -> None:
         """Watch the action ``name``."""
-        super().__init__(session)
+        super().__init__(session, name)
         self._board = GoalBoard(session, action_type, name)
+        self.resources.callback(self._board.stop)
         self._problem = ""
 
     @property
@@ -79,14 +84,18 @@ class ActionView(LiveView):
 
 
 def _shown(goal: Goal) -> dict[str, Any]:
-    asked = f"asked: {one_line(goal.asked)} " if goal.asked is not None else ""
-    feedback = f"feedback {goal.feedback}: {one_line(goal.latest)}" if goal.feedback else ""
-    result = f"result: {one_line(goal.result)}" if goal.result is not None else ""
+    asked = f"asked: {_line(goal.asked)} " if goal.asked is not None else ""
+    feedback = f"feedback {goal.feedback}: {_line(goal.latest)}" if goal.feedback else ""
+    result = f"result: {_line(goal.result)}" if goal.result is not None else ""
     return {
         "number": goal.number,
         "states": [[state.name, f"{when:.1f} s"] for state, when in goal.states],
         "text": asked + feedback,
-        "outcome": goal.problem or result,
-        "bad": bool(goal.problem),
+        "outcome": goal.problem or result or goal.note,
+        "bad": bool(goal.problem or goal.note),
         "over": goal.over,
     }
+
+
+def _line(data: Any) -> str:
+    return one_line(brief.data(data, LONGEST))

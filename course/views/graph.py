@@ -6,7 +6,6 @@ from dataclasses import asdict
 from typing import Any
 
 from course.graph import layout, reader, words
-from course.graph.events import IncompatibleQoS
 from course.graph.mermaid import mermaid
 from course.graph.model import Graph
 from course.runtime.session import Session
@@ -28,20 +27,15 @@ class GraphView(LiveView):
 
     def __init__(self, session: Session, *, everything: bool = False) -> None:
         """Show the graph of ``session``, with all that the ROS tools hide if ``everything``."""
-        super().__init__(session)
+        super().__init__(session, everything)
         self._everything = everything
-        self._events = IncompatibleQoS()
-        self._events.watch(session.nodes.values())
 
     @property
     def graph(self) -> Graph:
         """What is there now."""
         self.session._require_open()
         own = list(self.session.nodes.values())
-        self._events.watch(own)
-        return reader.read(
-            self.session.observer, everything=self._everything, own=own, event=self._events.policy
-        )
+        return reader.read(self.session.observer, everything=self._everything, own=own)
 
     @property
     def mermaid(self) -> Mermaid:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import threading
 import time
 from abc import ABC, abstractmethod
 from functools import cache
@@ -13,7 +15,9 @@ import anywidget
 import traitlets
 
 from course.runtime.session import Session
+from course.views import brief
 from course.views.saved import saved
+from course.views.shelf import shelf_of
 from course.views.ticker import ticker_of
 
 FASTEST = 0.1
@@ -23,7 +27,12 @@ PATIENCE = 20
 """Frames that may be on their way before a browser that confirms none gets one a second only."""
 
 MAX_FRAME = 256 * 1024
-"""Bytes of JSON that a frame may have; a view bounds its model to stay far below."""
+"""Bytes of JSON that a frame may have; a view cuts what it shows to stay below (see `brief`)."""
+
+MAX_WORDS = 15_000
+"""Characters of its words that a view sends along."""
+
+CLOSED = "The session has been closed."
 
 _STATIC = Path(__file__).parent / "static"
 
@@ -37,6 +46,7 @@ class LiveWidget(anywidget.AnyWidget):
         frame: what to draw; JSON data.
         words: the same as text, for screen readers.
         ended: why nothing comes any more; empty while the view is live.
+        notice: what else should be known of what is shown.
         number: counts frames; the browser sends back the number that it has drawn.
     """
 
@@ -44,14 +54,19 @@ class LiveWidget(anywidget.AnyWidget):
     frame = traitlets.Dict().tag(sync=True)
     words = traitlets.Unicode().tag(sync=True)
     ended = traitlets.Unicode().tag(sync=True)
+    notice = traitlets.Unicode().tag(sync=True)
     number = traitlets.Int().tag(sync=True)
 
 
 class LiveView(ABC):
     """A view of a session that keeps itself up to date while somebody looks at it.
 
-    A subclass says what there is to see (`frame`, `words`) and what a control does (`control`).
+    A subclass says what there is to see (`frame`, `words`) and what a control does (`control`),
+    and leaves in `resources` whatever is to be given back when the view ends.
     In a notebook it shows a widget; anywhere else, and for a screen reader, its words.
+
+    A view ends with its session, when its widget is closed, or when the cell that made it is run
+    again (see `shelf`).
     """
 
     label: ClassVar[str] = ""
@@ -66,13 +81,17 @@ class LiveView(ABC):
     period: ClassVar[float] = FASTEST
     """Seconds between two looks at the model."""
 
-    def __init__(self, session: Session) -> None:
-        """Show what happens in ``session``."""
+    def __init__(self, session: Session, *about: Any) -> None:
+        """Show what happens in ``session``; ``about`` tells views of one kind from each other."""
         self.session = session
+        self.resources = contextlib.ExitStack()
         self._widget: LiveWidget | None = None
         self._due = 0.0
         self._last = ""
         self._drawn = 0
+        self._why = ""
+        self._looking = threading.RLock()
+        shelf_of(session).put(self, (type(self).__qualname__, repr(about)))
 
     @abstractmethod
     def frame(self) -> Frame:
@@ -95,33 +114,59 @@ class LiveView(ABC):
         if self._widget is None:
             self._widget = _widget_class((*self.shared, self.script))(kind=self.script)
             self._widget.on_msg(self._heard)
-            # The widget keeps its view alive, and the ticker keeps neither: when the widget is
-            # closed and forgotten, the view ends by itself.
-            self._widget.view = self
             self._look()
-            self._due = time.monotonic() + self.period
-            ticker_of(self.session).add(self)
+            self._widget.ended = self._why
+            if not self._why:
+                self._widget.observe(self._closed, "comm")
+                self._widget.comm.on_close(self._closed)
+                self._due = time.monotonic() + self.period
+                ticker_of(self.session).add(self)
         return self._widget
+
+    @property
+    def over(self) -> str:
+        """Why nothing comes any more; empty while the view is live."""
+        return self._why or (CLOSED if self.session.closed else "")
 
     def tick(self, now: float) -> float:
         """Send a frame if one is due and something has changed; return when the next is due."""
-        if now >= self._due:
+        if self.session.closed:  # or its context has been shut down under it
+            self.end(CLOSED)
+        elif now >= self._due:
             self._look()
             slow = self._widget is not None and self._widget.number - self._drawn > PATIENCE
             self._due = time.monotonic() + (max(1.0, self.period) if slow else self.period)
         return self._due
 
-    def end(self, why: str) -> None:
-        """Say in the view that nothing will come any more."""
-        if self._widget is not None:
-            self._widget.ended = why
+    def end(self, why: str, *, close: bool = False) -> None:
+        """Give back what the view holds, and say in it that nothing will come any more. Idempotent.
+
+        ``close`` takes the widget off the page and out of the kernel's memory, too: the words that
+        it left in its output (see `saved`) are shown in its place.
+        """
+        with self._looking:  # nothing is sent after this
+            first, self._why = not self._why, self._why or why
+        if first:
+            ticker_of(self.session).forget(self)
+            self.resources.close()
+            if self._widget is not None:
+                self._widget.ended = why
+        if close or self._widget is None:
+            shelf_of(self.session).forget(self)
+            if self._widget is not None:
+                self._widget.close()
+
+    def stop(self) -> None:
+        """End this view; it says so. Idempotent."""
+        self.end("This view has been stopped.")
 
     def __repr__(self) -> str:
         """Return the view in words."""
-        return self.words()
+        return f"{self.label}: {self.over}" if self.over else self.words()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
-        if not _has_front_end():  # a script, a test, a grader: nobody could look at a widget
+        # A script, a test, a grader: nobody could look at a widget. And one that is over says so.
+        if not _has_front_end() or self.over:
             return {"text/plain": repr(self)}, {}
         bundle = self.widget._repr_mimebundle_(**kwargs)
         data, metadata = bundle if isinstance(bundle, tuple) else (bundle or {}, {})
@@ -136,21 +181,34 @@ class LiveView(ABC):
             display(saved(self.label, data["text/plain"]), raw=True)  # type: ignore[no-untyped-call]
 
     def _look(self) -> None:
-        widget = self._widget
-        if widget is None or widget.ended:
-            return
-        try:
-            frame, words = self.look()
-            text = json.dumps([frame, words])
-        except Exception as error:  # noqa: BLE001 - a view must never take its thread down
-            if not self.session.closed:
-                widget.ended = f"This view has stopped ({type(error).__name__}: {error})."
-            return
-        if text != self._last and len(text) <= MAX_FRAME:
+        with self._looking:
+            widget = self._widget
+            if widget is None or self._why:
+                return
+            try:
+                frame, words = self.look()
+                words = brief.text(words, MAX_WORDS)
+                text = json.dumps([frame, words])
+            except Exception as error:  # noqa: BLE001 - a view must never take its thread down
+                failed = f"This view has stopped ({type(error).__name__}: {error})."
+                self.end(CLOSED if self.session.closed else failed)
+                return
+            if text == self._last:
+                return
             self._last = text
+            if len(text) > MAX_FRAME:
+                widget.notice = (
+                    f"What there is to see now is too large to draw ({len(text) // 1024} KiB), so "
+                    "this is older. In a cell, the view's words() has all of it."
+                )
+                return
             with widget.hold_sync():
-                widget.frame, widget.words = frame, words
+                widget.frame, widget.words, widget.notice = frame, words, ""
                 widget.number += 1
+
+    def _closed(self, _change: Any) -> None:
+        """End when somebody has closed the widget, here or in the browser."""
+        self.end("Its widget has been closed.", close=True)
 
     def _heard(self, _widget: Any, message: Any, _buffers: Any) -> None:
         if not isinstance(message, dict):

@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+import json
 import time
+from typing import Any
 
+from course.runtime.log_store import SEVERITIES, LogRow
+from course.runtime.logs import LogTable
 from course.runtime.session import Session
+from course.views import brief
 from course.views.live import Frame, LiveView
 
 SHOWN = 200
-"""Lines that a frame has; the filters in the browser choose among them."""
+"""Lines that a frame has."""
 
 LONGEST_LINE = 500
+"""Characters of a line that are shown."""
+
+MOST_BYTES = 100_000
+"""Bytes of JSON that the lines of a frame may have, whatever language they are in."""
 
 
 class LogPanel(LiveView):
-    """The latest lines of all nodes, with filters for level and text.
+    """The latest lines of all nodes that the filters for level and text let through.
 
-    As text it is the table of `Session.logs`.
+    It begins with what is INFO or more. As text it is the table of `Session.logs`.
     """
 
     label = "Log panel"
@@ -26,25 +35,79 @@ class LogPanel(LiveView):
 
     def __init__(self, session: Session, level: str = "DEBUG") -> None:
         """Show lines of at least ``level``."""
-        super().__init__(session)
-        self._level = level
         session.logs(level=level, last=1)  # an unknown level is an error at once
+        super().__init__(session, level)
+        self._least = level
+        self._level = _named(level) if SEVERITIES[_named(level)] > SEVERITIES["INFO"] else "INFO"
+        self._search = ""
+
+    def filter(self, level: str, search: str = "") -> None:
+        """Show lines of at least ``level`` that have the text ``search`` in them, in any case.
+
+        Raises:
+            SessionError: there is no such level.
+        """
+        self.session.logs(level=level, last=1)
+        self._level, self._search = _named(level), search[:LONGEST_LINE].lower()
+
+    def control(self, message: dict[str, Any]) -> None:
+        """Filter as chosen."""
+        asked = message.get("filter")
+        if isinstance(asked, dict) and str(asked.get("level")) in SEVERITIES:
+            self.filter(str(asked["level"]), str(asked.get("search", "")))
 
     def frame(self) -> Frame:
-        """Return the latest lines: time, level, node, text."""
-        table = self.session.logs(level=self._level, last=SHOWN)
-        return {
-            "rows": [
-                [_moment(row.stamp), row.level, row.node, row.message[:LONGEST_LINE]]
-                for row in table
-            ],
-            "total": len(table) + table.left_out,
-        }
+        """Return the latest lines that pass the filters: time, level, node, text."""
+        return self._as_frame(*self._found())
+
+    def look(self) -> tuple[Frame, str]:
+        """Return both from one look at the log."""
+        found, total = self._found()
+        return self._as_frame(found, total), _table(found)
 
     def words(self) -> str:
         """Return the last lines as a table."""
-        return repr(self.session.logs(level=self._level, last=20))
+        return _table(self._found()[0])
+
+    def _as_frame(self, found: list[LogRow], total: int) -> Frame:
+        rows: list[list[str]] = []
+        left = MOST_BYTES
+        for row in reversed(found[-SHOWN:]):
+            shown = _shown(row)
+            left -= len(json.dumps(shown))
+            if left < 0:
+                break
+            rows.insert(0, shown)
+        return {
+            "rows": rows, "found": len(found), "total": total,
+            "level": self._level, "search": self._search,
+        }  # fmt: skip
+
+    def _found(self) -> tuple[list[LogRow], int]:
+        """Return the rows that pass, and how many there are in all."""
+        rows = self.session.logs(level=self._least, last=None).rows
+        lowest = SEVERITIES[self._level]
+        return [
+            row
+            for row in rows
+            if SEVERITIES.get(row.level, 0) >= lowest
+            and (not self._search or self._search in " ".join(_cells(row)).lower())
+        ], len(rows)
 
 
-def _moment(stamp: float) -> str:
-    return f"{time.strftime('%H:%M:%S', time.localtime(stamp))}.{int(stamp % 1 * 1000):03d}"
+def _table(found: list[LogRow]) -> str:
+    last = [row._replace(message=brief.text(row.message, LONGEST_LINE)) for row in found[-20:]]
+    return repr(LogTable(last, left_out=len(found) - len(last)))
+
+
+def _named(level: str) -> str:
+    return {"WARNING": "WARN"}.get(level.upper(), level.upper())
+
+
+def _shown(row: LogRow) -> list[str]:
+    return [brief.text(cell, LONGEST_LINE) for cell in _cells(row)]
+
+
+def _cells(row: LogRow) -> tuple[str, str, str, str]:
+    moment = time.strftime("%H:%M:%S", time.localtime(row.stamp))
+    return f"{moment}.{int(row.stamp % 1 * 1000):03d}", row.level, row.node, row.message

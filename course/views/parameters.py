@@ -10,11 +10,15 @@ from course.errors import CourseError
 from course.plain import for_json, one_line
 from course.runtime import arguments
 from course.runtime.session import Session
+from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch.parameter_values import ParameterError
 from course.watch.parameters import Entry, ParameterSheet
 
 ASK_TIMEOUT = 2.0
+
+LONGEST = 2000
+"""Bytes of a value that are shown."""
 
 
 class ParameterPanel(LiveView):
@@ -31,9 +35,11 @@ class ParameterPanel(LiveView):
         Raises:
             WaitTimeout: there is no such node, or it does not answer.
         """
-        super().__init__(session)
-        self._sheet = ParameterSheet(session, node)
-        self._entries = self._sheet.entries()
+        sheet = ParameterSheet(session, node)
+        entries = sheet.entries()
+        super().__init__(session, node)
+        self._sheet = sheet
+        self._entries = entries
         self._problem = ""
         self._changes = 0
         self._silent = ""
@@ -108,13 +114,20 @@ class ParameterPanel(LiveView):
         for entry in self._entries:
             limits = f" ({entry.least:g} to {entry.most:g})" if entry.least is not None else ""
             about = f"  # {entry.description}" if entry.description else ""
-            value = "not set" if entry.value is None else one_line(entry.value)
-            lines.append(f"  {entry.name}: {value}{limits}{about}")
-        return "\n".join([*lines, *([self._problem] if self._problem else [])])
+            value = brief.data(entry.value, LONGEST)
+            shown = "not set" if value is None else one_line(value)
+            lines.append(f"  {entry.name}: {shown}{limits}{about}")
+        with self._lock:
+            problem = self._problem or self._silent
+        return "\n".join([*lines, *([problem] if problem else [])])
 
 
 def _shown(entry: Entry) -> Frame:
     """Return what the browser draws: a list as the YAML that is typed to change it."""
-    value = entry.value
     shown: Frame = for_json(asdict(entry))
-    return shown | {"value": one_line(value)} if isinstance(value, list) else shown
+    value = brief.data(entry.value, LONGEST)
+    shown["value"] = one_line(value) if isinstance(value, list) else for_json(value)
+    if value != entry.value:  # what is typed into a part of it would replace the whole
+        shown["read_only"] = True
+        shown["description"] = f"too long to be edited here; {entry.description}".rstrip("; ")
+    return shown

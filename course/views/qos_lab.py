@@ -54,7 +54,7 @@ class QoSLab(LiveView):
         self, session: Session, offered: QoSProfile | None, requested: QoSProfile | None
     ) -> None:
         """Begin with two profiles; None is the default one."""
-        super().__init__(session)
+        super().__init__(session, offered, requested)
         self._offered = Profile.of(offered) if offered else Profile()
         self._requested = Profile.of(requested) if requested else Profile()
         self._trials: list[Trial] = []
@@ -126,12 +126,16 @@ class QoSLab(LiveView):
         }
 
     def words(self) -> str:
-        """Return the trials as text."""
+        """Return profiles, trials and the rule of each policy as text."""
         lines = [f"offered: {self._offered}", f"requested: {self._requested}"]
+        lines += [
+            f"  {_rule(asdict(rule))}" for rule in rules.compare(self._offered, self._requested)
+        ]
         for trial in self.trials:
             shown = _shown(trial)
             lines += [f"{shown['title']}: {shown['seen']}", f"  {shown['why']}"]
             lines += [f"  {shown['verdict']}"]
+            lines += [f"  {_rule(rule)}" for rule in shown["rules"]]
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
 
     def _run(self, asked: dict[str, Any]) -> None:
@@ -171,6 +175,11 @@ def _shown(trial: Trial) -> dict[str, Any]:
         "sent": outcome.sent,
         "rules": [asdict(r) for r in rules.compare(experiment.offered, experiment.requested)],
     }
+
+
+def _rule(rule: dict[str, Any]) -> str:
+    fits = "fits" if rule["fits"] else "does not fit"
+    return f"{rule['policy']}: {rule['offered']} -> {rule['requested']} {fits}. {rule['rule']}"
 
 
 def _seen(outcome: Outcome) -> str:

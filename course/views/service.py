@@ -8,14 +8,13 @@ from typing import Any
 from course.errors import CourseError
 from course.plain import for_json, one_line
 from course.runtime.session import Session
+from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch import forms
 from course.watch.calls import Call, Calls
 
-LONGEST = 4000
-"""Characters of an answer that are shown; ``calls`` has the rest."""
-
-_CUT = " … (cut: see .calls)"
+LONGEST = 3000
+"""Bytes of a request, and of an answer, that are shown."""
 
 
 class ServiceConsole(LiveView):
@@ -27,7 +26,7 @@ class ServiceConsole(LiveView):
 
     def __init__(self, session: Session, srv_type: Any, name: str, timeout: float = 5.0) -> None:
         """Call ``name``, and wait ``timeout`` s for each answer."""
-        super().__init__(session)
+        super().__init__(session, name)
         self._model = Calls(session, srv_type, name)
         self._timeout = timeout
         self._problem = ""
@@ -68,25 +67,17 @@ class ServiceConsole(LiveView):
         """Return the calls as text."""
         lines = [f"Service {self._model.name}, {len(self.calls)} calls"]
         for call in self.calls:
-            outcome = "waiting" if call.waiting else call.problem or _text(call.answer)
-            lines.append(f"  {call.number}: {_text(call.request)} -> {outcome}")
+            shown = _shown(call)
+            outcome = "waiting" if call.waiting else shown["problem"] or one_line(shown["answer"])
+            lines.append(f"  {call.number}: {one_line(shown['request'])} -> {outcome}")
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
 
 
-def _shown(call: Call) -> Frame:
-    """Return what the browser draws of a call: ten long answers must still fit into a frame."""
-    shown: Frame = for_json(asdict(call))
-    for part in ("request", "answer"):
-        if shown[part] is not None:
-            text = _text(shown[part])
-            shown[part] = {"cut": text} if text.endswith(_CUT) else shown[part]
-    return shown | {"time": _time(call)}
-
-
-def _text(data: Frame | None) -> str:
-    text = one_line(data)
-    return text if len(text) <= LONGEST else text[:LONGEST] + _CUT
-
-
-def _time(call: Call) -> str:
-    return "" if call.seconds is None else f"{call.seconds * 1000:.1f} ms"
+def _shown(call: Call) -> dict[str, Any]:
+    return {
+        "number": call.number,
+        "request": brief.data(for_json(call.request), LONGEST),
+        "answer": brief.data(for_json(call.answer), LONGEST),
+        "problem": brief.text(call.problem, LONGEST),
+        "time": "" if call.seconds is None else f"{call.seconds * 1000:.1f} ms",
+    }

@@ -26,8 +26,7 @@ class Ticking(Protocol):
 class Ticker:
     """Calls ``tick`` of each of its views when it is due.
 
-    Views are held weakly: one whose widget is gone is not kept up to date any more. Its thread
-    ends when it has no view left, and starts again with the next.
+    Its thread ends when it has no view left, and starts again with the next.
     """
 
     def __init__(self, session: Session) -> None:
@@ -51,6 +50,11 @@ class Ticker:
                 )
                 self._thread.start()
             self._changed.notify_all()
+
+    def forget(self, view: Ticking) -> None:
+        """Keep ``view`` up to date no more. Idempotent."""
+        with self._changed:
+            self._views.discard(view)
 
     def stop(self, why: str) -> None:
         """End every view, saying ``why``, and the thread. Idempotent."""

@@ -8,12 +8,15 @@ from typing import Any
 
 from course import mcap_file
 from course.errors import SessionError
-from course.runtime.recorder import Recorder
+from course.runtime import arguments
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
 from course.watch import timeline
 from course.watch.callbacks import CallbackTap, Run
-from course.watch.timeline import Figures, Passage, Trace
+from course.watch.timeline import Figures, Trace
+
+MOST_DROPS = 200
+"""Marks for drops that a frame has."""
 
 MOST_TOPICS = 6
 """Topics that one timeline shows: more lanes than that nobody can follow."""
@@ -23,8 +26,9 @@ class Timeline(LiveView):
     """Lanes of a few topics over the last seconds.
 
     Each topic has a lane of publications and receptions, one of callbacks for each node that reads
-    it, and figures: rate, median and 95th percentile of the latency from publication to reception
-    (on one machine: both stamps are of its clock), gaps, and messages that never arrived.
+    it, marks for gaps and drops, plots of rate and latency, and figures: rate, median and 95th
+    percentile of the latency from publication to reception (on one machine: both stamps are of its
+    clock), gaps, and messages that never arrived.
     """
 
     label = "Timeline"
@@ -40,30 +44,33 @@ class Timeline(LiveView):
             SessionError: no topic, too many, or a window that is not positive.
             WaitTimeout: a topic without a class that nobody uses.
         """
-        super().__init__(session)
         if not 0 < len(topics) <= MOST_TOPICS:
             raise SessionError(f"A timeline shows 1 to {MOST_TOPICS} topics, not {len(topics)}.")
+        window = arguments.seconds(window, "window")
         if not 0 < window <= 60:
             raise SessionError(f"A timeline shows up to 60 s, not {window:g} s.")
+        super().__init__(session, *topics, window)
         self._window = round(window * 1e9)
-        self._rows: list[tuple[Trace, CallbackTap, Recorder]] = []
-        for name, msg_type in topics:
-            trace = Trace(session, name, msg_type)
-            recorder = session.record(trace.topic, trace.msg_type)
-            self._rows.append((trace, CallbackTap(trace.topic), recorder))
-        self._tap()
-        session.on_close(self.stop)
+        self._rows: list[tuple[Trace, CallbackTap]] = []
+        try:
+            for name, msg_type in topics:
+                self._add(name, msg_type)
+        except BaseException:
+            self.stop()
+            raise
+        self._keep_up()
 
     def figures(self) -> dict[str, Figures]:
         """Return the figures of each topic over the window that ends now."""
+        self._keep_up()
         start = time.time_ns() - self._window
-        return {trace.topic: timeline.figures(trace.since(start)) for trace, _, _ in self._rows}
+        return {trace.topic: timeline.figures(trace.since(start)) for trace, _ in self._rows}
 
     def runs(self, topic: str) -> list[Run]:
         """Return when callbacks of a topic's subscriptions ran in the window that ends now."""
         start = time.time_ns() - self._window
         return [
-            run for trace, tap, _ in self._rows if trace.topic == topic for run in tap.since(start)
+            run for trace, tap in self._rows if trace.topic == topic for run in tap.since(start)
         ]
 
     def save(self, path: str | Path) -> Path:
@@ -72,22 +79,12 @@ class Timeline(LiveView):
         Raises:
             RecordingError: the file cannot be written.
         """
-        recordings = {
-            trace.topic: (trace.msg_type, recorder.messages) for trace, _, recorder in self._rows
-        }
+        recordings = {trace.topic: (trace.msg_type, trace.messages) for trace, _ in self._rows}
         return mcap_file.write(Path(path), recordings)
-
-    def stop(self) -> None:
-        """Trace no more, and leave callbacks as they were. Idempotent."""
-        for trace, tap, recorder in self._rows:
-            tap.stop()
-            if not self.session.closed:
-                trace.stop()
-                recorder.stop()
 
     def frame(self) -> Frame:
         """Return lanes as counts a column, and figures in words."""
-        self._tap()
+        self._keep_up()
         now = time.time_ns()
         # Columns stay where they are while time passes: the window moves on by whole ones.
         step = self._window // timeline.COLUMNS
@@ -95,7 +92,8 @@ class Timeline(LiveView):
         return {
             "window": self._window / 1e9,
             "columns": timeline.COLUMNS,
-            "topics": [self._topic(trace, tap, start) for trace, tap, _ in self._rows],
+            "bins": timeline.BINS,
+            "topics": [self._topic(trace, tap, start) for trace, tap in self._rows],
         }
 
     def words(self) -> str:
@@ -107,9 +105,20 @@ class Timeline(LiveView):
                 lines.append(f"    callbacks of {node}: {count}")
         return "\n".join(lines)
 
-    def _tap(self) -> None:
+    def _add(self, name: str, msg_type: Any | None) -> None:
+        trace = Trace(self.session, name, msg_type)
+        self.resources.callback(trace.stop)
+        tap = CallbackTap(trace.topic)
+        self.resources.callback(tap.stop)
+        self._rows.append((trace, tap))
+
+    def _keep_up(self) -> None:
+        """Follow nodes and publishers that have come since the last look."""
+        if self.over:
+            return
         nodes = list(self.session.nodes.values())
-        for _, tap, _ in self._rows:
+        for trace, tap in self._rows:
+            trace.adapt()
             tap.watch(nodes)
 
     def _nodes(self, topic: str) -> dict[str, int]:
@@ -121,6 +130,7 @@ class Timeline(LiveView):
     def _topic(self, trace: Trace, tap: CallbackTap, start: int) -> dict[str, Any]:
         passages, runs = trace.since(start), tap.since(start)
         found = timeline.figures(passages)
+        plots = timeline.plots(passages, start, self._window)
         lanes = [
             ("published", [passage.published for passage in passages]),
             ("received", [passage.received for passage in passages]),
@@ -134,12 +144,20 @@ class Timeline(LiveView):
                 {"label": label, "counts": timeline.columns(moments, start, self._window)}
                 for label, moments in lanes
             ],
-            "latency": _latency(passages, start, self._window),
+            "rate": _rounded(plots.rate, 1.0, 2),
+            "p50": _rounded(plots.p50, 1e3, 3),
+            "p95": _rounded(plots.p95, 1e3, 3),
             "gaps": [
-                [(moment - start / 1e9) / (self._window / 1e9) for moment in gap]
-                for gap in found.gaps
+                [self._share(begin, start), self._share(end, start)] for begin, end in found.gaps
+            ],
+            "drops": [
+                [self._share(when, start), count] for when, count in found.drops[-MOST_DROPS:]
             ],
         }
+
+    def _share(self, moment: float, start: int) -> float:
+        """Return where a moment (s) is in the window from ``start`` (ns), 0 to 1."""
+        return round((moment - start / 1e9) / (self._window / 1e9), 4)
 
 
 def describe(figures: Figures) -> str:
@@ -161,12 +179,5 @@ def describe(figures: Figures) -> str:
     return ", ".join(parts)
 
 
-def _latency(passages: list[Passage], start: int, window: int) -> list[float | None]:
-    """Return the largest latency (ms) of each column, None for an empty one."""
-    worst: list[float | None] = [None] * timeline.COLUMNS
-    for passage in passages:
-        place = (passage.received - start) * timeline.COLUMNS // window
-        if 0 <= place < timeline.COLUMNS:
-            latency = round((passage.received - passage.published) / 1e6, 3)
-            worst[place] = max(worst[place] or 0.0, latency)
-    return worst
+def _rounded(values: list[float | None], unit: float, digits: int) -> list[float | None]:
+    return [None if value is None else round(value * unit, digits) for value in values]

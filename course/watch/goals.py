@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,13 +21,18 @@ from course.runtime.actions import GoalRun, GoalState
 from course.runtime.session import Session
 from course.watch import forms
 
-KEPT = 12
+KEPT = 40
+"""Goals that are kept with all that is known of them: those that run before those that are over."""
+
 OVER = (GoalState.SUCCEEDED, GoalState.CANCELED, GoalState.ABORTED)
 
 
 @dataclass
 class Goal:
-    """One goal: the states that it went through with their times (s since it was first seen)."""
+    """One goal: the states that it went through with their times (s since it was first seen).
+
+    ``problem`` says why it never began; ``note`` what else there is to say about it.
+    """
 
     number: int
     states: list[tuple[GoalState, float]] = field(default_factory=list)
@@ -37,6 +41,7 @@ class Goal:
     result: dict[str, Any] | None = None
     asked: dict[str, Any] | None = None
     problem: str = ""
+    note: str = ""
     seen: float = 0.0
 
     @property
@@ -58,19 +63,28 @@ class GoalBoard:
         self.name = name
         self.action_type = action_type
         self._session = session
-        self._goals: OrderedDict[bytes, Goal] = OrderedDict()
+        self._goals: dict[bytes, Goal] = {}
+        self._let_go: set[bytes] = set()  # of what the server still lists
+        self._stopped = False
         self._rejected: list[Goal] = []
         self._count = 0
         self._lock = threading.Lock()
-        subscribe = session.watch
-        subscribe(
-            GoalStatusArray, f"{name}/_action/status", self._on_status,
-            qos_profile_action_status_default,
-        )  # fmt: skip
-        subscribe(
-            action_type.Impl.FeedbackMessage, f"{name}/_action/feedback", self._on_feedback,
-            QoSProfile(depth=100),
-        )  # fmt: skip
+        self._subscriptions = [
+            session.watch(
+                GoalStatusArray, f"{name}/_action/status", self._on_status,
+                qos_profile_action_status_default,
+            ),
+            session.watch(
+                action_type.Impl.FeedbackMessage, f"{name}/_action/feedback", self._on_feedback,
+                QoSProfile(depth=100),
+            ),
+        ]  # fmt: skip
+
+    def stop(self) -> None:
+        """Watch no more. Idempotent."""
+        self._stopped = True
+        for subscription in self._subscriptions:
+            self._session.unwatch(subscription)
 
     @property
     def goals(self) -> list[Goal]:
@@ -105,7 +119,7 @@ class GoalBoard:
                 CancelGoal, f"{self.name}/_action/cancel_goal", request, timeout
             )
             agreed = any(bytes(info.goal_id.uuid) == key for info in response.goals_canceling)
-            goal.problem = "" if agreed or goal.over else "The server refused to cancel."
+            goal.note = "" if agreed or goal.over else "The server refused to cancel."
 
     def _follow(self, goal: Any, timeout: float) -> None:
         asked = values.to_data(goal)
@@ -122,11 +136,13 @@ class GoalBoard:
             return
         with self._lock:
             kept = self._goal(run.goal_id)
+            if kept is None:
+                return
             kept.asked = asked
         self._await(run, kept)
 
     def _await(self, run: GoalRun, kept: Goal) -> None:
-        while not self._session.closed:
+        while not (self._stopped or self._session.closed):
             try:
                 if not run.done_within(1.0):
                     continue
@@ -142,26 +158,38 @@ class GoalBoard:
             self._rejected.append(Goal(self._count, asked=asked, problem=problem))
             del self._rejected[:-KEPT]
 
-    def _goal(self, key: bytes) -> Goal:
-        """Return the goal of an id; called with the lock held."""
+    def _goal(self, key: bytes) -> Goal | None:
+        """Return the goal of an id, None if it was let go of; called with the lock held."""
+        if key in self._let_go:
+            return None
         if key not in self._goals:
             self._count += 1
             self._goals[key] = Goal(self._count, seen=time.monotonic())
-            while len(self._goals) > KEPT:
-                self._goals.popitem(last=False)
         return self._goals[key]
 
     def _on_status(self, message: Any) -> None:
         now = time.monotonic()
+        listed = {bytes(status.goal_info.goal_id.uuid): status for status in message.status_list}
         with self._lock:
-            for status in message.status_list:
-                goal = self._goal(bytes(status.goal_info.goal_id.uuid))
+            for key, status in listed.items():
+                goal = self._goal(key)
+                if goal is None:
+                    continue
                 state = GoalState(status.status)
                 if goal.state != state:
                     goal.states.append((state, max(0.0, now - goal.seen)))
+                if goal.over:
+                    goal.note = ""
+            # A server lists goals for minutes after their end: these are not new ones.
+            self._let_go &= listed.keys()
+            oldest = sorted(self._goals, key=lambda key: not self._goals[key].over)
+            for key in oldest[: max(0, len(oldest) - KEPT)]:
+                del self._goals[key]
+                self._let_go |= {key} & listed.keys()
 
     def _on_feedback(self, message: Any) -> None:
         with self._lock:
             goal = self._goal(bytes(message.goal_id.uuid))
-            goal.feedback += 1
-            goal.latest = values.to_data(message.feedback)
+            if goal is not None:
+                goal.feedback += 1
+                goal.latest = values.to_data(message.feedback)

@@ -13,7 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from course.graph import reader
 from course.runtime.offers import fitting_qos, full_topic, type_on
+from course.runtime.recorder import Stamped
 from course.runtime.session import Session
 
 KEPT = 20_000
@@ -21,6 +23,12 @@ KEPT = 20_000
 
 COLUMNS = 200
 """Into how many columns a window is divided: more than an eye can tell apart."""
+
+BINS = 50
+"""Into how many parts a window is divided for the plots of rate and latency."""
+
+MESSAGES = 1000
+"""Messages of one topic that a trace keeps whole, to be saved."""
 
 GAP = 3.0
 """A pause is a gap if it is so many times as long as the median period."""
@@ -42,7 +50,11 @@ class Passage(NamedTuple):
 
 @dataclass(frozen=True)
 class Figures:
-    """What a window of a trace shows. Times are in seconds, rates in Hz; None where unknown."""
+    """What a window of a trace shows. Times are in seconds, rates in Hz; None where unknown.
+
+    ``gaps`` are pauses from publication to publication; ``drops`` how many messages never came, and
+    when the one after them was published. Both times are since the epoch.
+    """
 
     count: int
     rate: float | None = None
@@ -50,6 +62,18 @@ class Figures:
     latency_p95: float | None = None
     lost: int = 0
     gaps: tuple[tuple[float, float], ...] = ()
+    drops: tuple[tuple[float, int], ...] = ()
+
+
+class Plots(NamedTuple):
+    """Rate (Hz) and latency (s) in each of `BINS` parts of a window; None where nothing came.
+
+    In a gap the rate is 0.
+    """
+
+    rate: list[float | None]
+    p50: list[float | None]
+    p95: list[float | None]
 
 
 class Trace:
@@ -68,12 +92,32 @@ class Trace:
         self.msg_type = msg_type or session.until(
             lambda: type_on(session.observer, self.topic), what=f"somebody to use {self.topic}"
         )
-        qos = fitting_qos(session.observer, self.topic, _DEPTH)
-        self._subscription = session.watch(self.msg_type, self.topic, self._take, qos)
+        self._messages: deque[Stamped] = deque(maxlen=MESSAGES)
+        self._subscribe()
+
+    @property
+    def messages(self) -> list[Stamped]:
+        """The latest messages, oldest first (a snapshot)."""
+        with self._lock:
+            return list(self._messages)
+
+    def adapt(self) -> None:
+        """Subscribe anew if there is a publisher now that offers less than was requested.
+
+        A talker's cell is run again with another QoS, say; what asks for less goes on fitting.
+        """
+        offers = self._session.observer.get_publishers_info_by_topic(self.topic)
+        if not all(not reader.incompatibilities(offer.qos_profile, self._qos) for offer in offers):
+            self.stop()
+            self._subscribe()
 
     def stop(self) -> None:
         """Trace no more. Idempotent."""
         self._session.unwatch(self._subscription)
+
+    def _subscribe(self) -> None:
+        self._qos = fitting_qos(self._session.observer, self.topic, _DEPTH)
+        self._subscription = self._session.watch(self.msg_type, self.topic, self._take, self._qos)
 
     def since(self, moment_ns: int) -> list[Passage]:
         """Return the passages received since a moment (ns), oldest first."""
@@ -81,13 +125,16 @@ class Trace:
             passages = list(self._passages)
         return [passage for passage in passages if passage.received >= moment_ns]
 
-    def _take(self, _message: Any, info: dict[str, int]) -> None:
+    def _take(self, message: Any, info: dict[str, int]) -> None:
         passage = Passage(
             info["source_timestamp"], info["received_timestamp"] or time.time_ns(),
             info.get("publication_sequence_number") or 0,
         )  # fmt: skip
+        # As a recording has it: simulated time in a session that has one.
+        stamp = self._session.sim.now_ns if self._session.options["sim_time"] else passage.published
         with self._lock:
             self._passages.append(passage)
+            self._messages.append(Stamped(stamp, message))
 
 
 def figures(passages: Sequence[Passage]) -> Figures:
@@ -97,13 +144,45 @@ def figures(passages: Sequence[Passage]) -> Figures:
     latencies = sorted((p.received - p.published) / _NS for p in passages)
     stamps = [p.published / _NS for p in passages]
     span = stamps[-1] - stamps[0]
+    drops = _drops(passages)
     return Figures(
         len(passages),
         rate=(len(stamps) - 1) / span if span > 0 else None,
         latency_p50=_share(latencies, 0.5),
         latency_p95=_share(latencies, 0.95),
-        lost=_lost(passages),
+        lost=sum(count for _, count in drops),
         gaps=_gaps(stamps),
+        drops=drops,
+    )
+
+
+def plots(passages: Sequence[Passage], start: int, window_ns: int) -> Plots:
+    """Return rate and latency over a window from ``start`` (ns) of passages, oldest first.
+
+    The rate of a part is that of the periods that end in it, so that a steady topic has a level
+    line however few messages fall into a part.
+    """
+    periods: list[list[float]] = [[] for _ in range(BINS)]
+    latencies: list[list[float]] = [[] for _ in range(BINS)]
+    before: Passage | None = None
+    for passage in passages:
+        place = (passage.published - start) * BINS // window_ns
+        if 0 <= place < BINS:
+            latencies[place].append((passage.received - passage.published) / _NS)
+            if before is not None:
+                periods[place].append((passage.published - before.published) / _NS)
+        before = passage
+    rate = [len(found) / sum(found) if sum(found) > 0 else None for found in periods]
+    part = window_ns / BINS / _NS
+    for begin, end in figures(passages).gaps:
+        for place, found in enumerate(latencies):
+            middle = start / _NS + (place + 0.5) * part
+            if begin < middle < end and not found:
+                rate[place] = 0.0
+    ordered = [sorted(found) for found in latencies]
+    return Plots(
+        rate,
+        *([_share(found, share) if found else None for found in ordered] for share in (0.5, 0.95)),
     )
 
 
@@ -121,13 +200,16 @@ def _share(ordered: Sequence[float], share: float) -> float:
     return ordered[min(len(ordered) - 1, int(len(ordered) * share))]
 
 
-def _lost(passages: Sequence[Passage]) -> int:
-    """Return how many numbers are missing, if all come from one publisher that counts."""
-    numbers = [passage.sequence for passage in passages]
-    steps = [later - earlier for earlier, later in itertools.pairwise(numbers)]
-    if 0 in numbers or any(step <= 0 for step in steps):
-        return 0
-    return sum(step - 1 for step in steps)
+def _drops(passages: Sequence[Passage]) -> tuple[tuple[float, int], ...]:
+    """Return where numbers are missing, if all come from one publisher that counts."""
+    pairs = list(itertools.pairwise(passages))
+    if any(a.sequence == 0 or b.sequence <= a.sequence for a, b in pairs):
+        return ()
+    return tuple(
+        (b.published / _NS, b.sequence - a.sequence - 1)
+        for a, b in pairs
+        if b.sequence > a.sequence + 1
+    )
 
 
 def _gaps(stamps: Sequence[float]) -> tuple[tuple[float, float], ...]:

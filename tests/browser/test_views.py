@@ -123,6 +123,27 @@ def test_nodes_come_and_go_in_the_graph(open_cells: Open) -> None:
     expect(graph.locator("svg text", has_text="/listener")).to_be_visible()
 
 
+def test_a_cell_that_runs_again_has_one_live_view(open_cells: Open) -> None:
+    page = open_cells('view = session.timeline("chatter")\nview', "view", "session.graph()")
+    expect(region(page, "Timeline")).to_have_count(2)
+    for _ in range(3):
+        page.run_cell(1)
+    expect(region(page, "Timeline")).to_have_count(1)
+    old = page.cell(2).locator(".rosview-saved")
+    expect(old).to_contain_text("not live: run this cell again")
+    expect(old).to_be_visible()
+    page.write_cell(
+        2, "from course.views.shelf import shelf_of\nprint(len(shelf_of(session)._views))"
+    )
+    page.run_cell(2)
+    expect(page.cell(2)).to_contain_text("2")
+    number = "element => element.querySelector('.rosview-words').textContent"
+    before = region(page, "Timeline").evaluate(number)
+    expect(words(region(page, "Timeline"))).not_to_have_text(before)
+    expect(region(page, "ROS graph").locator("svg text", has_text="/listener")).to_be_visible()
+    assert page.errors == []
+
+
 def test_a_view_survives_a_reload_and_says_when_the_kernel_is_gone(open_cells: Open) -> None:
     page = open_cells("session.graph()", "")
     page.save()

@@ -15,6 +15,7 @@ from std_msgs.msg import String
 
 import course
 from course.errors import SessionError
+from course.runtime.log_store import LogStore
 from course.runtime.logs import LogRow, LogTable
 
 
@@ -234,3 +235,19 @@ def test_the_console_of_a_plain_context_opened_later_is_its_own(start_script):
     assert process.returncode == 0
     assert "on the console" in out + err
     assert "kept" not in out + err
+
+
+def test_the_store_is_bounded_in_loggers_and_bytes_and_errors_stay_longest():
+    store, home = LogStore(), object()
+    store.add(0.0, "ERROR", "robot", "first", home)
+    for number in range(1000):
+        store.add(float(number), "INFO", f"robot.child_{number}", "x", home)
+    rows = [row for _, row in store.rows(home, 0.0)]
+    assert rows[0].message == "first"
+    assert len(rows) <= 400
+    for number in range(200):
+        store.add(2000.0 + number, "INFO", "robot", "y" * 2**20, home)
+    rows = [row for _, row in store.rows(home, 0.0)]
+    assert sum(len(row.message) for row in rows) <= 16 * 2**20
+    assert rows[-1].stamp == 2199.0
+    assert rows[0].message == "first"

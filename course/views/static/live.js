@@ -55,7 +55,7 @@ function render({ model, el }) {
       dead = true; // the connection has been taken down
     }
   };
-  const stage = make("div", { class: "rosview-stage" });
+  const stage = make("fieldset", { class: "rosview-stage", role: "presentation" });
   const words = make("pre", { class: "rosview-words", tabindex: "0" });
   const status = make("p", { class: "rosview-status", role: "status" });
   const root = make(
@@ -85,11 +85,11 @@ function render({ model, el }) {
   };
   const say = () => {
     const ended = model.get("ended");
-    const text = dead ? DEAD : ended;
-    root.classList.toggle("rosview-over", Boolean(text));
-    for (const control of stage.querySelectorAll("button, input, select")) {
-      control.disabled = Boolean(text);
-    }
+    const over = dead ? DEAD : ended;
+    const text = over || model.get("notice");
+    root.classList.toggle("rosview-over", Boolean(over));
+    // A fieldset disables what is in it, and what is disabled for reasons of its own stays so.
+    stage.disabled = Boolean(over);
     if (status.textContent !== text) status.textContent = text;
   };
   // JupyterLab says that the connection has changed, not how: a kernel that lives answers.
@@ -108,6 +108,7 @@ function render({ model, el }) {
 
   model.on("change:number", refresh);
   model.on("change:ended", say);
+  model.on("change:notice", say);
   model.on("comm_live_update", connection);
   model.on("msg:custom", heard);
   draw();
@@ -116,6 +117,7 @@ function render({ model, el }) {
     cancelAnimationFrame(waiting);
     model.off("change:number", refresh);
     model.off("change:ended", say);
+    model.off("change:notice", say);
     model.off("comm_live_update", connection);
     model.off("msg:custom", heard);
     drawing.stop?.();

@@ -1,17 +1,21 @@
-// What all nodes said: filtered by level and text here, so that a flood needs no round trip.
+// What all nodes said. Level and text filter what is here at once; the kernel looks through the rest
+// of what it keeps, and sends the latest lines that pass.
 
 const LEVELS = { DEBUG: 10, INFO: 20, PRINT: 20, WARN: 30, STDERR: 30, ERROR: 40, FATAL: 50 };
 
 const view = {
   label: "Log panel",
-  start(stage) {
+  start(stage, send) {
+    const ask = () => {
+      redraw();
+      send({ filter: { level: level.value, search: search.value } });
+    };
     const level = make(
-      "select", { "aria-label": "Lowest level", onchange: () => redraw() },
-      ...["DEBUG", "INFO", "WARN", "ERROR"].map((name) => make("option", { value: name }, name)),
+      "select", { "aria-label": "Lowest level", onchange: ask },
+      ...["DEBUG", "INFO", "WARN", "ERROR", "FATAL"].map((name) => make("option", { value: name }, name)),
     );
-    level.value = "INFO";
     const search = make("input", {
-      type: "search", "aria-label": "Search", placeholder: "Search", oninput: () => redraw(),
+      type: "search", "aria-label": "Search", placeholder: "Search", oninput: ask,
     });
     const count = make("span", { class: "rosform-takes", role: "status" });
     const rows = make("tbody");
@@ -20,7 +24,8 @@ const view = {
       make("table", { class: "rostable" }, rows),
     );
     stage.append(make("div", {}, level, " ", search, count), box);
-    let frame = { rows: [], total: 0 };
+    let frame = { rows: [], found: 0, total: 0 };
+    let chosen = "";
     let following = true; // the end, until somebody scrolls up to read
     box.addEventListener("scroll", () => {
       following = box.scrollTop + box.clientHeight >= box.scrollHeight - 8;
@@ -35,10 +40,21 @@ const view = {
         ...row.map((cell) => make("td", {}, cell)),
       )));
       if (following) requestAnimationFrame(() => { box.scrollTop = box.scrollHeight; });
-      const said = `${found.length} of the last ${frame.rows.length} lines`;
+      const said = `the last ${found.length} of ${frame.found} lines (${frame.total} in all)`;
       if (count.textContent !== said) count.textContent = said;
     };
-    return { draw(latest) { frame = latest; redraw(); } };
+    return {
+      draw(latest) {
+        frame = latest;
+        const theirs = JSON.stringify([latest.level, latest.search]);
+        if (theirs !== chosen) { // chosen in another window on this view, or before a reload
+          chosen = theirs;
+          if (document.activeElement !== search) search.value = latest.search;
+          level.value = latest.level;
+        }
+        redraw();
+      },
+    };
   },
 };
 

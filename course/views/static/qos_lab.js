@@ -34,11 +34,6 @@ function build(stage, frame, id, send) {
       ...["", "writer offers", "reader requests", ""].map((name) => make("th", { scope: "col" }, name)))),
     make("tbody", {}, ...rows),
   );
-  const scenario = make(
-    "select", { id: `${id}-scenario` },
-    ...Object.keys(frame.scenarios).map((name) => make("option", { value: name }, name)),
-  );
-  const about = make("span", { class: "rosform-takes" });
   const loss = make("input", {
     id: `${id}-loss`, type: "number", min: 0, max: 90, step: 5, value: 0,
     disabled: Boolean(frame.no_loss), title: frame.no_loss || null,
@@ -49,44 +44,49 @@ function build(stage, frame, id, send) {
     make("option", { value: "no" }, "not connect"),
   );
   const arrive = make("input", { id: `${id}-arrive`, type: "number", min: 0, max: frame.count, placeholder: "?" });
-  const run = make("button", { type: "submit" }, "Run");
   const problem = make("p", { class: "rosform-problem", role: "alert" });
   const state = make("p", { class: "roslab-state", role: "status" });
   const results = make("ol", { class: "roslab-results" });
-  const say = () => { about.textContent = frame.scenarios[scenario.value]; };
-  scenario.addEventListener("change", say);
-  say();
+  let running = false;
+  const ask = (scenario) => {
+    if (running) return;
+    if (!connects.value) {
+      problem.textContent = "Predict first: will they connect?";
+      connects.focus();
+      return;
+    }
+    problem.textContent = "";
+    send({ run: {
+      offered: profileOf(sides.offered), requested: profileOf(sides.requested),
+      scenario, loss: Number(loss.value) || 0,
+      connects: connects.value === "yes",
+      arrive: arrive.value === "" ? null : Number(arrive.value),
+    } });
+  };
+  const buttons = Object.keys(frame.scenarios).map((name, number) => make(
+    "button", { type: "button", "aria-describedby": `${id}-about-${number}`, onclick: () => ask(name) },
+    `Run ${name}`,
+  ));
   const form = make(
-    "form", {
-      onsubmit: (event) => {
-        event.preventDefault();
-        if (!connects.value) {
-          problem.textContent = "Predict first: will they connect?";
-          connects.focus();
-          return;
-        }
-        problem.textContent = "";
-        send({ run: {
-          offered: profileOf(sides.offered), requested: profileOf(sides.requested),
-          scenario: scenario.value, loss: Number(loss.value) || 0,
-          connects: connects.value === "yes",
-          arrive: arrive.value === "" ? null : Number(arrive.value),
-        } });
-      },
-    },
+    "form", { onsubmit: (event) => event.preventDefault() },
     profiles,
-    make("p", {}, make("label", { for: scenario.id }, "Scenario "), scenario, about),
     make("p", {}, make("label", { for: loss.id }, "The link loses "), loss, " % ",
       make("span", { class: "rosform-takes" }, frame.no_loss)),
     make("p", {}, make("label", { for: connects.id }, "I predict that they will "), connects,
-      make("label", { for: arrive.id }, " and that so many arrive: "), arrive, ` of ${frame.count} `, run),
+      make("label", { for: arrive.id }, " and that so many arrive: "), arrive, ` of ${frame.count}`),
+    make("div", { class: "roslab-scenarios", role: "group", "aria-label": "Scenarios" },
+      ...Object.values(frame.scenarios).flatMap((about, number) => [
+        buttons[number], make("span", { class: "rosform-takes", id: `${id}-about-${number}` }, about),
+      ])),
     problem, state,
   );
   stage.append(form, results);
   let known = "";
   return {
     draw(latest) {
-      run.disabled = latest.running;
+      running = latest.running;
+      // Not disabled: that would take the keyboard's focus away from the one that was pressed.
+      for (const button of buttons) button.setAttribute("aria-disabled", String(running));
       const said = latest.running ? "Running…" : "";
       if (state.textContent !== said) state.textContent = said;
       if (latest.problem) problem.textContent = latest.problem;

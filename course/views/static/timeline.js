@@ -1,10 +1,11 @@
-// Lanes of topics: a stroke where something happened, stronger where much did; gaps hatched; the
-// largest latency of each column as a line below.
+// Lanes of topics: a stroke where something happened, stronger where much did; gaps shaded, drops
+// marked; rate and latency (median and 95th percentile) as lines below.
 
 const WIDTH = 760;
 const LABEL = 170;
 const LANE = 20;
-const PLOT = 44;
+const PLOT = 40;
+const SPACE = 12;
 
 const view = {
   label: "Timeline",
@@ -19,7 +20,7 @@ const view = {
 
 function block(topic, frame) {
   const lanes = topic.lanes.length;
-  const height = lanes * LANE + PLOT + 26;
+  const height = lanes * LANE + 2 * (PLOT + SPACE) + 22;
   const svg = shape("svg", {
     class: "rostimeline", role: "img", "aria-label": `${topic.name}: ${topic.text}`,
     viewBox: `0 0 ${LABEL + WIDTH + 10} ${height}`, width: LABEL + WIDTH + 10, height,
@@ -30,7 +31,7 @@ function block(topic, frame) {
     svg.append(shape("rect", {
       class: "rostimeline-gap", x, y: 0,
       width: Math.max(1, LABEL + Math.min(1, to) * WIDTH - x), height: lanes * LANE,
-    }));
+    }, shape("title", {}, `gap of ${((to - from) * frame.window).toFixed(2)} s`)));
   }
   topic.lanes.forEach((lane, row) => {
     const y = row * LANE;
@@ -46,7 +47,16 @@ function block(topic, frame) {
     });
     svg.append(shape("path", { class: `rostimeline-lane${Math.min(row, 2)}`, d: path }));
   });
-  svg.append(...latency(topic.latency, lanes * LANE + 10, column));
+  for (const [place, count] of topic.drops) {
+    const x = (LABEL + Math.max(0, Math.min(1, place)) * WIDTH).toFixed(1);
+    svg.append(shape("path", { class: "rostimeline-drop", d: `M${x},${LANE} m-4,0 h8 l-4,7 Z` },
+      shape("title", {}, `${count} lost on the way`)));
+  }
+  svg.append(
+    ...plot("rate", "Hz", 1, [["rostimeline-rate", topic.rate]], lanes * LANE + SPACE),
+    ...plot("latency p50, p95", "ms", 2, [["rostimeline-p50", topic.p50], ["rostimeline-p95", topic.p95]],
+      lanes * LANE + 2 * SPACE + PLOT),
+  );
   const base = height - 4;
   svg.append(
     shape("text", { x: LABEL, y: base }, `${-frame.window} s`),
@@ -56,16 +66,24 @@ function block(topic, frame) {
     make("strong", {}, topic.name), ` ${topic.text}`), svg);
 }
 
-function latency(values, top, column) {
-  const most = Math.max(0.1, ...values.map((value) => value ?? 0));
-  const points = values
-    .map((value, place) => value === null ? null
-      : `${(LABEL + (place + 0.5) * column).toFixed(1)},${(top + PLOT - value / most * (PLOT - 6)).toFixed(1)}`)
-    .filter(Boolean);
+/** Lines over one axis from 0 to the largest value; a part of the window without a value is skipped. */
+function plot(name, unit, digits, lines, top) {
+  const values = lines.flatMap(([, line]) => line.filter((value) => value !== null));
+  const most = Math.max(10 ** -digits, ...values);
+  const drawn = lines.map(([style, line]) => {
+    const step = WIDTH / line.length;
+    const points = line
+      .map((value, place) => value === null ? null
+        : `${(LABEL + (place + 0.5) * step).toFixed(1)},${(top + PLOT - value / most * (PLOT - 4)).toFixed(1)}`)
+      .filter(Boolean);
+    return shape("polyline", { class: style, points: points.join(" ") });
+  });
   return [
-    shape("text", { x: LABEL - 8, y: top + 12, class: "rostimeline-label" }, `latency, ${most.toFixed(1)} ms`),
+    shape("text", { x: LABEL - 8, y: top + 12, class: "rostimeline-label" }, name),
+    shape("text", { x: LABEL - 8, y: top + 26, class: "rostimeline-label" },
+      values.length ? `up to ${most.toFixed(digits)} ${unit}` : "nothing yet"),
     shape("line", { x1: LABEL, x2: LABEL + WIDTH, y1: top + PLOT, y2: top + PLOT }),
-    shape("polyline", { class: "rostimeline-latency", points: points.join(" ") }),
+    ...drawn,
   ];
 }
 

@@ -86,13 +86,29 @@ def test_services_and_actions_have_both_sides(session: Session) -> None:
         ),
     ],
 )
+@pytest.mark.parametrize("order", ["view, reader, writer", "writer, reader, view", "remote writer"])
 def test_ddss_own_event_names_what_breaks_a_pair(
-    session: Session, offered: QoSProfile, requested: QoSProfile, policy: str
+    session: Session, offered: QoSProfile, requested: QoSProfile, policy: str, order: str
 ) -> None:
     view = GraphView(session)
-    session.run(listener, requested)
-    assert view.graph.mismatches == ()
-    session.run(talker, offered)
+    with Session(domain_id=session.domain_id) as other:
+        if order == "view, reader, writer":
+            assert view.widget.number
+            session.run(listener, requested)
+            assert view.graph.mismatches == ()
+            session.run(talker, offered)
+        elif order == "writer, reader, view":
+            session.run(talker, offered)
+            session.run(listener, requested)
+            session.until(lambda: reader.read(session.observer).mismatches)
+            view = GraphView(session)
+        else:
+            other.run(talker, offered)
+            session.run(listener, requested)
+        check_event(session, view, policy)
+
+
+def check_event(session: Session, view: GraphView, policy: str) -> None:
     ((topic, pair),) = session.until(
         lambda: [found for found in view.graph.mismatches if found[1].from_event]
     )
@@ -100,6 +116,20 @@ def test_ddss_own_event_names_what_breaks_a_pair(
     assert pair.policies == (policy,)
     assert f"{policy.lower()} (" in view.words()
     assert "DDS reports it." in view.words()
+
+
+def test_a_publisher_hears_of_a_subscription_made_from_a_cell_and_in_another_process(
+    session: Session,
+) -> None:
+    node = session.run(talker, BEST_EFFORT)
+    with Session(domain_id=session.domain_id) as other:
+        other.run(listener, RELIABLE)
+        view = GraphView(session)
+        check_event(session, view, "RELIABILITY")
+    session.until(lambda: view.graph.mismatches == ())
+    node.create_subscription(String, "chatter", lambda _message: None, RELIABLE)
+    session.until(lambda: view.graph.mismatches)
+    session.until(lambda: view.graph.mismatches[0][1].from_event)
 
 
 def test_a_pair_that_was_there_before_is_told_from_the_announced_qos(session: Session) -> None:

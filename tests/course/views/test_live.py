@@ -138,6 +138,22 @@ def test_saved_words_are_escaped_and_bounded() -> None:
     assert len(data["text/html"]) < 30_000
 
 
+def test_a_frame_that_does_not_fit_is_said(session: Session) -> None:
+    class Large(Counter):
+        large = False
+
+        def frame(self) -> dict[str, Any]:
+            return {**super().frame(), "text": "x" * live.MAX_FRAME * self.large}
+
+    view = Large(session)
+    number = view.widget.number
+    view.large = True
+    session.until(lambda: "too large to draw (256 KiB)" in view.widget.notice)
+    assert view.widget.ended == ""
+    view.large = False
+    session.until(lambda: view.widget.number > number and not view.widget.notice)
+
+
 def test_messages_that_are_none_are_passed_over(session: Session) -> None:
     view = GraphView(session)
     for message in ("x", None, [], {}, {"drawn": "9"}, {"drawn": None}):

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rclpy.action import ActionServer, CancelResponse
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 from test_msgs.msg import Nested
 from test_msgs.srv import Arrays
@@ -19,7 +23,7 @@ from course.errors import CourseError, SessionError, WaitTimeout
 from course.runtime.actions import GoalState
 from course.values import MisfitError
 from course.views.live import MAX_FRAME, LiveView
-from course.watch import forms
+from course.watch import forms, goals
 from course.watch.parameter_values import ParameterError
 from tests.robot import Robot
 
@@ -131,6 +135,72 @@ def test_a_rejected_goal_is_said(busy: Session) -> None:
     busy.until(lambda: view.goals)
     assert view.goals[0].problem == "The server rejected this goal."
     assert view.goals[0].over
+
+
+class Server(Node):
+    """Serves an action whose goals end when `go` is set, and which nobody can cancel."""
+
+    def __init__(self) -> None:
+        super().__init__("server")
+        self.go = threading.Event()
+        self._action = ActionServer(
+            self, Fibonacci, "fib", self._execute, callback_group=ReentrantCallbackGroup(),
+            cancel_callback=lambda _goal: CancelResponse.REJECT,
+        )  # fmt: skip
+
+    def _execute(self, goal: Any) -> Fibonacci.Result:
+        self.go.wait()
+        goal.succeed()
+        return Fibonacci.Result(sequence=[goal.request.order])
+
+
+def test_a_refused_cancel_is_said_until_the_goal_ends(busy: Session) -> None:
+    server = busy.run(Server)
+    assert isinstance(server, Server)
+    view = busy.action("fib")
+    view.send(order=3)
+    busy.until(lambda: view.goals and view.goals[0].state == GoalState.EXECUTING)
+    view.cancel(1)
+    (goal,) = view.frame()["goals"]
+    assert (goal["over"], goal["outcome"]) == (False, "The server refused to cancel.")
+    server.go.set()
+    busy.until(lambda: view.goals[0].over and view.goals[0].result)
+    (goal,) = view.frame()["goals"]
+    assert (goal["over"], goal["outcome"]) == (True, "result: {sequence: [3]}")
+
+
+def test_several_goals_at_once_are_told_apart(busy: Session) -> None:
+    busy.run(Robot)
+    view = busy.action("count")
+    for order in (1, 2):
+        view.send(order=order)
+    busy.until(lambda: [g.state for g in view.goals] == [GoalState.EXECUTING] * 2)
+    busy.until(lambda: {g.asked["order"] for g in view.goals if g.asked} == {1, 2})
+    first = view.goals[0].number
+    view.cancel(first)
+    busy.until(lambda: view.goals[0].state == GoalState.CANCELED)
+    assert [g.state for g in view.goals[1:]] == [GoalState.EXECUTING]
+
+
+def test_goals_that_were_let_go_of_do_not_come_back(
+    busy: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(goals, "KEPT", 8)
+    server = busy.run(Server)
+    assert isinstance(server, Server)
+    server.go.set()
+    view = busy.action("fib")
+    for order in range(30):  # the server lists all of them for minutes, in each status message
+        run = busy.send_goal(Fibonacci, "fib", Fibonacci.Goal(order=order))
+        run.wait()
+    busy.until(lambda: len(view.goals) == 8 and all(goal.over for goal in view.goals))
+    assert [goal.number for goal in view.goals] == list(range(23, 31))
+    server.go.clear()
+    busy.send_goal(Fibonacci, "fib", Fibonacci.Goal(order=1))
+    busy.until(lambda: view.goals[-1].state == GoalState.EXECUTING)
+    server.go.set()
+    busy.until(lambda: all(goal.over for goal in view.goals))
+    assert [goal.number for goal in view.goals] == list(range(24, 32))
 
 
 def test_parameters_have_controls_from_their_descriptors(session: Session) -> None:
@@ -261,6 +331,70 @@ def test_the_log_panel_has_the_latest_lines(session: Session) -> None:
     assert len(shown(panel)["rows"]) == 200
     assert shown(panel)["rows"][-1][1:3] == ["INFO", "/robot"]
     assert "line 299" in panel.words()
+
+
+def test_the_log_panel_filters_before_it_cuts(session: Session) -> None:
+    robot = session.run(Robot)
+    panel = session.log_panel()
+    robot.get_logger().error("the battery is empty")
+    for number in range(1200):
+        robot.get_logger().info(f"line {number}")
+    session.until(lambda: shown(panel)["rows"] and shown(panel)["rows"][-1][3] == "line 1199")
+    say(panel, filter={"level": "ERROR", "search": ""})
+    session.until(lambda: [row[3] for row in shown(panel)["rows"]] == ["the battery is empty"])
+    assert "the battery is empty" in panel.words()
+    say(panel, filter={"level": "INFO", "search": "Line 100"})
+    session.until(lambda: len(shown(panel)["rows"]) == 10)  # 200 to 1199 are kept
+    assert shown(panel)["rows"][0][3] == "line 1000"
+    for message in ({"filter": {"level": []}}, {"filter": {"level": "LOUD"}}, {"filter": 3}):
+        say(panel, **message)
+    assert panel.widget.ended == ""
+
+
+def test_long_lines_and_answers_are_cut_with_a_mark_and_fit_a_frame(session: Session) -> None:
+    robot = session.run(Robot)
+    panel = session.log_panel()
+    for _ in range(25):
+        robot.get_logger().info("y" * 20_000)
+    for _ in range(200):
+        robot.get_logger().info("\N{SNOWMAN}" * 600)
+    robot.get_logger().info("later")
+    session.until(lambda: shown(panel)["rows"] and shown(panel)["rows"][-1][3] == "later")
+    assert shown(panel)["rows"][-2][3].endswith("… [100 more characters]")
+    assert "more characters]" in panel.words()
+    assert len(json.dumps(panel.look())) < MAX_FRAME
+
+    def big() -> Node:
+        node = Node("big")
+
+        def answer(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.message = "\N{SNOWMAN}" * 300_000
+            return response
+
+        node.create_service(Trigger, "big", answer)
+        node.declare_parameter("map", "m" * 100_000)
+        return node
+
+    session.run(big)
+    console = session.service("big")
+    for _ in range(10):
+        say(console, call={})
+    session.until(lambda: [c["time"] for c in shown(console)["calls"] if c["time"]][9:])
+    assert shown(console)["calls"][0]["answer"]["message"].endswith("more characters]")
+    assert len(json.dumps(console.look())) < MAX_FRAME
+    sheet = session.parameters("big")
+    (entry,) = shown(sheet)["entries"]
+    assert (len(entry["value"]) < 3000, entry["read_only"]) == (True, True)
+    assert "too long to be edited here" in entry["description"]
+
+
+def test_a_panel_of_a_node_that_has_gone_says_so_in_words(session: Session) -> None:
+    session.run(Robot)
+    panel = session.parameters("robot")
+    assert shown(panel)["problem"] == ""
+    session.stop("robot")
+    session.until(lambda: shown(panel)["problem"])
+    assert "Nobody offers" in panel.words()
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,105 @@
+"""Which views of a session live: running a cell again replaces what its earlier run had made."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import weakref
+from collections.abc import Hashable
+from pathlib import Path
+from typing import Any, Protocol
+
+from course.runtime.session import Session
+
+MOST = 30
+"""Views of one session that live at a time: the oldest ends when there are more."""
+
+REPLACED = "This view has been replaced: the cell that made it was run again."
+TOO_MANY = f"This view has ended, as its session shows {MOST} at most: run its cell again."
+
+_PACKAGE = str(Path(__file__).parents[1])
+
+
+class Shown(Protocol):
+    """What a shelf keeps."""
+
+    def end(self, why: str, *, close: bool = False) -> None:
+        """Stop whatever it does, and say ``why``; ``close`` takes it off the page. Idempotent."""
+
+
+class Shelf:
+    """The living views of one session, each with the place in the code that it came from."""
+
+    def __init__(self, session: Session) -> None:
+        """Keep views until ``session`` closes."""
+        self._views: dict[Shown, tuple[Hashable, Hashable]] = {}
+        self._lock = threading.Lock()
+        session.on_close(lambda: self.clear("The session has been closed."))
+
+    def put(self, view: Shown, about: Hashable) -> None:
+        """Keep a view that is being made now, and end those whose place it takes.
+
+        Args:
+            view: what is kept.
+            about: what the view shows. Outside notebooks, one call that makes views of different
+                things, in a loop, makes as many views.
+        """
+        place, run = _whereabouts(about)
+        with self._lock:
+            before = [
+                other
+                for other, (where, when) in self._views.items()
+                if where == place and when != run
+            ]
+            self._views[view] = (place, run)
+            alive = [other for other in self._views if other not in before]
+        for other in before:
+            other.end(REPLACED, close=True)
+        for other in alive[:-MOST]:
+            other.end(TOO_MANY, close=True)
+
+    def forget(self, view: Shown) -> None:
+        """Let go of a view that has ended and has no widget any more. Idempotent."""
+        with self._lock:
+            self._views.pop(view, None)
+
+    def clear(self, why: str) -> None:
+        """End all views."""
+        with self._lock:
+            views = list(self._views)
+            self._views.clear()
+        for view in views:
+            view.end(why)
+
+
+_shelves: weakref.WeakKeyDictionary[Session, Shelf] = weakref.WeakKeyDictionary()
+_lock = threading.Lock()
+
+
+def shelf_of(session: Session) -> Shelf:
+    """Return the shelf of a session, made on first use."""
+    with _lock:
+        if session not in _shelves:
+            _shelves[session] = Shelf(session)
+        return _shelves[session]
+
+
+def _whereabouts(about: Hashable) -> tuple[Hashable, Hashable]:
+    """Return where in a notebook or program this is, and in which run of that place.
+
+    A notebook's front end tells which cell it runs; without that, IPython's kernel names a cell by
+    its text. A call in a program that
+    is made again is a new run of its own.
+    """
+    from IPython.core.getipython import get_ipython
+
+    caller: Any = sys._getframe(1)
+    while caller.f_back is not None and caller.f_code.co_filename.startswith(_PACKAGE):
+        caller = caller.f_back
+    shell: Any = get_ipython()
+    parent = shell.get_parent() if hasattr(shell, "get_parent") else None
+    if parent:
+        run = parent.get("header", {}).get("msg_id")
+        cell = parent.get("metadata", {}).get("cellId")
+        return cell or caller.f_code.co_filename, run
+    return (caller.f_code.co_filename, caller.f_lineno, caller.f_lasti, about), object()

@@ -1,0 +1,141 @@
+"""A view's cell that is run again replaces the view, and leaves nothing of the old one behind."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from course import Session
+from course.views import shelf
+from course.views.live import LiveView
+from course.views.shelf import shelf_of
+from course.views.ticker import ticker_of
+from tests.kernel import Kernel
+from tests.robot import Listener, Robot
+
+SETUP = """
+import inspect, json
+import course
+from tests.robot import Listener, Robot
+from course.views.shelf import shelf_of
+from course.views.ticker import ticker_of
+session = course.session(threads=4)
+robot, listener = course.run(Robot, 20.0), course.run(Listener)
+depth = []
+def hear(message):
+    depth.append(len(inspect.stack(0)))
+listener.create_subscription(__import__('std_msgs.msg').msg.String, 'chatter', hear, 10)
+"""
+
+VIEWS = (
+    "session.graph()",
+    "session.log_panel()",
+    "session.timeline('chatter')",
+    "session.action('count')",
+    "session.service('lamp')",
+    "session.parameters('robot')",
+    "session.qos_lab()",
+)
+
+COUNT = """
+session.until(lambda: depth)
+count = len(depth)
+session.until(lambda: len(depth) > count + 1)
+import ipywidgets.widgets.widget
+print(json.dumps({
+    'living': len(shelf_of(session)._views), 'ticking': len(ticker_of(session)._views),
+    'widgets': sum(hasattr(w, 'ended') for w in ipywidgets.widgets.widget._instances.values()),
+    'readers': session.observer.count_subscribers('/chatter'),
+    'watchers': session.observer.count_subscribers('/count/_action/feedback'),
+    'depth': depth[-1],
+}))
+"""
+
+
+@pytest.fixture(scope="module")
+def kernel() -> Iterator[Kernel]:
+    running = Kernel()
+    yield running
+    running.close()
+
+
+def counted(kernel: Kernel) -> dict[str, Any]:
+    status, shown = kernel.run(COUNT)
+    assert status == "ok", shown
+    return dict(json.loads(next(text for kind, text in shown if kind == "stdout")))
+
+
+def test_cells_that_run_again_have_as_many_views_as_cells(kernel: Kernel) -> None:
+
+    assert kernel.run(SETUP)[0] == "ok"
+    for cell in VIEWS:
+        assert kernel.run(cell)[0] == "ok"
+    once = counted(kernel)
+    for _ in range(14):
+        for cell in VIEWS:
+            assert kernel.run(cell)[0] == "ok"
+    assert counted(kernel) == once
+    assert (once["living"], once["ticking"], once["widgets"]) == (len(VIEWS),) * 3
+    # A cell of another text is another cell: both graphs live, and so do two of one cell.
+    assert kernel.run("session.graph() # beside")[0] == "ok"
+    assert kernel.run("pair = session.graph(), session.graph()\npair[0].widget")[0] == "ok"
+    assert counted(kernel)["living"] == once["living"] + 3
+
+
+class Plain(LiveView):
+    label = "Plain"
+    script = "graph"
+
+    def frame(self) -> dict[str, Any]:
+        return {}
+
+    def words(self) -> str:
+        return "as ever"
+
+
+def test_a_call_in_a_program_that_is_made_again_replaces_its_view(session: Session) -> None:
+    session.run(Robot, 20.0)
+    listener = session.run(Listener)
+    (original,) = {s.callback for s in listener.subscriptions if s.topic_name == "/chatter"}
+    before = session.observer.count_subscribers("/chatter")
+    views = []
+    for _ in range(15):
+        for topic in ("chatter", "scan"):
+            views.append(session.timeline(topic))
+    assert len(shelf_of(session)._views) == 2
+    session.until(lambda: session.observer.count_subscribers("/chatter") == before + 2)
+    for view in views[-2:]:
+        assert not view.over
+        view.stop()
+    session.until(lambda: session.observer.count_subscribers("/chatter") == before)
+    assert original in {s.callback for s in listener.subscriptions}
+    assert "Timeline: This view has been replaced" in repr(views[0])
+
+
+def test_two_places_have_two_views_and_nobody_has_more_than_so_many(session: Session) -> None:
+    one, two = Plain(session), Plain(session)
+    assert (repr(one), repr(two)) == ("as ever", "as ever")
+    views = [Plain(session, number) for number in range(shelf.MOST + 5)]
+    assert one.over == two.over == views[0].over == shelf.TOO_MANY
+    assert sum(not view.over for view in views) == shelf.MOST == len(shelf_of(session)._views)
+
+
+def test_a_closed_widget_ends_its_view(session: Session) -> None:
+    view = Plain(session)
+    view.widget.close()
+    assert view.over == "Its widget has been closed."
+    assert list(ticker_of(session)._views) == []
+
+
+def test_a_view_of_a_context_that_was_shut_down_says_so() -> None:
+    with Session() as session:
+        made = (session.graph(), session.log_panel(), session.qos_lab())
+        widgets = [view.widget for view in made]
+        session.context.shutdown()
+        while not all(widget.ended for widget in widgets):
+            ticker_of(session)._thread.join(0.05)  # type: ignore[union-attr]
+        assert {widget.ended for widget in widgets} == {"The session has been closed."}
+        assert repr(made[0]) == "ROS graph: The session has been closed."
