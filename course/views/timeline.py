@@ -75,7 +75,7 @@ class Timeline(LiveView):
         recordings = {
             trace.topic: (trace.msg_type, recorder.messages) for trace, _, recorder in self._rows
         }
-        return mcap_file.write(Path(path), recordings)
+        return mcap_file.write(path, recordings)
 
     def stop(self) -> None:
         """Trace no more, and leave callbacks as they were. Idempotent."""
