@@ -16,6 +16,7 @@ from rclpy.serialization import serialize_message
 from course import values
 from course.errors import CourseError
 from course.files import replacing
+from course.runtime import arguments
 from course.runtime.names import type_name
 
 _RULE = "=" * 80
@@ -25,7 +26,9 @@ class RecordingError(CourseError):
     """A recording that cannot be written; the message says where, and what to do."""
 
 
-def write(path: Path, recordings: Mapping[str, tuple[Any, Sequence[tuple[int, Any]]]]) -> Path:
+def write(
+    path: str | Path, recordings: Mapping[str, tuple[Any, Sequence[tuple[int, Any]]]]
+) -> Path:
     """Write recordings to an MCAP file of profile "ros2"; return its path.
 
     Args:
@@ -34,7 +37,10 @@ def write(path: Path, recordings: Mapping[str, tuple[Any, Sequence[tuple[int, An
 
     Raises:
         RecordingError: the file cannot be written.
+        SessionError: the path is no path.
     """
+    if not isinstance(path, Path):
+        path = Path(arguments.text(path, "The path", "scan.mcap"))
     try:
         if path.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))

@@ -111,9 +111,7 @@ class Recorder:
         """
         from course import mcap_file
 
-        if not isinstance(path, Path):
-            path = arguments.text(path, "The path", "scan.mcap")
-        return mcap_file.write(Path(path), {self.topic: (self.msg_type, self.messages)})
+        return mcap_file.write(path, {self.topic: (self.msg_type, self.messages)})
 
     def stop(self) -> None:
         """Stop recording; what was recorded stays. Idempotent."""

@@ -149,15 +149,16 @@ class Showing(Asking):
 
         self._require_open()
         named = [_named(topic) for topic in topics]
-        return Timeline(self._me, named, window)
+        return Timeline(self._me, named, arguments.seconds(window, "window"))
 
     def qos_lab(
-        self, offered: QoSProfile | None = None, requested: QoSProfile | None = None
+        self, offered: QoSProfile | int | None = None, requested: QoSProfile | int | None = None
     ) -> QoSLab:
         """Return the QoS lab: predict what two profiles do together, then see it happen.
 
         Args:
-            offered: the writer's profile to begin with; None is the default one.
+            offered: the writer's profile to begin with; a number is the depth of a default one,
+                None the default itself.
             requested: the reader's.
 
         Raises:
@@ -167,7 +168,7 @@ class Showing(Asking):
         from course.views.qos_lab import QoSLab
 
         self._require_open()
-        return QoSLab(self._me, offered, requested)
+        return QoSLab(self._me, arguments.qos(offered), arguments.qos(requested))
 
     def diagnose(self) -> Diagnosis:
         """Return what is wrong, or may be, with the nodes here: in plain words, with the mend.

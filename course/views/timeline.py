@@ -80,7 +80,7 @@ class Timeline(LiveView):
             RecordingError: the file cannot be written.
         """
         recordings = {trace.topic: (trace.msg_type, trace.messages) for trace, _ in self._rows}
-        return mcap_file.write(Path(path), recordings)
+        return mcap_file.write(path, recordings)
 
     def frame(self) -> Frame:
         """Return lanes as counts a column, and figures in words."""

@@ -232,6 +232,9 @@ def test_an_action_that_is_not_there_is_one_sentence(any_session):
         (lambda s: s.send_goal(Fibonacci, "", Fibonacci.Goal()), "'' is not an action name"),
         (lambda s: s.timeline(("x", 5)), "The type is a message class"),
         (lambda s: s.timeline(("x", String, 5)), "A topic is a string, such as '/scan', not"),
+        (lambda s: s.timeline(("x", String), window="a"), "window is a number of seconds"),
+        (lambda s: s.timeline(("x", String)).save(5), "The path is a string"),
+        (lambda s: s.qos_lab("x"), "qos is a whole number"),
         (lambda s: s.timeline(5), "A topic is a string, such as '/scan', not 5."),
     ],
 )
