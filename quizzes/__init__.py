@@ -11,5 +11,5 @@ from quizzes.errors import AttemptsError as AttemptsError
 from quizzes.errors import BankError as BankError
 from quizzes.errors import QuizError as QuizError
 from quizzes.loader import names as names
+from quizzes.opening import load as load
 from quizzes.quiz import Quiz as Quiz
-from quizzes.quiz import load as load

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import datetime
 import functools
-import os
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
-from quizzes import answers, demonstration, loader, marking, model, regrade
+from quizzes import answers, demonstration, marking, model, regrade
 from quizzes.answers import Answer
 from quizzes.attempts import AttemptsFile
 from quizzes.bank import Bank
 from quizzes.errors import AnswerError, QuizError, UnwritableError
-from quizzes.identity import login
+from quizzes.identity import login, named
 from quizzes.marking import Result
 from quizzes.model import Item, Paper
 from quizzes.record import Attempt, Given
@@ -57,7 +56,7 @@ class Quiz:
             QuizError: the student's name is no text that can be saved.
         """
         self.bank = bank
-        self.student = _name(student or login())
+        self.student = named(student or login())
         self._file = AttemptsFile((folder or Path.cwd()).absolute(), bank.quiz)
         self._lock = threading.RLock()
         self.notice = ""
@@ -290,50 +289,3 @@ class Quiz:
         self._begin(self._next_number())
         self._take_up({item.concept.id: given.get(item.concept.id) for item in self.items})
         return True
-
-
-def load(
-    name: str,
-    *,
-    student: str = "",
-    folder: str | os.PathLike[str] | None = None,
-    banks: str | os.PathLike[str] | None = None,
-) -> Quiz:
-    """Return the quiz called ``name``, with what this learner has done of it so far.
-
-    Args:
-        name: such as ``"ch05"``.
-        student: who takes it; the login if left out.
-        folder: where attempts are kept; the current folder if left out.
-        banks: a folder of banks, for an author's own; those of the package if left out.
-
-    Raises:
-        BankError: there is no such quiz (the message names the ones there are), or its bank is
-            not sound.
-        QuizError: ``student`` is no name, or ``folder`` or ``banks`` is no path.
-    """
-    bank = loader.load_bank(name, loader.BANKS if banks is None else _path("banks", banks))
-    return Quiz(bank, student=student, folder=None if folder is None else _path("folder", folder))
-
-
-def _path(argument: str, given: Any) -> Path:
-    try:
-        path = Path(given)
-        with suppress(OSError):
-            path.stat()  # refuses what no system takes for a name
-    except (TypeError, ValueError):
-        raise QuizError(
-            f"{argument}={given!r} is no folder: give its path, such as {argument}='my-quizzes'."
-        ) from None
-    return path
-
-
-def _name(student: Any) -> str:
-    try:
-        str.encode(student)
-    except (TypeError, UnicodeError):
-        raise QuizError(
-            f"student={student!r} is no name that can be saved: give it as plain text, such as "
-            "student='ada'."
-        ) from None
-    return str(student)[:100]

@@ -1,0 +1,48 @@
+"""Opens a quiz by its name, for notebooks: finds its bank, and the folder of the learner's work."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from quizzes import loader
+from quizzes.errors import QuizError
+from quizzes.quiz import Quiz
+
+
+def load(
+    name: str,
+    *,
+    student: str = "",
+    folder: str | os.PathLike[str] | None = None,
+    banks: str | os.PathLike[str] | None = None,
+) -> Quiz:
+    """Return the quiz called ``name``, with what this learner has done of it so far.
+
+    Args:
+        name: such as ``"ch05"``.
+        student: who takes it; the login if left out.
+        folder: where attempts are kept; the current folder if left out.
+        banks: a folder of banks, for an author's own; those of the package if left out.
+
+    Raises:
+        BankError: there is no such quiz (the message names the ones there are), or its bank is
+            not sound.
+        QuizError: ``student`` is no name, or ``folder`` or ``banks`` is no path.
+    """
+    bank = loader.load_bank(name, loader.BANKS if banks is None else _path("banks", banks))
+    return Quiz(bank, student=student, folder=None if folder is None else _path("folder", folder))
+
+
+def _path(argument: str, given: Any) -> Path:
+    try:
+        path = Path(given)
+        with suppress(OSError):
+            path.stat()  # refuses what no system takes for a name
+    except (TypeError, ValueError):
+        raise QuizError(
+            f"{argument}={given!r} is no folder: give its path, such as {argument}='my-quizzes'."
+        ) from None
+    return path
