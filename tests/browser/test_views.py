@@ -282,6 +282,7 @@ def test_a_view_that_was_scrolled_away_is_up_to_date_when_it_is_back(open_cells:
     view = region(page, "ROS graph")
     expect(view.locator("svg text", has_text="/robot")).to_be_in_viewport()
     expect(label).to_have_count(0)
+    run_in_kernel(page, "course.run(Listener)")
     stays_live(page)
     assert page.errors == []
 
@@ -399,7 +400,10 @@ def test_all_text_stands_out_from_its_background_in_both_themes(open_cells: Open
 
 
 CONTRAST = """root => {
-    const parse = text => (text.match(/[\\d.]+/g) ?? [0, 0, 0, 0]).map(Number);
+    const parse = text => {  // rgb(255, …), or color(srgb 1 …) for a mixed one
+        const unit = text.startsWith('color(') ? 255 : 1;
+        return (text.match(/[\\d.]+/g) ?? [0, 0, 0, 0]).map((v, n) => n < 3 ? v * unit : Number(v));
+    };
     const light = ([r, g, b]) => [r, g, b]
         .map(v => v / 255).map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
         .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
