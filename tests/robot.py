@@ -19,7 +19,10 @@ from test_msgs.action import Fibonacci
 
 
 class Robot(Node):
-    """Serves, acts, and has parameters; `go` lets its goals end. At a rate (Hz) it chatters."""
+    """Serves, acts, and has parameters; `go` lets its goals end. At a rate (Hz) it chatters.
+
+    ``published`` counts its chatter.
+    """
 
     def __init__(self, rate: float = 0.0) -> None:
         super().__init__("robot")
@@ -31,16 +34,22 @@ class Robot(Node):
         self.declare_parameter("legs", 4)
         self.add_on_set_parameters_callback(self._judge)
         group = ReentrantCallbackGroup()
+        self.published = 0
         if rate:
-            publisher = self.create_publisher(String, "chatter", 10)
+            self.chatter = self.create_publisher(String, "chatter", 10)
             self.create_publisher(String, "scan", qos_profile_sensor_data)
-            self.create_timer(1 / rate, lambda: publisher.publish(String(data="hello")))
+            self.create_timer(1 / rate, self.talk)
         self.create_service(SetBool, "lamp", self._switch, callback_group=group)
         self.go = threading.Event()
         self._action = ActionServer(
             self, Fibonacci, "count", self._count, callback_group=group,
             goal_callback=self._accept, cancel_callback=lambda _goal: CancelResponse.ACCEPT,
         )  # fmt: skip
+
+    def talk(self) -> None:
+        """Chatter once."""
+        self.chatter.publish(String(data="hello"))
+        self.published += 1
 
     def _judge(self, parameters: list[Any]) -> SetParametersResult:
         limits = {"speed": (1.5, "too fast for a corridor"), "legs": (8, "no insect has so many")}

@@ -103,10 +103,10 @@ def test_every_view_renders_updates_and_speaks(open_cells: Open, tmp_path: Path)
         page.page.keyboard.press("ArrowRight")
     expect(panel.get_by_role("alert")).to_contain_text("too fast for a corridor")
     lab_view = region(page, "QoS lab")
-    lab_view.get_by_role("button", name="Run").click()
+    lab_view.get_by_role("button", name="Run stream").click()
     expect(lab_view.get_by_role("alert")).to_contain_text("Predict first")
     lab_view.get_by_label("I predict that they will").select_option("yes")
-    lab_view.get_by_role("button", name="Run").click()
+    lab_view.get_by_role("button", name="Run stream").click()
     expect(lab_view.locator(".roslab-results li").first).to_contain_text("30 of 30 arrived")
     expect(lab_view.locator(".roslab-results li").first).to_contain_text("That was right.")
     assert page.errors == []
@@ -145,9 +145,16 @@ def test_a_cell_that_runs_again_has_one_live_view(open_cells: Open) -> None:
 
 
 def test_a_view_survives_a_reload_and_says_when_the_kernel_is_gone(open_cells: Open) -> None:
-    page = open_cells("session.graph()", "")
+    others = [source for name, (source, _) in VIEWS.items() if name != "graph"]
+    page = open_cells("session.graph()", *others)
     page.save()
     page.reload()
+    for _, label in VIEWS.values():
+        expect(region(page, label)).to_be_visible()
+    stays_live(page)
+    action = region(page, "Action view")
+    action.get_by_role("button", name="Send goal").click()
+    expect(action.locator("[aria-current]")).to_contain_text("EXECUTING")
     graph = region(page, "ROS graph")
     expect(graph.locator("svg text", has_text="/listener")).to_be_visible()
     run_in_kernel(page, "session.stop('listener')")
@@ -191,8 +198,81 @@ def test_every_view_is_honest_after_a_restart_and_in_a_notebook_that_is_opened_a
         expect(copy).to_be_hidden()
 
 
+def test_the_labs_scenarios_are_buttons_that_keys_press(open_cells: Open) -> None:
+    page = open_cells("session.qos_lab()")
+    view = region(page, "QoS lab")
+    group = view.get_by_role("group", name="Scenarios")
+    expect(group.get_by_role("button")).to_have_text(
+        ["Run stream", "Run late joiner", "Run slow reader", "Run deadline", "Run liveliness"]
+    )
+    view.get_by_label("I predict that they will").select_option("yes")
+    view.get_by_label("and that so many arrive").fill("0")
+    late = group.get_by_role("button", name="Run late joiner")
+    expect(late).to_have_accessible_description(
+        "The writer has published before the reader starts."
+    )
+    late.focus()
+    page.page.keyboard.press("Enter")
+    newest = view.locator(".roslab-results > li").first
+    expect(newest).to_contain_text("late joiner")
+    expect(newest).to_contain_text("0 of 30 arrived")
+    expect(newest).to_contain_text("That was right.")
+    expect(late).to_be_focused()
+    expect(late).to_have_attribute("aria-disabled", "false")
+    view.get_by_label("requested depth").fill("3")
+    view.get_by_label("and that so many arrive").fill("3")
+    group.get_by_role("button", name="Run slow reader").focus()
+    page.page.keyboard.press("Space")
+    expect(newest).to_contain_text("slow reader")
+    expect(newest).to_contain_text("3 of 30 arrived")
+    expect(words(view)).to_contain_text("BEST_EFFORT never satisfies a request for RELIABLE")
+    assert page.errors == []
+
+
+def test_what_is_read_only_stays_so_and_gaps_and_drops_are_marked(open_cells: Open) -> None:
+    page = open_cells(
+        "from rcl_interfaces.msg import ParameterDescriptor\n"
+        "_ = robot.declare_parameter('serial', 'x1', ParameterDescriptor(read_only=True))",
+        'session.parameters("robot")',
+        'session.timeline("chatter")',
+        # The hidden reader keeps the last 1000: what is published while it is held is lost.
+        "import contextlib\nwith session._probe.executor.held():\n"
+        "    for _ in range(1500): robot.talk()",
+    )
+    panel = region(page, "Parameter panel")
+    expect(panel.get_by_label("speed")).to_be_enabled()
+    expect(panel.get_by_label("serial")).to_be_disabled()
+    timeline = region(page, "Timeline")
+    expect(timeline.locator(".rostimeline-drop")).to_have_count(1)
+    expect(timeline.locator(".rostimeline-drop title")).to_contain_text("lost on the way")
+    expect(timeline.locator(".rostimeline-gap title").first).to_contain_text("gap of")
+    for line in ("rate", "p50", "p95"):
+        assert len(timeline.locator(f".rostimeline-{line}").get_attribute("points") or "") > 10
+    expect(words(timeline)).to_contain_text("lost on the way")
+
+
+def test_at_double_zoom_every_view_fits_its_place(open_cells: Open) -> None:
+    page = open_cells(*(source for source, _ in VIEWS.values()))
+    page.page.set_viewport_size({"width": 640, "height": 450})  # 1280 x 900 at 200 %
+    for _, label in VIEWS.values():
+        view = region(page, label)
+        view.scroll_into_view_if_needed()
+        expect(view).to_be_visible()
+        # What is wider than its place scrolls inside the view, and is not cut off outside it.
+        assert view.evaluate(
+            """element => {
+                const area = element.closest('.jp-OutputArea-output').getBoundingClientRect();
+                return element.getBoundingClientRect().right <= area.right + 1;
+            }"""
+        ), label
+        for control in view.locator("button:visible, select:visible").all():
+            control.scroll_into_view_if_needed()
+            expect(control).to_be_in_viewport()
+
+
 def test_a_view_that_was_scrolled_away_is_up_to_date_when_it_is_back(open_cells: Open) -> None:
-    page = open_cells("session.graph()", *["print('far\\n' * 30)"] * 12)
+    moving = [VIEWS[name][0] for name in ("timeline", "log")]
+    page = open_cells("session.graph()", *moving, *["print('far\\n' * 30)"] * 12)
     label = region(page, "ROS graph").locator("svg text", has_text="/listener")
     expect(label).to_be_in_viewport()
     page.scroll_to(page.cell_count() - 1)
@@ -202,7 +282,16 @@ def test_a_view_that_was_scrolled_away_is_up_to_date_when_it_is_back(open_cells:
     view = region(page, "ROS graph")
     expect(view.locator("svg text", has_text="/robot")).to_be_in_viewport()
     expect(label).to_have_count(0)
+    run_in_kernel(page, "course.run(Listener)")
+    stays_live(page)
     assert page.errors == []
+
+
+def stays_live(page: NotebookPage) -> None:
+    """Wait until the views that always have news show some."""
+    for label in ("Timeline", "Log panel"):
+        said = words(region(page, label))
+        expect(said).not_to_have_text(said.text_content() or "")
 
 
 def test_a_closed_session_is_said(open_cells: Open) -> None:
@@ -252,42 +341,95 @@ def test_what_a_streaming_cell_prints_never_lands_in_another(open_cells: Open) -
     assert [text.strip() for text in texts[3]] == ["second"]
 
 
-def test_a_flood_leaves_the_page_responsive_and_the_frames_bounded(open_cells: Open) -> None:
+def test_a_flood_leaves_the_page_responsive_and_the_frames_bounded(
+    open_cells: Open, record_property: Callable[[str, object], None]
+) -> None:
     page = open_cells(
-        'session.timeline("chatter")', "session.log_panel()", "session.graph()", rate=1000.0
-    )
+        'session.timeline("chatter")', "session.log_panel()", "session.graph()",
+        "print('published', robot.published)", rate=1000.0,
+    )  # fmt: skip
+
+    def published() -> int:
+        page.run_cell(4)
+        return int(page.cell(4).locator("pre").inner_text().split()[-1])
+
     expect(words(region(page, "Timeline"))).to_contain_text("Hz")
-    seen = page.watch(10)
-    assert 0 < len(seen.updates) <= 3 * 10 * seen.seconds + 3, "ten frames a second for each view"
-    assert sum(seen.updates) / seen.seconds < 600_000, "bytes a second"
-    assert seen.longest < 5_000, "the page never stands still for long (ms)"
-    expect(region(page, "Log panel").get_by_label("Search")).to_be_editable()
-    region(page, "Log panel").get_by_label("Search").fill("hello")
+    before = published()
+    watched = [page.watch(10)]
+    search = region(page, "Log panel").get_by_label("Search")
+    # Ten seconds of 1 kHz: a machine that is slower publishes as many, and takes its time.
+    while published() - before < 10_000:
+        watched.append(page.watch(2))
+    for seen in watched:
+        assert len(seen.updates) <= 3 * 10 * seen.seconds + 3, "ten frames a second for each view"
+        assert sum(seen.updates) / seen.seconds < 600_000, "bytes a second"
+        assert seen.longest < 5_000, "the page never stands still for long (ms)"
+    assert any(seen.updates for seen in watched)
+    record_property("longest standstill (ms)", max(seen.longest for seen in watched))
+    # The page answers while the flood goes on, in the browser and through the kernel.
+    start = published()
+    search.fill("nobody says this")
+    expect(region(page, "Log panel").locator("tbody tr")).to_have_count(0)
+    search.fill("hello")
+    expect(region(page, "Log panel").locator("tbody tr").first).to_contain_text("heard hello")
+    assert published() > start
     assert page.errors == []
 
 
-def test_text_stands_out_from_its_background_in_both_themes(open_cells: Open) -> None:
-    page = open_cells(*(source for source, _ in VIEWS.values()))
+def test_all_text_stands_out_from_its_background_in_both_themes(open_cells: Open) -> None:
+    page = open_cells(
+        *(source for source, _ in VIEWS.values()),
+        "robot.get_logger().warning('careful')\nrobot.get_logger().error('too late')",
+    )
+    lab_view = region(page, "QoS lab")
+    for said in ("yes", "no"):  # one prediction comes true
+        lab_view.get_by_label("I predict that they will").select_option(said)
+        run = lab_view.get_by_role("button", name="Run stream")
+        expect(run).to_have_attribute("aria-disabled", "false")
+        run.click()
+        expect(lab_view.locator(".roslab-results > li")).to_have_count(1 if said == "yes" else 2)
     for theme in ("JupyterLab Dark", "JupyterLab Light"):
         page.theme(theme)
         for _, label in VIEWS.values():
             view = region(page, label)
             expect(view).to_be_visible()
-            ratio = view.evaluate(CONTRAST)
-            assert ratio >= 4.5, f"{label}: WCAG 2.2 asks for 4.5, in {theme} it is {ratio:.1f}"
+            texts = view.evaluate(CONTRAST)
+            assert texts, label
+            weak = [(text, round(ratio, 1)) for text, ratio in texts if ratio < 4.5]
+            assert weak == [], f"{label}: WCAG 2.2 asks for 4.5 in {theme}"
 
 
-CONTRAST = """element => {
-    const parse = text => text.match(/[\\d.]+/g).map(Number);
+CONTRAST = """root => {
+    const parse = text => {  // rgb(255, …), or color(srgb 1 …) for a mixed one
+        const unit = text.startsWith('color(') ? 255 : 1;
+        return (text.match(/[\\d.]+/g) ?? [0, 0, 0, 0]).map((v, n) => n < 3 ? v * unit : Number(v));
+    };
     const light = ([r, g, b]) => [r, g, b]
         .map(v => v / 255).map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
         .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
-    let back = element;
-    const clear = e => parse(getComputedStyle(e).backgroundColor)[3] === 0;
-    while (back && clear(back)) back = back.parentElement;
-    const one = light(parse(getComputedStyle(element).color));
-    const two = light(parse(getComputedStyle(back ?? document.body).backgroundColor));
-    return (Math.max(one, two) + 0.05) / (Math.min(one, two) + 0.05);
+    const clear = color => color === 'none' || parse(color)[3] === 0;
+    const backOf = element => {
+        const box = element instanceof SVGElement
+            ? element.closest('g')?.querySelector(':scope > rect') : null;
+        if (box && !clear(getComputedStyle(box).fill)) return getComputedStyle(box).fill;
+        for (let e = element; e; e = e.parentElement) {
+            const color = getComputedStyle(e).backgroundColor;
+            if (!clear(color)) return color;
+        }
+        return getComputedStyle(document.body).backgroundColor;
+    };
+    return [...root.querySelectorAll('*')]
+        .filter(e => e.tagName !== 'title' && e.tagName !== 'OPTION' && e.checkVisibility()
+            && [...e.childNodes].some(n => n.nodeType === 3 && n.data.trim()))
+        .map(e => {
+            const style = getComputedStyle(e);
+            const back = parse(backOf(e));
+            const [r, g, b, alpha = 1] = parse(e instanceof SVGElement ? style.fill : style.color);
+            const seen = [r, g, b].map((value, n) => alpha * value + (1 - alpha) * back[n]);
+            const [one, two] = [light(seen), light(back)];
+            return [`${e.tagName}.${e.getAttribute('class') ?? ''} ${e.textContent.slice(0, 30)}`,
+                (Math.max(one, two) + 0.05) / (Math.min(one, two) + 0.05)];
+        });
 }"""
 
 

@@ -105,7 +105,8 @@ def test_without_namespaces_the_loss_is_left_out_and_that_is_said(
     ("experiment", "sentence"),
     [
         (Experiment(scenario="party"), "no scenario 'party': choose stream"),
-        (Experiment(loss=95), "0 to 90 % of its packets, not 95"),
+        (Experiment(loss=95), "0 to 90 % of its packets, a whole number, not 95"),
+        (Experiment(loss="x"), "0 to 90 % of its packets, a whole number, not 'x'"),  # type: ignore[arg-type]
     ],
 )
 def test_what_cannot_be_run_is_said(experiment: Experiment, sentence: str) -> None:
@@ -153,6 +154,7 @@ def test_the_view_keeps_the_prediction_beside_what_was_seen(session: Session) ->
     assert trial.right is False
     words = view.words()
     assert "not connected (reliability)" in words
+    assert "reliability: BEST_EFFORT -> RELIABLE does not fit. BEST_EFFORT never satis" in words
     assert "You said: connected, 30 messages. It came out otherwise." in words
     asked = {
         "offered": Profile().data(), "requested": Profile().data(), "scenario": "stream",
