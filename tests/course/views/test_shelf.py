@@ -106,7 +106,7 @@ def test_a_call_in_a_program_that_is_made_again_replaces_its_view(session: Sessi
         for topic in ("chatter", "scan"):
             views.append(session.timeline(topic))
     assert len(shelf_of(session)._views) == 2
-    session.until(lambda: session.observer.count_subscribers("/chatter") == before + 2)
+    session.until(lambda: session.observer.count_subscribers("/chatter") == before + 1)
     for view in views[-2:]:
         assert not view.over
         view.stop()
