@@ -88,8 +88,7 @@ def _whereabouts(about: Hashable) -> tuple[Hashable, Hashable]:
     """Return where in a notebook or program this is, and in which run of that place.
 
     A notebook's front end tells which cell it runs; without that, IPython's kernel names a cell by
-    its text. A call in a program that
-    is made again is a new run of its own.
+    its text. A call in a program that is made again is a new run of its own.
     """
     from IPython.core.getipython import get_ipython
 
