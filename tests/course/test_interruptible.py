@@ -15,7 +15,7 @@ import course
 from course.runtime.interruptible import SessionContext
 
 SCRIPT = """
-import course, rclpy, sys
+import course, rclpy, signal, sys
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.task import Future
@@ -28,6 +28,9 @@ def own(executor):
     executor.add_node(node)
     executor.spin()
 
+# Whoever started the tests in the background of a shell has had it ignored.
+signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+signal.signal(signal.SIGINT, signal.default_int_handler)
 node = course.run(Silent)
 stranger = Node("stranger")
 rclpy.spin_once(stranger, timeout_sec=0)  # the global executor is there from now on
