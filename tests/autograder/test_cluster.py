@@ -79,12 +79,21 @@ def children(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
     return psutil.Process(process.pid).children(recursive=True)
 
 
-def wait_for_work(engine: subprocess.Popen[str], cluster: Cluster) -> None:
-    """Wait until a worker has begun, or the engine has ended."""
-    wait_for(
-        lambda: engine.poll() is not None or any(map(children, cluster.workers)),
-        "a worker at work",
-    )
+Work = tuple[subprocess.Popen[bytes], list[psutil.Process]]
+
+
+def wait_for_work(engine: subprocess.Popen[str], cluster: Cluster) -> Work:
+    """Wait until a worker has begun; return it, and what it has started."""
+    found: list[Work] = []
+
+    def begun() -> bool:
+        # Kept as seen: what a worker tries before its first job is over a moment later.
+        found[:] = [(worker, busy) for worker in cluster.workers if (busy := children(worker))]
+        return bool(found) or engine.poll() is not None
+
+    wait_for(begun, "a worker at work")
+    assert found, "the engine ended before any worker began"
+    return found[0]
 
 
 def engine_of(class_: Undisturbed, tmp_path: Path, address: str) -> Engine:
@@ -97,9 +106,7 @@ def test_a_worker_that_is_killed_changes_no_grade(
 ) -> None:
     engine = engine_of(class_, tmp_path, cluster.address)
     with engine.start() as process:
-        wait_for_work(process, cluster)
-        victim = next(worker for worker in cluster.workers if children(worker))
-        started = children(victim)
+        victim, started = wait_for_work(process, cluster)
         victim.send_signal(signal.SIGKILL)
         said, complaint = process.communicate()
     assert process.returncode == 0, complaint
