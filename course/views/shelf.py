@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 import threading
-import weakref
 from collections.abc import Hashable
 from pathlib import Path
 from typing import Any, Protocol
 
 from course.runtime.session import Session
+from course.views.per_session import PerSession
 
 MOST = 30
 """Views of one session that live at a time: the oldest ends when there are more."""
@@ -72,16 +72,8 @@ class Shelf:
             view.end(why)
 
 
-_shelves: weakref.WeakKeyDictionary[Session, Shelf] = weakref.WeakKeyDictionary()
-_lock = threading.Lock()
-
-
-def shelf_of(session: Session) -> Shelf:
-    """Return the shelf of a session, made on first use."""
-    with _lock:
-        if session not in _shelves:
-            _shelves[session] = Shelf(session)
-        return _shelves[session]
+shelf_of = PerSession(Shelf)
+"""Returns the shelf of a session."""
 
 
 def _whereabouts(about: Hashable) -> tuple[Hashable, Hashable]:

@@ -8,6 +8,7 @@ import weakref
 from typing import Protocol
 
 from course.runtime.session import Session
+from course.views.per_session import PerSession
 
 LONGEST_REST = 1.0
 """Seconds that the thread sleeps at most, so that it notices views that nobody has any more."""
@@ -82,13 +83,5 @@ class Ticker:
                 self._changed.wait(max(0.0, due - time.monotonic()))
 
 
-_tickers: weakref.WeakKeyDictionary[Session, Ticker] = weakref.WeakKeyDictionary()
-_lock = threading.Lock()
-
-
-def ticker_of(session: Session) -> Ticker:
-    """Return the ticker of a session, made on first use."""
-    with _lock:
-        if session not in _tickers:
-            _tickers[session] = Ticker(session)
-        return _tickers[session]
+ticker_of = PerSession(Ticker)
+"""Returns the ticker of a session."""

@@ -107,7 +107,7 @@ class Trace:
         A talker's cell is run again with another QoS, say; what asks for less goes on fitting.
         """
         offers = self._session.observer.get_publishers_info_by_topic(self.topic)
-        if not all(not reader.incompatibilities(offer.qos_profile, self._qos) for offer in offers):
+        if any(reader.incompatibilities(offer.qos_profile, self._qos) for offer in offers):
             self.stop()
             self._subscribe()
 
