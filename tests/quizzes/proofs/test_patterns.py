@@ -68,7 +68,9 @@ def test_two_participants_find_each_other_without_a_third(ros):
     ros.matched(publisher)
     publisher.publish(String(data="image 1"))
     ros.until(lambda: heard == ["image 1"], "the image")
-    ros.until(lambda: "camera" in detector.get_node_names(), "the graph")
+    # Endpoints match before either side hears by what name the other's node goes: wait on both.
+    ros.until(lambda: "camera" in detector.get_node_names(), "the graph as the detector sees it")
+    ros.until(lambda: "detector" in camera.get_node_names(), "the graph as the camera sees it")
     # A leased domain: had anything else to run for this, it would stand here.
     assert sorted(detector.get_node_names()) == ["camera", "detector"]
     assert sorted(camera.get_node_names()) == ["camera", "detector"]
