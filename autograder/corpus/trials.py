@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -101,10 +102,15 @@ def run(
         return list(pool.map(one, rounds()))
 
 
+# A loop looks who its parent is, again and again: a parent that was killed cannot end it.
+_LOOP = "import os, sys\nwhile os.getppid() == int(sys.argv[1]): pass"
+
+
 @contextmanager
 def busy_loops(number: int) -> Iterator[None]:
-    """Keep ``number`` processes computing for as long as the block lasts."""
-    loops = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(number)]
+    """Keep ``number`` processes computing for as long as the block lasts, or this process lives."""
+    command = [sys.executable, "-c", _LOOP, str(os.getpid())]
+    loops = [subprocess.Popen(command) for _ in range(number)]
     try:
         yield
     finally:

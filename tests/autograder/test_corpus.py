@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from functools import cache
 from pathlib import Path
 
+import psutil
 import pytest
 
 from autograder import corpus, exams, submission
@@ -137,6 +140,24 @@ def test_a_case_without_splices_is_the_exemplar(tmp_path: Path) -> None:
     solution = next(c for c in handed_in.cells if submission.grade_id(c) == "qos-solution")
     exemplar = next(c for c in source.cells if submission.grade_id(c) == "qos-solution")
     assert solution.source == without_markers(exemplar.source)
+
+
+def test_busy_loops_end_with_the_block_and_with_a_process_that_is_killed() -> None:
+    with trials.busy_loops(1):
+        (loop,) = (p for p in psutil.Process().children() if "getppid" in " ".join(p.cmdline()))
+    assert not loop.is_running()
+    inside = "with busy_loops(2): print('running', flush=True); sys.stdin.read()"
+    program = f"import sys\nfrom autograder.corpus.trials import busy_loops\n{inside}"
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as load:
+        assert load.stdout is not None
+        assert load.stdout.readline() == "running\n"
+        loops = psutil.Process(load.pid).children()
+        load.kill()
+    assert len(loops) == 2
+    _, left = psutil.wait_procs(loops, timeout=30.0)
+    assert left == []
 
 
 def test_a_missing_corpus_is_named(tmp_path: Path) -> None:
