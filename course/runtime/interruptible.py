@@ -62,16 +62,14 @@ class SessionContext(Context):
     def shutdown(self) -> None:
         """Shut the context down."""
         self._over.set()
-        with self._at_rest():
+        with self._at_rest(), rcutils_tap.staying():
             super().shutdown()
-            rcutils_tap.stay()
 
     def try_shutdown(self) -> None:
         """Shut the context down, if that has not been done."""
         self._over.set()
-        with self._at_rest():
+        with self._at_rest(), rcutils_tap.staying():
             super().try_shutdown()
-            rcutils_tap.stay()
 
     def join(self, timeout: float) -> None:
         """Wait until no thread of this context is left, after it has been shut down."""
@@ -82,8 +80,8 @@ class SessionContext(Context):
     def _at_rest(self) -> Iterator[None]:
         """Let no callback of ours begin, and those that run end, if they are quick about it.
 
-        rclpy.shutdown() may come at any moment, and turns the console on: a callback that logs just
-        then would write into a cell.
+        rclpy.shutdown() may come at any moment: a callback that publishes just then would raise, as
+        its context has ended under it.
         """
         with contextlib.ExitStack() as stack:
             ours = [executor for executor in self._ours if not executor.ended]

@@ -8,11 +8,16 @@ keeps each line and hands it on to the handler that was there, so that /rosout w
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import ctypes
+import functools
+import operator
 import threading
 from collections.abc import Iterator
 
+import rclpy.context
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.logging import get_logger_level, set_logger_level
 from rclpy.node import Node
@@ -66,16 +71,33 @@ def install(*, hand_on: bool) -> None:
         _rcutils.rcutils_logging_set_output_handler(_ours)
 
 
-def stay() -> None:
-    """Go on hearing when the last context has been shut down, which turns the console on again.
+@contextlib.contextmanager
+def staying() -> Iterator[None]:
+    """Go on hearing while a context is shut down in the block, and afterwards.
 
-    A student may still hold a node of a session that is closed, and its logger still works.
+    With the last context rclpy takes logging down, which turns the console on. But a callback may
+    still run then, and a student may hold a node of a session that is closed: what they log would
+    be written into a cell. So the block counts as one more user of logging, and it is taken down
+    here, in one step with hearing again.
     """
     global _next
-    with _lock:
-        if _rcutils.rcutils_logging_get_output_handler() == _console:
-            _next = None
-            _rcutils.rcutils_logging_set_output_handler(_ours)
+    with rclpy.context.g_logging_configure_lock:
+        users, handed_on_to = rclpy.context.g_logging_ref_count, _next
+        rclpy.context.g_logging_ref_count += 1
+        if users == 1:
+            _next = None  # /rosout complains on stderr about publishers of a context that has ended
+    try:
+        yield
+    finally:
+        with rclpy.context.g_logging_configure_lock:
+            rclpy.context.g_logging_ref_count -= 1
+            if rclpy.context.g_logging_ref_count > 0:  # somebody has come meanwhile, or is there
+                _next = handed_on_to
+            elif users > 0:
+                _next = None
+                # No other thread has a turn between the two: each is in C, and keeps the GIL.
+                steps = (rclpy_implementation.rclpy_logging_fini, _hear_again)
+                collections.deque(map(operator.call, steps), maxlen=0)
 
 
 def uninstall() -> None:
@@ -161,3 +183,7 @@ def _is_ours_to_lower(logger: str) -> bool:
 
 _hear_in_c = _Handler(_hear)  # kept here: C only has its address
 _ours = ctypes.cast(_hear_in_c, ctypes.c_void_p).value
+# PyDLL and not CDLL: its functions keep the GIL.
+_hear_again = functools.partial(
+    ctypes.PyDLL("librcutils.so").rcutils_logging_set_output_handler, ctypes.c_void_p(_ours)
+)

@@ -272,19 +272,48 @@ def test_at_double_zoom_every_view_fits_its_place(open_cells: Open) -> None:
             expect(control).to_be_in_viewport()
 
 
-def test_a_view_that_was_scrolled_away_is_up_to_date_when_it_is_back(open_cells: Open) -> None:
-    moving = [VIEWS[name][0] for name in ("timeline", "log")]
-    page = open_cells("session.graph()", *moving, *["print('far\\n' * 30)"] * 12)
-    label = region(page, "ROS graph").locator("svg text", has_text="/listener")
-    expect(label).to_be_in_viewport()
+def test_every_view_that_was_scrolled_away_is_up_to_date_when_it_is_back(open_cells: Open) -> None:
+    page = open_cells(*(source for source, _ in VIEWS.values()), *["print('far\\n' * 30)"] * 12)
+    place = {name: number for number, name in enumerate(VIEWS, start=1)}
+    view = {name: region(page, label) for name, (_, label) in VIEWS.items()}
+
+    def see(name: str) -> Locator:
+        page.scroll_to(place[name])
+        expect(view[name]).to_be_in_viewport()
+        return view[name]
+
+    see("service").get_by_role("button", name="Call").click()
+    expect(view["service"].locator("tbody tr")).to_have_count(1)
+    see("qos_lab").get_by_label("I predict that they will").select_option("yes")
+    view["qos_lab"].get_by_role("button", name="Run stream").click()
+    expect(view["qos_lab"].locator(".roslab-results > li")).to_have_count(1)
+    see("action").get_by_label("order").fill("3")
+    view["action"].get_by_role("button", name="Send goal").click()
+    expect(view["action"].locator("[aria-current]")).to_contain_text("EXECUTING")
     page.scroll_to(page.cell_count() - 1)
-    expect(label).not_to_be_in_viewport()
-    run_in_kernel(page, "session.stop('listener')")
-    page.scroll_to(1)
-    view = region(page, "ROS graph")
-    expect(view.locator("svg text", has_text="/robot")).to_be_in_viewport()
-    expect(label).to_have_count(0)
+    for gone in view.values():
+        expect(gone).not_to_be_in_viewport()
+    run_in_kernel(
+        page,
+        "from rclpy.parameter import Parameter\n"
+        "session.stop('listener')\n"
+        "robot.set_parameters([Parameter('legs', value=6)])\n"
+        "robot.go.set()",
+    )
+    # What happened meanwhile is shown, and what stood there still stands.
+    expect(see("graph").locator("svg text", has_text="/robot")).to_be_visible()
+    expect(view["graph"].locator("svg text", has_text="/listener")).to_have_count(0)
+    expect(see("action").locator("[aria-current]")).to_contain_text("SUCCEEDED")
+    expect(see("parameters").get_by_label("legs")).to_have_value("6")
+    expect(see("service").locator("tbody tr")).to_have_count(1)
+    expect(see("qos_lab").locator(".roslab-results > li")).to_have_count(1)
+    # And each of them lives on.
+    view["qos_lab"].get_by_role("button", name="Run stream").click()
+    expect(view["qos_lab"].locator(".roslab-results > li")).to_have_count(2)
+    see("service").get_by_role("button", name="Call").click()
+    expect(view["service"].locator("tbody tr")).to_have_count(2)
     run_in_kernel(page, "course.run(Listener)")
+    expect(see("graph").locator("svg text", has_text="/listener")).to_be_visible()
     stays_live(page)
     assert page.errors == []
 

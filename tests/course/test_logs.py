@@ -225,6 +225,39 @@ def test_a_node_of_a_closed_session_is_quiet(start_script, end, threads):
     assert (process.returncode, out, err) == (0, "", "")
 
 
+LOGS_ON = """
+import sys, threading
+import course, rclpy
+from rclpy.node import Node
+
+class Chatty(Node):
+    def __init__(self):
+        super().__init__("chatty")
+        self.running, self.over = threading.Event(), threading.Event()
+        self.create_timer(0.01, self.talk)
+
+    def talk(self):
+        self.running.set()
+        while not self.over.is_set():
+            self.get_logger().debug("a callback that will not end")
+            self.get_logger().info("a callback that will not end")
+
+sys.setswitchinterval(1e-6)  # as if many cores looked for the moment in which nobody listens
+for _ in range(10):
+    chatty = course.run(Chatty)
+    assert chatty.running.wait(60.0)
+    END
+    chatty.over.set()
+"""
+
+
+@pytest.mark.parametrize("end", ["course.session().close(0.3)", "rclpy.shutdown()"])
+def test_a_callback_that_logs_while_its_context_is_shut_down_is_quiet(start_script, end):
+    process = start_script(LOGS_ON.replace("END", end))
+    out, err = process.communicate(timeout=120)
+    assert (process.returncode, out, err) == (0, "", "")
+
+
 def test_the_console_of_a_plain_context_opened_later_is_its_own(start_script):
     process = start_script(
         "import course, rclpy\nfrom rclpy.node import Node\n"
