@@ -63,12 +63,13 @@ def abilities() -> Abilities:
 
 @cache
 def _abilities() -> Abilities:
-    missing = [package for tool, package in TOOLS.items() if shutil.which(tool) is None]
+    missing = list(dict.fromkeys(TOOLS[tool] for tool in TOOLS if shutil.which(tool) is None))
     if missing:
         packages = " ".join(sorted({*missing, "bubblewrap", "iproute2", "nftables"}))
+        lacking = f"{' and '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing"
         return Abilities(
-            f"Submissions cannot be sandboxed here because {' and '.join(missing)} is missing: "
-            f"install it with `sudo apt install {packages}`, {TRUST}."
+            f"Submissions cannot be sandboxed here because {lacking}: "
+            f"run `sudo apt install {packages}`, {TRUST}."
         )
     try:
         return Abilities(loss=_try(), warm=_try_warm())
