@@ -44,12 +44,15 @@ def load(folder: Path, exam: str) -> list[Case]:
     Raises:
         CorpusError: the folder is missing, or a case is not well formed.
     """
-    own = sorted((folder / exam).glob("*.py"))
-    if not own:
-        raise CorpusError(f"There is no corpus for '{exam}' in {folder}.")
+    own, mutants = sorted((folder / exam).glob("*.py")), folder / exam / MUTANTS
+    if not own and not mutants.exists():
+        raise CorpusError(
+            f"There is no corpus for '{exam}' in {folder}: write cases into {folder / exam}, as "
+            "notebooks/authoring/README.md says."
+        )
     cases = [_case(exam, file) for file in own]
     cases += [_case(exam, file, every=True) for file in sorted((folder / EVERY).glob("*.py"))]
-    cases += _mutants(exam, folder / exam / MUTANTS)
+    cases += _mutants(exam, mutants)
     names = [case.name for case in cases]
     for name in names:
         if names.count(name) > 1:
@@ -93,10 +96,8 @@ def _texts(exam: str, body: str) -> dict[str, str]:
 
 
 def _mutants(exam: str, file: Path) -> Iterator[Case]:
-    if not file.exists():
-        return
     try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8"))
+        tables = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     except tomllib.TOMLDecodeError as error:
         raise CorpusError(f"{file} is not TOML: {error}.") from error
     for name, data in tables.items():
@@ -106,8 +107,9 @@ def _mutants(exam: str, file: Path) -> Iterator[Case]:
                 splices=_splices(exam, data["splices"]),
             )  # fmt: skip
         except (KeyError, TypeError, AttributeError) as error:
+            what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
             raise CorpusError(
-                f"{file}: mutant '{name}' needs title, fails and splices of old and new ({error})."
+                f"{file}: mutant '{name}' needs title, fails and splices of old and new: {what}."
             ) from error
 
 
