@@ -84,8 +84,16 @@ class Managed:
             if (state := self.attempt(transition)) != goal:
                 raise Failed(
                     expected=f"After “{transition}” your node is {goal}.",
-                    actual=f"It is {state}{self._rig.raised()}.",
+                    actual=f"It is {state}{self._rig.raised()}. {self._hint(transition)}",
                 )
+
+    @staticmethod
+    def _hint(transition: str) -> str:
+        """Return why rclpy says nothing, and how to see it: it catches what on_…() raises."""
+        return (
+            f"Your on_{transition}() did not return SUCCESS, or it raised. rclpy keeps such an "
+            "exception to itself: call the method in a cell of your own to see it."
+        )
 
     def _ask(self, service: Any, name: str, request: Any) -> Any:
         reply = self._rig.ask(service, f"{self._node}/{name}", request)
