@@ -151,7 +151,8 @@ def position_answered(rig: RobotRig) -> str:
 
     A planner that starts from where the robot was a while ago plans through the shelf beside it.
     """
-    needed = f"Whoever wants to know the position gets it, at most {POSITION_AGE:g} s old."
+    needed = "Whoever wants to know the position gets it in metres, "
+    needed += f"at most {POSITION_AGE:g} s old."
     pattern = offers.require(rig, "position", WORKING["position"], needed)
     if not rig.listens_to("position"):
         raise Failed(expected=needed, actual="Your node does not listen to hardware/position.")
