@@ -37,9 +37,11 @@ class Managed:
         """Drive ``node``; its services are looked for when they are needed."""
         self._rig = rig
         self._node = node
+        self._rate = ""
 
     def set(self, **values: str | float) -> bool:
         """Set parameters; return whether the node took them all."""
+        self._rate = f" with a rate of {values['rate']:g} Hz" if "rate" in values else ""
         parameters = [Parameter(name=name, value=_value(value)) for name, value in values.items()]
         request = SetParameters.Request(parameters=parameters)
         reply = self._ask(SetParameters, "set_parameters", request)
@@ -82,8 +84,9 @@ class Managed:
         for transition in transitions:
             goal = TRANSITIONS[transition][1] if transition in TRANSITIONS else "finalized"
             if (state := self.attempt(transition)) != goal:
+                how = self._rate if transition == "configure" else ""
                 raise Failed(
-                    expected=f"After “{transition}” your node is {goal}.",
+                    expected=f"After “{transition}”{how} your node is {goal}.",
                     actual=f"It is {state}{self._rig.raised()}. {self._hint(transition)}",
                 )
 
