@@ -34,8 +34,11 @@ POSITION, FURTHER = 2.5, 90  # m, and how many tenths of a metre there are to dr
 POSITION_AGE = 0.5  # s
 LEVEL_AGE = 1.0  # s
 SPEEDS, SPEED_MARGIN = (0.3, 0.8), 0.011  # m/s
-BAD_SPEEDS = (-0.5, 5.0)  # m/s
+GOOD_SPEEDS = (1.0, 0.1, 0.3)  # m/s, the bounds among them
+BAD_SPEEDS = (-0.5, 0.05, 5.0)  # m/s
+LEVELS = (0.6, 0.4, 0.38)  # great changes and a small one
 START, GOAL, FAR = 0, 3, 50  # stations
+STOPS = 0.5  # s
 
 READ_TOPICS = "Chapter 5, “Topics: continuous data sharing (publish-subscribe)”"
 READ_SERVICES = "Chapter 5, “Services: synchronous request-response”"
@@ -129,7 +132,7 @@ def camera_streams(rig: RobotRig) -> None:
             expected=f"{RATE[0]:g} to {RATE[1]:g} pictures a second, by the node's clock.",
             actual=f"They came at {hertz:g} a second.",
         )
-    if fault := picture_fault(pictures[-1][1]):
+    if fault := picture_fault(pictures[-1]):
         raise Failed(expected="A message on robot/camera holds a picture.", actual=fault)
 
 
@@ -148,7 +151,8 @@ def position_answered(rig: RobotRig) -> str:
 
     A planner that starts from where the robot was a while ago plans through the shelf beside it.
     """
-    needed = f"Whoever wants to know the position gets it, at most {POSITION_AGE:g} s old."
+    needed = "Whoever wants to know the position gets it in metres, "
+    needed += f"at most {POSITION_AGE:g} s old."
     pattern = offers.require(rig, "position", WORKING["position"], needed)
     if not rig.listens_to("position"):
         raise Failed(expected=needed, actual="Your node does not listen to hardware/position.")
@@ -216,13 +220,13 @@ def parameter_changes(rig: RobotRig) -> None:
     """
     needed = "Whoever changes max_speed hears whether the new value holds, or why it does not."
     offers.require(rig, "parameters", WORKING["parameters"], needed)
-    good = SPEEDS[0]
-    taken, reason = offers.set_speed_limit(rig, good)
-    if not taken:
-        raise Failed(
-            expected=f"{needed} {good:g} m/s is a good value.",
-            actual=f"It was refused, with the reason {reason[:200]!r}.",
-        )
+    for good in GOOD_SPEEDS:
+        taken, reason = offers.set_speed_limit(rig, good)
+        if not taken:
+            raise Failed(
+                expected=f"{needed} {good:g} m/s is a good value: from 0.1 to 1.0 all are.",
+                actual=f"It was refused, with the reason {reason[:200]!r}.",
+            )
     for bad in BAD_SPEEDS:
         taken, reason = offers.set_speed_limit(rig, bad)
         if taken:
@@ -269,7 +273,7 @@ def battery_broadcast(rig: RobotRig) -> None:
         return _is_level(0.9, levels)
 
     rig.wait_stepping(first, LEVEL_AGE)  # the two find each other
-    for level in (0.6, 0.4):
+    for level in LEVELS:
         rig.report("charge", level)
         if not rig.wait_stepping(lambda level=level: _is_level(level, levels), LEVEL_AGE):  # type: ignore[misc]
             said = f"the last percentage was {levels[-1]:.4g}" if levels else "nothing was heard"
@@ -320,7 +324,7 @@ def battery_late_joiner(rig: RobotRig) -> str:
             raise Failed(
                 expected=needed,
                 actual=f"The level was not published again within {LEVEL_AGE:g} s, and its "
-                "publisher (VOLATILE) keeps nothing for late joiners.",
+                f"publisher ({late.unkept}) keeps nothing for late joiners.",
             )
         rig.wait_stepping(told)
     if not told():
@@ -349,6 +353,20 @@ def navigation_drives(rig: RobotRig) -> None:
     with Drive(rig, START, GOAL) as drive:
         drive.to_the_end()
         drive.require_result()
+    _drive_again(rig, GOAL, "a drive")
+
+
+def _drive_again(rig: RobotRig, station: int, before: str) -> None:
+    """Send the robot one station on: what the goal ``before`` has left must not be in the way."""
+    try:
+        with Drive(rig, station, station + 1) as drive:
+            drive.to_the_end()
+            drive.require_result()
+    except Failed as failed:
+        raise Failed(
+            expected=f"After {before} the next goal is as good as the first. {failed.expected}",
+            actual=f"In that next drive: {failed.actual}",
+        ) from None
 
 
 @EXAM.check(
@@ -368,12 +386,14 @@ def speed_takes_effect(rig: RobotRig) -> None:
     """
     for station, limit in enumerate(SPEEDS):
         offers.set_speed_limit(rig, limit)
+        offers.set_speed_limit(rig, BAD_SPEEDS[-1])  # refused, so the good one stays
         with Drive(rig, station, station + 1) as drive:
             rig.wait_stepping(partial(_as_fast, rig, drive, limit))
             top = max(rig.node.speeds, default=0.0)
             if abs(top - limit) > SPEED_MARGIN:
                 raise Failed(
-                    expected=f"With max_speed at {limit:g} m/s the robot drives at {limit:g} m/s.",
+                    expected=f"With max_speed at {limit:g} m/s, and {BAD_SPEEDS[-1]:g} m/s refused "
+                    f"after that, the robot drives at {limit:g} m/s.",
                     actual=f"hardware/speed went up to {top:g} m/s.",
                 )
             drive.to_the_end()
@@ -409,7 +429,15 @@ def navigation_cancel(rig: RobotRig) -> None:
                 expected="A request to cancel a drive is accepted.",
                 actual=f"It was refused, {drive.where}{rig.because()}.",
             )
+        in_time = drive.stops_within(STOPS)
         drive.require_end(GoalState.CANCELED, "A drive that is called off ends there and then.")
+        if not in_time:
+            raise Failed(
+                expected=f"A drive that is called off stops the robot within {STOPS:g} s.",
+                actual=f"{STOPS:g} s of the node's time later hardware/speed had not said 0.0 yet. "
+                "It did so afterwards.",
+            )
+    _drive_again(rig, drive.station, "a drive that was called off")
 
 
 choosing.add_checks(EXAM, needs=("choices_made",))

@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any, NamedTuple
 
+from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -214,6 +215,11 @@ class CameraRig:
         """Return what the student's callbacks raised, as the end of a sentence."""
         errors = self.subject.errors()
         return f" (a callback raised: {errors[-1]})" if errors else ""
+
+    def refused_zoom(self, factor: int) -> None:
+        """Send a zoom that the camera does not have; it is with the driver when this returns."""
+        self.node.zoom.publish(Int32(data=factor))
+        self.node.zoom.wait_for_all_acked(Duration(seconds=SETTLE))
 
     def ask(self, service: Any, name: str, request: Any, patience: float = SETTLE) -> Any:
         """Call a service; return its response, or None if none came in ``patience`` seconds.

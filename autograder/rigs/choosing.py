@@ -25,7 +25,8 @@ def read(rig: RobotRig) -> dict[Scenario, str]:
     try:
         value = rig.subject.value(VARIABLE)
     except StudentError as error:
-        raise Failed(expected=expected, actual=f"It could not be read: {error}.") from None
+        reason = str(error).partition(": ")[2] or str(error)  # without the exception's name
+        raise Failed(expected=expected, actual=f"It could not be read: {reason}.") from None
     if not isinstance(value, dict):
         raise Failed(expected=expected, actual=f"choices is not a dictionary but {_few(value)}.")
     chosen: dict[Scenario, str] = {}

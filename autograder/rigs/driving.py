@@ -19,8 +19,13 @@ from course import GoalRun, GoalState, WaitTimeout
 NAME = NAMES["navigation"]
 ACTIONS = "example_interfaces/action/Fibonacci or test_msgs/action/Fibonacci"
 """The chapter's Fibonacci, and what stands in for it on a machine without a compiler."""
+PART_OF_THE_WAY = 0.7
+"""Of the metre between two stations: who rounds a position is at the next one too early."""
 BLOCKED, BLOCKED_WALL = 12, 0.3
 """Steps of the node's clock, and then seconds on the wall, for which the robot cannot get on."""
+LOOKING, STOPPING = 0.6, 4.0
+"""Seconds of wall time for those who look by the wall's clock whether they are called off, and for
+a stop to become visible."""
 CLEARING = 2.0
 """Seconds of wall time that a goal gets to end after its check has failed."""
 
@@ -38,6 +43,7 @@ class Drive:
             Failed: the goal was not accepted.
         """
         self.station, self.start, self.goal = start, start, goal
+        self._between = False
         self.heard: list[list[int]] = []
         self._rig = rig
         rig.report("position", float(start))
@@ -79,7 +85,10 @@ class Drive:
     @property
     def where(self) -> str:
         """The robot's place, as a phrase."""
-        return f"while the robot was at station {self.station} on the way to {self.goal}"
+        place = f"at station {self.station}"
+        if self._between:
+            place = f"between stations {self.station} and {self.station + 1}"
+        return f"while the robot was {place} on the way to {self.goal}"
 
     def require_driving(self) -> None:
         """Wait until the robot is commanded to drive.
@@ -122,9 +131,14 @@ class Drive:
 
     def roll_on(self) -> None:
         """Let the robot drive to the next station."""
-        self._rig.report("position", self.station + 0.5)
+        self._leave()
         self.station += 1
+        self._between = False
         self._rig.report("position", float(self.station))
+
+    def _leave(self) -> None:
+        self._between = True
+        self._rig.report("position", self.station + PART_OF_THE_WAY)
 
     def require_report(self) -> None:
         """Wait for feedback that says that the robot is at its station, and at none further on.
@@ -140,11 +154,12 @@ class Drive:
         self._complain()
 
     def hold(self) -> None:
-        """Let the aisle be blocked for a while: the robot does not get on, whatever it is told.
+        """Let the aisle be blocked before the next station, whatever the robot is told.
 
         Raises:
-            Failed: the feedback goes on, so it counts time and does not look where the robot is.
+            Failed: the feedback goes on, so it does not look where the robot is, or not closely.
         """
+        self._leave()
         for _ in range(BLOCKED):
             self._rig.step()
         if self._rig.wait(lambda: self._latest > self.station, BLOCKED_WALL):
@@ -163,6 +178,18 @@ class Drive:
     @property
     def _latest(self) -> int:
         return max((number for stations in list(self.heard) for number in stations), default=-1)
+
+    def stops_within(self, seconds: float) -> bool:
+        """Return whether the robot is told to stop in so many seconds of the node's clock.
+
+        Who looks by the clock on the wall gets the time to do so before that one moves on.
+        """
+
+        def stopped() -> bool:
+            return self._rig.speed == 0
+
+        self._rig.wait(stopped, LOOKING)
+        return self._rig.wait_stepping(stopped, seconds, STOPPING)
 
     def require_end(self, state: GoalState, expected: str) -> None:
         """Wait for the end of the goal, and for the robot to stand still.

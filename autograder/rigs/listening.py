@@ -10,9 +10,8 @@ import time
 from typing import Any
 
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from sensor_msgs.msg import Image
 
-from autograder.rigs.robot import STEP, RobotRig
+from autograder.rigs.robot import STEP, Picture, RobotRig
 
 MOST_NUMBERS = 4
 """In an answer that says where the robot is: a position has three, and perhaps a station."""
@@ -21,7 +20,12 @@ PATIENCE = 1.0
 
 
 class LateJoiner:
-    """A subscription that begins now and asks for what was published before, if that is kept."""
+    """A subscription that begins now and asks for what was published before, if that is kept.
+
+    Attributes:
+        durable: whether it is kept for those who join late.
+        unkept: if not, why, as a phrase.
+    """
 
     def __init__(self, rig: RobotRig, msg_type: Any, topic: str) -> None:
         """Subscribe to ``topic``."""
@@ -31,6 +35,8 @@ class LateJoiner:
             and offer.reliability == ReliabilityPolicy.RELIABLE
             for offer in offers
         )
+        kept = any(offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers)
+        self.unkept = "TRANSIENT_LOCAL, but BEST_EFFORT" if kept else "VOLATILE"
         self.heard: list[Any] = []
         rig.node.listen(msg_type, topic, self.heard.append, durable=self.durable)
 
@@ -52,17 +58,17 @@ def rate(rig: RobotRig, seconds: float, expected: float) -> float:
         rig.wait(lambda due=due: len(pictures) >= due, budget)  # type: ignore[misc]
         budget = max(0.0, budget - (time.monotonic() - started))
     ended = time.time_ns()
-    rig.wait_stepping(lambda: pictures[-1][0] >= ended, 1.0)
-    return sum(began <= published < ended for published, _ in list(pictures)) / seconds
+    rig.wait_stepping(lambda: pictures[-1].published >= ended, 1.0)
+    return sum(began <= picture.published < ended for picture in list(pictures)) / seconds
 
 
-def picture_fault(picture: Image) -> str:
+def picture_fault(picture: Picture) -> str:
     """Return what is wrong with a picture, or an empty string."""
-    if not picture.height or not picture.width or not len(picture.data):
-        return f"It is empty: {picture.width} x {picture.height}, {len(picture.data)} bytes."
-    if len(picture.data) != picture.height * picture.step:
+    if not picture.height or not picture.width or not picture.size:
+        return f"It is empty: {picture.width} x {picture.height}, {picture.size} bytes."
+    if picture.size != picture.height * picture.step:
         return (
-            f"It has {len(picture.data)} bytes, which are not {picture.height} rows of "
+            f"It has {picture.size} bytes, which are not {picture.height} rows of "
             f"{picture.step} bytes (step)."
         )
     return ""
@@ -70,5 +76,5 @@ def picture_fault(picture: Image) -> str:
 
 def numbers(text: str) -> list[float]:
     """Return the numbers that stand in a text; none of a text that is a whole list of them."""
-    found = re.findall(r"-?\d+(?:\.\d+)?", text[:1000])
+    found = re.findall(r"-?\d+(?:\.\d+)?(?:[eE][-+]?\d{1,2})?", text[:1000])
     return [float(number) for number in found] if len(found) <= MOST_NUMBERS else []

@@ -14,6 +14,7 @@ from autograder.rigs.process import Usage
 DRIVER = "CameraDriver"
 WARM_UP, LIVES = 5, 25
 MEMORY = 100  # KiB a life
+WORDS = {"threads": "threads", "files": "open files"}
 PICTURES = 0.5  # s of simulated time that a life lasts: five pictures of 64 KiB
 
 
@@ -63,17 +64,23 @@ def _each(grown: int) -> str:
 
 
 def failing_starts(rig: CameraRig, kind: str, times: int) -> None:
-    """Fail unless the constructor raises, and the process keeps none of its threads."""
-    before = rig.process.threads()
+    """Fail unless the constructor raises, and the process keeps none of its threads and files."""
+    before = rig.process.usage()
     for _ in range(times):
         attempt(rig, rig.device(kind))
+    rig.subject.collect()
     # Half of them: a notebook has threads of its own, which come and go.
-    if not rig.wait(lambda: rig.process.threads() < before + times / 2):
-        raise Failed(
-            expected="A driver that cannot start leaves no thread behind.",
-            actual=f"After {times} such starts the process had {rig.process.threads() - before} "
-            "more threads than before.",
-        )
+    for what in ("threads", "files"):
+
+        def grown(what: str = what) -> int:
+            return int(getattr(rig.process.usage().grown(before), what))
+
+        if not rig.wait(lambda grown=grown: grown() < times / 2):  # type: ignore[misc]
+            raise Failed(
+                expected="A driver that cannot start leaves nothing behind, no thread and no file.",
+                actual=f"After {times} such starts the process had {grown()} more {WORDS[what]} "
+                "than before.",
+            )
 
 
 def attempt(rig: CameraRig, device: str) -> None:

@@ -37,9 +37,11 @@ class Managed:
         """Drive ``node``; its services are looked for when they are needed."""
         self._rig = rig
         self._node = node
+        self._rate = ""
 
     def set(self, **values: str | float) -> bool:
         """Set parameters; return whether the node took them all."""
+        self._rate = f" with a rate of {values['rate']:g} Hz" if "rate" in values else ""
         parameters = [Parameter(name=name, value=_value(value)) for name, value in values.items()]
         request = SetParameters.Request(parameters=parameters)
         reply = self._ask(SetParameters, "set_parameters", request)
@@ -82,10 +84,19 @@ class Managed:
         for transition in transitions:
             goal = TRANSITIONS[transition][1] if transition in TRANSITIONS else "finalized"
             if (state := self.attempt(transition)) != goal:
+                how = self._rate if transition == "configure" else ""
                 raise Failed(
-                    expected=f"After “{transition}” your node is {goal}.",
-                    actual=f"It is {state}{self._rig.raised()}.",
+                    expected=f"After “{transition}”{how} your node is {goal}.",
+                    actual=f"It is {state}{self._rig.raised()}. {self._hint(transition)}",
                 )
+
+    @staticmethod
+    def _hint(transition: str) -> str:
+        """Return why rclpy says nothing, and how to see it: it catches what on_…() raises."""
+        return (
+            f"Your on_{transition}() did not return SUCCESS, or it raised. rclpy keeps such an "
+            "exception to itself: call the method in a cell of your own to see it."
+        )
 
     def _ask(self, service: Any, name: str, request: Any) -> Any:
         reply = self._rig.ask(service, f"{self._node}/{name}", request)

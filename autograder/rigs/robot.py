@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import Any, TypeVar, overload
+from typing import Any, NamedTuple, TypeVar, overload
 
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
@@ -36,6 +36,19 @@ SETTLE = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
 STEP = 0.1
 """Seconds of simulated time in one step."""
+
+
+class Picture(NamedTuple):
+    """What is kept of a picture: when it was published (ns), and what its fields say.
+
+    Not its pixels: a camera of 640 x 480 sends nearly 10 MB a second.
+    """
+
+    published: int
+    height: int
+    width: int
+    step: int
+    size: int  # bytes
 
 
 class Ears(Sequence[T]):
@@ -93,7 +106,7 @@ class ExaminerNode(Node):
         }
         self.speeds = Ears[float]()
         self.levels = Ears[float]()
-        self.pictures = Ears[tuple[int, Image]]()  # published at (ns), picture
+        self.pictures = Ears[Picture]()
         self._both(Float64, "hardware/speed", self.speeds, lambda msg: msg.data)
         self._both(BatteryState, "robot/battery", self.levels, lambda msg: msg.percentage)
         for heard, reliable in ((self.pictures.any, False), (self.pictures.reliable, True)):
@@ -111,8 +124,9 @@ class ExaminerNode(Node):
             self.listen(msg_type, topic, note, reliable=reliable)
 
     @staticmethod
-    def _see(heard: list[tuple[int, Image]], picture: Image, info: dict[str, Any]) -> None:
-        heard.append((int(info["source_timestamp"]), picture))
+    def _see(heard: list[Picture], image: Image, info: dict[str, Any]) -> None:
+        published, size = int(info["source_timestamp"]), len(image.data)
+        heard.append(Picture(published, image.height, image.width, image.step, size))
 
     def listen(
         self,

@@ -162,7 +162,10 @@ class Hosting:
 
     def _require_open(self) -> None:
         if self.closed:
-            raise SessionError("This session is closed: open a new one with course.Session().")
+            raise SessionError(
+                "This session is closed, or a node has shut its context down (rclpy.shutdown() "
+                "ends every node of it): open a new one with course.Session()."
+            )
 
     def _claim_log(self, node: Node) -> None:
         store.claim(node_name(node), self._crew)

@@ -35,7 +35,7 @@ class RobotInterface(Robot):
         return response
 
     def where(self, request, response):
-        response.success, response.message = True, f"{self.position}"
+        response.success, response.message = True, f"{self.position:.3e}"
         return response
 
     def position_changed(self):

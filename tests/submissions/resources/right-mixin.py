@@ -1,4 +1,4 @@
-# title: One mix-in that opens and closes the camera for both nodes
+# title: One mix-in that opens and closes the camera for both nodes; its stream is tried early
 # fails: nothing
 
 
@@ -73,7 +73,10 @@ class ManagedCamera(HasCamera, LifecycleNode):
             return TransitionCallbackReturn.FAILURE
         try:
             self.open_camera(self.get_parameter('device').value)
+            self.camera.start()  # does it stream?
+            self.camera.stop()
         except OSError:
+            self.close_camera()
             return TransitionCallbackReturn.FAILURE
         self.pub = self.create_lifecycle_publisher(Image, 'camera/image', 10)
         self.timer = self.create_timer(1.0 / rate, self.publish)

@@ -228,7 +228,8 @@ class CameraDriver(Node):
         self.create_timer(0.1, self.order)
 
     def order(self):
-        self.orders.put(None)
+        if self.orders.empty():  # a camera that is slow is not given a heap of orders
+            self.orders.put(None)
 
     def work(self):
         while self.orders.get() is not END:
