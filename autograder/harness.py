@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import gc
 import json
+import sysconfig
 import traceback
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
@@ -249,11 +251,16 @@ def _as_json(value: Any) -> Any:
     return json.loads(text)
 
 
+_NOT_THEIRS = tuple({sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")})
+_OURS = tuple(str(Path(__file__).parent.parent / part) for part in ("autograder", "course"))
+
+
 def _student_trace(error: BaseException) -> str:
-    """Return the last frames of ``error`` that are not rclpy's or ours."""
+    """Return the last frames of ``error`` that are the student's: not Python's, rclpy's or ours."""
     frames = [
         frame
         for frame in traceback.extract_tb(error.__traceback__)
-        if not any(part in frame.filename for part in ("/rclpy/", "/course/", "/autograder/"))
+        if not frame.filename.startswith((*_NOT_THEIRS, *_OURS))
+        and not frame.filename.startswith("<frozen")
     ]
     return "".join(traceback.format_list(frames[-TRACE_LINES:]))[:4000]

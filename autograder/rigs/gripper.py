@@ -129,6 +129,18 @@ def double(name: str, value: float) -> Parameter:
     return Parameter(name=name, value=ParameterValue(type=kind, double_value=value))
 
 
+def whole(name: str, value: int) -> Parameter:
+    """Return a parameter that is an integer."""
+    kind = ParameterType.PARAMETER_INTEGER
+    return Parameter(name=name, value=ParameterValue(type=kind, integer_value=value))
+
+
+def flag(name: str, value: bool) -> Parameter:
+    """Return a parameter that is a bool."""
+    kind = ParameterType.PARAMETER_BOOL
+    return Parameter(name=name, value=ParameterValue(type=kind, bool_value=value))
+
+
 def text(name: str, value: str) -> Parameter:
     """Return a parameter that is a string."""
     kind = ParameterType.PARAMETER_STRING

@@ -13,6 +13,7 @@ from geometry_msgs.msg import Twist
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import Bool, Int32, String
@@ -39,6 +40,7 @@ class Navigator(Node):
     async def _goal(self, goal: Drive.Goal) -> GoalResponse:
         self._user.orders.append(goal.order)
         await self._user.pause(self)
+        await self._user.hesitate(self)
         return GoalResponse.ACCEPT if self._user.accepts else GoalResponse.REJECT
 
     async def _cancel(self, _goal: ServerGoalHandle) -> CancelResponse:
@@ -61,6 +63,8 @@ class NavigatorUser(Player):
         """Create everything but the navigator."""
         super().__init__("navigator_user")
         self.accepts = self.obeys = True
+        self.hesitates = False
+        self._undecided: list[tuple[Executor, Future]] = []
         self.orders: list[int] = []
         self.goals: list[ServerGoalHandle] = []
         self.cancels: list[float] = []
@@ -74,12 +78,33 @@ class NavigatorUser(Player):
         """Return a navigator; it is for the session to run."""
         return Navigator(self)
 
-    def request(self, metres: int, *, accepts: bool = True, obeys: bool = True) -> None:
-        """Ask for a drive that is accepted or not, and that can be cancelled or not."""
-        self.accepts, self.obeys = accepts, obeys
+    def request(
+        self, metres: int, *, accepts: bool = True, obeys: bool = True, hesitates: bool = False
+    ) -> None:
+        """Ask for a drive that is accepted or not, and that can be cancelled or not.
+
+        A navigator that ``hesitates`` answers the goal when it is told to `decide`.
+        """
+        self.accepts, self.obeys, self.hesitates = accepts, obeys, hesitates
         for noted in (self.orders, self.goals, self.cancels, self.outcomes, self.speeds):
             noted.clear()
         self._request.publish(Int32(data=metres))
+
+    async def hesitate(self, server: Node) -> None:
+        """Let the navigator wait until it is to decide, if this goal is one of that kind."""
+        if self.hesitates:
+            executor = server.executor
+            assert isinstance(executor, Executor)
+            over = Future(executor=executor)
+            self._undecided.append((executor, over))
+            await over
+
+    def decide(self) -> None:
+        """Have the navigator answer the goal that it has."""
+        undecided, self._undecided = self._undecided, []
+        for executor, over in undecided:
+            over.set_result(None)
+            executor.wake()
 
     def feedback(self, metres: int) -> None:
         """Tell how far the drive has come."""
@@ -104,6 +129,7 @@ class Drives:
         self.began = 0.0
         self.handle: Any = None
         self.feedback: list[list[int]] = []
+        self.fed: list[float] = []  # when, in simulated s
         self.canceling: bool | None = None
         self.status: int | None = None
         self.result: list[int] = []
@@ -118,13 +144,18 @@ class Dispatcher(Player):
         """Create the client and ends of topics."""
         super().__init__("dispatcher")
         self.speeds: list[bool] = []
+        self.commands: list[Twist] = []
         self.faults: list[str] = []
         self._jam = self.speak(Bool, "hardware/jammed")
-        self.hear(Twist, "cmd_vel", lambda message: self.speeds.append(moves(message)))
+        self.hear(Twist, "cmd_vel", self._command)
         self.hear(String, "drive/fault", lambda message: self.faults.append(message.data))
         self._client = ActionClient(self, Drive, "drive")
         for service in services_of("drive"):
             self.uses(service)
+
+    def _command(self, message: Twist) -> None:
+        self.commands.append(message)
+        self.speeds.append(moves(message))
 
     def jam(self, jammed: bool) -> None:
         """Jam the wheels, or free them."""
@@ -133,6 +164,7 @@ class Dispatcher(Player):
     def send(self, metres: int) -> Drives:
         """Send a goal; forgets what was before."""
         self.speeds.clear()
+        self.commands.clear()
         self.faults.clear()
         drive = Drives()
 
@@ -147,6 +179,7 @@ class Dispatcher(Player):
 
         def fed(message: Any) -> None:
             drive.feedback.append(list(message.feedback.sequence))
+            drive.fed.append(self.now)
 
         with self._held():
             goal = self._client.send_goal_async(Drive.Goal(order=metres), fed)

@@ -73,7 +73,10 @@ def why_no_obstacles(jobs: Jobs) -> str:
                 f"{nodes(offer.servers)} hands it out by the service {offer.name} to "
                 f"{nodes(offer.clients)}: it comes all the time, so it is a stream, not an answer."
             )
-    return f"{does(jobs.detectors, 'read')} the sensors, but nothing of the kind is published."
+    reading = f"{does(jobs.detectors, 'read')} the sensors, but"
+    if found := [f"{t.name} ({listed(t.types)})" for t in outputs.values() if set(t.types) & POSES]:
+        return f"{reading} all that comes of it is a pose: {listed(found)}."
+    return f"{reading} nothing of the kind is published."
 
 
 def _why_no_obstacle(topic: Topic, jobs: Jobs) -> str:

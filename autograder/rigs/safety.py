@@ -214,9 +214,7 @@ class RobotRig:
             raise
 
     def _change_to(self, name: str, player: type[Player]) -> None:
-        if self._robot is not None:
-            self.bench.subject.stop(self._robot.name)
-        self.clear()
+        self.renew()
         if not self._fresh:
             self.bench.subject.open(threads=THREADS, sim_time=True)
             self._fresh = True
@@ -224,6 +222,12 @@ class RobotRig:
         assert isinstance(made, player)
         self._player = made
         self._robot = Robot(self.bench, name, made, self._still)
+
+    def renew(self) -> None:
+        """Have the next check begin with a fresh node, in the same session."""
+        if self._robot is not None:
+            self.bench.subject.stop(self._robot.name)
+        self.clear()
 
     def once(self, trial: Callable[[RobotRig], None]) -> None:
         """Run a trial that others build on, unless an earlier part of the exam has passed it."""

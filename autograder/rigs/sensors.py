@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import re
 import secrets
+import threading
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
@@ -110,6 +111,13 @@ class Sensor:
             numbers = [message.orientation.x, message.orientation.y, message.orientation.z]
         return Tag.read("/".join(f"{number:.0f}" for number in numbers))
 
+    def unchanged(self, message: Any, tag: Tag) -> bool:
+        """Whether a reading is what the hardware delivered; its header is the driver's to fill."""
+        delivered = self.message(tag, Time())
+        if self.type is not String:
+            delivered.header = message.header
+        return bool(message == delivered)
+
 
 SENSORS = (
     Sensor("camera", "camera/image", Image, 10),
@@ -153,6 +161,8 @@ class ExaminerNode(Node):
         }
         self.consumed: Heard = defaultdict(list)
         self.witnessed: Heard = defaultdict(list)
+        self.altered: set[str] = set()  # topics with readings that the hardware did not deliver so
+        self.published: dict[tuple[str, Tag], int] = {}  # when the driver did, in ns since 1970
         for sensor in SENSORS:
             self.listen(sensor, sensor.topic, undemanding(), self.witnessed)
 
@@ -170,11 +180,16 @@ class ExaminerNode(Node):
         ``on`` is the node that gets the subscription, if not this one.
         """
 
-        def note(message: Any) -> None:
+        def keep(message: Any, info: Any) -> None:
             tag = sensor.tag(message)
             if tag is not None and tag.nonce == self.nonce:
                 heard[sensor.name].append(tag)
+                if not sensor.unchanged(message, tag):
+                    self.altered.add(topic)
+                if heard is self.witnessed:
+                    self.published.setdefault((sensor.name, tag), info["source_timestamp"])
 
+        note: Callable[..., None] = keep  # rclpy's stubs know nothing of the second argument
         # Without a handler of ours rclpy would log an incompatible profile as a warning.
         events = SubscriptionEventCallbacks(
             incompatible_qos=on_incompatible or (lambda _: None), use_default_callbacks=False
@@ -209,13 +224,15 @@ class Stream:
         self.sent = 0
         self._node, self._phase, self._limit = node, phase, limit
         self._since = time.monotonic()
+        self._turn = threading.Lock()
         self._timer = node.create_timer(1 / sensor.rate, self._tick)
 
     def _tick(self) -> None:
-        if self.sent < self._limit and not self._ahead():
-            self._node.publish(self.sensor, self._phase, self.sent)
-            self.sent += 1
-            self._since = time.monotonic()
+        with self._turn:
+            if self.sent < self._limit and not self._ahead():
+                self._node.publish(self.sensor, self._phase, self.sent)
+                self.sent += 1
+                self._since = time.monotonic()
 
     def _ahead(self) -> bool:
         """Whether the driver has not yet come to what was sent; one that drops it is not it."""
@@ -225,6 +242,16 @@ class Stream:
         heard = self._node.witnessed[self.sensor.name]
         newest = heard[-1].number if heard and heard[-1].phase == phase else -1
         return self.sent - newest > AHEAD
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Send nothing for the length of the block."""
+        with self._turn:
+            limit, self._limit = self._limit, 0
+        try:
+            yield
+        finally:
+            self._limit = limit
 
     def stop(self) -> None:
         """Send no more."""
@@ -303,14 +330,45 @@ class SensorRig:
     def _silent(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> list[Sensor]:
         return [sensor for sensor in sensors if not self.indices(heard, sensor, phase)]
 
+    def withheld(self, sensors: Iterable[Sensor]) -> list[Sensor]:
+        """Send one reading of each sensor; return those whose driver does not publish it by itself.
+
+        Tried once more for these: a best-effort link may have lost it.
+        """
+        missing = list(sensors)
+        for index in range(2):
+            for sensor in missing:
+                self.node.publish(sensor, "single", index)
+            self.wait(partial(self._all_witnessed, missing, index), SETTLE / 2)
+            missing = [s for s in missing if not self._all_witnessed([s], index)]
+        return missing
+
+    def _all_witnessed(self, sensors: Iterable[Sensor], index: int) -> bool:
+        return all(index in self.witnessed(sensor, "single") for sensor in sensors)
+
     def burst(self, sensor: Sensor, phase: str, count: int) -> bool:
-        """Send ``count`` readings; return whether the last was seen on the sensor's topic."""
-        self.node.send(sensor, phase, count)
-        return self.wait(lambda: count - 1 in self.witnessed(sensor, phase))
+        """Send ``count`` readings; return whether the last was seen on the sensor's topic.
+
+        No faster than the driver takes them: its queue for the hardware need not be longer.
+        """
+        takes = True
+        for index in range(count):
+            self.node.publish(sensor, phase, index)
+            if takes:
+                takes = self.wait(partial(self._taken, sensor, phase, index - AHEAD), LAG)
+        return self.wait(partial(self._taken, sensor, phase, count - 1))
+
+    def _taken(self, sensor: Sensor, phase: str, index: int) -> bool:
+        return max(self.witnessed(sensor, phase), default=-1) >= index
 
     def witnessed(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings as they went over the sensor's topic."""
         return self.indices(self.node.witnessed, sensor, phase)
+
+    def published(self, sensor: Sensor, phase: str, index: int) -> int:
+        """Return when the driver published a reading, in ns since 1970; 0 if it was not seen."""
+        tag = Tag(self.node.nonce, self.node.phase(phase), index)
+        return self.node.published.get((sensor.name, tag), 0)
 
     def consumed(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings in the order the consumer passed them on."""
@@ -350,4 +408,7 @@ def mismatch(offered: TopicEndpointInfo, requested: TopicEndpointInfo) -> str:
     Only an ERROR is a refusal: rmw reports a WARNING for two default profiles, too.
     """
     compatibility, reason = qos_check_compatible(offered.qos_profile, requested.qos_profile)
-    return str(reason) if compatibility == QoSCompatibility.ERROR else ""
+    if compatibility != QoSCompatibility.ERROR:
+        return ""
+    parts = (part.strip().removeprefix("ERROR: ") for part in str(reason).split(";"))
+    return f"{'; '.join(part for part in parts if part)}."

@@ -4,8 +4,11 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 import socket
 import threading
+from collections import deque
 from collections.abc import Iterator
 
 import pytest
@@ -43,7 +46,15 @@ class Managed(LifecycleNode):
         super().__init__("managed")
 
 
-CLASSES = {cls.__name__: cls for cls in (Named, OneCleanupOnly, Managed)}
+class Deaf(Node):
+    """Its callback is one that rclpy cannot look into: the error comes from deep in Python."""
+
+    def __init__(self) -> None:
+        super().__init__("deaf")
+        self.create_subscription(String, "talk", deque[String]().append, 1)
+
+
+CLASSES = {cls.__name__: cls for cls in (Named, OneCleanupOnly, Managed, Deaf)}
 
 
 @pytest.fixture
@@ -108,3 +119,10 @@ def test_a_destroyed_lifecycle_node_is_gone_once_it_is_collected(
     subject.stop("Managed")
     subject.collect()
     outside.until(lambda: not observer.count_services(f"{node}/get_state"))
+
+
+def test_a_trace_has_the_students_lines_only(subject: Subject) -> None:
+    with pytest.raises(StudentError, match="no signature found") as raised:
+        subject.start("Deaf")
+    assert re.findall(r'File "(.*)", line', raised.value.trace) == [__file__]
+    assert inspect.__file__ not in raised.value.trace

@@ -9,7 +9,7 @@ from action_msgs.msg import GoalStatus
 
 from autograder.bench import StudentError
 from autograder.exam import Failed
-from autograder.rigs.navigation import Dispatcher, Drives
+from autograder.rigs.navigation import Dispatcher, Drives, moves
 from autograder.rigs.safety import Robot, RobotRig
 
 PROMPT = 1.0  # s for an answer
@@ -19,7 +19,8 @@ ABORT = 1.0  # s from a jam to the end of the drive
 TOLERANCE = 0.25  # s: what the task allows, and strides
 SLACK = 1.0  # s by which a drive of some seconds may be longer or shorter
 BAD = (0, -2, 11)
-LONG = 10  # m: what is still under way when something happens
+SPEED, SPEED_TOLERANCE = 1.0, 0.05  # m/s
+LONG, LONGEST = 8, 10  # m: what is still under way when something happens
 
 WORDS = {
     GoalStatus.STATUS_SUCCEEDED: "succeeded",
@@ -29,7 +30,7 @@ WORDS = {
 
 
 def arrives(rig: RobotRig) -> None:
-    """Bad goals, then one of 2 m."""
+    """Bad goals, then one of 2 m and one of 1 m."""
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
         for order in BAD:
             _rejected(robot, dispatcher, order)
@@ -45,18 +46,49 @@ def arrives(rig: RobotRig) -> None:
                 expected="The result of a goal of 2 m is [1, 2].",
                 actual=f"The result was {drive.result}.",
             )
-        if drive.feedback != [[1], [1, 2]]:
-            raise Failed(
-                expected="After each metre there is feedback: [1], then [1, 2].",
-                actual=f"The feedback was {', then '.join(map(str, drive.feedback)) or 'nothing'}.",
-            )
+        _require_feedback(dispatcher, drive)
+        _require_speed(dispatcher)
         _stands(robot, dispatcher, "succeeded")
+        drive = _driving(robot, dispatcher, 1)
+        _ends(robot, drive, "A goal of 1 m, the next one,", "succeeded", 1.0 + SLACK)
+        if drive.result != [1]:
+            raise Failed(
+                expected="The result of a goal of 1 m is [1], whatever was driven before.",
+                actual=f"The result was {drive.result}.",
+            )
+
+
+def _require_feedback(dispatcher: Dispatcher, drive: Drives) -> None:
+    """Require that marks are told as they are passed; nothing new may be told in between."""
+    told = [marks for marks in drive.feedback if marks]
+    if [marks for n, marks in enumerate(told) if told[:n][-1:] != [marks]] != [[1], [1, 2]]:
+        raise Failed(
+            expected="After each metre there is feedback: [1], then [1, 2].",
+            actual=f"The feedback was {', then '.join(map(str, drive.feedback)) or 'nothing'}.",
+        )
+    ahead = dispatcher.now - drive.fed[drive.feedback.index([1])]
+    if ahead < SLACK / 2:
+        raise Failed(
+            expected="The feedback comes on the way: [1] a second before the goal of 2 m ends.",
+            actual=f"It came {ahead:.1f} s before the end.",
+        )
+
+
+def _require_speed(dispatcher: Dispatcher) -> None:
+    for command in dispatcher.commands:
+        x, turn = command.linear.x, command.angular.z
+        if moves(command) and not (abs(x - SPEED) <= SPEED_TOLERANCE and turn == 0.0):
+            turning = f", turning at {turn:g} rad/s" if turn else ""
+            raise Failed(
+                expected=f"On the way the robot is told to drive straight on at {SPEED:g} m/s.",
+                actual=f"It was told to drive at {x:g} m/s{turning}.",
+            )
 
 
 def canceled(rig: RobotRig) -> None:
-    """A drive that is canceled after 1.5 s."""
+    """The longest drive, which is canceled after 1.5 s, and another one."""
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
-        drive = _driving(robot, dispatcher, LONG)
+        drive = _driving(robot, dispatcher, LONGEST)
         robot.spend(1.5)
         dispatcher.cancel(drive)
         robot.run(lambda: drive.canceling is not None, CANCEL)
@@ -69,6 +101,8 @@ def canceled(rig: RobotRig) -> None:
             )
         _ends(robot, drive, "A canceled goal", "canceled", CANCEL)
         _stands(robot, dispatcher, "been canceled")
+        drive = _driving(robot, dispatcher, 1)
+        _ends(robot, drive, "The goal after a canceled one", "succeeded", 1.0 + SLACK)
 
 
 def aborted(rig: RobotRig) -> None:
@@ -92,17 +126,11 @@ def aborted(rig: RobotRig) -> None:
 
 
 def shutdown(rig: RobotRig) -> None:
-    """The node is about to be taken down on the way."""
+    """The node is about to be taken down, on the way, and then while nothing is under way."""
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
         drive = _driving(robot, dispatcher, LONG)
         robot.spend(0.5)
-        try:
-            rig.bench.subject.call(Dispatcher.SERVER, "shutdown")
-        except StudentError as error:
-            raise Failed(
-                expected=f"{Dispatcher.SERVER} has a method shutdown() that does not raise.",
-                actual=f"The call raised {error}.",
-            ) from None
+        _shut_down(rig, "in the middle of a drive")
         robot.rest()
         if dispatcher.speeds[-1]:
             raise Failed(
@@ -111,6 +139,19 @@ def shutdown(rig: RobotRig) -> None:
             )
         _ends(robot, drive, "A goal under way at shutdown()", "aborted", ABORT)
         _stands(robot, dispatcher, "been aborted")
+    rig.renew()
+    with rig.robot(Dispatcher.SERVER, Dispatcher):
+        _shut_down(rig, "while no goal is under way")
+
+
+def _shut_down(rig: RobotRig, when: str) -> None:
+    try:
+        rig.bench.subject.call(Dispatcher.SERVER, "shutdown")
+    except StudentError as error:
+        raise Failed(
+            expected=f"{Dispatcher.SERVER} has a method shutdown() that does not raise {when}.",
+            actual=error.told,
+        ) from None
 
 
 def _driving(robot: Robot, dispatcher: Dispatcher, metres: int) -> Drives:

@@ -23,6 +23,7 @@ BREATH = 1.5  # s between the feedbacks of a navigator that is slow, not dead
 TOLERANCE = 0.5  # s: what the task allows, strides, and a node that looks by a timer
 AFTER = 2.5  # s in which a second outcome would show
 METRES = 3
+HESITATION = 0.7  # s that an answer takes which is slow, but in time whatever the tolerance
 
 
 @contextmanager
@@ -116,9 +117,9 @@ def stalled(rig: RobotRig) -> None:
         robot.spend(1.0)
         user.feedback(1)
         _canceled(robot, user)
-        user.end(ServerGoalHandle.canceled)
         when = f"When feedback ceased for {SILENCE:g} s, and the cancel was accepted"
         _outcome(robot, user, when, "stalled")
+        user.end(ServerGoalHandle.canceled)
         _once(robot, user, when, "stalled")
 
 
@@ -127,7 +128,7 @@ def _canceled(robot: Robot, user: NavigatorUser) -> None:
     robot.rest()
     since = user.now
     robot.run(lambda: user.cancels, SILENCE + TOLERANCE)
-    expected = f"{SILENCE:g} s after the last feedback the goal is canceled."
+    expected = f"{SILENCE:g} s after its acceptance or the last feedback the goal is canceled."
     if not user.cancels:
         said = f" It said “{user.outcomes[0]}”." if user.outcomes else ""
         raise Failed(
@@ -138,16 +139,44 @@ def _canceled(robot: Robot, user: NavigatorUser) -> None:
         raise Failed(expected=expected, actual=f"It came after {user.cancels[0] - since:.1f} s.")
 
 
+def _accepted_slowly(robot: Robot, user: NavigatorUser, *, obeys: bool) -> None:
+    """Ask for a drive whose goal is accepted after a while, but in time."""
+    user.request(METRES, obeys=obeys, hesitates=True)
+    _sent(robot, user)
+    robot.spend(HESITATION)
+    if user.outcomes:
+        raise Failed(
+            expected=f"An answer to the goal after {HESITATION:g} s is in time.",
+            actual=f"Before that it said “{user.outcomes[0]}”.",
+        )
+    user.decide()
+    robot.run(lambda: user.goals, PROMPT)
+
+
+def _too_late(robot: Robot, user: NavigatorUser) -> None:
+    """Ask for a drive whose goal is accepted, and reached, when it has been given up."""
+    user.request(METRES, hesitates=True)
+    _sent(robot, user)
+    when = f"When the navigator did not answer the goal for {ANSWER:g} s"
+    _outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
+    user.decide()
+    if robot.run(lambda: user.goals, PROMPT):
+        user.feedback(1)
+        user.end(ServerGoalHandle.succeed)
+    _once(robot, user, f"{when}, then accepted it and arrived", "lost")
+
+
 def lost(rig: RobotRig) -> None:
-    """A navigator that refuses to cancel, one that dies on the way, and none at all."""
+    """A navigator that refuses to cancel, one that is slow or dies on the way, and none at all."""
     with _user(rig) as (robot, user):
-        _accepted(robot, user, obeys=False)
+        _accepted_slowly(robot, user, obeys=False)
         _canceled(robot, user)
         when = "When the navigator refused to cancel"
         _outcome(robot, user, when, "runaway")
         user.feedback(2)
         user.end(ServerGoalHandle.succeed)
         _once(robot, user, f"{when}, and reported success later", "runaway")
+        _too_late(robot, user)
         _accepted(robot, user)
     with _user(rig, navigator=False) as (robot, user):
         when = "When the navigator died on the way"

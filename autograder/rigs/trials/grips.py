@@ -22,6 +22,8 @@ GROWTH = 0.5  # s by which the second pause is longer, at least
 TOLERANCE = 0.25  # s: what the task allows, and what the examiner's strides blur
 AFTER = 1.5  # s in which a second outcome would show
 BEAT = 0.5  # s between two heartbeats
+LATE = 1.4  # s after a try at which its answer is late, whatever the tolerance
+SHORTEST = 2.25  # s: less than two tries take, so that their number is left to another check
 
 
 @contextmanager
@@ -94,6 +96,7 @@ def carried_out(rig: RobotRig) -> None:
                 )
             when = f"When the gripper answered success=True after {delay:g} s"
             _outcome(robot, user, when, "done")
+        _once(robot, user, when)
 
 
 def refused(rig: RobotRig) -> None:
@@ -130,7 +133,8 @@ def unanswered(rig: RobotRig) -> None:
             )
         _outcome(robot, user, when, "failed")
         _require_pauses(times[1] - times[0], times[2] - times[1])
-        _once(robot, user, when)
+        user.tries[2].reply(True)
+        _once(robot, user, f"{when}, and a late answer to the third")
 
 
 def _hint_of_clock(user: GripUser) -> str:
@@ -158,34 +162,67 @@ def _require_pauses(first: float, second: float) -> None:
 
 
 def stale(rig: RobotRig) -> None:
-    """The answer to the first try comes while the second one is under way."""
+    """Answers that come after their try: in the pause, and during a later try or request."""
     with _user(rig) as (robot, user):
         _tried(robot, user, True)
-        first = user.tries[0]
-        if not robot.run(lambda: len(user.tries) > 1 or user.outcomes, LONGEST):
-            raise Failed(
-                expected="After a try without an answer there is a second one.",
-                actual=f"There was no second try in {LONGEST:g} s.",
-            )
-        if len(user.tries) < 2:
-            raise Failed(
-                expected="After a try without an answer there is a second one.",
-                actual=f"After one try it said “{user.outcomes[0]}”.",
-            )
-        first.reply(False)
-        robot.spend(2 * STRIDE)
-        if user.outcomes:
-            raise Failed(
-                expected="The answer to the first try comes after its time, and is ignored.",
-                actual=f"It was taken for the answer to the second: it said “{user.outcomes[0]}” "
-                "while the second try was still open.",
-            )
-        user.tries[1].reply(True)
-        when = (
-            "When the second try was answered with success=True, after a late answer to the first"
-        )
+        robot.spend(LATE)
+        _require_patience(user)
+        user.tries[0].reply(False)
+        _ignored(robot, user, f"first try comes {LATE:g} s after it")
+        _answered_again(robot, user)
+        _once(robot, user, "When the second try was answered, after a late answer to the first")
+
+        _tried(robot, user, False)
+        _tried_again(robot, user)
+        user.tries[0].reply(False)
+        _ignored(robot, user, "first try comes when the second one is under way")
+        _answered_again(robot, user)
+
+        _tried(robot, user, True)
+        late = user.tries[0]
+        _answered_again(robot, user)
+        _tried(robot, user, True)
+        late.reply(False)
+        _ignored(robot, user, "first try for the last request comes when the next one is under way")
+        user.tries[0].reply(True)
+        when = "When a try was answered with success=True, after a late answer from before"
         _outcome(robot, user, when, "done")
-        _once(robot, user, when)
+
+
+def _require_patience(user: GripUser) -> None:
+    if user.outcomes:
+        raise Failed(
+            expected="After a try without an answer there is a second one.",
+            actual=f"After one try it said “{user.outcomes[0]}”.",
+        )
+
+
+def _tried_again(robot: Robot, user: GripUser) -> None:
+    """Wait for the second try of the same request."""
+    robot.run(lambda: len(user.tries) > 1 or user.outcomes, LONGEST)
+    _require_patience(user)
+    if len(user.tries) < 2:
+        raise Failed(
+            expected="After a try without an answer there is a second one.",
+            actual=f"There was no second try in {LONGEST:g} s.{robot.complaint()}",
+        )
+
+
+def _answered_again(robot: Robot, user: GripUser) -> None:
+    """Let the second try succeed."""
+    _tried_again(robot, user)
+    user.tries[1].reply(True)
+    _outcome(robot, user, "When the second try was answered with success=True", "done")
+
+
+def _ignored(robot: Robot, user: GripUser, what: str) -> None:
+    """Require that an answer that has just been given does not count."""
+    robot.spend(2 * STRIDE)
+    if user.outcomes:
+        raise Failed(
+            expected=f"A try has 1 s. The answer to the {what}, and is ignored.",
+            actual=f"It was taken for a present answer: it said “{user.outcomes[0]}”.",
+        )
 
 
 def absent(rig: RobotRig) -> None:
@@ -206,6 +243,11 @@ def absent(rig: RobotRig) -> None:
 def _gone(robot: Robot, user: GripUser, when: str, began: float) -> None:
     _outcome(robot, user, when, "failed", LONGEST + STRIDE)
     lasted = user.now - began
+    if lasted < SHORTEST:
+        raise Failed(
+            expected=f"{when}, three tries have 1 s each, with pauses between: it may come back.",
+            actual=f"“failed” came after {lasted:.1f} s.",
+        )
     beats = [beat for beat in user.beats if beat >= began]
     if len(beats) < int(lasted / BEAT) - 1:
         raise Failed(

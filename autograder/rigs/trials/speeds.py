@@ -11,7 +11,7 @@ from typing import Any
 from rcl_interfaces.msg import Parameter
 
 from autograder.exam import Failed
-from autograder.rigs.gripper import Operator, double, ready, text
+from autograder.rigs.gripper import Operator, double, flag, ready, text, whole
 from autograder.rigs.safety import Robot, RobotRig
 
 PATIENCE = 1.0  # s for an answer; a service callback may await something
@@ -24,21 +24,25 @@ NONSENSE: tuple[tuple[str, list[Parameter]], ...] = (
     ("angular = minus infinity", [double("angular", -math.inf)]),
     ("linear = -0.1", [double("linear", -0.1)]),
     ("linear = 1.5", [double("linear", 1.5)]),
+    ("angular = -0.1", [double("angular", -0.1)]),
     ("angular = 2.5", [double("angular", 2.5)]),
     ("linear = “fast”, a string", [text("linear", "fast")]),
+    ("linear = 1, an integer", [whole("linear", 1)]),
+    ("angular = true, a bool", [flag("angular", True)]),
     ("a limit named “warp”", [double("warp", 0.5)]),
     ("an empty list", []),
 )
 
 
 def good(rig: RobotRig) -> None:
-    """Two good requests: both limits, then one."""
+    """Good requests: both limits, then one at a time, at its bounds."""
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
         _accepted(
             robot, operator, "linear = 0.3, angular = 0.6", (0.3, 0.6), linear=0.3, angular=0.6
         )
         _accepted(robot, operator, "angular = 2.0 alone", (0.3, 2.0), angular=2.0)
         _accepted(robot, operator, "linear = 0.0 alone", (0.0, 2.0), linear=0.0)
+        _accepted(robot, operator, "linear = 1.0 alone", (1.0, 2.0), linear=1.0)
 
 
 def bad(rig: RobotRig) -> None:
@@ -60,6 +64,7 @@ def atomic(rig: RobotRig) -> None:
         )
         halves = [double("linear", 0.2), double("angular", math.nan)]
         _refused(robot, operator, "linear = 0.2 together with angular = NaN", halves)
+        _refused(robot, operator, "angular = NaN together with linear = 0.2", halves[::-1])
         _accepted(
             robot,
             operator,

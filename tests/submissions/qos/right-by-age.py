@@ -18,9 +18,9 @@ class SensorDrivers(Relay):
 class SensorConsumers(Relay):
     def __init__(self):
         super().__init__('sensor_consumers')
-        self.not_older(Image, 'camera/image', 'consumer/camera', 0.9)
-        self.not_older(LaserScan, 'scan', 'consumer/lidar', 0.35)
-        self.not_older(Imu, 'imu/data', 'consumer/imu', 0.4)
+        self.not_older(Image, 'camera/image', 'consumer/camera', 1.0)
+        self.not_older(LaserScan, 'scan', 'consumer/lidar', 0.5)
+        self.not_older(Imu, 'imu/data', 'consumer/imu', 0.5)
         self.relay(String, 'emergency/stop', 'consumer/emergency_stop', source_qos=CABLE)
 
     def not_older(self, msg_type, source, target, seconds):
@@ -28,7 +28,7 @@ class SensorConsumers(Relay):
 
         def handle(msg):
             age = self.get_clock().now() - Time.from_msg(msg.header.stamp)
-            if age.nanoseconds < seconds * 1e9:
+            if age.nanoseconds <= seconds * 1e9:
                 publisher.publish(msg)
 
         self.create_subscription(msg_type, source, handle, deep)

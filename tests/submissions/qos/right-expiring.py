@@ -13,7 +13,7 @@ def fresh(seconds, reliability=ReliabilityPolicy.RELIABLE):
     )
 
 
-camera_qos = fresh(0.8, ReliabilityPolicy.BEST_EFFORT)
-lidar_qos = fresh(0.4)
-imu_qos = fresh(0.4)
+camera_qos = fresh(1.0, ReliabilityPolicy.BEST_EFFORT)
+lidar_qos = fresh(0.5)
+imu_qos = fresh(0.5)
 stop_qos = QoSProfile(history=HistoryPolicy.KEEP_ALL)

@@ -1,4 +1,4 @@
-# title: Drivers that set the frame id and a logger that listens along
+# title: Drivers with short queues for the hardware, that set the frame id; a logger listens along
 # fails: nothing
 
 camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -17,7 +17,7 @@ class SensorDrivers(Node):
         ):
             self.drive(msg_type, name, topic, qos)
         stops = self.create_publisher(String, 'emergency/stop', stop_qos)
-        self.create_subscription(String, 'hardware/emergency_stop', stops.publish, CABLE)
+        self.create_subscription(String, 'hardware/emergency_stop', stops.publish, 10)
 
     def drive(self, msg_type, name, topic, qos):
         publisher = self.create_publisher(msg_type, topic, qos)

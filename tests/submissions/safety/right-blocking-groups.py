@@ -1,4 +1,4 @@
-# title: Callbacks that block on the node's clock, each in a callback group of its own
+# title: Callbacks that block on the node's clock, in groups of their own; more feedback than asked
 # fails: nothing
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup as Own
@@ -139,6 +139,7 @@ class NavigationServer(Node):
         passed = []
         try:
             for metre in range(1, handle.request.order + 1):
+                handle.publish_feedback(Drive.Feedback(sequence=passed))
                 for _ in range(10):
                     if handle.is_cancel_requested:
                         handle.canceled()

@@ -157,7 +157,7 @@ class Wheels:
 #   ignored: it is not the answer to the try that runs now.
 # - Between a failed try and the next one there is a pause: at least 0.5 s before the second try, and
 #   before the third at least 0.5 s longer than before the second. Within 10 s of the request there
-#   is an outcome. A gripper that is not there at all is treated the same way.
+#   is an outcome. A gripper that is not there at all is treated the same way: it may come back.
 # - With every outcome but `done`, the arm must hold still: publish an `Empty` on `arm/hold`.
 # - All the time, whatever happens, an `Empty` on `grip/heartbeat` every 0.5 s shows that the node is
 #   alive.
@@ -354,7 +354,8 @@ class NavigationClient(Node):
 # - If the wheels raise, the goal is **aborted** within 1 s, and the reason is published in words on
 #   `drive/fault` (`String`). The next goal is served as usual.
 # - Whoever takes the node down calls its method `shutdown()` first, in a thread of their own. It does
-#   not wait: it stops the wheels, and the goal that is under way is **aborted** within 1 s.
+#   not wait: it stops the wheels, and the goal that is under way, if there is one, is **aborted**
+#   within 1 s.
 # - **However it ends** (succeeded, canceled, aborted, shut down) the robot stands: the last message
 #   on `cmd_vel` is a zero `Twist`, within 0.5 s of the end.
 
@@ -448,7 +449,7 @@ check("safety")
 # %% [markdown] nbgrader={"grade": false, "grade_id": "safety-about-hidden", "locked": true, "schema_version": 3, "solution": false}
 # The next cell is empty for you. When your work is graded, it examines the rest of the task: late
 # answers and the heartbeat of part A, half-good requests and jammed wheels of part B, a navigator
-# that is not there, dies or refuses to cancel in part C, and the shutdown in part D.
+# that is slow, is not there, dies or refuses to cancel in part C, and the shutdown in part D.
 
 # %% nbgrader={"grade": true, "grade_id": "safety-hidden", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 # Filled in when your work is graded.

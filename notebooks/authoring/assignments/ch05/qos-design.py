@@ -25,7 +25,7 @@
 # | emergency stop | `emergency/stop` | `std_msgs/String`, on each press and release | Every event, in order, at every consumer, whichever reliability it asks for. Up to 100 events can queue up while a consumer is busy or out of radio range; whoever comes back into range gets all that it missed. |
 #
 # And one rule for camera, LIDAR and IMU together: a node that starts late must not be handed old
-# readings. Whether the emergency stop remembers its last event for late joiners is up to you.
+# readings, not even if it asks for them. Whether the emergency stop remembers its last event for late joiners is up to you.
 #
 # The drivers publish each reading as soon as the hardware delivers it, with its content unchanged;
 # the consumers hand on what they act on. Leave the threads to ROS 2: the examiner keeps your
