@@ -79,6 +79,7 @@ class BackgroundExecutor(Executor):
         self._created = CreatedTasks()
         self._awaiting: weakref.WeakSet[Task] = weakref.WeakSet()
         self._returned = False  # a coroutine has ended since the last round
+        self._newest_end = object()  # another one each time that a callback is done
         self._interrupted = self.gate.new_interrupt()
         self._round = _fresh_false()
         self._workers = Workers(threads, self._run, name) if threads > 1 else None
@@ -304,6 +305,7 @@ class BackgroundExecutor(Executor):
     def _run(self, job: Job) -> bool:
         """Run a callback; return whether this thread is to go on with others."""
         job.thread_id = threading.get_ident()
+        newest_end = self._newest_end
         self.gate.notify_watchers()
         streams.install()
         failure = job()
@@ -325,9 +327,25 @@ class BackgroundExecutor(Executor):
         except KeyError:  # somebody has given this thread up
             self.given_up.discard(job)
             goes_on = False
+        if self._workers is not None:
+            self._workers.end(job)
+        self._resume_coroutines(job, newest_end)
         self.pulse.beat()
         self.gate.notify_watchers()
         return goes_on
+
+    def _resume_coroutines(self, job: Job, newest_end: object) -> None:
+        """Have the coroutines looked at again that may have awaited what is done now.
+
+        rclpy resumes each of them once before it waits, and leaves out those that run at that
+        moment. What one awaits may be done just after that, and nothing else might ever wake it.
+        """
+        if job.task.done():
+            self._newest_end = object()  # before the look at who awaits: one of two sees the other
+            if self._awaiting:
+                self.wake()
+        elif self._newest_end is not newest_end:
+            self.wake()
 
     def _drop_what_never_began(self) -> None:
         # A coroutine that never began would complain on stderr.

@@ -22,7 +22,7 @@ class Workers:
     def __init__(self, count: int, run: Callable[[Job], bool], name: str) -> None:
         """Make the pool; its threads, `threads`, are for the caller to start and to join.
 
-        `run` runs a job and returns whether its thread is to go on with the next one.
+        `run` runs a job, `end`s it, and returns whether its thread is to go on with the next one.
         """
         self._run = run
         self._name = name
@@ -48,6 +48,10 @@ class Workers:
         """Return the job that was put for `task` and has not ended, if there is one."""
         return self._in_hand.get(task)
 
+    def end(self, job: Job) -> None:
+        """Forget `job`: its task may be put again, if it is a coroutine that is not done."""
+        self._in_hand.pop(job.task, None)
+
     def stop(self) -> None:
         """Let every worker end after the job that it runs."""
         self._stopping = True
@@ -68,7 +72,5 @@ class Workers:
             if self._stopping:
                 self._queue.put(job)  # for `never_begun`
                 return
-            goes_on = self._run(job)
-            self._in_hand.pop(job.task, None)
-            if not goes_on:
+            if not self._run(job):
                 return

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -199,7 +200,10 @@ def test_a_coroutine_waits_for_a_future_while_callbacks_run(host):
 
 
 def test_a_task_can_await_another(host):
-    executor = executor_of(host.run())
+    node = host.run()
+    executor = executor_of(node)
+    # rclpy's executors look at coroutines when something wakes them, and this one may just run.
+    node.create_timer(0.005, lambda: None)
 
     async def inner():
         return 20
@@ -210,6 +214,33 @@ def test_a_task_can_await_another(host):
     task = executor.create_task(outer)
     wait(task.done)
     assert task.result() == 21
+
+
+@pytest.mark.parametrize("threads", [1, 4])
+def test_a_sessions_coroutine_goes_on_when_what_it_awaits_is_done(threads):
+    """Whichever is older, whichever runs at that moment, and though nothing else happens."""
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)  # as if many cores looked for the moment in which nobody looks
+    try:
+        with session(threads) as host:
+            executor = executor_of(host.run())
+
+            async def inner():
+                return 20
+
+            async def outer():
+                return await executor.create_task(inner) + 1
+
+            async def after(task):
+                return await task + 1
+
+            for _ in range(100):
+                task = executor.create_task(outer)
+                last = executor.create_task(after, task)
+                wait(last.done)
+                assert (task.result(), last.result()) == (21, 22)
+    finally:
+        sys.setswitchinterval(interval)
 
 
 def test_a_cancelled_task_never_runs(host):
