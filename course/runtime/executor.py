@@ -78,6 +78,7 @@ class BackgroundExecutor(Executor):
         self.finished = 0  # callbacks; told apart only from what it was
         self._created = CreatedTasks()
         self._awaiting: weakref.WeakSet[Task] = weakref.WeakSet()
+        self._has_awaited = False  # most programs never do, and looking at a weak set takes time
         self._returned = False  # a coroutine has ended since the last round
         self._newest_end = object()  # another one each time that a callback is done
         self._interrupted = self.gate.new_interrupt()
@@ -309,11 +310,16 @@ class BackgroundExecutor(Executor):
         self.gate.notify_watchers()
         streams.install()
         failure = job()
-        if not job.task.done():
+        # rclpy resumes each coroutine once before it waits, and leaves out those that run at that
+        # moment. What one awaits may be done just after that, and nothing else might ever wake it.
+        if done := job.task.done():
+            self._newest_end = object()  # before the look at who awaits: one of two sees the other
+            if look_again := self._has_awaited and len(self._awaiting) > 0:
+                self._returned = self._returned or job.task in self._awaiting
+                self._awaiting.discard(job.task)
+        else:
+            self._has_awaited = True
             self._awaiting.add(job.task)
-        elif job.task in self._awaiting:
-            self._awaiting.discard(job.task)
-            self._returned = True
         if job.unfinished is not None:
             streams.finish_lines(job)
         if failure is not None:
@@ -329,23 +335,11 @@ class BackgroundExecutor(Executor):
             goes_on = False
         if self._workers is not None:
             self._workers.end(job)
-        self._resume_coroutines(job, newest_end)
+        if look_again if done else self._newest_end is not newest_end:
+            self.wake()
         self.pulse.beat()
         self.gate.notify_watchers()
         return goes_on
-
-    def _resume_coroutines(self, job: Job, newest_end: object) -> None:
-        """Have the coroutines looked at again that may have awaited what is done now.
-
-        rclpy resumes each of them once before it waits, and leaves out those that run at that
-        moment. What one awaits may be done just after that, and nothing else might ever wake it.
-        """
-        if job.task.done():
-            self._newest_end = object()  # before the look at who awaits: one of two sees the other
-            if self._awaiting:
-                self.wake()
-        elif self._newest_end is not newest_end:
-            self.wake()
 
     def _drop_what_never_began(self) -> None:
         # A coroutine that never began would complain on stderr.
