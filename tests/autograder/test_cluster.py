@@ -75,8 +75,17 @@ def wait_for(condition: Callable[[], object], what: str) -> None:
 
 
 def children(process: subprocess.Popen[bytes]) -> list[psutil.Process]:
-    """Return a worker's examiners and subjects."""
-    return psutil.Process(process.pid).children(recursive=True)
+    """Return a worker's examiners and subjects, and what they run in."""
+    return [child for child in psutil.Process(process.pid).children(recursive=True) if ours(child)]
+
+
+def ours(process: psutil.Process) -> bool:
+    """Whether it was started for a job: Dask starts programs of its own before it has any."""
+    try:
+        command = " ".join(process.cmdline())
+    except psutil.Error:  # it has just ended
+        return False
+    return "autograder" in command or "bwrap" in command
 
 
 Work = tuple[subprocess.Popen[bytes], list[psutil.Process]]
