@@ -31,7 +31,7 @@ from autograder.rigs.sensors import (
     sensor_rig,
     undemanding,
 )
-from autograder.rigs.stalling import BURST, backlog, few, require_burst, require_fresh
+from autograder.rigs.stalling import BURST, backlog, few, lost, require_burst, require_fresh
 
 EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
 
@@ -312,8 +312,7 @@ def stop_complete(rig: SensorRig) -> str:
     count, kept = found.count, found.kept
     if kept != list(range(count)):
         missing = count - len(set(kept))
-        lost = "was lost" if missing == 1 else "were lost"
-        what = f"{missing} of {count} {lost}" if missing else "Some came twice or out of order"
+        what = f"{lost(missing, count)}" if missing else "Some came twice or out of order"
         raise Failed(
             expected=f"All {count} events of the pause are handled, once and in order.",
             actual=f"{what}: the consumer handled {few(kept)}.",

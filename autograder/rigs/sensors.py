@@ -201,11 +201,6 @@ class ExaminerNode(Node):
         """Return the number of a phase of the exam."""
         return self._phases.setdefault(name, len(self._phases) + 1)
 
-    def send(self, sensor: Sensor, phase: str, count: int = 1) -> None:
-        """Feed ``count`` readings at once, numbered from 0, into a sensor's hardware."""
-        for index in range(count):
-            self.publish(sensor, phase, index)
-
     def publish(self, sensor: Sensor, phase: str, index: int) -> None:
         """Feed one reading, taken now, into a sensor's hardware."""
         tag = Tag(self.nonce, self.phase(phase), index)
@@ -317,7 +312,7 @@ class SensorRig:
         silent = list(sensors)
         for _ in range(int(SETTLE / PROBE_PERIOD)):
             for sensor in silent:
-                self.node.send(sensor, phase)
+                self.node.publish(sensor, phase, 0)
             self.wait(partial(self._all_heard, silent, heard, phase), PROBE_PERIOD)
             silent = self._silent(silent, heard, phase)
             if all(give_up is not None and give_up(sensor) for sensor in silent):

@@ -193,13 +193,17 @@ def require_burst(rig: SensorRig, expected: str) -> None:
             "person will look at it."
         )
     if found.missing:
-        lost = "was lost" if found.missing == 1 else "were lost"
-        actual = f"Of {BURST} readings that came in while it was busy {found.missing} {lost}."
+        actual = f"Of {BURST} readings that came in while it was busy {lost(found.missing)}."
     elif found.kept != sorted(found.kept):
         actual = f"It passed them on out of order: {few(found.kept)}."
     else:
         return
     raise Failed(expected=expected, actual=actual)
+
+
+def lost(number: int, of: int = 0) -> str:
+    """Return a phrase such as "1 was lost", or "2 of 7 were lost"."""
+    return f"{number}{f' of {of}' if of else ''} {'was' if number == 1 else 'were'} lost"
 
 
 def few(numbers: list[int]) -> str:

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 from action_msgs.msg import GoalStatus
 
 from autograder.bench import StudentError
@@ -61,7 +63,7 @@ def arrives(rig: RobotRig) -> None:
 def _require_feedback(dispatcher: Dispatcher, drive: Drives) -> None:
     """Require that marks are told as they are passed; nothing new may be told in between."""
     told = [marks for marks in drive.feedback if marks]
-    if [marks for n, marks in enumerate(told) if told[:n][-1:] != [marks]] != [[1], [1, 2]]:
+    if [marks for marks, _repeated in groupby(told)] != [[1], [1, 2]]:
         raise Failed(
             expected="After each metre there is feedback: [1], then [1, 2].",
             actual=f"The feedback was {', then '.join(map(str, drive.feedback)) or 'nothing'}.",
