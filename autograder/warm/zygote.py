@@ -9,6 +9,7 @@ is itself not in it, forks once more, reports that process and, when it has ende
 from __future__ import annotations
 
 import argparse
+import atexit
 import gc
 import json
 import os
@@ -114,17 +115,48 @@ def _reap(*_: object) -> None:
             pass
 
 
+class _Leaving:
+    """How a fork ends: as any Python program, but without the exit functions of C libraries.
+
+    Those know threads that a fork does not have; LTTng's cancels its own, and crashes. So this is
+    the last of Python's exit functions, which are called in the order opposite to their arrival.
+    """
+
+    def __init__(self) -> None:
+        self._code: int | None = None
+        atexit.register(self)
+
+    def run(self, task: Task) -> int:
+        """Run a task in this process, which is a fork; return its exit code."""
+        self._code = 1  # for what it raises
+        try:
+            self._code = task.run()
+        except SystemExit as leaving:
+            if leaving.code is None or isinstance(leaving.code, int):
+                self._code = leaving.code or 0
+            raise
+        return self._code
+
+    def __call__(self) -> None:
+        if self._code is not None:
+            for stream in (sys.stdout, sys.stderr):
+                with suppress(OSError, ValueError):  # nobody reads it any more, or it is closed
+                    stream.flush()
+            os._exit(self._code)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the process, and in a fork of it what that is to be; returns its exit code."""
     parser = argparse.ArgumentParser(prog="autograder.warm.zygote")
     parser.add_argument("--socket", type=int, required=True, help="file descriptor of the tasks")
     parser.add_argument("module", help="the module whose main() is run")
     options = parser.parse_args(arguments)
+    leaving = _Leaving()  # before anything else has an exit function
     tasks = socket.socket(fileno=options.socket)
     module: Any = import_module(options.module)
     module.preload()
-    # A fork has no thread but the one that forked. What libraries keep in waiting does no harm: the
-    # workers of OpenBLAS are made anew in a fork, LTTng's only listen for a tracer.
+    # A fork has no thread but the one that forked. Two libraries have some that are not Python's:
+    # the workers of OpenBLAS are made anew in a fork, LTTng's only listen for a tracer.
     if threading.active_count() > 1:
         sys.exit(f"{options.module} starts threads when it is imported, which no fork would have")
     # What is here now stays: nothing of it needs to be looked at, and so copied, by a fork.
@@ -133,7 +165,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGCHLD, _reap)
     tasks.send(json.dumps({"ready": os.getpid()}).encode())
     task = serve(tasks)
-    return 0 if task is None else task.run()
+    return 0 if task is None else leaving.run(task)
 
 
 if __name__ == "__main__":

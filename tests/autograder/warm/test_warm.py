@@ -20,10 +20,10 @@ from autograder.warm.task import Task
 from course.runtime.waiting import Pulse, poll
 
 PROGRAM = """
-import os, sys, signal
+import atexit, os, signal, sys, threading
 
 def preload():
-    pass
+    import rclpy  # and with it LTTng, which has threads that listen
 
 def main(arguments):
     command, *rest = arguments
@@ -37,6 +37,15 @@ def main(arguments):
         raise ValueError("nothing of it")
     elif command == "signal":
         os.kill(os.getpid(), signal.SIGTERM)
+    elif command == "leave":
+        atexit.register(print, "last words")
+        many = threading.Barrier(50)
+        threads = [threading.Thread(target=many.wait) for _ in range(many.parties)]
+        for thread in threads:  # their ends give the memory of stacks back to the machine
+            thread.start()
+        threading.Thread(target=lambda: threads[-1].join() or print("a thread ended")).start()
+        if rest:
+            sys.exit(rest[0])
     return 0
 """
 
@@ -97,6 +106,15 @@ def test_what_a_fork_raises_is_read_from_its_errors(zygote: Zygote) -> None:
     assert process.wait(30) == 1
     with os.fdopen(out_of) as stream:
         assert stream.read().splitlines()[-1] == "ValueError: nothing of it"
+    os.close(into)
+
+
+@pytest.mark.parametrize(("said", "code"), [([], 0), (["no submission"], 1)])
+def test_a_fork_ends_as_a_program_does(zygote: Zygote, said: list[str], code: int) -> None:
+    process, into, out_of = forked(zygote, "leave", *said)
+    assert process.wait(30) == code
+    with os.fdopen(out_of) as stream:
+        assert {*stream.read().splitlines()} == {*said, "a thread ended", "last words"}
     os.close(into)
 
 
