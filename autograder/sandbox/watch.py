@@ -18,7 +18,10 @@ _TICK = os.sysconf("SC_CLK_TCK")
 
 
 class Watch:
-    """Adds up memory and processor time of a process namespace; kills its first process."""
+    """Adds up memory and processor time of a process namespace; kills its first process.
+
+    A sandbox that is not complete yet has the machine's own files, its process list among them.
+    """
 
     def __init__(self, init: int, handle: int, limits: Limits) -> None:
         """Watch the namespace whose process 1 is ``init``, as seen from here, with a pidfd."""
@@ -49,6 +52,8 @@ class Watch:
         """Return what is used too much of, as a phrase, or an empty string."""
         if time.monotonic() - self._started > self._limits.wall:
             return f"it ran for more than {self._limits.wall} s"
+        if (self._proc / "self").exists():
+            return ""  # whoever is here has no number in there; so this is still the machine's own
         processes = [entry for entry in self._proc.iterdir() if entry.name.isdecimal()]
         if len(processes) > self._limits.processes:
             return f"it started more than {self._limits.processes} processes"

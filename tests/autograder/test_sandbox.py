@@ -19,6 +19,7 @@ from autograder.corpus import Case
 from autograder.gradebook import CourseGradebook
 from autograder.sandbox import BoxError, SandboxError, network, probe, seccomp
 from autograder.sandbox.limits import Limits
+from autograder.sandbox.watch import Watch
 from autograder.store import OutcomeStore
 from autograder.submission import Cell
 
@@ -163,6 +164,17 @@ def test_the_hidden_part_is_examined_in_full() -> None:
 def test_limits_survive_the_way_to_the_subject() -> None:
     limits = Limits(memory=1, wall=2)
     assert Limits.from_json(limits.to_json()) == limits
+
+
+def test_the_machine_s_own_processes_do_not_count() -> None:
+    # A process that is not in its sandbox yet, as bwrap's first one is while it makes it.
+    with subprocess.Popen(["sleep", "infinity"]) as process:
+        handle = os.pidfd_open(process.pid)
+        watch = Watch(process.pid, handle, Limits(processes=1, cpu=0, memory=0, wall=1))
+        assert process.wait(30) == -signal.SIGKILL
+        watch.stop()
+        os.close(handle)
+    assert watch.reason == "it ran for more than 1 s"
 
 
 def test_the_filter_is_a_whole_number_of_instructions() -> None:
