@@ -329,8 +329,10 @@ def plain_program(program: Path, prose: str) -> Path:
     [ending] = re.findall(r"> ```python\n(.*?)> ```", note, re.DOTALL)
     nodes = program.read_text(encoding="utf-8").partition("NODE_CLASSES =")[0]
     lines = [
+        "import signal",
         "import rclpy",
-        "from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor",
+        "from rclpy.executors import MultiThreadedExecutor",
+        "from rclpy.signals import SignalHandlerOptions",
         *(line.removeprefix(">").removeprefix(" ") for line in ending.splitlines()),
     ]
     path = program.with_name("plain.py")
@@ -347,8 +349,8 @@ def test_the_ending_without_course_is_clean(
         for running in run(plain_program, 150):
             outside.next_message(String, "processed/data", timeout=60.0)
             code, _ = running.stop(number)
-            assert code == 0
             assert "Traceback" not in running.errors.read_text()
+            assert code == 0
 
 
 @pytest.mark.timeout(400)

@@ -1163,27 +1163,37 @@ assert "Action result: [0, 1, 1, 2, 3, 5]" in talk
 #
 # > **Note** The printed chapter catches `KeyboardInterrupt` and then calls `rclpy.shutdown()`. By
 # > then rclpy's own signal handler has already shut the context down, so that call raises an error;
-# > and the nodes are never destroyed. Without `course`, end a program like this:
+# > and the nodes are never destroyed. Callbacks that still run then have no context any more either.
+# > Without `course`, take Ctrl-C yourself, stop spinning, and clean up while everything still works:
 # >
 # > ```python
-# > rclpy.init()
+# > running = True
+# >
+# >
+# > def stop(signal_number, frame):
+# >     global running
+# >     running = False
+# >
+# >
+# > signal.signal(signal.SIGINT, stop)  # Ctrl-C
+# > signal.signal(signal.SIGTERM, stop)  # how the system ends a program
+# > rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
 # > executor = MultiThreadedExecutor(num_threads=5)
 # > nodes = [SensorNode(), ProcessingNode(), ServiceNode(), ActionNode(), ClientNode()]
 # > for node in nodes:
 # >     executor.add_node(node)
 # > try:
-# >     executor.spin()
-# > except (KeyboardInterrupt, ExternalShutdownException):
-# >     pass
+# >     while running:
+# >         executor.spin_once(timeout_sec=0.1)
 # > finally:
 # >     for node in nodes:
 # >         node.destroy_node()
 # >     executor.shutdown()
-# >     rclpy.try_shutdown()
+# >     rclpy.shutdown()
 # > ```
 # >
-# > (A goal that runs at that moment may still print a line on its way out; `course` waits for it.)
-# > Sources: rclpy, `rclpy.try_shutdown` and `rclpy.executors.ExternalShutdownException`.
+# > (A callback that is under way at that moment may still print a line; `course` waits for it.)
+# > Source: rclpy, `rclpy.init`, its `signal_handler_options`.
 
 
 # %%
