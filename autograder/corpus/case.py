@@ -130,12 +130,13 @@ class Case:
             f"{what} {', '.join(sorted(names))}"
             for what, names in (
                 ("did not fail but must:", self.must_fail - failed - unknown),
-                ("failed but must not:", failed - self.must_fail),
                 ("must pass:", set() if self.fails else set(checks) - passed - failed),
                 ("grader error in:", spoilt),
             )
             if names
         ]
+        for name in sorted(failed - self.must_fail):
+            differences.append(f"{name} failed but must not: {_words(checks[name])!r}")
         for name, fragment in self.says.items():
             if name in checks and name not in unknown and fragment not in _words(checks[name]):
                 differences.append(f"{name} does not say {fragment!r}: {_words(checks[name])!r}")

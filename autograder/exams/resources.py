@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger
 from autograder.exam import Exam, Failed
 from autograder.rigs.camera import PERIOD, SETTLE, SNAPSHOT, CameraRig, camera_rig, phrase
 from autograder.rigs.camera_duties import (
+    let_arrive,
     require_callbacks_ended,
     require_closed,
     require_endpoints,
@@ -267,8 +268,7 @@ def silent_when_inactive(rig: CameraRig) -> None:
         require_still(rig, device, "configure")
         node.go("activate")
         require_picture(rig, device)
-        # What was read is on its way: let it arrive.
-        rig.wait(lambda: rig.pictures(device)[-1].number == max(rig.cameras(device)) - 1, 1.0)
+        let_arrive(rig, device)
         node.go("deactivate")
         sent = len(rig.pictures(device))
         require_still(rig, device, "deactivate")

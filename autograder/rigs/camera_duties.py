@@ -48,6 +48,7 @@ def require_rate(rig: CameraRig, device: str, rate: float, when: str = "") -> No
         # A thread may publish a moment after the timer: let it keep up.
         due = before + int(rate / STEPS * step) - 1
         rig.wait(lambda due=due: len(rig.pictures(device)) >= due, deadline.left)  # type: ignore[misc]
+    let_arrive(rig, device)
     came = len(rig.pictures(device)) - before
     # Some of those before may have been on their way: not more than one step's.
     if abs(came - rate) > max(1.0, rate / STEPS):
@@ -55,6 +56,19 @@ def require_rate(rig: CameraRig, device: str, rate: float, when: str = "") -> No
             expected=f"In one second {rate:.0f} pictures come{when}.",
             actual=f"In one second of the robot's time {came} came{rig.raised()}.",
         )
+
+
+def let_arrive(rig: CameraRig, device: str) -> None:
+    """Wait for pictures of ``device`` that were read and are on their way.
+
+    Not for long: a thread may read all the time, and publish just some of what it reads.
+    """
+
+    def all_here() -> bool:
+        newest = [picture.number for picture in rig.pictures(device)[-1:]]
+        return newest >= [max(rig.cameras(device), default=0) - 1]
+
+    rig.wait(all_here, 1.0)
 
 
 def require_own_clock(rig: CameraRig, device: str) -> None:

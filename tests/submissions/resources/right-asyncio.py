@@ -2,12 +2,15 @@
 # fails: nothing
 
 import asyncio
+from concurrent.futures import Future
 
 
 class CameraDriver(Node):
     loop = thread = camera = None
+    over = False
 
     def __init__(self, device="front"):
+        self.gate = threading.Lock()
         super().__init__("aio_camera")
         try:
             self.camera = Camera(device)
@@ -32,7 +35,12 @@ class CameraDriver(Node):
         return True
 
     def order(self):
-        return asyncio.run_coroutine_threadsafe(self.picture(), self.loop)
+        with self.gate:
+            if not self.over:
+                return asyncio.run_coroutine_threadsafe(self.picture(), self.loop)
+        refused = Future()
+        refused.set_result(False)
+        return refused
 
     def on_timer(self):
         self.order()
@@ -47,8 +55,10 @@ class CameraDriver(Node):
     def destroy_node(self):
         if self.camera is not None:
             self.camera.close()  # whoever waits for a picture goes on with an error
+        with self.gate:
+            self.over = True
         if self.thread is not None:
-            # Behind every order that is in the loop by now: none is left unanswered.
+            # Behind every order, all of which are in the loop by now: none is left unanswered.
             self.loop.call_soon_threadsafe(self.loop.stop)
             self.thread.join()
             self.loop.run_until_complete(asyncio.sleep(0))

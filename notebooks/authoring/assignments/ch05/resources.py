@@ -157,9 +157,9 @@ class Camera:
         with self._lock:
             if not self._closed.is_set():
                 self._closed.set()
-                os.close(self._file)
                 with Camera._registry:
                     Camera._in_use.discard(self.device)
+                    os.close(self._file)
 
     def _require_open(self):
         if self._closed.is_set():
