@@ -29,6 +29,9 @@ PASSING = (BoxError, ZygoteError)
 MOST_STARTS = 3
 """Times that a notebook is started in vain before the run ends with the reason."""
 
+MOST_TRIES = 2
+"""Times that a notebook is run if the grader itself fails; then a person is told."""
+
 
 @dataclass(frozen=True)
 class Graded:
@@ -177,7 +180,12 @@ class ClassRun:
         self._workers.submit(key, piece.job)
 
     def _finish(self, done: Done) -> None:
-        if isinstance(done.error, PASSING) and self._starts[done.key] < MOST_STARTS:
+        most = 1
+        if isinstance(done.error, PASSING):
+            most = MOST_STARTS
+        elif done.result is not None and done.result.outcome.spoilt:
+            most = MOST_TRIES
+        if self._starts[done.key] < most:
             self._start(done.key, self._running[done.key][0])
             return
         pieces = self._running.pop(done.key)

@@ -152,6 +152,20 @@ def test_a_mistake_of_the_grader_is_tried_again(
     assert (seen.run, seen.entered) == (1, ["right"])
 
 
+def test_a_mistake_of_the_grader_that_passes_costs_nobody_a_grade(
+    class_: Undisturbed, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    course = course_of(class_, tmp_path, graded=False)
+    timeouts = iter([0.0])
+    monkeypatch.setattr(
+        runner.Channel, "receive", lambda channel, timeout, real=runner.Channel.receive:
+        real(channel, next(timeouts, timeout)),
+    )  # fmt: skip
+    engine.grade(course.root, ASSIGNMENT, jobs=1)
+    assert next(timeouts, None) is None
+    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
+
+
 def refuse(folder: Path, monkeypatch: pytest.MonkeyPatch, times: int) -> None:
     """Have the next ``times`` sandboxes refused, as on a machine that is out of processes."""
     (folder / "left").write_text(str(times))
