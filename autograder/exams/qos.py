@@ -312,7 +312,7 @@ def stop_complete(rig: SensorRig) -> str:
     count, kept = found.count, found.kept
     if kept != list(range(count)):
         missing = count - len(set(kept))
-        what = f"{lost(missing, count)}" if missing else "Some came twice or out of order"
+        what = lost(missing, count) if missing else "Some came twice or out of order"
         raise Failed(
             expected=f"All {count} events of the pause are handled, once and in order.",
             actual=f"{what}: the consumer handled {few(kept)}.",
