@@ -21,10 +21,10 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import nbformat
-from playwright.sync_api import BrowserContext, sync_playwright
+from playwright.sync_api import BrowserContext
 
 from tests import robot
-from tests.browser.conftest import ARGUMENTS, BROWSERS
+from tests.browser import chromium
 from tests.browser.lab import Lab
 from tests.browser.notebook_page import NotebookPage
 from tests.browser.test_views import SETUP
@@ -64,11 +64,8 @@ def watch(lab: Lab, context: BrowserContext, rate: float, views: int, seconds: f
 @contextmanager
 def browser() -> Iterator[BrowserContext]:
     """Give a window of a real browser."""
-    path = next(found for name in BROWSERS if (found := shutil.which(name)))
-    with sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+    with chromium.started() as running:
         yield running.new_context(viewport={"width": 1280, "height": 900})
-        running.close()
 
 
 def main() -> None:
