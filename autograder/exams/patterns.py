@@ -114,14 +114,15 @@ def camera_streams(rig: RobotRig) -> None:
     needed = "Pictures come by themselves, 10 a second, for any number of viewers."
     offers.require(rig, "camera", WORKING["camera"], needed)
     pictures = rig.node.pictures
-    since, before = rig.still
-    # One may have been on its way. A publisher that goes by the wall's clock sends more.
-    if rig.wait(lambda: len(pictures) > before + 1, since + FROZEN - time.monotonic()):
+    since = rig.still
+    left = FROZEN - (time.time_ns() - since) / 1e9
+    # One may have been under way. A publisher that goes by the wall's clock sends more.
+    if rig.wait(lambda: len(pictures) > 1 and pictures[-2].published > since, left):
         raise Failed(
             expected=f"{needed} The node's clock sets the pace, as a timer of the node does.",
             actual="Pictures were published while the node's clock stood still.",
         )
-    if not rig.wait_stepping(lambda: len(pictures) > before, 2.0):
+    if not rig.wait_stepping(lambda: pictures and pictures[-1].published > since, 2.0):
         raise Failed(
             expected=needed,
             actual=f"Not one picture came in 2 s of the node's time{rig.because()}.",

@@ -98,6 +98,8 @@ class Drive:
         """
         rig = self._rig
         rig.wait_stepping(lambda: rig.speed > 0 or self.run.done)
+        rig.step(0.01)
+        _hear_out(rig)  # a goal that has ended here, not at the next station, is told so
         self._require_going_on()
         if rig.speed <= 0:
             speeds = "hardware/speed said nothing"
@@ -265,14 +267,22 @@ def _acquaint(rig: RobotRig) -> None:
     DDS makes endpoints known in the order in which they were made. So once a client that is newer
     than all of them gets an answer, the subject's writers know the earlier readers, too.
     """
-    services = rig.node.get_service_names_and_types()
-    names = [
-        name
-        for name, types in services
-        if types == ["rcl_interfaces/srv/GetParameters"] and rig.node.count_services(name)
-    ]
-    if names:
-        client = rig.node.create_client(GetParameters, names[0])
+    if name := _answering(rig):
+        client = rig.node.create_client(GetParameters, name)
         if rig.wait(client.service_is_ready):
             rig.wait(client.call_async(GetParameters.Request()).done)
         rig.node.destroy_client(client)
+
+
+def _hear_out(rig: RobotRig) -> None:
+    """Return when what the subject has sent so far has come in: it has answered since."""
+    if name := _answering(rig):
+        rig.call(GetParameters, name, GetParameters.Request())
+
+
+def _answering(rig: RobotRig) -> str | None:
+    """Return a service that every node of the subject's has, unless it was made without."""
+    for name, types in rig.node.get_service_names_and_types():
+        if types == ["rcl_interfaces/srv/GetParameters"] and rig.node.count_services(name):
+            return name
+    return None

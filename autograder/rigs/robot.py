@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import secrets
 import time
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from functools import partial
+from operator import itemgetter
 from typing import Any, NamedTuple, TypeVar, overload
 
 from rclpy.duration import Duration
@@ -52,19 +53,23 @@ class Picture(NamedTuple):
 
 
 class Ears(Sequence[T]):
-    """What two subscriptions to one topic have heard, in order: that of the one that heard more.
+    """What two subscriptions to one topic have heard, each message once, in order of publication.
 
-    One is best effort and matches every publisher, the other is reliable and loses nothing.
+    One is best effort and matches every publisher, the other is reliable and loses nothing. Neither
+    alone has all: the first may lose the newest message, the second may have matched later.
     """
 
     def __init__(self) -> None:
         """Nothing yet."""
-        self.reliable: list[T] = []
-        self.any: list[T] = []
+        self._heard: list[tuple[int, T]] = []
+        self._forgotten = 0
 
-    @property
-    def _best(self) -> list[T]:
-        return self.reliable if len(self.reliable) >= len(self.any) else self.any
+    def hear(self, published: int, item: T) -> None:
+        """Note what was published at ``published`` (ns), unless it has been heard before."""
+        at = bisect_left(self._heard, published, key=itemgetter(0))
+        known = at < len(self._heard) and self._heard[at][0] == published
+        if published > self._forgotten and not known:
+            self._heard.insert(at, (published, item))
 
     @overload
     def __getitem__(self, index: int) -> T: ...
@@ -72,20 +77,23 @@ class Ears(Sequence[T]):
     def __getitem__(self, index: slice) -> list[T]: ...
     def __getitem__(self, index: int | slice) -> T | list[T]:
         """Return one item, or some."""
-        return self._best[index]
+        if isinstance(index, slice):
+            return [item for _, item in self._heard[index]]
+        return self._heard[index][1]
 
     def __len__(self) -> int:
         """Return how many there are."""
-        return len(self._best)
+        return len(self._heard)
 
     def __iter__(self) -> Iterator[T]:
         """Go through a copy."""
-        return iter(list(self._best))
+        return iter(self[:])
 
     def clear(self) -> None:
-        """Forget all."""
-        self.reliable.clear()
-        self.any.clear()
+        """Forget all, and what the other subscription may still hear of it."""
+        if self._heard:
+            self._forgotten = self._heard[-1][0]
+            self._heard = []
 
 
 class ExaminerNode(Node):
@@ -107,26 +115,18 @@ class ExaminerNode(Node):
         self.speeds = Ears[float]()
         self.levels = Ears[float]()
         self.pictures = Ears[Picture]()
-        self._both(Float64, "hardware/speed", self.speeds, lambda msg: msg.data)
-        self._both(BatteryState, "robot/battery", self.levels, lambda msg: msg.percentage)
-        for heard, reliable in ((self.pictures.any, False), (self.pictures.reliable, True)):
-            see = partial(self._see, heard)
-            self.listen(Image, "robot/camera", see, reliable=reliable)
+        self._both(Float64, "hardware/speed", self.speeds, lambda msg, _: msg.data)
+        self._both(BatteryState, "robot/battery", self.levels, lambda msg, _: msg.percentage)
+        self._both(Image, "robot/camera", self.pictures, _picture)
 
-    def _both(
-        self, msg_type: Any, topic: str, ears: Ears[float], value: Callable[[Any], float]
-    ) -> None:
-        for heard, reliable in ((ears.any, False), (ears.reliable, True)):
+    def _both(self, msg_type: Any, topic: str, ears: Ears[T], value: Callable[..., T]) -> None:
+        """Listen with two subscriptions; ``value`` says what is kept of a message and its info."""
 
-            def note(message: Any, heard: list[float] = heard) -> None:
-                heard.append(value(message))
+        def note(message: Any, info: dict[str, Any]) -> None:
+            ears.hear(int(info["source_timestamp"]), value(message, info))
 
+        for reliable in (False, True):
             self.listen(msg_type, topic, note, reliable=reliable)
-
-    @staticmethod
-    def _see(heard: list[Picture], image: Image, info: dict[str, Any]) -> None:
-        published, size = int(info["source_timestamp"]), len(image.data)
-        heard.append(Picture(published, image.height, image.width, image.step, size))
 
     def listen(
         self,
@@ -151,6 +151,11 @@ class ExaminerNode(Node):
         return self.create_subscription(msg_type, topic, heard, qos, event_callbacks=events)
 
 
+def _picture(image: Image, info: dict[str, Any]) -> Picture:
+    published, size = int(info["source_timestamp"]), len(image.data)
+    return Picture(published, image.height, image.width, image.step, size)
+
+
 class RobotRig:
     """The examiner's view of one subject during the pattern exam."""
 
@@ -163,7 +168,7 @@ class RobotRig:
         node = bench.session.run(ExaminerNode)
         assert isinstance(node, ExaminerNode)
         self.node = node
-        self.still = (0.0, 0)
+        self.still = 0
         self._clients: dict[str, Any] = {}
         self._told: set[str] = set()
 
@@ -180,8 +185,8 @@ class RobotRig:
         self.stands_still()
 
     def stands_still(self) -> None:
-        """Note since when (monotonic, s) the student's clock stands still, and what came before."""
-        self.still = (time.monotonic(), len(self.node.pictures))
+        """Note since when (ns, as messages are stamped) the student's clock stands still."""
+        self.still = time.time_ns()
 
     def step(self, seconds: float = STEP) -> None:
         """Move the student's clock on; everything that this sets off has then run."""
