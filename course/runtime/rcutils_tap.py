@@ -49,8 +49,12 @@ _console = ctypes.cast(_rcutils.rcutils_logging_console_output_handler, ctypes.c
 _vsnprintf = ctypes.CDLL(None).vsnprintf
 _vsnprintf.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_void_p]
 
+_HAND_ON_TIMEOUT = 1.0  # s that lines may be under way to the next handler before it is taken down
+
 _lock = threading.Lock()
 _next: ctypes._CFunctionType | None = None
+_under_way = 0  # lines
+_handed_on = threading.Condition()
 _lowered: set[str] = set()
 _being_made = 0  # nodes
 _level_before = LoggingSeverity.UNSET
@@ -85,7 +89,9 @@ def staying() -> Iterator[None]:
         users, handed_on_to = rclpy.context.g_logging_ref_count, _next
         rclpy.context.g_logging_ref_count += 1
         if users == 1:
-            _next = None  # /rosout complains on stderr about publishers of a context that has ended
+            # /rosout complains on stderr about publishers of a context that has ended, and without
+            # a configuration the handlers of rcl write to the console.
+            _hand_nothing_on()
     try:
         yield
     finally:
@@ -94,7 +100,7 @@ def staying() -> Iterator[None]:
             if rclpy.context.g_logging_ref_count > 0:  # somebody has come meanwhile, or is there
                 _next = handed_on_to
             elif users > 0:
-                _next = None
+                _hand_nothing_on()
                 # No other thread has a turn between the two: each is in C, and keeps the GIL.
                 steps = (rclpy_implementation.rclpy_logging_fini, _hear_again)
                 collections.deque(map(operator.call, steps), maxlen=0)
@@ -167,8 +173,34 @@ def _hear(
     job = current_job()
     home = None if job is None else job.home.session_key
     store.add(stamp / 1e9, severity, logger, _text(text_format, arguments), home)
-    if _next is not None and (severity >= LoggingSeverity.INFO or not _is_ours_to_lower(logger)):
-        _next(location, severity, name, stamp, text_format, arguments)
+    if _next is None or (severity < LoggingSeverity.INFO and _is_ours_to_lower(logger)):
+        return
+    with _handing_on() as handler:
+        if handler is not None:
+            handler(location, severity, name, stamp, text_format, arguments)
+
+
+@contextlib.contextmanager
+def _handing_on() -> Iterator[ctypes._CFunctionType | None]:
+    """Give the next handler, if there is one, which stays in place for the block."""
+    global _under_way
+    with _handed_on:
+        handler = _next
+        _under_way += 1
+    try:
+        yield handler
+    finally:
+        with _handed_on:
+            _under_way -= 1
+            _handed_on.notify_all()
+
+
+def _hand_nothing_on() -> None:
+    """Return when no line is under way to the next handler, and none will be."""
+    global _next
+    with _handed_on:
+        _next = None
+        _handed_on.wait_for(lambda: not _under_way, _HAND_ON_TIMEOUT)
 
 
 def _is_ours_to_lower(logger: str) -> bool:
