@@ -78,11 +78,11 @@ def grade(
         StoreError: there is no room for what came out.
         Stopped: a signal ended the run; what was graded is kept.
     """
-    if not trust and not scheduler:
-        sandbox.require()
     gradebook = CourseGradebook(root, staged=STAGED)
     names = _notebooks(gradebook, assignment)
     students, wrong = _students(gradebook, assignment)
+    if not trust and not scheduler:
+        sandbox.require()
     refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
     store = OutcomeStore(root / bridge.WORK_FOLDER / "outcomes", trust=trust, hidden=[root])
     with ExitStack() as stack:

@@ -17,13 +17,10 @@ from autograder.corpus import Case
 from autograder.corpus.trials import one_notebook
 from autograder.gradebook import Grade
 from autograder.release import release
-from autograder.sandbox import abilities
 from tests.killing import Engine, fresh_copy
 
 SUBMISSIONS = Path(__file__).parents[1] / "submissions"
 ASSIGNMENT, NOTEBOOK = "ch05", "qos-design"
-
-needs_sandbox = pytest.mark.skipif(not abilities().loss, reason=abilities().problem or "no nft")
 
 
 @dataclass(frozen=True)

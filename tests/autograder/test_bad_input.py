@@ -23,8 +23,9 @@ from autograder.engine import AssignmentError, Graded
 from autograder.gradebook import CourseGradebook, Grade
 from autograder.progress import Progress
 from tests.killing import fresh_copy
+from tests.machine import needs_sandbox
 
-from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed, needs_sandbox
+from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed
 
 # The class is graded before the first test. nbgrader swallows a time-out that strikes inside it, as
 # it does any error, so it must be far off on a busy machine, too.

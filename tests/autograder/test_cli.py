@@ -10,6 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from autograder.sandbox import abilities
+from tests.machine import needs_own_mounts, needs_sandbox
+
 from .conftest import Course
 
 
@@ -37,9 +40,10 @@ def test_the_demo_ends_with_grades(tmp_path: Path) -> None:
     assert demo["as_expected"] is True
     scores = {row["student"]: row["grade"]["score"] for row in demo["rows"]}
     assert len(scores) == 12
-    assert scores["right-chapter"] == scores["right-two-sides"] == 15
+    full = 15 if abilities().loss else 13  # what lost packets show is then left to a person
+    assert scores["right-chapter"] == scores["right-two-sides"] == full
     assert scores["broken-file"] == scores["broken-syntax"] == 0
-    assert 0 < scores["wrong-stub"] < scores["wrong-imu-endless"] < 15
+    assert 0 < scores["wrong-stub"] < scores["wrong-imu-endless"] < full
     root = tmp_path / "here"
     assert len((root / "grades.csv").read_text().splitlines()) == 1 + len(scores)
     assert len(list((root / "feedback").glob("*/ch05/qos-design.html"))) == len(scores)
@@ -47,6 +51,7 @@ def test_the_demo_ends_with_grades(tmp_path: Path) -> None:
     assert "right-chapter" in waiting, "the written explanation waits for a person"
 
 
+@needs_sandbox
 @pytest.mark.timeout(900)
 def test_the_demo_of_all_exercises(tmp_path: Path) -> None:
     result = autograder("demo", "--all", "--dir", "here", "--json", cwd=tmp_path, timeout=850)
@@ -68,6 +73,7 @@ def test_the_demo_leaves_other_peoples_files_alone(tmp_path: Path) -> None:
     assert (tmp_path / "thesis.tex").read_text() == "ten years of work"
 
 
+@needs_own_mounts
 @pytest.mark.parametrize("size", ["300k", "1m"])
 def test_a_full_disk_is_one_sentence(tmp_path: Path, size: str) -> None:
     mount = f"mount -t tmpfs -o size={size} none {tmp_path}"
@@ -76,6 +82,7 @@ def test_a_full_disk_is_one_sentence(tmp_path: Path, size: str) -> None:
     assert len(result.stderr.strip().splitlines()) == 1
 
 
+@needs_own_mounts
 def test_a_read_only_folder_is_one_sentence(tmp_path: Path) -> None:
     mount = f"mount -t tmpfs -o ro none {tmp_path}"
     result = autograder("demo", "--dir", str(tmp_path / "d"), cwd=tmp_path, code=1, before=mount)
@@ -92,6 +99,7 @@ def test_an_unknown_assignment_or_exam_names_those_there_are(course: Course) -> 
     assert "Did you mean 'qos'?" in result.stderr
 
 
+@needs_sandbox
 def test_grade_and_report_speak_json(course: Course) -> None:
     course.submit("s1", "not a notebook")
     root = ("--root", str(course.root))

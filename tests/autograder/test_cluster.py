@@ -21,8 +21,9 @@ from autograder.runner import Outcome
 from autograder.submission import Cell
 from tests.browser.lab import until
 from tests.killing import GONE, Engine, fresh_copy
+from tests.machine import needs_sandbox
 
-from .conftest import ASSIGNMENT, Undisturbed, needs_sandbox
+from .conftest import ASSIGNMENT, Undisturbed
 
 pytestmark = [needs_sandbox, pytest.mark.xdist_group("class"), pytest.mark.timeout(900)]
 

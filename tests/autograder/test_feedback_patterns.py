@@ -10,6 +10,7 @@ import pytest
 from autograder import corpus, runner, submission
 from autograder.corpus import trials
 from autograder.report import Report
+from tests.machine import needs_sandbox
 
 from .conftest import SUBMISSIONS
 
@@ -30,6 +31,7 @@ def report(name: str, part: str) -> str:
     return repr(Report(outcome.verdicts[f"patterns-{part}"], hints=3)) + "\n"
 
 
+@needs_sandbox
 @pytest.mark.parametrize(
     ("name", "part"),
     [

@@ -10,7 +10,7 @@ import pytest
 from autograder import corpus
 from autograder.corpus import trials
 from autograder.report import Report
-from autograder.sandbox import abilities
+from tests.machine import needs_sandbox
 
 from .conftest import SUBMISSIONS
 
@@ -19,7 +19,7 @@ CASES = {case.name: case for case in corpus.load(SUBMISSIONS, "qos")}
 MISTAKES = ("wrong-camera-reliable", "wrong-imu-single", "wrong-incompatible")
 
 
-@pytest.mark.skipif(not abilities().loss, reason="lost packets need a network of its own")
+@needs_sandbox
 @pytest.mark.parametrize("name", MISTAKES)
 def test_the_report_reads_as_it_should(name: str) -> None:
     (trial,) = corpus.run([CASES[name]], *trials.notebooks("qos"), jobs=1)

@@ -18,8 +18,9 @@ from autograder import engine, runner, submission
 from autograder.corpus import Case
 from autograder.engine import AssignmentError
 from autograder.gradebook import CourseGradebook, Grade, GradebookError
+from tests.machine import needs_sandbox
 
-from .conftest import ASSIGNMENT, NOTEBOOK, Course, needs_sandbox
+from .conftest import ASSIGNMENT, NOTEBOOK, Course
 
 pytestmark = needs_sandbox
 

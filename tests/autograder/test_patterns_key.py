@@ -17,6 +17,7 @@ from autograder.release import release
 from autograder.rigs import scenarios
 from autograder.rigs.choosing import compare
 from course.student_version import student_versions
+from tests.machine import needs_sandbox
 
 from .conftest import SUBMISSIONS
 
@@ -108,6 +109,7 @@ def test_a_part_without_its_key_is_the_graders_fault() -> None:
         compare(rig, "camera")
 
 
+@needs_sandbox
 def test_the_feedback_html_has_the_verdict_and_not_the_key(root: Path) -> None:
     cases = {case.name: case for case in corpus.load(SUBMISSIONS, "patterns")}
     case = cases["wrong-choice-navigation"]

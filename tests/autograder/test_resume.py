@@ -18,8 +18,9 @@ from autograder.gradebook import CourseGradebook
 from autograder.progress import Progress
 from autograder.sandbox import SandboxError
 from tests.killing import Engine, episode, fresh_copy
+from tests.machine import needs_sandbox
 
-from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed, needs_sandbox
+from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed
 
 # Many engines are started, and nbgrader swallows a time-out that strikes inside it, as any error.
 pytestmark = [needs_sandbox, pytest.mark.xdist_group("class"), pytest.mark.timeout(900)]

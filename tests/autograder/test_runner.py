@@ -10,8 +10,7 @@ from autograder import runner
 from autograder.runner import Outcome
 from autograder.store import OutcomeStore
 from autograder.submission import Cell, Program
-
-from .conftest import needs_sandbox
+from tests.machine import needs_sandbox
 
 pytestmark = needs_sandbox
 

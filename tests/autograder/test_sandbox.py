@@ -22,8 +22,9 @@ from autograder.sandbox.limits import Limits
 from autograder.sandbox.watch import Watch
 from autograder.store import OutcomeStore
 from autograder.submission import Cell
+from tests.machine import needs_sandbox
 
-from .conftest import ASSIGNMENT, NOTEBOOK, Course, needs_sandbox
+from .conftest import ASSIGNMENT, NOTEBOOK, Course
 
 EXAM = Cell("", "qos-hidden", "qos", "hidden")
 

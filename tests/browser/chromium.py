@@ -16,7 +16,9 @@ ARGUMENTS = [
     "--disable-dev-shm-usage",
 ]  # fmt: skip
 FETCH_TIMEOUT = 900.0  # s, for some 100 MB
-FETCH = (sys.executable, "-m", "playwright", "install", "--only-shell", "chromium")
+PLAYWRIGHT = (sys.executable, "-m", "playwright")
+FETCH = (*PLAYWRIGHT, "install", "--only-shell", "chromium")
+MISSING = "error while loading shared libraries: "
 
 
 class NoBrowserError(Exception):
@@ -30,6 +32,9 @@ def started() -> Iterator[Browser]:
     Raises:
         NoBrowserError: If there is none and none could be fetched, or it does not start.
     """
+    tried = subprocess.run([*PLAYWRIGHT, "--version"], capture_output=True, text=True)
+    if tried.returncode:
+        raise _nothing(f"Playwright does not start ({_cause(tried.stderr)})")
     path = next((found for name in INSTALLED if (found := shutil.which(name))), None)
     with sync_playwright() as playwright:
         browser = _launch(playwright, path) if path else _launch_fetched(playwright)
@@ -53,9 +58,14 @@ def _launch(playwright: Playwright, path: str | None) -> Browser:
     try:
         return playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
     except Error as error:
-        first, missing, library = error.message.partition("error while loading shared libraries: ")
-        said = (library or first).splitlines()[0].strip()
-        raise _nothing(f"{path or 'the fetched one'} does not start ({missing}{said})") from None
+        raise _nothing(
+            f"{path or 'the fetched one'} does not start ({_cause(error.message)})"
+        ) from None
+
+
+def _cause(text: str) -> str:
+    first, missing, library = text.strip().partition(MISSING)
+    return missing + (library or first or "no reason was given").splitlines()[0].strip()
 
 
 def _nothing(why: str) -> NoBrowserError:

@@ -16,15 +16,15 @@ from autograder import corpus, submission
 from autograder.build import build
 from autograder.corpus.trials import one_notebook
 from autograder.release import release
-from autograder.sandbox import abilities
 from course.content import corpus_root
+from tests.machine import needs_sandbox
 
 from .lab import Lab, until
 from .notebook_page import NotebookPage
 
 pytestmark = [
     pytest.mark.timeout(900), pytest.mark.xdist_group("browser"),
-    pytest.mark.skipif(not abilities().loss, reason=abilities().problem or "no nft"),
+    needs_sandbox,
 ]  # fmt: skip
 
 ASSIGNMENT, NOTEBOOK, EXPLANATION = "ch05", "qos-design", "qos-explanation"

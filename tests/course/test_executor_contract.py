@@ -18,6 +18,7 @@ import rclpy
 from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.context import Context
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import (
     Executor,
     ExternalShutdownException,
@@ -70,9 +71,12 @@ def plain(kind: Callable[..., Executor], *, parallel: bool) -> Iterator[Host]:
                 executor.spin()
             except (ExternalShutdownException, ZeroDivisionError):
                 continue  # what a task raised is its creator's business
+            except InvalidHandle:
+                continue  # rclpy's own race between an entity's end and the executor that waits
             except RuntimeError as error:
-                # rclpy's own race between Timer.cancel() and the executor that calls the timer.
-                if "timer is canceled" not in str(error):
+                # rclpy's own races: Timer.cancel() and the executor that calls the timer, the
+                # context's end and the executor that begins to wait.
+                if "timer is canceled" not in str(error) and context.ok():
                     raise
 
     def add(node: Node) -> None:

@@ -28,6 +28,7 @@ import course
 from course import Session, mcap_file
 from course.mcap_file import RecordingError
 from course.values import to_data
+from tests.machine import needs_compiler
 
 
 def read(path: Path) -> list[Any]:
@@ -94,6 +95,7 @@ def test_every_kind_of_field_survives(message: object, tmp_path: Path) -> None:
     assert as_data(decoded) == to_data(message, None)
 
 
+@needs_compiler
 def test_own_interfaces_are_written_with_their_definition(tmp_path: Path) -> None:
     own = course.interfaces.define("mcap_msgs/msg/Reading", "float64 value\nstring[] names\n")
     message = own(value=1.5, names=["a"])

@@ -39,15 +39,16 @@ from autograder.corpus.trials import one_notebook
 from autograder.gradebook import CourseGradebook
 from autograder.release import release
 from autograder.runner import CELL_TIMEOUT, Outcome
-from autograder.sandbox import abilities, network
+from autograder.sandbox import network
 from autograder.submission import Program
+from tests.machine import needs_sandbox
 
 HERE = Path(__file__).parent
 EMPTY = "broken-empty"
 FULL = 15.0
 
 pytestmark = [
-    pytest.mark.skipif(bool(abilities().problem), reason=abilities().problem or "-"),
+    needs_sandbox,
     pytest.mark.xdist_group("hostile"),  # one listener on the host, which no attack may reach
 ]
 

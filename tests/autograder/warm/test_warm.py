@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from autograder import runner
-from autograder.sandbox import abilities
 from autograder.submission import Cell
 from autograder.warm import ForkedProcess, Nursery, Zygote, ZygoteError
 from autograder.warm.task import Task
 from course.runtime.waiting import Pulse, poll
+from tests.machine import needs_warm_starts
 
 PROGRAM = """
 import atexit, os, signal, sys, threading
@@ -48,8 +48,6 @@ def main(arguments):
             sys.exit(rest[0])
     return 0
 """
-
-needs_warmth = pytest.mark.skipif(not abilities().warm, reason="no warm starts here")
 
 
 @pytest.fixture(scope="module")
@@ -151,7 +149,7 @@ def test_a_nursery_has_one_zygote_for_a_module_and_environment(tmp_path: Path) -
     assert not second.alive
 
 
-@needs_warmth
+@needs_warm_starts
 def test_a_subject_has_no_rights_and_nothing_of_its_zygote() -> None:
     source = """
 import ctypes, os
@@ -176,7 +174,7 @@ for path in ("/proc/self/exe", "/proc/1/mem"):
     ]  # fmt: skip
 
 
-@needs_warmth
+@needs_warm_starts
 def test_two_subjects_are_two_processes_with_chances_of_their_own() -> None:
     source = "import random, numpy; print(random.random(), numpy.random.random(), end='')"
     runs = [runner.run((Cell(source),)).outputs[0][0]["text"].split() for _ in range(2)]
@@ -195,7 +193,7 @@ def subjects_of(pid: int) -> list[int]:
     return found
 
 
-@needs_warmth
+@needs_warm_starts
 def test_a_subject_ends_with_an_engine_that_is_killed() -> None:
     program = """
 from autograder import runner

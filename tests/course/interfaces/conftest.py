@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from course.interfaces.toolchain import compiler_problem
+
 DEADLINE = 120.0  # seconds; only a hung process reaches it
 
 Python = Callable[..., subprocess.CompletedProcess[str]]
@@ -46,6 +48,8 @@ def python(environment: dict[str, str], tmp_path: Path) -> Python:
 @pytest.fixture(scope="session")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A cache in which example_interfaces is built, by the command that a grader runs."""
+    if problem := compiler_problem():
+        pytest.skip(problem)
     cache = tmp_path_factory.mktemp("interfaces")
     done = subprocess.run(
         [sys.executable, "-m", "course.interfaces"],

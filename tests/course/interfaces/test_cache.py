@@ -18,6 +18,7 @@ import pytest
 
 from course.interfaces import pruning
 from course.interfaces.locks import locked
+from tests.machine import needs_compiler
 
 # A small type builds in a third of the time of example_interfaces.
 USE = """
@@ -69,6 +70,7 @@ def test_a_second_process_loads_what_the_first_built(python, cache: Path) -> Non
     assert entry(cache).stat().st_ctime_ns == made
 
 
+@needs_compiler
 def test_two_processes_at_once_build_once(environment, tmp_path: Path) -> None:
     code = f"from course import interfaces; interfaces.install()\n{USE}"
     processes = [
@@ -93,6 +95,7 @@ def test_two_processes_at_once_build_once(environment, tmp_path: Path) -> None:
     assert leftovers(tmp_path / "cache") == []
 
 
+@needs_compiler
 def test_a_build_that_is_killed_is_never_used(environment, python, tmp_path: Path) -> None:
     cache = tmp_path / "cache"
     victim = subprocess.Popen(
@@ -143,6 +146,7 @@ def test_a_library_that_is_whole_and_does_not_load_is_built_again(python, cache:
     assert (done.stdout, done.stderr) == (USED, "")
 
 
+@needs_compiler
 def test_a_cache_that_cannot_be_written_gives_way_to_a_private_folder(python, tmp_path) -> None:
     blocker = tmp_path / "file"
     blocker.write_text("a file, where a folder should be", encoding="utf-8")
@@ -158,6 +162,7 @@ def test_a_cache_that_cannot_be_written_gives_way_to_a_private_folder(python, tm
     assert not Path(folder).exists()
 
 
+@needs_compiler
 def test_a_disk_that_is_full_is_one_sentence(python, tmp_path: Path) -> None:
     # The kernel refuses to let any file of this process grow past 5 kB: the same error path as
     # a full disk, without one.

@@ -14,6 +14,7 @@ from course.qoslab import lab, link, rules
 from course.qoslab.experiment import COUNT, Experiment, Outcome
 from course.qoslab.lab import LabError
 from course.qoslab.profile import Profile, ProfileError
+from tests.machine import needs_lossy_link
 
 
 def best_effort(**policies: Any) -> Profile:
@@ -45,7 +46,13 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("experiment", CASES.values(), ids=CASES)
+@pytest.mark.parametrize(
+    "experiment",
+    [
+        pytest.param(case, id=name, marks=[needs_lossy_link] if case.loss else [])
+        for name, case in CASES.items()
+    ],
+)
 def test_dds_does_what_the_rules_say(experiment: Experiment) -> None:
     outcome = lab.run(experiment)
     assert outcome.remark == ""
@@ -64,6 +71,7 @@ def _pair(experiment: Experiment) -> tuple[Profile, Profile]:
     return experiment.offered, experiment.requested
 
 
+@needs_lossy_link
 def test_what_is_lost_is_lost_under_best_effort() -> None:
     outcome = lab.run(Experiment(best_effort(), best_effort(), "stream", loss=60))
     assert outcome.missing > 0
@@ -72,6 +80,7 @@ def test_what_is_lost_is_lost_under_best_effort() -> None:
     )
 
 
+@needs_lossy_link
 def test_a_shallow_writer_cannot_repair() -> None:
     experiment = Experiment(Profile(depth=1), Profile(depth=1), "stream", loss=60)
     outcome = lab.run(experiment)

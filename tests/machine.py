@@ -1,0 +1,37 @@
+"""What tests need of a machine beyond Python packages.
+
+Where it is missing, a test that is marked so is left out, with the reason.
+"""
+
+from __future__ import annotations
+
+import subprocess
+
+import pytest
+
+from autograder.sandbox import abilities
+from course.interfaces.toolchain import compiler_problem
+from course.qoslab import link
+
+
+def _needs(problem: str | None) -> pytest.MarkDecorator:
+    return pytest.mark.skipif(bool(problem), reason=problem or "nothing is missing")
+
+
+def _namespace_problem() -> str:
+    tried = subprocess.run(
+        ["unshare", "-rm", "true"], capture_output=True, text=True, timeout=60, check=False
+    )
+    return "" if tried.returncode == 0 else f"no mounts of one's own: {tried.stderr.strip()}"
+
+
+def _sandbox_problem() -> str:
+    able = abilities()
+    return able.problem or ("" if able.loss else "The sandbox cannot lose packets: nft is missing.")
+
+
+needs_sandbox = _needs(_sandbox_problem())
+needs_warm_starts = _needs("" if abilities().warm else "The sandbox has no warm starts here.")
+needs_compiler = _needs(compiler_problem())
+needs_lossy_link = _needs(link.problem())
+needs_own_mounts = _needs(_namespace_problem())
