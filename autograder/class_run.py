@@ -92,7 +92,8 @@ class ClassRun:
             desk.root, desk.folders, workers.modes[0], _exams(desk.assignment)
         )
         self._running: dict[str, list[Piece]] = {}
-        self._starts: Counter[str] = Counter()
+        self._refusals: Counter[str] = Counter()
+        self._failures: Counter[str] = Counter()
         self._graded: list[Graded] = []
 
     def grade(self, students: list[str], refused: list[Graded]) -> list[Graded]:
@@ -176,16 +177,17 @@ class ClassRun:
 
     def _start(self, key: str, piece: Piece) -> None:
         assert piece.job is not None
-        self._starts[key] += 1
         self._workers.submit(key, piece.job)
 
     def _finish(self, done: Done) -> None:
-        most = 1
+        again = False
         if isinstance(done.error, PASSING):
-            most = MOST_STARTS
+            self._refusals[done.key] += 1
+            again = self._refusals[done.key] < MOST_STARTS
         elif done.result is not None and done.result.outcome.spoilt:
-            most = MOST_TRIES
-        if self._starts[done.key] < most:
+            self._failures[done.key] += 1
+            again = self._failures[done.key] < MOST_TRIES
+        if again:
             self._start(done.key, self._running[done.key][0])
             return
         pieces = self._running.pop(done.key)
