@@ -25,12 +25,13 @@ def _namespace_problem() -> str:
     return "" if tried.returncode == 0 else f"no mounts of one's own: {tried.stderr.strip()}"
 
 
-def _sandbox_problem() -> str:
+def sandbox_problem() -> str:
+    """Say why submissions cannot be sandboxed here, lost packets included; empty if they can."""
     able = abilities()
     return able.problem or ("" if able.loss else "The sandbox cannot lose packets: nft is missing.")
 
 
-needs_sandbox = _needs(_sandbox_problem())
+needs_sandbox = _needs(sandbox_problem())
 needs_warm_starts = _needs("" if abilities().warm else "The sandbox has no warm starts here.")
 needs_compiler = _needs(compiler_problem())
 needs_lossy_link = _needs(link.problem())
