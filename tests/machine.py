@@ -31,6 +31,8 @@ def sandbox_problem() -> str:
     return able.problem or ("" if able.loss else "The sandbox cannot lose packets: nft is missing.")
 
 
+needs_isolation = _needs(abilities().problem)
+"""A sandbox, be it one that cannot lose packets."""
 needs_sandbox = _needs(sandbox_problem())
 needs_warm_starts = _needs("" if abilities().warm else "The sandbox has no warm starts here.")
 needs_compiler = _needs(compiler_problem())

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from autograder.sandbox import abilities
-from tests.machine import needs_own_mounts, needs_sandbox
+from tests.machine import needs_isolation, needs_own_mounts, needs_sandbox
 
 from .conftest import Course
 
@@ -99,7 +99,7 @@ def test_an_unknown_assignment_or_exam_names_those_there_are(course: Course) -> 
     assert "Did you mean 'qos'?" in result.stderr
 
 
-@needs_sandbox
+@needs_isolation
 def test_grade_and_report_speak_json(course: Course) -> None:
     course.submit("s1", "not a notebook")
     root = ("--root", str(course.root))

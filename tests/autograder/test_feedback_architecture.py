@@ -11,7 +11,7 @@ from autograder import corpus, exams, points
 from autograder.corpus import trials
 from autograder.report import Report
 from autograder.rigs.architecture import NAVIGATE_TO, NAVIGATE_TO_TEXT
-from tests.machine import needs_sandbox
+from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS
 
@@ -25,7 +25,7 @@ def notebooks() -> trials.Notebooks:
     return trials.notebooks(EXAM)
 
 
-@needs_sandbox
+@needs_isolation
 @pytest.mark.parametrize(
     ("name", "hints"),
     [

@@ -10,7 +10,7 @@ import pytest
 from autograder import corpus, runner, submission
 from autograder.corpus import trials
 from autograder.report import Report
-from tests.machine import needs_sandbox
+from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS
 
@@ -31,7 +31,7 @@ def report(name: str, part: str) -> str:
     return repr(Report(outcome.verdicts[f"patterns-{part}"], hints=3)) + "\n"
 
 
-@needs_sandbox
+@needs_isolation
 @pytest.mark.parametrize(
     ("name", "part"),
     [

@@ -13,7 +13,7 @@ from autograder import corpus, runner, submission
 from autograder.corpus import Case
 from autograder.corpus.trials import Notebooks, notebooks
 from autograder.report import Report
-from tests.machine import needs_sandbox
+from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS
 
@@ -30,7 +30,7 @@ def cases() -> dict[str, Case]:
     return {case.name: case for case in corpus.load(SUBMISSIONS, "resources")}
 
 
-@needs_sandbox
+@needs_isolation
 @pytest.mark.parametrize("name", ["camera-left-open", "timer-goes-on", "stays-inactive"])
 def test_the_report_of_a_typical_mistake(
     name: str, versions: Notebooks, cases: dict[str, Case]

@@ -9,7 +9,7 @@ import pytest
 from autograder import corpus
 from autograder.corpus import trials
 from autograder.report import Report
-from tests.machine import needs_sandbox
+from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS
 
@@ -18,7 +18,7 @@ CASES = {case.name: case for case in corpus.load(SUBMISSIONS, "safety")}
 MISTAKES = ("wrong-gripper-constant-pauses", "wrong-speed-nan", "wrong-drive-shutdown-drives-on")
 
 
-@needs_sandbox
+@needs_isolation
 @pytest.mark.parametrize("name", MISTAKES)
 def test_the_report_reads_as_it_should(name: str) -> None:
     (trial,) = corpus.run([CASES[name]], *trials.notebooks("safety"), jobs=1)

@@ -17,7 +17,7 @@ from autograder.release import release
 from autograder.rigs import scenarios
 from autograder.rigs.choosing import compare
 from course.student_version import student_versions
-from tests.machine import needs_sandbox
+from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS
 
@@ -109,7 +109,7 @@ def test_a_part_without_its_key_is_the_graders_fault() -> None:
         compare(rig, "camera")
 
 
-@needs_sandbox
+@needs_isolation
 def test_the_feedback_html_has_the_verdict_and_not_the_key(root: Path) -> None:
     cases = {case.name: case for case in corpus.load(SUBMISSIONS, "patterns")}
     case = cases["wrong-choice-navigation"]

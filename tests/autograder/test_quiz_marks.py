@@ -29,7 +29,7 @@ from quizzes import model
 from quizzes.loader import load_bank
 from quizzes.model import Item
 from quizzes.quiz import Quiz
-from tests.machine import needs_sandbox
+from tests.machine import needs_isolation
 
 ASSIGNMENT, NOTEBOOK, CELL = "ch05-quiz", "quiz", "quiz-ch05"
 FILE = "quiz-ch05.attempts.jsonl"
@@ -97,7 +97,7 @@ def verdict(folder: Path, student: str = "ada") -> Verdict:
     return quiz_marks.verdict(load_bank("ch05"), folder, student)
 
 
-@needs_sandbox
+@needs_isolation
 def test_the_best_attempt_becomes_points(root: Path, hand_in: HandIn) -> None:
     hand_in("ada", 5)
     hand_in("alan", 1, 4, 2)
@@ -146,7 +146,7 @@ def test_the_best_attempt_becomes_points(root: Path, hand_in: HandIn) -> None:
         assert says in html.unescape(page.read_text())
 
 
-@needs_sandbox
+@needs_isolation
 def test_nbgraders_own_command_gives_the_same_points(root: Path, hand_in: HandIn) -> None:
     hand_in("ada", 5)
     hand_in("alan", 2)
@@ -162,7 +162,7 @@ def test_nbgraders_own_command_gives_the_same_points(root: Path, hand_in: HandIn
     assert by_nbgrader["ada"] == 5.0
 
 
-@needs_sandbox
+@needs_isolation
 def test_a_new_attempt_counts_when_graded_again(root: Path, hand_in: HandIn) -> None:
     folder = hand_in("ada", 1)
     engine.grade(root, ASSIGNMENT)
@@ -172,7 +172,7 @@ def test_a_new_attempt_counts_when_graded_again(root: Path, hand_in: HandIn) -> 
     assert (before is not None and before < 5, points(root)["ada"]) == (True, 5.0)
 
 
-@needs_sandbox
+@needs_isolation
 def test_a_changed_grade_cell_earns_nothing(root: Path, hand_in: HandIn) -> None:
     folder = hand_in("ada", 0)
     notebook = submission.read(folder / f"{NOTEBOOK}.ipynb")

@@ -41,14 +41,14 @@ from autograder.release import release
 from autograder.runner import CELL_TIMEOUT, Outcome
 from autograder.sandbox import network
 from autograder.submission import Program
-from tests.machine import needs_sandbox
+from tests.machine import needs_isolation
 
 HERE = Path(__file__).parent
 EMPTY = "broken-empty"
 FULL = 15.0
 
 pytestmark = [
-    needs_sandbox,
+    needs_isolation,
     pytest.mark.xdist_group("hostile"),  # one listener on the host, which no attack may reach
 ]
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from course.interfaces import cache, finder
+from course.interfaces.toolchain import python_headers
 from tests.machine import needs_compiler
 
 NO_COMPILER = {"PATH": "/nonexistent", "CC": "", "CXX": ""}
@@ -108,11 +109,11 @@ except ImportError as error:
     )
     assert done.stderr == ""
     note, no_stand_in = done.stdout.splitlines()
+    headers = "" if python_headers() else " and Python's headers (Python.h)"
     for part in (
         "std_srvs/srv/SetBool, std_srvs/srv/Trigger, test_msgs/action/Fibonacci",
         "on the network a type is called std_srvs/srv/SetBool, not example_interfaces/srv/SetBool",
-        "a C compiler (gcc) and a C++ compiler (g++)",
-        "not found here",
+        f"a C compiler (gcc) and a C++ compiler (g++){headers}, not found here",
         "apt-get install g++ python3-dev",
     ):
         assert part in note
