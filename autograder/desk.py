@@ -96,9 +96,11 @@ class Desk:
             (staged / "timestamp.txt").write_text(time, encoding="utf-8")
         for name in self.notebooks:
             notebook, piece = self._piece(work, submitted / f"{name}.ipynb")
-            marks = quiz_marks.with_quizzes(Outcome(), notebook, submitted, work.student).verdicts
+            marked = quiz_marks.with_quizzes(
+                Outcome(), notebook, submitted, work.student, self.root
+            )
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
-            yield replace(piece, marks=marks)
+            yield replace(piece, marks=marked.verdicts)
 
     def refused(self, piece: Piece, reason: str, status: Status) -> Outcome:
         """Return the outcome of a notebook that could not be run after all, for ``reason``."""

@@ -1,6 +1,7 @@
 """Quizzes in the gradebook: the saved answers of a submission, marked with the instructor's keys.
 
-A grade cell whose grade id is ``quiz-NAME`` stands for the quiz NAME. The scores in a student's
+A grade cell whose grade id is ``quiz-NAME`` stands for the quiz NAME, whose bank lies in the course
+(``authoring/banks``) or in the package. The scores in a student's
 attempts file are not looked at: its best attempt is marked again (see `quizzes.regrade`), so a
 file that was written by hand earns what its answers earn. How many attempts there are stands in
 the feedback; a file that looks machine-made is marked for a person, with the reason.
@@ -25,22 +26,50 @@ from quizzes.marking import Mark
 
 PREFIX = "quiz-"
 PART = "answers"
+BANKS = Path("authoring") / "banks"
+"""The folder under the course root with a course's own banks."""
 
 
 class QuizMarksError(CourseError):
     """A quiz whose bank cannot be used for marking."""
 
 
-def of_grade_cells() -> dict[str, float]:
+def names(root: Path) -> list[str]:
+    """Return the names of the quizzes that a course can use: its own, and those of the package."""
+    return sorted({*loader.names(root / BANKS), *loader.names()})
+
+
+def find_bank(root: Path, name: str) -> Bank:
+    """Return the bank of a quiz, the course's own before one of the package.
+
+    Raises:
+        QuizMarksError: it is not sound, or has no keys.
+    """
+    own = root / BANKS
+    try:
+        found = loader.load_bank(name, own if name in loader.names(own) else loader.BANKS)
+    except QuizError as error:
+        raise QuizMarksError(str(error)) from error
+    if found.keyless:
+        raise QuizMarksError(
+            f"{own / name}.yaml has no keys, so nothing can be marked with it: put the bank that "
+            "the questions were made of there."
+        )
+    return found
+
+
+def of_grade_cells(root: Path) -> dict[str, float]:
     """Return {grade_id: points} for the quizzes there are: one point for each concept.
 
     Raises:
         QuizMarksError: a bank is not sound.
     """
-    return {f"{PREFIX}{name}": float(len(_bank(name).concepts)) for name in loader.names()}
+    return {f"{PREFIX}{name}": float(len(find_bank(root, name).concepts)) for name in names(root)}
 
 
-def with_quizzes(outcome: Outcome, notebook: NotebookNode, folder: Path, student: str) -> Outcome:
+def with_quizzes(
+    outcome: Outcome, notebook: NotebookNode, folder: Path, student: str, root: Path
+) -> Outcome:
     """Return an outcome that holds the marks of the notebook's quizzes, too.
 
     Args:
@@ -48,13 +77,13 @@ def with_quizzes(outcome: Outcome, notebook: NotebookNode, folder: Path, student
         notebook: the submitted notebook, its cells restored.
         folder: the submission, with the attempts file in it.
         student: whose submission it is.
+        root: the course root, with banks of its own.
 
     Raises:
         QuizMarksError: a bank is not sound.
     """
-    marked = {
-        f"{PREFIX}{name}": verdict(_bank(name), folder, student) for name in _quizzes(notebook)
-    }
+    asked = [name for name in in_cells(notebook) if name in names(root)]
+    marked = {f"{PREFIX}{name}": verdict(find_bank(root, name), folder, student) for name in asked}
     return replace(outcome, verdicts={**outcome.verdicts, **marked}) if marked else outcome
 
 
@@ -82,20 +111,12 @@ def verdict(bank: Bank, folder: Path, student: str) -> Verdict:
     return Verdict(f"{PREFIX}{bank.quiz}", PART, checks, tuple(_notes(marked, student)))
 
 
-def _quizzes(notebook: NotebookNode) -> Iterator[str]:
-    known = loader.names()
+def in_cells(notebook: NotebookNode) -> Iterator[str]:
+    """Yield the names in a notebook's grade cells of quizzes, whether or not there are such."""
     for cell in notebook.cells:
-        name = submission.grade_id(cell).removeprefix(PREFIX)
         graded = bool(submission.metadata(cell).get("grade")) and submission.is_locked(cell)
-        if graded and submission.grade_id(cell).startswith(PREFIX) and name in known:
-            yield name
-
-
-def _bank(name: str) -> Bank:
-    try:
-        return loader.load_bank(name)
-    except QuizError as error:
-        raise QuizMarksError(str(error)) from error
+        if graded and submission.grade_id(cell).startswith(PREFIX):
+            yield submission.grade_id(cell).removeprefix(PREFIX)
 
 
 def _check(mark: Mark) -> CheckResult:

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
+from autograder import quiz_marks
 from autograder.quiz_cli import as_course_errors
-from quizzes import loader, record
+from quizzes import record
 
 if TYPE_CHECKING:
+    from quizzes.bank import Bank
     from quizzes.insight.analysis import Analysis
 
 
@@ -62,22 +64,23 @@ def of_assignment(root: Path, assignment: str) -> list[QuizReport]:
     They are written into ``reports/ASSIGNMENT`` of the course root.
 
     Raises:
-        QuizCommandError: a bank is not sound, or the reports cannot be written.
+        QuizMarksError: a bank is not sound.
+        QuizCommandError: the reports cannot be written.
     """
     submitted = sorted((root / "submitted").glob(f"*/{assignment}"))
     folders = {folder.parent.name: folder for folder in submitted}
     reports = []
-    for name in loader.names():
+    for name in quiz_marks.names(root):
         if any((folder / record.filename(name)).exists() for folder in folders.values()):
-            reports.append(_report(name, folders, root / "reports" / assignment))
+            bank = quiz_marks.find_bank(root, name)
+            reports.append(_report(bank, folders, root / "reports" / assignment))
     return reports
 
 
-def _report(name: str, folders: dict[str, Path], target: Path) -> QuizReport:
+def _report(bank: Bank, folders: dict[str, Path], target: Path) -> QuizReport:
     from quizzes import insight  # plots take a moment to import
 
     with as_course_errors():
-        bank = loader.load_bank(name)
         collected = insight.collect(bank, folders)
         analysis = insight.analyse(bank, collected.results, collected.notes)
         return QuizReport(analysis, insight.write(analysis, target))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import nbformat
@@ -21,8 +21,8 @@ class ReleaseError(CourseError):
 def release(root: Path, assignment: str) -> Path:
     """Write the student version of ``assignment`` to ``release/``; return its folder.
 
-    The release holds the notebooks and nothing else. One that would give away a solution or a
-    hidden test is removed again.
+    The release holds the notebooks, the questions of closed quizzes, and nothing else. One that
+    would give away a solution or a hidden test is removed again.
 
     Args:
         root: the nbgrader course root.
@@ -30,14 +30,15 @@ def release(root: Path, assignment: str) -> Path:
 
     Raises:
         ReleaseError: no such assignment, files in it that students must not get, or a leak.
+        QuizMarksError, QuizSheetError: a quiz that it uses is not sound, or cannot be handed out.
         GradebookError: nbgrader could not do it.
     """
     from autograder.gradebook import CourseGradebook
 
     source, released = root / "source" / assignment, root / "release" / assignment
-    _check_source(root, assignment)
+    beside = _check_source(root, assignment)
     CourseGradebook(root).generate_assignment(assignment)
-    if found := leaks(source, released):
+    if found := leaks(source, released, beside):
         _remove(released)
         raise ReleaseError(
             f"The release of '{assignment}' was removed again, because {found[0]}: correct "
@@ -46,16 +47,25 @@ def release(root: Path, assignment: str) -> Path:
     return released
 
 
-def leaks(source: Path, released: Path) -> list[str]:
+def leaks(source: Path, released: Path, beside: Mapping[Path, bytes] | None = None) -> list[str]:
     """Return what a released assignment gives away or lacks, one phrase each; empty if sound.
 
     Args:
         source: folder of the instructor's notebooks.
         released: folder of the students' notebooks.
+        beside: {path in it: content} of what else belongs there.
     """
     names = {path.name for path in source.glob("*.ipynb")}
     files = {str(path.relative_to(released)) for path in released.rglob("*") if path.is_file()}
-    found = [f"it holds the file {name}" for name in sorted(files - names)]
+    changed = []
+    for path, content in (beside or {}).items():
+        if str(path) not in files:
+            names.add(str(path))
+            continue
+        files.remove(str(path))
+        if (released / path).read_bytes() != content:
+            changed.append(f"{path} in it is not what was built")
+    found = changed + [f"it holds the file {name}" for name in sorted(files - names)]
     found += [f"{name} is missing from it" for name in sorted(names - files)]
     for name in sorted(names & files):
         notebook = _read(released / name)
@@ -100,7 +110,10 @@ def _secret_lines(source: NotebookNode) -> set[str]:
     return secret - given - {""}
 
 
-def _check_source(root: Path, assignment: str) -> None:
+def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
+    """Return what belongs beside the notebooks of an assignment that can be released."""
+    from autograder import quiz_sheets
+
     folder = root / "source" / assignment
     known = sorted({p.parent.name for p in (root / "source").glob("*/*.ipynb")})
     authored = {p.parent.name for p in (root / "authoring" / "assignments").glob("*/*.py")}
@@ -113,13 +126,21 @@ def _check_source(root: Path, assignment: str) -> None:
             f"There is no assignment '{assignment}' in {root}: there are "
             f"{', '.join(sorted(authored | set(known))) or 'none yet'}."
         )
+    notebooks = [_read(path) for path in sorted(folder.glob("*.ipynb"))]
+    beside = quiz_sheets.of_notebooks(root, notebooks)
+    for name, content in beside.items():
+        if not (folder / name).is_file() or (folder / name).read_bytes() != content:
+            raise ReleaseError(
+                f"{folder / name} is not in step with the quiz: run `autograder build` first."
+            )
     # nbgrader would hand out whatever else lies there.
     for path in sorted(folder.rglob("*")):
-        if path.is_file() and path.suffix != ".ipynb":
+        if path.is_file() and path.suffix != ".ipynb" and path.relative_to(folder) not in beside:
             raise ReleaseError(
                 f"{path} would be handed out to students: move it out of {folder}, which is for "
                 "notebooks only."
             )
+    return beside
 
 
 def _remove(folder: Path) -> None:

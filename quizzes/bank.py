@@ -24,6 +24,9 @@ from pydantic import (
 MIN_VARIANTS = 4
 """Variants a concept has at least: with fewer, a retry is too soon the same quiz again."""
 
+COUNTED = 20
+"""How many attempts of a quiz count unless its bank says it; later ones are practice."""
+
 DEAL = 2
 """How `quizzes.model` deals letters: answers saved under another number mean nothing."""
 
@@ -254,13 +257,20 @@ class Concept(Part):
 class Bank(Part):
     """A quiz: its concepts in order, and what learners may wrongly believe about them.
 
-    ``pass_mark`` is how many concepts must be fully right.
+    ``pass_mark`` is how many concepts must be fully right, ``attempts`` how many attempts count
+    (see ``counted``).
+
+    A ``closed`` quiz is marked by the instructor alone: learners get it ``keyless``, without keys
+    and feedback (see `quizzes.closing`), and hand their answers in.
     """
 
     quiz: Id
     title: Text
     chapter: Text
     pass_mark: int = Field(ge=1)
+    attempts: int | None = Field(default=None, ge=1, le=100)
+    closed: bool = False
+    keyless: bool = False
     misconceptions: dict[Id, Text]
     concepts: list[Concept] = Field(min_length=1)
     _folder: Path = PrivateAttr(default=Path())
@@ -269,6 +279,11 @@ class Bank(Part):
     def folder(self) -> Path:
         """The folder of the bank's file, where ``assets`` lies."""
         return self._folder
+
+    @property
+    def counted(self) -> int:
+        """How many attempts count: `COUNTED`, or 1 of a closed quiz, unless the bank says it."""
+        return self.attempts or (1 if self.closed else COUNTED)
 
     @property
     def pass_text(self) -> str:
@@ -282,7 +297,7 @@ class Bank(Part):
         Mending a key, a stem or a feedback keeps it, so saved answers can be marked anew.
         """
         content = [
-            [concept.id, [[variant.id, variant.kind, _texts(variant)]
+            [concept.id, [[variant.id, variant.kind, _texts(variant, by_name=self.closed)]
                           for variant in concept.variants]]
             for concept in self.concepts
         ]  # fmt: skip
@@ -298,6 +313,7 @@ def near(number: float, target: float, tolerance: float) -> bool:
     return abs(number - target) <= tolerance + 1e-9 * max(1.0, abs(target))
 
 
-def _texts(variant: Variant) -> list[str]:
+def _texts(variant: Variant, *, by_name: bool) -> list[str]:
+    """Return what letters refer to; ``by_name`` if the order of the bank is not for learners."""
     lefts = [pair.left for pair in variant.pairs] if isinstance(variant, Matching) else []
-    return [*lefts, *variant.texts]
+    return [*lefts, *(sorted(variant.texts) if by_name else variant.texts)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterable, Iterator
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -26,14 +26,20 @@ def names(folder: Path = BANKS) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.yaml"))
 
 
-def load_bank(name: str, folder: Path = BANKS) -> Bank:
+def load_bank(name: str, folder: Path = BANKS, others: Iterable[str] = ()) -> Bank:
     """Return the bank of the quiz called ``name``.
+
+    Args:
+        name: such as ``"ch05"``.
+        folder: where its bank lies.
+        others: quizzes elsewhere, for the message to name.
 
     Raises:
         BankError: there is none (the message names the ones there are), or it is not sound.
     """
     known = names(folder)
     if name not in known:
+        known = sorted({*known, *others})
         close = difflib.get_close_matches(str(name), known, n=1)
         guess = f" Did you mean '{close[0]}'?" if close else ""
         raise BankError(
@@ -49,8 +55,12 @@ def _cached(path: Path, _changed: int, _size: int) -> Bank:
     return read_bank(path)
 
 
-def read_bank(path: Path) -> Bank:
-    """Return the bank in the file at ``path``.
+def read_bank(path: Path, quiz: str = "") -> Bank:
+    """Return the bank in the file at ``path``, of the quiz that the file is named after.
+
+    Args:
+        path: the file.
+        quiz: what the quiz is called, if the file is named otherwise.
 
     Raises:
         BankError: it cannot be read, is no YAML, or does not hold together.
@@ -61,11 +71,13 @@ def read_bank(path: Path) -> Bank:
         raise BankError(f"There is no bank {path}.") from None
     except (OSError, UnicodeError) as error:
         raise BankError(f"{path} cannot be read as UTF-8 text: {error}.") from None
-    return bank_of(text, path.name, path.parent)
+    return bank_of(text, path.name, path.parent, quiz)
 
 
-def bank_of(text: str, name: str, folder: Path) -> Bank:
+def bank_of(text: str, name: str, folder: Path, quiz: str = "") -> Bank:
     """Return the bank in the text of a file called ``name``, whose pictures lie in ``folder``.
+
+    ``quiz`` is what it must be called; what the file is called, if left out.
 
     Raises:
         BankError: it is no YAML, or does not hold together.
@@ -75,7 +87,7 @@ def bank_of(text: str, name: str, folder: Path) -> Bank:
     except (yaml.YAMLError, RecursionError, ValueError) as error:
         problem = " ".join(str(error).split())
         raise BankError(f"{name} is not valid YAML: {problem[:300]}.") from None
-    return sound(data, name, Path(name).stem, folder)
+    return sound(data, name, quiz or Path(name).stem, folder)
 
 
 def sound(data: Any, source: str, quiz: str, folder: Path, noun: str = "item") -> Bank:
@@ -157,6 +169,8 @@ def _problems(bank: Bank, quiz: str) -> Iterator[tuple[str, str, str]]:
     """Yield (item, field, problem) for what the schema alone cannot see."""
     if bank.quiz != quiz:
         yield "", "quiz", f"it says '{bank.quiz}', but the file's name says '{quiz}'"
+    if bank.keyless and not bank.closed:
+        yield "", "keyless", "only the questions of a closed quiz go without keys"
     if bank.pass_mark > len(bank.concepts):
         yield "", "pass_mark", f"{bank.pass_mark} of {len(bank.concepts)} concepts is impossible"
     seen: set[str] = set()

@@ -71,7 +71,7 @@ def draw(bank: Bank, student: str, attempt: int) -> Paper:
     for number, concept in enumerate(bank.concepts, start=1):
         variant = _variant(bank, concept, student, attempt)
         seed = f"{student}\0{bank.quiz}\0{attempt}\0{variant.id}"
-        items.append(Item(number, concept, variant, _order(variant, seed)))
+        items.append(Item(number, concept, variant, _order(variant, seed, closed=bank.closed)))
     return Paper(bank, student, attempt, tuple(items))
 
 
@@ -87,16 +87,16 @@ def _variant(bank: Bank, concept: Concept, student: str, attempt: int) -> Varian
     return concept.variants[places[step]]
 
 
-def _order(variant: Variant, seed: str) -> tuple[int, ...]:
+def _order(variant: Variant, seed: str, *, closed: bool) -> tuple[int, ...]:
     if isinstance(variant, Numeric):
         return ()
     places = _shuffled(len(variant.texts), seed)
-    if isinstance(variant, Ordering | Matching):
+    if isinstance(variant, Ordering | Matching) or closed:
         # The bank has these in the right order: whoever knows the shuffle could turn it back. From
-        # the alphabet's order it leads nowhere.
+        # the alphabet's order it leads nowhere; nor does a closed quiz's bank give away an order.
         base = sorted(range(len(places)), key=variant.texts.__getitem__)
         places = [base[place] for place in places]
-    if isinstance(variant, Ordering) and places == sorted(places):
+    if isinstance(variant, Ordering) and places == sorted(places) and not closed:
         places = [*places[1:], places[0]]  # shown in the right order, it would need no answer
     return tuple(places)
 

@@ -1,4 +1,7 @@
-"""Opens a quiz by its name, for notebooks: finds its bank, and the folder of the learner's work."""
+"""Opens a quiz by its name, for notebooks: finds its bank, and the folder of the learner's work.
+
+A closed quiz comes as a question sheet beside the notebook; it goes before a bank of that name.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from quizzes import loader
+from quizzes import closing, loader
 from quizzes.errors import QuizError
 from quizzes.quiz import Quiz
 
@@ -25,15 +28,22 @@ def load(
         name: such as ``"ch05"``.
         student: who takes it; the login if left out.
         folder: where attempts are kept; the current folder if left out.
-        banks: a folder of banks, for an author's own; those of the package if left out.
+        banks: a folder of banks, for an author's own; if left out, the folder's question sheets
+            and the banks of the package.
 
     Raises:
         BankError: there is no such quiz (the message names the ones there are), or its bank is
             not sound.
         QuizError: ``student`` is no name, or ``folder`` or ``banks`` is no path.
     """
-    bank = loader.load_bank(name, loader.BANKS if banks is None else _path("banks", banks))
-    return Quiz(bank, student=student, folder=None if folder is None else _path("folder", folder))
+    place = None if folder is None else _path("folder", folder)
+    if banks is not None:
+        bank = loader.load_bank(name, _path("banks", banks))
+    else:
+        sheets = closing.sheets(place or Path.cwd())
+        path = sheets.get(str(name))
+        bank = closing.read(path, name) if path else loader.load_bank(name, others=sheets)
+    return Quiz(bank, student=student, folder=place)
 
 
 def _path(argument: str, given: Any) -> Path:

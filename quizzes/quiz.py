@@ -111,12 +111,17 @@ class Quiz:
     @property
     def counted(self) -> list[Attempt]:
         """The attempts that count; what comes after them is practice (see `quizzes.regrade`)."""
-        return [attempt for attempt in self.attempts if attempt.attempt <= regrade.COUNTED]
+        return [attempt for attempt in self.attempts if attempt.attempt <= self.bank.counted]
 
     @property
     def best(self) -> Attempt | None:
         """The attempt with the best score of those that count, the earliest of equal ones."""
         return max(self.counted, key=lambda a: (a.score, -a.attempt), default=None)
+
+    @property
+    def more(self) -> bool:
+        """Whether there is another attempt after the one at hand."""
+        return not self.bank.closed or self.attempt < self.bank.counted
 
     @property
     def open_questions(self) -> list[int]:
@@ -141,7 +146,16 @@ class Quiz:
         return QuizWidget(self)
 
     def points(self) -> float:
-        """Return the points of the best attempt so far, one for each concept."""
+        """Return the points of the best attempt so far, one for each concept.
+
+        Raises:
+            QuizError: the instructor marks this quiz.
+        """
+        if self.bank.keyless:
+            raise QuizError(
+                "Your instructor marks this quiz: its points come with the feedback to what you "
+                "hand in."
+            )
         return self.best.score if self.best else 0.0
 
     # What a learner does
@@ -199,12 +213,15 @@ class Quiz:
         """Begin another quiz: other questions on the same concepts.
 
         Raises:
-            QuizError: the attempt at hand has not been submitted.
+            QuizError: the attempt at hand has not been submitted, or was the last.
         """
         if self._result is None:
             raise QuizError(
                 f"Attempt {self.attempt} is still open: submit it with quiz.submit() first."
             )
+        if not self.more:
+            attempts = "one attempt" if self.bank.counted == 1 else f"{self.bank.counted} attempts"
+            raise QuizError(f"This quiz has {attempts}, and you have handed in the last.")
         self._begin(self._next_number())
         self._save_draft({})
 

@@ -5,12 +5,12 @@ questions that it names. The letters in it mean nothing without that deal: under
 are guesses. A file that was copied whole still says under which login it was made.
 
 Nobody is kept from practising, but the best of thousands of guesses would be full marks. So the
-first `COUNTED` attempts of a file count, by their number and in the order of the file, whoever
-made them. That is four times through all variants of a concept with five, and who guesses has one
-chance in some hundreds to get everything right in it. A file that goes on from there, or in which
-attempts follow one another faster than anybody reads (`HASTE`), is for a person to look at, with
-the reason: what it earns is what its first attempts earn. Time stamps are easily forged, so they
-only ever add a reason to look.
+first `Bank.counted` attempts of a file count, by their number and in the order of the file, whoever
+made them. Twenty, as in most banks, is four times through all variants of a concept with five, and
+who guesses has one chance in some hundreds to get everything right in it. A file that goes on from
+there, or in which attempts follow one another faster than anybody reads (`HASTE`), is for a person
+to look at, with the reason: what it earns is what its first attempts earn. Time stamps are easily
+forged, so they only ever add a reason to look.
 """
 
 from __future__ import annotations
@@ -26,8 +26,6 @@ from quizzes.errors import AnswerError
 from quizzes.marking import Result
 from quizzes.record import Attempt
 
-COUNTED = 20
-"""How many attempts count; those with a higher number are practice."""
 HASTE, WITHIN = 5, 60.0
 """More attempts than `HASTE` within so many seconds are not made by hand."""
 
@@ -87,23 +85,23 @@ def mark_all(bank: Bank, found: Iterable[Attempt], damaged: int = 0) -> Marked:
             other_edition += 1
         elif who in seen:
             problems.append(f"{name} is there more than once; the first one counts.")
-        elif attempt.attempt > COUNTED or len(results) == COUNTED:
+        elif attempt.attempt > bank.counted or len(results) == bank.counted:
             surplus += 1
         elif (result := again(bank, attempt)) is None:
             problems.append(f"{name} answers questions that were not asked in it.")
         else:
             seen.add(who)
             results.append(result)
-    doubt = _doubt(stamps, surplus)
+    doubt = _doubt(stamps, surplus, bank.counted)
     return Marked(tuple(results), tuple(problems), other_edition, damaged, doubt)
 
 
-def _doubt(stamps: list[float], surplus: int) -> str:
+def _doubt(stamps: list[float], surplus: int, counted: int) -> str:
     """Say why attempts may not have been made by a person; empty if nothing speaks for it."""
     reasons = []
     if surplus:
         reasons.append(
-            f"of {len(stamps)} attempts {surplus} are beyond the first {COUNTED}, which alone count"
+            f"of {len(stamps)} attempts {surplus} are beyond the first {counted}, which alone count"
         )
     ordered = sorted(stamps)
     spans = [last - first for first, last in zip(ordered, ordered[HASTE:], strict=False)]

@@ -84,6 +84,12 @@ def plain(text: str) -> str:
     return " ".join("".join(words).split())
 
 
+def pictures(text: str) -> list[str]:
+    """Return where the pictures of a Markdown text come from, in order."""
+    inner = (child for token in _markdown().parse(text) for child in token.children or ())
+    return [str(child.attrGet("src")) for child in inner if child.type == "image"]
+
+
 def check(text: str, folder: Path) -> None:
     """Return if ``text`` can be rendered.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from quizzes import loader
+from quizzes import closing, loader
 from quizzes.bank import Bank
 from quizzes.errors import BankError
 from quizzes.exchange import gift, merge, questions
@@ -18,11 +18,16 @@ def open_bank(name: str) -> Bank:
     """Return the bank of an installed quiz, or the one in the YAML file called ``name``.
 
     Raises:
-        BankError: there is none, or it is not sound.
+        BankError: there is none, it is not sound, or it has no keys.
     """
-    if name.endswith((".yaml", ".yml")):
-        return loader.read_bank(Path(name))
-    return loader.load_bank(name)
+    if not name.endswith((".yaml", ".yml")):
+        return loader.load_bank(name)
+    path = Path(name)
+    sheet = closing.quiz_of(path)
+    bank = closing.read(path, sheet) if sheet else loader.read_bank(path)
+    if bank.keyless:
+        raise BankError(f"{path.name} holds questions without keys: take the bank they come from.")
+    return bank
 
 
 def export_bank(bank: Bank, format_name: str, to: Path | None = None) -> tuple[Path, list[str]]:

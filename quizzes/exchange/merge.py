@@ -97,7 +97,8 @@ def merge(bank: Bank, questions: Sequence[Question], source: str) -> Merged:
 
 def dump(bank: Bank) -> str:
     """Return a bank as YAML that people can edit: texts of several lines as blocks."""
-    data = bank.model_dump(exclude_none=True)
+    usual = {name for name in ("closed", "keyless") if not getattr(bank, name)}
+    data = bank.model_dump(exclude_none=True, exclude=usual)
     return yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
 
 

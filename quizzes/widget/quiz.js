@@ -166,10 +166,10 @@ class QuizView {
     setText(this.alarm, { dead: DEAD, silent: SILENT, live: "" }[this.connection]);
     setText(this.notice, this.model.get("notice"));
     setText(this.result, done ? result.headline : "");
-    this.result.dataset.passed = done ? String(result.passed) : "";
+    this.result.dataset.passed = done && result.passed !== null ? String(result.passed) : "";
     for (const control of this.controls.values()) control.fieldset.disabled = done || dead;
     this.submit.hidden = done;
-    this.retry.hidden = !done;
+    this.retry.hidden = !done || !this.paper.more;
     for (const button of [this.submit, this.retry]) button.disabled = dead || this.waitingFor !== undefined;
     this.showFeedback(done ? result : null);
     this.showSaved();

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from quizzes import marking, model, regrade, rendering, text
+from quizzes import marking, model, rendering, text
 from quizzes.bank import Matching, Multiple, Numeric
 from quizzes.model import Item
 
@@ -21,6 +21,7 @@ def paper(quiz: Quiz) -> dict[str, Any]:
         "attempt": quiz.attempt,
         "needed": quiz.bank.pass_text,
         "standing": _standing(quiz),
+        "more": quiz.more,
         "questions": [_question(item, quiz.bank.folder) for item in quiz.items],
     }
 
@@ -30,17 +31,16 @@ def _standing(quiz: Quiz) -> str:
     first, best = quiz.first, quiz.best
     if first is None or best is None:
         return ""
+    counted = quiz.bank.counted
+    if quiz.bank.keyless:
+        return f"Handed in: {len(quiz.counted)} of {counted}."
     most = len(quiz.bank.concepts)
     passed = "passed" if any(attempt.passed for attempt in quiz.counted) else "not passed yet"
-    practice = quiz.attempt > regrade.COUNTED
+    practice = quiz.attempt > counted
     return (
         f"First attempt: {first.score:g} of {most}. Best: {best.score:g} of {most} "
         f"(attempt {best.attempt}). So far: {passed}."
-        + (
-            f" The first {regrade.COUNTED} attempts count: this one is practice."
-            if practice
-            else ""
-        )
+        + (f" The first {counted} attempts count: this one is practice." if practice else "")
     )
 
 
@@ -70,14 +70,18 @@ def _question(item: Item, folder: Path) -> dict[str, Any]:
 
 
 def result(quiz: Quiz) -> dict[str, Any] | None:
-    """Return what came of the attempt at hand; None before it is submitted."""
+    """Return what came of the attempt at hand; None before it is submitted.
+
+    Of a quiz that is marked elsewhere ``passed`` is None, and there are no marks.
+    """
     if quiz.result is None:
         return None
+    marks = [] if quiz.bank.keyless else quiz.result.marks
     return {
         "attempt": quiz.attempt,
         "headline": quiz.result.headline,
-        "passed": quiz.result.passed,
-        "marks": [_mark(mark, quiz.bank.folder) for mark in quiz.result.marks],
+        "passed": None if quiz.bank.keyless else quiz.result.passed,
+        "marks": [_mark(mark, quiz.bank.folder) for mark in marks],
     }
 
 

@@ -34,7 +34,7 @@ def write_notebook(
         cells=[
             nbformat.v4.new_markdown_cell("Before."),  # type: ignore[no-untyped-call]
             nbformat.v4.new_code_cell(source),  # type: ignore[no-untyped-call]
-            nbformat.v4.new_code_cell("print('points', quiz.points())"),  # type: ignore[no-untyped-call]
+            nbformat.v4.new_code_cell("print('quiz', quiz)"),  # type: ignore[no-untyped-call]
         ],
         metadata={"kernelspec": kernel},
     )
@@ -153,7 +153,7 @@ class Learner:
                 self.page.keyboard.press("ArrowDown")
             assert select.input_value() == letter
 
-    def take(self, *, right: int) -> None:
+    def take(self, *, right: int, says: str = "needed") -> None:
         """Answer all questions by keyboard, the first ``right`` of them rightly, and submit."""
         for item in self.quiz.items:
             key = model.key(item)
@@ -161,7 +161,7 @@ class Learner:
             self.answer_by_keyboard(item, answer)
         self.tab_to(self.submit)
         self.page.keyboard.press("Enter")
-        self.result.filter(has_text="needed").wait_for()
+        self.result.filter(has_text=says).wait_for()
 
     def saved(self) -> None:
         """Wait until the kernel has all answers."""

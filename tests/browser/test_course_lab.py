@@ -85,6 +85,8 @@ def test_from_the_first_minute_to_the_first_passed_check(
     record_timing("from opening the chapter to the first live messages", opened)
 
     student.open(EXERCISE)
+    expect(student.page.locator(".validate-button:visible")).to_be_visible()
+    expect(student.page.get_by_text("Create Assignment")).to_have_count(0)  # instructors' alone
     student.write_cell(place(student, SOLUTION), exercise.solution)
     for name in ("qos-given", SOLUTION, CHECK):
         student.run_cell(place(student, name))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
 
-from quizzes import model, rendering
+from quizzes import closing, model, regrade, rendering
 from quizzes.loader import load_bank, read_bank
 from quizzes.quiz import Quiz
 from tests.quizzes import sample
@@ -32,11 +33,17 @@ def sit(
     """Open a notebook with a quiz in a folder of its own, and sit a learner in front of it."""
     name = re.sub(r"\W+", "-", request.node.name)
 
-    def make(quiz: str = sample.NAME, *, attempts: Path | None = None) -> Learner:
+    def make(
+        quiz: str = sample.NAME, *, attempts: Path | None = None, closed: bool = False
+    ) -> Learner:
         banks = tmp_path / "banks"
         real = quiz != sample.NAME
-        bank = load_bank(quiz) if real else read_bank(sample.write(banks))
-        path = write_notebook(lab.work / name, None if real else banks, quiz, attempts)
+        data = {**sample.data(), "closed": closed}
+        bank = load_bank(quiz) if real else read_bank(sample.write(banks, data))
+        path = write_notebook(lab.work / name, None if real or closed else banks, quiz, attempts)
+        if closed:
+            (path.parent / closing.filename(quiz)).write_text(closing.sheet(bank))
+            shutil.copytree(banks / "assets", path.parent / "assets")
         window = open_notebook(path.relative_to(lab.work))
         learner = Learner(window, Quiz(bank, student=STUDENT, folder=tmp_path / "elsewhere"))
         learner.start()
@@ -286,26 +293,46 @@ def test_no_key_leaves_the_kernel_before_submission(sit: Sit) -> None:
         learner.answer_by_keyboard(item, model.key(item))
     learner.saved()
 
-    def everywhere() -> dict[str, str]:
-        return {
-            "file": json.dumps(learner.window.save()),
-            "page": learner.page.content(),
-            "frames": "\n".join(learner.window.frames),
-            "folder": "\n".join(
-                path.read_text(errors="replace")
-                for path in (learner.window.lab.work / learner.window.path).parent.rglob("*")
-                if path.is_file()
-            ),
-        }
-
-    for place, text in everywhere().items():
+    for place, text in everywhere(learner).items():
         assert not re.search(sample.SECRET, text, re.IGNORECASE), place
         assert "misconception" not in text, place
-    assert "Stem" in everywhere()["frames"], "the frames are really read"
+    assert "Stem" in everywhere(learner)["frames"], "the frames are really read"
     learner.submit.click()
     learner.result.filter(has_text="needed").wait_for()
-    assert sample.SECRET in everywhere()["frames"], "the mark is one that would be found"
-    assert sample.SECRET in everywhere()["page"]
+    assert sample.SECRET in everywhere(learner)["frames"], "the mark is one that would be found"
+    assert sample.SECRET in everywhere(learner)["page"]
+
+
+def everywhere(learner: Learner) -> dict[str, str]:
+    """Return all that a learner can look into."""
+    return {
+        "file": json.dumps(learner.window.save()),
+        "page": learner.page.content(),
+        "frames": "\n".join(learner.window.frames),
+        "folder": "\n".join(
+            path.read_text(errors="replace")
+            for path in (learner.window.lab.work / learner.window.path).parent.rglob("*")
+            if path.is_file()
+        ),
+    }
+
+
+def test_a_closed_quiz_is_handed_in_by_keyboard_and_its_key_is_nowhere(sit: Sit) -> None:
+    learner = sit(closed=True)
+    learner.take(right=4, says="Handed in: your instructor marks it.")
+    expect(learner.result).to_be_focused()
+    expect(learner.retry).to_be_hidden()
+    expect(learner.root.locator(".quiz-verdict")).to_have_count(0)
+    expect(learner.root.locator(".quiz-meta")).to_contain_text("Handed in: 1 of 1.")
+    for place, text in everywhere(learner).items():
+        assert not re.search(sample.SECRET, text, re.IGNORECASE), place
+    (attempt,) = learner.attempts()
+    bank = learner.quiz.bank
+    found = regrade.mark_file(bank, json.dumps(attempt).encode()).best
+    assert found is not None
+    assert found.right == 4
+    assert learner.window.errors == []
+    assert learner.window.foreign_requests() == []
 
 
 def test_no_feedback_of_the_real_quiz_is_sent_before_submission(sit: Sit) -> None:

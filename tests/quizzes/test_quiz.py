@@ -12,8 +12,8 @@ import pytest
 from IPython.testing.globalipapp import start_ipython
 
 import quizzes
-from quizzes import model, regrade
-from quizzes.bank import Bank
+from quizzes import model
+from quizzes.bank import COUNTED, Bank
 from quizzes.errors import AnswerError, AttemptsError, QuizError
 from quizzes.identity import login
 from quizzes.widget import view
@@ -62,12 +62,12 @@ def test_the_first_and_the_best_score_are_kept(make_quiz: MakeQuiz) -> None:
 
 def test_practice_goes_on_but_only_the_first_attempts_count(make_quiz: MakeQuiz) -> None:
     quiz = make_quiz()
-    for number in range(1, regrade.COUNTED + 2):
-        answer_all(quiz, right=3 if number == 7 else 1 if number <= regrade.COUNTED else 5)
+    for number in range(1, COUNTED + 2):
+        answer_all(quiz, right=3 if number == 7 else 1 if number <= COUNTED else 5)
         quiz.submit()
         quiz.retry()
     again = make_quiz()
-    assert len(again.attempts) == regrade.COUNTED + 1
+    assert len(again.attempts) == COUNTED + 1
     assert again.best is not None
     assert (again.best.attempt, again.points()) == (7, 3.0)
     standing = view.paper(again)["standing"]

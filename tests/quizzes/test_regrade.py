@@ -13,7 +13,7 @@ import pytest
 
 from quizzes import model, record, regrade
 from quizzes.answers import Answer
-from quizzes.bank import Bank
+from quizzes.bank import COUNTED, Bank
 from quizzes.loader import read_bank
 from quizzes.record import Attempt, Given
 from quizzes.regrade import Marked
@@ -165,7 +165,7 @@ def test_thousands_of_guesses_earn_no_full_marks_and_are_for_a_person(
     assert damaged == 0
     assert max(result.score for result in everything if result) == 3.0, "guesses do come true"
     found = regrade.mark_file(bank, content)
-    assert len(found.results) == (0 if first > regrade.COUNTED else regrade.COUNTED)
+    assert len(found.results) == (0 if first > COUNTED else COUNTED)
     assert all(result.score < 3.0 for result in found.results)
     beyond = 1000 - len(found.results)
     assert found.doubt == (
@@ -195,8 +195,8 @@ def test_stamps_that_are_none_are_no_way_around(bank: Bank) -> None:
 
 
 def test_a_learner_who_tries_often_is_not_doubted(bank: Bank) -> None:
-    found = regrade.mark_file(bank, guesses(bank, regrade.COUNTED, seconds=13))
-    assert (len(found.results), found.doubt) == (regrade.COUNTED, "")
+    found = regrade.mark_file(bank, guesses(bank, COUNTED, seconds=13))
+    assert (len(found.results), found.doubt) == (COUNTED, "")
 
 
 @pytest.mark.parametrize("content", [b"", b"\n\n", b"\x00" * 1000, b"null\n3\n", b"{}" * 9])
