@@ -64,8 +64,8 @@ def make_copy(folder: Path, root: Path | None = None) -> Copied:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         handed_out = _read_manifest(folder)
-        for name, text in files.items():
-            _hand_out(copied, name, text.encode(), handed_out.setdefault(str(name), []))
+        for name, content in files.items():
+            _hand_out(copied, name, content, handed_out.setdefault(str(name), []))
         _write_manifest(folder, handed_out)
         welcome.refresh(folder)
     except OSError as error:
@@ -104,13 +104,17 @@ def _first_view(arguments: Sequence[str]) -> list[str]:
     return [] if chosen or not WELCOME.is_file() else [f"--LabApp.default_url=/lab/tree/{WELCOME}"]
 
 
-def _course_files(root: Path) -> dict[Path, str]:
-    """Return {path in a working copy: text}: chapters at its top, assignments in their folders."""
+def _course_files(root: Path) -> dict[Path, bytes]:
+    """Return {path in a working copy: content}: chapters at its top, assignments in folders."""
     from course.student_version import student_versions
 
     chapters = sorted((root / "chapters").glob("*.ipynb"))
-    files = {Path(path.name): path.read_text(encoding="utf-8") for path in chapters}
-    files |= student_versions(root)
+    files = {Path(path.name): path.read_bytes() for path in chapters}
+    files |= {path: text.encode() for path, text in student_versions(root).items()}
+    for sheet in sorted((root / "source").glob("*/quiz-*.questions.yaml")):
+        pictures = sorted((sheet.parent / "assets").glob("*"))
+        files |= {path.relative_to(root / "source"): path.read_bytes()
+                  for path in (sheet, *pictures)}  # fmt: skip
     if not files:
         raise LabError(f"There are no notebooks in {root}: run `autograder build` first.")
     return files

@@ -40,6 +40,8 @@ class BlockedCallback:
         reason: why it cannot go on, if it waits for what cannot come; else "".
         holds_up: whether callbacks of other nodes have to wait for it.
         advice: what to do about it.
+        wall_wait: the method of rclpy in which it waits by the wall clock, such as
+            ``wait_for_service``, or "".
         key: tells this run of the callback from any other.
     """
 
@@ -50,6 +52,7 @@ class BlockedCallback:
     reason: str
     holds_up: bool
     advice: str
+    wall_wait: str
     key: tuple[int, float]
 
     @property
@@ -100,6 +103,7 @@ def describe(job: Job) -> BlockedCallback:
         reason=reason,
         holds_up=len({other.thread_id for other in home.running.copy()} - {0}) >= home.threads,
         advice=advice,
+        wall_wait=next((name for frame in frames if (name := _wall_wait(frame))), ""),
         key=(id(job), job.since),
     )
 
@@ -136,6 +140,18 @@ def _client_of(frame: FrameType) -> Client | ActionClient | None:
         return None
     client = frame.f_locals.get("self")
     return client if isinstance(client, Client | ActionClient) else None
+
+
+def _wall_wait(frame: FrameType) -> str:
+    """Return the method that `frame` is in, if that waits for a client's server by the wall clock.
+
+    A blocking call does so only if it is given a time-out: else its future's end is what it awaits.
+    """
+    if _client_of(frame) is None:
+        return ""
+    name = frame.f_code.co_name
+    timed = name == "call" and frame.f_locals.get("timeout_sec") is not None
+    return name if timed or name in _WAITS_FOR_SERVER else ""
 
 
 def _name(client: Client | ActionClient) -> str:

@@ -26,6 +26,7 @@ from rclpy.node import Node
 from rclpy.task import Future, Task
 
 from course.runtime import qos_events, streams
+from course.runtime.families import Families
 from course.runtime.gate import Gate
 from course.runtime.idleness import Idleness
 from course.runtime.jobs import Job, Report
@@ -76,6 +77,7 @@ class BackgroundExecutor(Executor):
         self.pulse = pulse
         self.gate = Gate(self.wake)
         self.finished = 0  # callbacks; told apart only from what it was
+        self._families = Families()
         self._created = CreatedTasks()
         self._awaiting: weakref.WeakSet[Task] = weakref.WeakSet()
         self._has_awaited = False  # most programs never do, and looking at a weak set takes time
@@ -204,7 +206,16 @@ class BackgroundExecutor(Executor):
             self._threads.replace_busy()
         return True
 
+    def brought_by(self, node: Node) -> list[Node]:
+        """Return the nodes of this executor that `node` brought along, directly or not."""
+        return self._families.brought_by(node, self.get_nodes())
+
     # What rclpy's own executors override.
+
+    def add_node(self, node: Node) -> bool:
+        """Add a node; one that a callback of another node adds belongs to that node."""
+        with self._families.arrival(node):
+            return bool(super().add_node(node))
 
     def wait_for_ready_callbacks(self, *args: Any, **kwargs: Any) -> tuple[Any, Any, Any]:
         """Return the next job, its entity and its node; only the timeout matters."""

@@ -102,6 +102,13 @@ class Hosting:
         for resident in self._residents.find(what):
             self._residents.stop(resident.node)
 
+    def let_go(self, node: Node) -> None:
+        """Stop spinning a node and forget it, without destroying it: that is now up to the caller.
+
+        Idempotent.
+        """
+        self._residents.let_go(node)
+
     def pause(self, *what: Any) -> None:
         """Stop executing callbacks of nodes, while DDS goes on receiving for them. Idempotent."""
         for resident in self._residents.find(what):

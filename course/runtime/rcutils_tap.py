@@ -46,8 +46,15 @@ _rcutils = ctypes.CDLL("librcutils.so")
 _rcutils.rcutils_logging_get_output_handler.restype = ctypes.c_void_p
 _rcutils.rcutils_logging_set_output_handler.argtypes = [ctypes.c_void_p]
 _console = ctypes.cast(_rcutils.rcutils_logging_console_output_handler, ctypes.c_void_p).value
-_vsnprintf = ctypes.CDLL(None).vsnprintf
+# PyDLL and not CDLL: its functions keep the GIL.
+_vsnprintf = ctypes.PyDLL(None).vsnprintf
 _vsnprintf.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes.c_void_p]
+
+# What rcl says while rclpy makes or destroys a node is said under the mutex of rclpy's logging, and
+# to hear it takes the GIL. A thread that holds the GIL then, and waits for that mutex to make or
+# destroy another node, never goes on, and neither does this one. All that is regularly said there
+# is a warning that /rosout has two publishers of one name: what is heard here needs no /rosout.
+_SAID_UNDER_LOCK = "rcl.logging_rosout"
 
 _HAND_ON_TIMEOUT = 1.0  # s that lines may be under way to the next handler before it is taken down
 
@@ -72,6 +79,7 @@ def install(*, hand_on: bool) -> None:
         if address == _ours:
             return
         _next = _Handler(address) if hand_on and address else None
+        set_logger_level(_SAID_UNDER_LOCK, LoggingSeverity.ERROR)
         _rcutils.rcutils_logging_set_output_handler(_ours)
 
 
@@ -215,7 +223,6 @@ def _is_ours_to_lower(logger: str) -> bool:
 
 _hear_in_c = _Handler(_hear)  # kept here: C only has its address
 _ours = ctypes.cast(_hear_in_c, ctypes.c_void_p).value
-# PyDLL and not CDLL: its functions keep the GIL.
 _hear_again = functools.partial(
     ctypes.PyDLL("librcutils.so").rcutils_logging_set_output_handler, ctypes.c_void_p(_ours)
 )

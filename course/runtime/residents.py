@@ -8,7 +8,7 @@ import functools
 import threading
 import weakref
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from rclpy.context import Context
@@ -34,7 +34,7 @@ Factory = Callable[..., Node]
 
 @dataclass
 class Resident:
-    """A node that a session runs."""
+    """A node that a session runs; ``held`` are those that it brought along, while it is paused."""
 
     node: Node
     name: str
@@ -42,6 +42,7 @@ class Resident:
     factory: object
     executor: BackgroundExecutor
     paused: bool = False
+    held: list[Node] = field(default_factory=list)
 
 
 class Residents:
@@ -112,12 +113,17 @@ class Residents:
 
     def stop(self, node: Node) -> None:
         """Stop spinning `node`, let its running callback end, and destroy it. Idempotent."""
+        if self.let_go(node):
+            destroy_node(node)
+
+    def let_go(self, node: Node) -> bool:
+        """Stop spinning `node`, let its running callback end, and forget it; True if it ran."""
         with self._lock:
             resident = self._residents.pop(node, None)
         if resident is None:
-            return
+            return False
         self.stopped.add(node)
-        for job in self._take_out(resident):
+        for job in self._take_out(resident.executor, resident.node):
             blocked = describe(job)  # before its thread is another's business
             if resident.executor.give_up(job):
                 self._tell(
@@ -125,12 +131,20 @@ class Residents:
                     f"been running for {blocked.seconds:.0f} s. {blocked.reason} The session goes "
                     "on without it; only a restart of the kernel or program ends it for good."
                 )
-        destroy_node(node)
+        return True
 
     def pause(self, resident: Resident) -> None:
-        """Stop executing callbacks; DDS goes on receiving into the node's queues."""
+        """Stop executing callbacks; DDS goes on receiving into the node's queues.
+
+        So with the nodes that it has brought to its executor: they are part of it.
+        """
         resident.paused = True
-        for job in self._take_out(resident):
+        jobs = self._take_out(resident.executor, resident.node)
+        # In rounds: a callback that was just running may have brought another one.
+        while brought := self._brought_along(resident):
+            resident.held += brought
+            jobs += [job for node in brought for job in self._take_out(resident.executor, node)]
+        for job in jobs:
             self._tell(
                 f"{resident.name} is paused, but a callback that had begun has not ended: "
                 f"{describe(job)}"
@@ -139,12 +153,17 @@ class Residents:
     def resume(self, resident: Resident) -> None:
         """Execute callbacks again, beginning with what the queues hold."""
         resident.executor.add_node(resident.node)  # first: it must not look stolen
+        held, resident.held = resident.held, []
+        for node in filter(is_alive, held):
+            resident.executor.add_node(node)
         resident.paused = False
 
     def forget_all(self) -> list[str]:
         """Destroy every node; no executor may be spinning. Return which cleanups raised what."""
         problems = []
-        nodes = {*(resident.node for resident in self.all()), *self._crew.nodes()}
+        residents = self.all()
+        nodes = {*(resident.node for resident in residents), *self._crew.nodes()}
+        nodes.update(node for resident in residents for node in resident.held)
         with self._lock:
             self._residents.clear()
         for node in nodes:
@@ -235,9 +254,17 @@ class Residents:
             and _holder(resident) is not resident.executor
         ]
 
-    def _take_out(self, resident: Resident) -> list[Job]:
+    def _brought_along(self, resident: Resident) -> list[Node]:
+        """Return the nodes that a node brought to its executor, and that no session was given."""
+        with self._lock:
+            return [
+                node
+                for node in resident.executor.brought_by(resident.node)
+                if node not in self._residents
+            ]
+
+    def _take_out(self, executor: BackgroundExecutor, node: Node) -> list[Job]:
         """Stop spinning a node; return its callbacks that have not ended after some time."""
-        node, executor = resident.node, resident.executor
         with executor.held():
             executor.remove_node(node)
         if (job := current_job()) is None or job.node is not node:

@@ -26,14 +26,19 @@ def destroy_node(node: Node) -> None:
         with contextlib.suppress(InvalidHandle):
             node.destroy_node()
     finally:
-        for waitable in list(node.waitables):
-            if isinstance(waitable, ActionServer | ActionClient):
-                with contextlib.suppress(InvalidHandle, ValueError):  # destroyed already
-                    waitable.destroy()
-        # An override that raised, or did not call the base method, must leave no ghost.
-        with contextlib.suppress(InvalidHandle):
-            Node.destroy_node(node)
-        _destroy_state_machine(node)
+        sweep(node)
+
+
+def sweep(node: Node) -> None:
+    """Destroy what a class's own `destroy_node()` may have left; it is not called. Idempotent."""
+    for waitable in list(node.waitables):
+        if isinstance(waitable, ActionServer | ActionClient):
+            with contextlib.suppress(InvalidHandle, ValueError):  # destroyed already
+                waitable.destroy()
+    # An override that raised, or did not call the base method, must leave no ghost.
+    with contextlib.suppress(InvalidHandle):
+        Node.destroy_node(node)
+    _destroy_state_machine(node)
 
 
 def _destroy_state_machine(node: Node) -> None:

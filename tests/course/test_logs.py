@@ -258,6 +258,36 @@ def test_a_callback_that_logs_while_its_context_is_shut_down_is_quiet(start_scri
     assert (process.returncode, out, err) == (0, "", "")
 
 
+TWO_OF_A_NAME = """
+import threading
+import course
+from rclpy.node import Node
+
+context, over = course.session().context, threading.Event()
+
+def come_and_go(name):
+    Node(name, context=context).destroy_node()
+
+def others():
+    while not over.is_set():
+        come_and_go("other")
+
+first, thread = Node("camera", context=context), threading.Thread(target=others)
+thread.start()
+for _ in range(50):
+    come_and_go("camera")
+over.set()
+thread.join()
+"""
+
+
+def test_a_second_node_of_a_name_can_be_made_while_another_thread_makes_nodes(start_script):
+    """About the second one rcl warns under a mutex that the other thread may want."""
+    process = start_script(TWO_OF_A_NAME)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out, err) == (0, "", "")
+
+
 def test_the_console_of_a_plain_context_opened_later_is_its_own(start_script):
     process = start_script(
         "import course, rclpy\nfrom rclpy.node import Node\n"

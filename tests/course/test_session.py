@@ -183,6 +183,33 @@ def test_a_paused_node_receives_but_does_not_execute(any_session):
     assert listener.heard == ["0", "1", "2", "3", "4"]
 
 
+def test_what_a_node_brought_to_its_executor_is_paused_with_it(any_session):
+    class Parent(Node):
+        def __init__(self):
+            super().__init__("parent")
+            self.child = Listener()
+            self.once = self.create_timer(0.0, self.adopt)
+
+        def adopt(self):
+            self.destroy_timer(self.once)
+            self.executor.add_node(self.child)
+
+        def destroy_node(self):
+            self.child.destroy_node()
+            super().destroy_node()
+
+    parent, other = any_session.run(Parent), any_session.run(lambda: Talker("other"))
+    publisher = any_session.run(Node, "publisher").create_publisher(String, "chatter", 10)
+    any_session.until(lambda: publisher.get_subscription_count() == 1)
+    any_session.until(lambda: parent.child.heard, what="the other talker")
+    any_session.pause(parent)
+    heard, said = len(parent.child.heard), other.count
+    any_session.until(lambda: other.count > said + 20, what="what is nobody's child goes on")
+    assert len(parent.child.heard) == heard
+    any_session.resume(parent)
+    any_session.until(lambda: len(parent.child.heard) > heard, what="what has queued up")
+
+
 def test_nodes_can_be_run_and_stopped_from_a_callback(any_session):
     done = threading.Event()
 
