@@ -144,6 +144,8 @@ class Design:
             namespace: its namespace, such as ``"front"``.
             factory: a node class of your own, or a function that returns a node: it is run in
                 place of one that the library makes, and what you declare of it is only drawn.
+                It passes a mark on by copying the header of what it received, or with
+                ``course.design.carry(received, sent)`` just before it sends.
 
         Raises:
             DesignError: it is no name for a node, or `factory` cannot be called.

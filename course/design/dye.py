@@ -2,6 +2,7 @@
 
 Water pipes are tested by pouring dye in at one end and looking for it at the other. Here a tag is
 the dye: it stands in the message's text (``frame_id`` first) if there is any, else in its numbers.
+A message that answers a question may carry several: the asker's own, and what else is known.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ _TEXT = re.compile(r"dye-(\d{7,8})")
 _WIDE = {"float", "double", "int32", "uint32", "int64", "uint64"}
 _BYTES = {"uint8", "int8", "octet"}
 _LONGEST = len(f"dye-{TAGS.stop}")
+_MOST = 4
+"""How many tags a text can hold."""
 _FRAME, _OTHER_TEXT, _NUMBER, _LIST, _STAMP = range(5)
 
 
@@ -38,8 +41,8 @@ class _Place:
     """A place in a message that can hold a tag; `rank` says how well suited it is."""
 
     rank: int
-    put: Callable[[int], None]
-    get: Callable[[], int | None]
+    put: Callable[[list[int]], set[int]]  # returns those for which there is room
+    get: Callable[[], list[int]]
 
 
 def fresh_tag() -> int:
@@ -47,42 +50,62 @@ def fresh_tag() -> int:
     return secrets.choice(TAGS)
 
 
-def mark(message: Any, tag: int) -> bool:
-    """Write `tag` into a message; return whether it has room for one.
+def mark(message: Any, *tags: int) -> set[int]:
+    """Write `tags` into a message, and return those for which it has room: none, one, or several.
+
+    One tag is written wherever there is a place for it.
 
     Raises:
-        ValueError: `tag` is not one of `TAGS`.
+        ValueError: one of `tags` is not one of `TAGS`.
     """
-    if tag not in TAGS:
-        raise ValueError(f"A tag is a number from {TAGS.start} to {TAGS.stop - 1}, not {tag}.")
+    for tag in tags:
+        if tag not in TAGS:
+            raise ValueError(f"A tag is a number from {TAGS.start} to {TAGS.stop - 1}, not {tag}.")
     places = list(_places(message))
     best = min((place.rank for place in places), default=None)
-    for place in places:
-        if place.rank == best:
-            place.put(tag)
-    return best is not None
+    suited = [place for place in places if place.rank == best]
+    written: set[int] = set()
+    for number, place in enumerate(suited if tags else ()):
+        # Numbers hold one tag each: the first has the first tag, the next one the next.
+        at = number % len(tags)
+        written |= place.put([*tags[at:], *tags[:at]])
+    return written
 
 
 def read(message: Any) -> int | None:
-    """Return the tag that a message carries, or None."""
-    for place in sorted(_places(message), key=lambda place: place.rank):
-        if (tag := place.get()) is not None:
-            return tag
-    return None
+    """Return the tag that a message carries, the first if there are several, or None."""
+    return next(iter(read_all(message)), None)
+
+
+def read_all(message: Any) -> list[int]:
+    """Return every tag that a message carries."""
+    places = list(_places(message))
+    if any(place.rank != _STAMP for place in places):
+        # The time of a real reading can look like a tag; it bears one only where nothing else can.
+        places = [place for place in places if place.rank != _STAMP]
+    for rank in sorted({place.rank for place in places}):
+        found = [tag for place in places if place.rank == rank for tag in place.get()]
+        if found:
+            return list(dict.fromkeys(found))
+    return []
 
 
 def carry(source: Any, target: Any) -> bool:
-    """Write the tag of one message into another; return whether there was one and room for it.
+    """Write the mark of one message into another; return whether there was one and room for it.
 
-    A node that you write yourself passes dye on with this line.
+    It stands in the text of ``target`` (``frame_id`` first), or in its numbers if it has no text.
+    Marks that are there already stay as far as there is room, so what is made of several messages
+    can carry the marks of each.
+
+    A node that you write yourself passes marks on with this line.
     """
-    tag = read(source)
-    return tag is not None and mark(target, tag)
+    tags = read_all(source)
+    return bool(tags and mark(target, *dict.fromkeys([*tags, *read_all(target)])))
 
 
 def has_room(msg_type: Any) -> bool:
     """Return whether messages of a type can carry a tag: `std_msgs/msg/Bool` cannot."""
-    return mark(msg_type(), TAGS.start)
+    return bool(mark(msg_type(), TAGS.start))
 
 
 def _places(message: Any) -> Iterator[_Place]:
@@ -109,11 +132,22 @@ def _holds_tag(kind: Any) -> bool:
 
 
 def _field(message: Any, name: str, kind: Any, rank: int) -> _Place:
-    return _Place(
-        rank,
-        lambda tag: setattr(message, name, _encoded(tag, kind)),
-        lambda: _decoded(getattr(message, name)),
-    )
+    def put(tags: list[int]) -> set[int]:
+        fitting = tags[: _room(kind)]
+        setattr(message, name, _encoded(fitting, kind))
+        return set(fitting)
+
+    return _Place(rank, put, lambda: _decoded(getattr(message, name)))
+
+
+def _room(kind: Any) -> int:
+    """Return how many tags a text or number holds."""
+    return 1 if isinstance(kind, BasicType) else _fitting(getattr(kind, "maximum_size", None))
+
+
+def _fitting(length: int | None) -> int:
+    """Return how many tags a text of at most ``length`` characters holds."""
+    return _MOST if length is None else min(_MOST, (length + 1) // (_LONGEST + 1))
 
 
 def _in_list(message: Any, name: str, kind: Any) -> Iterator[_Place]:
@@ -127,10 +161,12 @@ def _in_list(message: Any, name: str, kind: Any) -> Iterator[_Place]:
         yield from _in_messages(message, name, element)
     elif _holds_tag(element):
 
-        def put(tag: int) -> None:
-            setattr(message, name, [_encoded(tag, element), *list(values)[1:]])
+        def put(tags: list[int]) -> set[int]:
+            fitting = tags[: _room(element)]
+            setattr(message, name, [_encoded(fitting, element), *list(values)[1:]])
+            return set(fitting)
 
-        yield _Place(_LIST, put, lambda: _decoded(values[0]) if len(values) else None)
+        yield _Place(_LIST, put, lambda: _decoded(values[0]) if len(values) else [])
 
 
 def _in_messages(message: Any, name: str, element: Any) -> Iterator[_Place]:
@@ -139,27 +175,30 @@ def _in_messages(message: Any, name: str, element: Any) -> Iterator[_Place]:
     places = list(_places(first))
     if places:
 
-        def put(tag: int) -> None:
-            mark(first, tag)
+        def put(tags: list[int]) -> set[int]:
+            written = mark(first, *tags)
             setattr(message, name, [first, *values[1:]])
+            return written
 
-        yield _Place(_LIST, put, lambda: read(first))
+        yield _Place(_LIST, put, lambda: read_all(first))
 
 
 def _in_bytes(message: Any, name: str, kind: Any) -> Iterator[_Place]:
-    room = kind.size if isinstance(kind, Array) else getattr(kind, "maximum_size", _LONGEST)
-    if room < _LONGEST:
+    room = kind.size if isinstance(kind, Array) else getattr(kind, "maximum_size", None)
+    if not _fitting(room):
         return
     octets = kind.value_type.typename == "octet"
 
-    def put(tag: int) -> None:
-        text = f"dye-{tag}".encode()
+    def put(tags: list[int]) -> set[int]:
+        fitting = tags[: _fitting(room)]
+        text = _text(fitting).encode()
         if not isinstance(kind, AbstractSequence):
             text = text.ljust(kind.size, b"\0")
         setattr(message, name, [bytes([b]) for b in text] if octets else list(text))
+        return set(fitting)
 
-    def get() -> int | None:
-        first = list(getattr(message, name)[:_LONGEST])
+    def get() -> list[int]:
+        first = list(getattr(message, name)[: _MOST * (_LONGEST + 1)])
         text = b"".join(first) if octets else bytes(int(value) % 256 for value in first)
         return _decoded(text.decode(errors="replace"))
 
@@ -170,15 +209,19 @@ def _load(element: Any) -> Any:
     return getattr(importlib.import_module(".".join(element.namespaces)), element.name)
 
 
-def _encoded(tag: int, kind: Any) -> str | int | float:
+def _text(tags: list[int]) -> str:
+    return " ".join(f"dye-{tag}" for tag in tags)
+
+
+def _encoded(tags: list[int], kind: Any) -> str | int | float:
     if not isinstance(kind, BasicType):
-        return f"dye-{tag}"
-    return float(tag) if kind.typename in ("float", "double") else tag
+        return _text(tags)
+    return float(tags[0]) if kind.typename in ("float", "double") else tags[0]
 
 
-def _decoded(value: Any) -> int | None:
+def _decoded(value: Any) -> list[int]:
     if isinstance(value, str):
-        found = _TEXT.search(value)
-        value = int(found[1]) if found else 0
+        found = [int(digits) for digits in _TEXT.findall(value)[:_MOST]]
+        return [tag for tag in found if tag in TAGS]
     number = float(value)
-    return int(number) if number.is_integer() and int(number) in TAGS else None
+    return [int(number)] if number.is_integer() and int(number) in TAGS else []

@@ -8,20 +8,28 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import cycle
 from typing import Any
 
+from nav_msgs.msg import OccupancyGrid
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer, ServerGoalHandle
 from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.task import Future
+from sensor_msgs.msg import Imu
 
 from course.design import dye
 from course.design.endpoints import Endpoint, Role
+from course.design.lifelike import lifelike
 
 REMEMBERED = 1000
 """How many tags a node knows again; so many can be on their way at a time."""
+OF_ITSELF = (Imu, OccupancyGrid)
+"""What a node that reads nothing sends unasked: others may do nothing before they have it."""
+PERIOD = 0.5
+"""Seconds until it sends that again."""
 
 
 class DesignNode(Node):
@@ -29,6 +37,8 @@ class DesignNode(Node):
 
     A tag that comes in for the first time, by whatever endpoint, goes out by all of them: as a
     message, a request or a goal. Each tag passes a node once, so a cycle in the graph is no loop.
+    What is sent is filled with something to work on, for the nodes of a student's own. They may
+    wait for a map or an IMU, where no tag comes in: a node that reads nothing sends those unasked.
     """
 
     def __init__(self, name: str, namespace: str, endpoints: Sequence[Endpoint]) -> None:
@@ -38,13 +48,16 @@ class DesignNode(Node):
         self._known: deque[int] = deque(maxlen=REMEMBERED)
         self._outlets: list[Callable[[int], None]] = []
         self._unanswered: list[deque[int]] = []
+        self._is_source = not any(end.role is Role.SUBSCRIBES for end in endpoints)
         for end in sorted(endpoints, key=lambda end: not end.role.writes):
             _MAKERS[end.role](self, end)
 
-    def take(self, tag: int | None) -> None:
-        """Pass a tag on, unless it is none or has been here before."""
-        if tag is None:
-            return
+    def take(self, message: Any) -> None:
+        """Pass on what a message is marked with, unless it has been here before."""
+        for tag in dye.read_all(message):
+            self._take(tag)
+
+    def _take(self, tag: int) -> None:
         with self._lock:
             if tag in self._known:
                 return
@@ -59,16 +72,16 @@ class DesignNode(Node):
     def _publish(self, end: Endpoint) -> None:
         publisher = self.create_publisher(end.type, end.full_name, end.qos)
         self._outlets.append(partial(self._send_message, publisher, end.type))
+        if self._is_source and end.type in OF_ITSELF:
+            self.create_timer(PERIOD, lambda: publisher.publish(lifelike(end.type)))
 
     def _send_message(self, publisher: Publisher, msg_type: Any, tag: int) -> None:
-        message = msg_type()
+        message = lifelike(msg_type)
         if dye.mark(message, tag):
             publisher.publish(message)
 
     def _subscribe(self, end: Endpoint) -> None:
-        self.create_subscription(
-            end.type, end.full_name, lambda message: self.take(dye.read(message)), end.qos
-        )
+        self.create_subscription(end.type, end.full_name, self.take, end.qos)
 
     # Services.
 
@@ -78,28 +91,32 @@ class DesignNode(Node):
 
     def _send_request(self, client: Client, srv_type: Any, tag: int) -> None:
         if client.service_is_ready():
-            request = srv_type.Request()
+            request = lifelike(srv_type.Request)
             dye.mark(request, tag)
             client.call_async(request).add_done_callback(self._take_outcome)
 
     def _take_outcome(self, future: Future) -> None:
         if not future.cancelled() and future.exception() is None:
-            self.take(dye.read(future.result()))
+            self.take(future.result())
 
     def _serve(self, end: Endpoint) -> None:
         unanswered: deque[int] = deque(maxlen=REMEMBERED)
         self._unanswered.append(unanswered)
 
-        def answer(request: Any, response: Any) -> Any:
-            asked = dye.read(request)
-            self.take(asked)
+        turns = cycle((False, True))
+
+        def answer(request: Any, _: Any) -> Any:
+            self.take(request)
+            response = lifelike(end.type.Response)
+            asked = dye.read_all(request)
             with self._lock:
-                # The client knows its own tag: it is told what else came in here.
-                others = [tag for tag in unanswered if tag != asked]
+                others = [tag for tag in unanswered if tag not in asked]
                 unanswered.clear()
-                unanswered.extend(others[1:])
-            if tag := (others[0] if others else asked):
-                dye.mark(response, tag)
+                # A client may wait for its own mark, or for what else came in here. Where there is
+                # room for one only, they take turns.
+                own_first = bool(others and asked) and next(turns)
+                told = dye.mark(response, *([*asked, *others] if own_first else [*others, *asked]))
+                unanswered.extend(tag for tag in others if tag not in told)
             return response
 
         self.create_service(end.type, end.full_name, answer, qos_profile=end.qos)
@@ -111,10 +128,10 @@ class DesignNode(Node):
         self._outlets.append(partial(self._send_goal, client, end.type))
 
     def _send_goal(self, client: ActionClient, action_type: Any, tag: int) -> None:
-        goal = action_type.Goal()
+        goal = lifelike(action_type.Goal)
         if client.server_is_ready() and dye.mark(goal, tag):
             client.send_goal_async(
-                goal, feedback_callback=lambda message: self.take(dye.read(message.feedback))
+                goal, feedback_callback=lambda message: self.take(message.feedback)
             ).add_done_callback(self._follow_goal)
 
     def _follow_goal(self, future: Future) -> None:
@@ -124,19 +141,17 @@ class DesignNode(Node):
 
     def _take_result(self, future: Future) -> None:
         if future.exception() is None and (answer := future.result()) is not None:
-            self.take(dye.read(answer.result))
+            self.take(answer.result)
 
     def _carry_out_goals(self, end: Endpoint) -> None:
         ActionServer(self, end.type, end.full_name, partial(self._execute, end.type))
 
     def _execute(self, action_type: Any, goal: ServerGoalHandle) -> Any:
-        tag = dye.read(goal.request)
-        self.take(tag)
-        feedback, result = action_type.Feedback(), action_type.Result()
-        if tag is not None:
-            if dye.mark(feedback, tag):
-                goal.publish_feedback(feedback)
-            dye.mark(result, tag)
+        self.take(goal.request)
+        feedback, result = lifelike(action_type.Feedback), lifelike(action_type.Result)
+        if dye.carry(goal.request, feedback):
+            goal.publish_feedback(feedback)
+        dye.carry(goal.request, result)
         goal.succeed()
         return result
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
+from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, Twist
 from nav_msgs.msg import Path
 from nav_msgs.srv import GetPlan
@@ -92,6 +93,29 @@ def test_a_tag_survives_text_around_it() -> None:
     assert dye.read(String(data="seen: dye-2000000 (left)")) == 2_000_000
 
 
+def test_an_answer_carries_several_tags_and_carry_passes_all_of_them_on() -> None:
+    path, command, distance = Path(), Twist(), Float32()
+    assert dye.mark(path, 2_000_000, 3_000_000) == {2_000_000, 3_000_000}
+    assert dye.read_all(path) == [2_000_000, 3_000_000]
+    assert dye.read(path) == 2_000_000
+    assert carry(path, command)
+    assert set(dye.read_all(command)) == {2_000_000, 3_000_000}
+    assert dye.mark(distance, 2_000_000, 3_000_000) == {2_000_000}
+    assert dye.read_all(distance) == [2_000_000]
+
+
+def test_no_flood_of_tags_fits_into_a_text() -> None:
+    flood = String(data=" ".join(f"dye-{tag}" for tag in range(2_000_000, 2_001_000)))
+    assert len(dye.read_all(flood)) == 4
+
+
+def test_the_time_of_a_reading_is_no_tag() -> None:
+    scan = LaserScan()
+    scan.header.stamp.nanosec = 2_000_000
+    assert dye.read(scan) is None
+    assert dye.read(Time(nanosec=2_000_000)) == 2_000_000
+
+
 def test_carry_copies_a_tag_and_says_if_there_was_none() -> None:
     pose, command = PoseStamped(), Twist()
     assert not carry(pose, command)
@@ -99,6 +123,25 @@ def test_carry_copies_a_tag_and_says_if_there_was_none() -> None:
     assert carry(pose, command)
     assert dye.read(command) == 3_000_000
     assert not carry(pose, Bool())
+
+
+def test_what_is_made_of_several_messages_carries_the_marks_of_each() -> None:
+    plan, obstacles, command, pose = Path(), LaserScan(), Twist(), PoseStamped()
+    dye.mark(plan, 2_000_000)
+    dye.mark(obstacles, 3_000_000)
+    for target in (command, pose):
+        assert carry(plan, target)
+        assert carry(obstacles, target)
+        assert not carry(LaserScan(), target)
+        assert dye.read_all(target) == [3_000_000, 2_000_000]
+
+
+def test_where_there_is_room_for_few_marks_the_newest_stay() -> None:
+    command = Twist()
+    for tag in [*range(2_000_000, 2_000_020), 2_000_018]:
+        dye.mark(scan := LaserScan(), tag)
+        assert carry(scan, command)
+    assert dye.read_all(command)[:3] == [2_000_018, 2_000_019, 2_000_017]
 
 
 @pytest.mark.parametrize("tag", [0, 7, 2**24])

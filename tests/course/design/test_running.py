@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from action_msgs.srv import CancelGoal
 from geometry_msgs.msg import PoseStamped, Twist
+from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap, GetPlan
 from rclpy.node import Node
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import Imu, LaserScan
 from std_msgs.msg import String
 from test_msgs.action import Fibonacci
 
@@ -86,6 +88,32 @@ def test_a_response_tells_what_else_the_server_knows(session: Session) -> None:
     assert dye.read(session.call(GetMap, "map", GetMap.Request())) is None
 
 
+def test_a_response_bears_the_mark_of_the_question_too(session: Session) -> None:
+    design = Design()
+    design.node("map").subscribes("in", String).serves("plan", GetPlan).publishes("read", String)
+    design.run(session)
+    read = session.record("/read", String)
+    send(session, read, "in", 2_000_005)
+    answer = session.call(GetPlan, "plan", marked(GetPlan.Request, 2_000_006))
+    assert dye.read_all(answer) == [2_000_005, 2_000_006]
+
+
+def test_where_one_mark_fits_the_question_and_the_others_take_turns(session: Session) -> None:
+    design = Design()
+    design.node("stop").subscribes("in", String).serves("stop", CancelGoal).publishes(
+        "read", String
+    )
+    design.run(session)
+    read = session.record("/read", String)
+    for tag in (2_000_010, 2_000_011):
+        send(session, read, "in", tag)
+    answers = [
+        dye.read(session.call(CancelGoal, "stop", marked(CancelGoal.Request, tag)))
+        for tag in (2_000_020, 2_000_021, 2_000_022)
+    ]
+    assert answers == [2_000_010, 2_000_021, 2_000_011]
+
+
 def test_a_type_without_room_ends_the_dye_and_nothing_else(session: Session) -> None:
     design = Design()
     design.node("a").subscribes("in", String).publishes("flag", "std_msgs/msg/Bool").publishes(
@@ -95,6 +123,21 @@ def test_a_type_without_room_ends_the_dye_and_nothing_else(session: Session) -> 
     out = session.record("/out", String)
     send(session, out, "in", 2_000_004)
     assert session.errors == []
+
+
+def test_maps_and_imus_come_unasked_from_a_node_that_reads_nothing(session: Session) -> None:
+    design = Design()
+    design.node("hardware").publishes("imu", Imu).publishes("motors", Twist)
+    design.node("map_server").publishes("map", OccupancyGrid).serves("map", GetMap)
+    design.node("slam").subscribes("scan", LaserScan).publishes("slam_map", OccupancyGrid)
+    design.run(session)
+    imu, grid = session.record("/imu", Imu), session.record("/map", OccupancyGrid)
+    silent = [session.record("/motors", Twist), session.record("/slam_map", OccupancyGrid)]
+    session.until(
+        lambda: len(imu.messages) >= 2 and len(grid.messages) >= 2, what="a second map and reading"
+    )
+    assert {*tags(imu), *tags(grid)} == {None}
+    assert not any(recorder.messages for recorder in silent)
 
 
 def test_running_again_replaces_what_ran_before(session: Session) -> None:
