@@ -64,15 +64,15 @@ def examine(
     Raises:
         ExaminerError: the examiner failed.
     """
-    ours, theirs = socket.socketpair()
-    channel = Channel(ours)
     lease = lease_domain()
 
     def open_session(threads: int, sim_time: bool) -> Session:
         return Session(domain_id=lease.domain_id, threads=threads, sim_time=sim_time)
 
     try:
-        with ExaminerProcess(theirs, lease.domain_id) as examiner:
+        ours, theirs = socket.socketpair()
+        with ours, ExaminerProcess(theirs, lease.domain_id) as examiner:
+            channel = Channel(ours)
             examiner.request(exam, part, pid=os.getpid(), key=key)
             sitting = _Sitting(examiner)
             try:

@@ -90,8 +90,9 @@ def run(
         # one, which is being read, before the examiner's, which is not until an exam begins.
         pairs = sorted((socket.socketpair() for _ in range(2)), key=lambda pair: pair[1].fileno())
         (engine, subject_engine), (control, subject_control) = pairs
+        for end in (engine, subject_engine, control, subject_control):
+            stack.enter_context(end)
         channel = Channel(engine)
-        stack.callback(channel.close)
         examiner = stack.enter_context(
             ExaminerProcess(
                 control, place.domain_id, own_network=place.own_network, spawn=place.spawn

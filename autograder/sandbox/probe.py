@@ -118,8 +118,8 @@ def _try_warm() -> bool:
     try:
         with Box(warm=True) as box, _in_the_network(box, "read -r _"), ExitStack() as stack:
             (engine, ours), (control, theirs) = socket.socketpair(), socket.socketpair()
-            for end in (engine, control, theirs):
-                stack.callback(end.close)
+            for end in (engine, ours, control, theirs):
+                stack.enter_context(end)
             fds = [engine.fileno(), control.fileno()]
             options = ["--engine", str(fds[0]), "--control", str(fds[1]), "--domain", "1"]
             subject = stack.enter_context(box.start_subject([*command, *options], {}, fds))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -119,3 +120,18 @@ def test_an_outcome_survives_the_store_and_a_damaged_one_is_ignored(tmp_path: Pa
     (file,) = (tmp_path / "outcomes").iterdir()
     file.write_text(file.read_text()[:20])
     assert store.get(program(), {}) is None
+
+
+def test_an_examiner_that_cannot_be_started_leaves_no_socket_open(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def sockets() -> set[str]:
+        links = [link for link in Path("/proc/self/fd").iterdir() if link.exists()]
+        return {name for link in links if "socket" in (name := str(link.readlink()))}
+
+    before = sockets()
+    monkeypatch.setenv("PATH", "/nowhere")
+    monkeypatch.setattr(sys, "executable", "/nowhere/python")
+    with pytest.raises(FileNotFoundError) as raised:
+        runner.run(program("x = 1"), trust=True)
+    assert sockets() == before, f"open while {raised.value} is held"
