@@ -17,12 +17,14 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
 from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 from std_msgs.msg import UInt32
 
 from course.qoslab import answers, link
@@ -36,6 +38,23 @@ END = 4_000_000_000
 """The number of a last message that is not counted: what comes before it has come."""
 
 
+class Gate(MutuallyExclusiveCallbackGroup):
+    """A callback group that leaves messages in their queue as long as it is closed.
+
+    Events pass: a closed reader still learns that it is connected.
+    """
+
+    def __init__(self) -> None:
+        """Be open."""
+        super().__init__()
+        self.closed = False
+
+    def can_execute(self, entity: Any) -> bool:
+        """Whether ``entity`` may run now."""
+        held = self.closed and isinstance(entity, Subscription)
+        return not held and super().can_execute(entity)
+
+
 class Reader:
     """The reader's side: a subscription that is spun when it is asked to."""
 
@@ -47,14 +66,16 @@ class Reader:
             "reader", context=context, enable_rosout=False, start_parameter_services=False
         )
         self.ended = False
+        self.gate = Gate()
         events = SubscriptionEventCallbacks(
             incompatible_qos=self._incompatible, deadline=self._deadline,
             liveliness=self._liveliness, matched=self._matched, use_default_callbacks=False,
         )  # fmt: skip
         take: Any = self._take  # rclpy's annotation does not know of the second argument
         self._subscription = self._node.create_subscription(
-            UInt32, TOPIC, take, experiment.requested.qos(), event_callbacks=events
-        )
+            UInt32, TOPIC, take, experiment.requested.qos(), callback_group=self.gate,
+            event_callbacks=events,
+        )  # fmt: skip
         self._executor.add_node(self._node)
 
     def spin_until(self, condition: Callable[[], bool], timeout: float) -> bool:
@@ -161,8 +182,9 @@ class Bench:
         self._context.try_shutdown()
         return self._outcome
 
-    def _connect(self) -> Reader | None:
+    def _connect(self, *, closed: bool = False) -> Reader | None:
         reader = Reader(self._context, self._experiment, self._outcome)
+        reader.gate.closed = closed
         reader.spin_until(lambda: reader.decided, MATCH_TIMEOUT)
         if not self._outcome.connected:
             return None
@@ -179,7 +201,12 @@ class Bench:
     def _late_joiner(self) -> None:
         self._writer.do("publish", (0, COUNT, RATE * 4))
         self._outcome.sent = COUNT
-        if reader := self._connect():
+        # What is sent again comes in several packets. A reader that took the first message between
+        # two of them would have room for one more, now and then.
+        if reader := self._connect(closed=True):
+            if reliable(self._experiment):
+                self._writer.do("acked", ACK_TIMEOUT)
+            reader.gate.closed = False
             self._collect(reader)
 
     def _slow(self) -> None:
