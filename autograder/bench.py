@@ -23,16 +23,22 @@ class SubjectGone(Exception):  # noqa: N818 - it is a finding, not a fault of ou
 
 
 class StudentError(Exception):
-    """The student's code raised while carrying out a request; the message is its error."""
+    """The student's code raised while carrying out a request; the message is its error.
 
-    def __init__(self, error: str, trace: str = "") -> None:
+    Or there is nothing that could carry it out: then the message is a sentence that says so.
+    """
+
+    def __init__(self, error: str, trace: str = "", *, missing: bool = False) -> None:
         """Keep the student's error and where in their code it came from."""
         super().__init__(error)
         self.trace = trace
+        self.missing = missing
 
     @property
     def told(self) -> str:
         """Return what was raised, and where in the student's own lines, as feedback tells it."""
+        if self.missing:
+            return str(self)
         where = f" It happened here:\n{self.trace}" if self.trace else ""
         return f"It raised {str(self).rstrip('.')}.{where}"
 
@@ -88,7 +94,17 @@ class Subject:
         Raises:
             StudentError: the object is missing or declares nothing, or a node could not be made.
         """
-        return {str(k): str(v) for k, v in self._ask("start_all", name)["nodes"].items()}
+        labels = self._ask("declare", name, doing=f"bring up the nodes of `{name}`")["labels"]
+        # One by one: if a constructor does not return, it is known whose.
+        return {
+            str(label): str(
+                self._ask(
+                    "start_declared", name, label=label,
+                    doing=f"bring up the nodes of `{name}`, and {str(label)[:60]} did not come up",
+                )["node"]
+            )
+            for label in labels
+        }  # fmt: skip
 
     def mark(self, name: str) -> None:
         """Make a node called ``name`` with one publisher and one subscription on topic ``name``.
@@ -98,9 +114,15 @@ class Subject:
         """
         self._ask("mark", name)
 
-    def stop(self, name: str) -> None:
-        """Destroy the node made of a class, as a session does: its ``destroy_node`` is called."""
-        self._ask("stop", name)
+    def stop(self, name: str, *, bare: bool = False) -> None:
+        """Destroy the node made of a class, as a session does: its ``destroy_node`` is called.
+
+        Args:
+            name: the class.
+            bare: nobody tidies up after ``destroy_node``, as in a program without a session, and
+                the program still refers to the node, until it is stopped once more.
+        """
+        self._ask("stop", name, bare=bare)
 
     def collect(self) -> None:
         """Have Python free what nobody refers to any more.
@@ -173,16 +195,42 @@ class Subject:
         counts = self._ask("sees", name, endpoints=wanted)["counts"]
         return {kind: {n: int(counts[kind][n]) for n in names} for kind, names in wanted.items()}
 
+    def wall_waits(self) -> list[str]:
+        """Return in which methods of rclpy's callbacks wait by the wall clock now, and where.
+
+        Each is like ``wait_for_service: Asker.ask of /asker (at line 7: ...)``.
+        """
+        return [str(line) for line in self._ask("wall_waits", "its waits")["waits"]]
+
     def errors(self) -> list[str]:
         """Return what the student's callbacks raised: for an explanation, never as evidence."""
         return [str(line) for line in self._ask("errors", "its errors").get("errors", [])]
 
+    def thread_errors(self) -> list[str]:
+        """Return what ended threads of the student's: for an explanation, never as evidence."""
+        return [str(line) for line in self._ask("errors", "its errors").get("of_threads", [])]
+
+    def own_errors(self) -> dict[str, int]:
+        """Return what left the student's callbacks and was raised by a line of theirs, how often.
+
+        What rclpy raised, in a call of theirs or elsewhere, is not among it: that may be a race of
+        its own.
+        """
+        found = self._ask("own_errors", "its errors")["errors"]
+        return {str(error["told"]): int(error["count"]) for error in found}
+
     def _ask(
-        self, operation: str, what: str, timeout: float = REPLY_TIMEOUT, **more: Any
+        self,
+        operation: str,
+        what: str,
+        timeout: float = REPLY_TIMEOUT,
+        *,
+        doing: str = "",
+        **more: Any,
     ) -> dict[str, Any]:
         if self._gone:
             raise SubjectGone(self._gone)
-        doing = f"{operation.replace('_', ' ')} {what}"
+        doing = doing or f"{operation.replace('_', ' ')} {what}"
         try:
             self._channel.send({"op": operation, "name": what, **more})
             reply = self._channel.receive(timeout)
@@ -196,6 +244,8 @@ class Subject:
             )
             self.hangs = self._gone
             raise SubjectGone(self._gone) from None
+        if "missing" in reply:
+            raise StudentError(str(reply["missing"]), missing=True)
         if not reply.get("ok"):
             raise StudentError(str(reply.get("error", "unknown")), str(reply.get("trace", "")))
         return reply

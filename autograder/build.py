@@ -1,8 +1,9 @@
 """Build the notebooks from their text sources (jupytext py:percent), always byte for byte alike.
 
 ``authoring/chapters/NAME.py`` becomes ``chapters/NAME.ipynb``, and
-``authoring/assignments/ASSIGNMENT/NAME.py`` becomes ``source/ASSIGNMENT/NAME.ipynb``. The built
-notebooks are committed, so `build` with ``check=True`` proves that they are in step.
+``authoring/assignments/ASSIGNMENT/NAME.py`` becomes ``source/ASSIGNMENT/NAME.ipynb``, with the
+questions of its closed quizzes beside it. What is built is committed, so `build` with
+``check=True`` proves that it is in step.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from nbformat import NotebookNode
 from autograder import cells
 from autograder.cells import BuildError
 from autograder.submission import grade_id
-from course.files import write_text
+from course.files import replacing
 
 SOLUTIONS_TAG = "solutions"
 """Tag of the chapters' cells that only an instructor's build keeps."""
@@ -44,7 +45,7 @@ def build(
     with_solutions: bool = False,
     points: Mapping[str, float] | None = None,
 ) -> list[Path]:
-    """Build every chapter and assignment of the course at ``root``; return the notebooks.
+    """Build every chapter and assignment of the course at ``root``; return the files.
 
     Args:
         root: the nbgrader course root, with the text sources in ``authoring``.
@@ -53,18 +54,19 @@ def build(
         points: points by grade id, in place of the package's ``points.toml`` and quizzes.
 
     Raises:
-        BuildError: a source is not sound, there is none, a notebook cannot be written, or
+        BuildError: a source is not sound, there is none, a file cannot be written, or
             (``check``) some are not in step. A source that is not sound leaves all as it was.
+        QuizMarksError, QuizSheetError: a quiz that it uses is not sound, or cannot be handed out.
     """
     if points is None:
         from autograder import points as exams
         from autograder import quiz_marks
 
-        points = exams.of_grade_cells() | quiz_marks.of_grade_cells()
+        points = exams.of_grade_cells() | quiz_marks.of_grade_cells(root)
     built = dict(_built(root, points, with_solutions))
     if not built:
         raise BuildError(f"There is nothing to build: no {root / 'authoring'}/*/*.py.")
-    stale = [path for path, text in built.items() if _content(path) != text]
+    stale = [path for path, content in built.items() if _content(path) != content]
     if check and stale:
         names = ", ".join(str(path.relative_to(root)) for path in stale)
         raise BuildError(
@@ -119,16 +121,21 @@ def to_text(notebook: NotebookNode) -> str:
 
 def _built(
     root: Path, points: Mapping[str, float], with_solutions: bool
-) -> Iterator[tuple[Path, str]]:
+) -> Iterator[tuple[Path, bytes]]:
+    from autograder import quiz_sheets
+
     authoring = root / "authoring"
     for path in sorted((authoring / "chapters").glob("*.py")):
         name = str(path.relative_to(root))
         notebook = build_chapter(_source(path), with_solutions=with_solutions, name=name)
-        yield root / "chapters" / f"{path.stem}.ipynb", to_text(notebook)
+        yield root / "chapters" / f"{path.stem}.ipynb", to_text(notebook).encode()
     for path in sorted((authoring / "assignments").glob("*/*.py")):
         name = str(path.relative_to(root))
         notebook = build_assignment(_source(path), points, name=name)
-        yield root / "source" / path.parent.name / f"{path.stem}.ipynb", to_text(notebook)
+        folder = root / "source" / path.parent.name
+        yield folder / f"{path.stem}.ipynb", to_text(notebook).encode()
+        for file, content in quiz_sheets.of_notebooks(root, [notebook]).items():
+            yield folder / file, content
 
 
 def _source(path: Path) -> str:
@@ -138,20 +145,21 @@ def _source(path: Path) -> str:
         raise BuildError(f"{path} cannot be read as UTF-8 text: {error}.") from error
 
 
-def _content(path: Path) -> str | None:
+def _content(path: Path) -> bytes | None:
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_bytes()
     except FileNotFoundError:
         return None
-    except (OSError, UnicodeError) as error:
+    except OSError as error:
         raise BuildError(f"{path} cannot be read: {error}.") from error
 
 
-def _write(path: Path, text: str) -> None:
-    """Replace a file's text in one step: a full disk must not leave half a notebook."""
+def _write(path: Path, content: bytes) -> None:
+    """Replace a file's content in one step: a full disk must not leave half a notebook."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_text(path, text)
+        with replacing(path) as file:
+            file.write(content)
     except OSError as error:
         raise BuildError(
             f"{path} cannot be written ({error.strerror or error}): make room there, or name a "

@@ -118,6 +118,7 @@ class Exam(Generic[RigT]):
         table = self.part(part)
         failed = {} if failed is None else failed
         done = dict(failed)
+        gone: list[CheckResult] = []
         with ExitStack() as stack:
             rig: RigT | None
             try:
@@ -125,24 +126,30 @@ class Exam(Generic[RigT]):
             except (StudentError, SubjectGone) as error:
                 done.update((name, _blamed(self.checks[name], error)) for name in self._roots())
                 rig = None
-            results = [_worth(self._result(name, rig, done), table[name]) for name in table]
+            results = [_worth(self._result(name, rig, done, gone), table[name]) for name in table]
         failed.update((name, result) for name, result in done.items() if result.status == "failed")
         return Verdict(self.name, part, tuple(results))
 
     def _roots(self) -> list[str]:
         return [name for name, check in self.checks.items() if not check.needs]
 
-    def _result(self, name: str, rig: RigT | None, done: dict[str, CheckResult]) -> CheckResult:
+    def _result(
+        self,
+        name: str,
+        rig: RigT | None,
+        done: dict[str, CheckResult],
+        gone: list[CheckResult],
+    ) -> CheckResult:
         if name not in done:
             check = self.checks[name]
             for need in check.needs:
-                self._result(need, rig, done)
+                self._result(need, rig, done, gone)
             missing = [done[need] for need in check.needs if not done[need].passed]
             if missing:
                 done[name] = _not_checked(check, missing[0])
             else:
                 assert rig is not None  # without one, what needs nothing has failed already
-                done[name] = _run(check, rig)
+                done[name] = _run(check, rig, gone)
         return done[name]
 
 
@@ -161,13 +168,32 @@ def _not_checked(check: Check[RigT], missing: CheckResult) -> CheckResult:
     return replace(_result_of(check, "not_checked"), actual=f"This needs “{missing.title}” first.")
 
 
-def _run(check: Check[RigT], rig: RigT) -> CheckResult:
+def _not_reached(check: Check[RigT], gone: CheckResult) -> CheckResult:
+    return replace(
+        _result_of(check, "not_checked"),
+        actual=f"Your program hung or ended in “{gone.title}”, and was gone by then.",
+    )
+
+
+def _run(check: Check[RigT], rig: RigT, gone: list[CheckResult]) -> CheckResult:
+    """Run a check; add its result to ``gone`` if it lost the subject.
+
+    What comes after a check that did is not at fault.
+    """
     try:
         note = check.run(rig) or ""
     except Failed as failed:
-        return replace(_result_of(check, "failed"), expected=failed.expected, actual=failed.actual)
-    except (StudentError, SubjectGone) as error:
+        result = _failed(check, failed.expected, failed.actual)
+        if isinstance(failed.__cause__, SubjectGone):
+            gone.append(result)
+        return result
+    except StudentError as error:
         return _blamed(check, error)
+    except SubjectGone as error:
+        if gone:
+            return _not_reached(check, gone[0])
+        gone.append(_blamed(check, error))
+        return gone[0]
     except NotExaminable as reason:
         return replace(_result_of(check, "not_examined"), actual=str(reason))
     except Exception as error:  # noqa: BLE001 - whatever else goes wrong in here is our fault
@@ -186,6 +212,10 @@ def _blamed(check: Check[RigT], error: StudentError | SubjectGone) -> CheckResul
     else:
         expected = "Your program keeps running and answering while it is examined."
         actual = str(error)
+    return _failed(check, expected, actual)
+
+
+def _failed(check: Check[RigT], expected: str, actual: str) -> CheckResult:
     return replace(_result_of(check, "failed"), expected=expected, actual=actual)
 
 

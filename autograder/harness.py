@@ -8,23 +8,32 @@ from __future__ import annotations
 
 import gc
 import json
-import sysconfig
-import traceback
+import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from rclpy.node import Node
 from std_msgs.msg import String
 
+from autograder.raised import (
+    MUST_NOT_SPIN,
+    ThreadErrors,
+    described,
+    own_line,
+    spins,
+    student_trace,
+)
 from autograder.wire import Channel, ChannelClosed
 from course import Session
+from course.runtime.teardown import sweep
 
-TRACE_LINES = 6
 MAX_VALUE = 64 * 1024
 """Characters of JSON that a value or a returned object may have."""
+
+MAX_TOLD = 500
+"""Characters that are told of the error of a cell."""
 
 MOST_CLEANUPS = 100
 """Nodes whose cleanup may raise while a session is closed."""
@@ -45,35 +54,42 @@ class Harness:
         self._session: Session | None = None
         self._namespace = namespace
         self._nodes: dict[str, Any] = {}
+        self._declared: dict[str, Callable[[], Any]] = {}
         # What a constructor raised is kept, as a notebook keeps it, and with it all that its
         # frames refer to: what they leave behind does not go away by chance.
-        self._raised: list[Exception] = []
+        self._raised: list[Exception | SystemExit] = []
+        self._threads = ThreadErrors()
 
     def serve(self, channel: Channel) -> None:
         """Answer requests until the examiner says that it is done or goes away."""
-        try:
-            while (request := channel.receive())["op"] != "done":
-                channel.send(self._answer(request))
-        except ChannelClosed:
-            pass
-        finally:
-            self._close()
+        with self._threads:
+            try:
+                while (request := channel.receive())["op"] != "done":
+                    channel.send(self._answer(request))
+            except ChannelClosed:
+                pass
+            finally:
+                self._close()
 
     def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
         try:
             operation = {
-                "open": self._open, "start": self._start, "start_all": self._start_all,
-                "mark": self._mark, "stop": self._stop, "pause": self._pause,
-                "resume": self._resume, "collect": self._collect, "advance": self._advance,
-                "call": self._call, "value": self._value, "errors": self._errors,
-                "sees": self._sees,
+                "open": self._open, "start": self._start, "declare": self._declare,
+                "start_declared": self._start_declared, "mark": self._mark, "stop": self._stop,
+                "pause": self._pause, "resume": self._resume, "collect": self._collect,
+                "advance": self._advance, "call": self._call, "value": self._value,
+                "errors": self._errors, "sees": self._sees, "wall_waits": self._wall_waits,
+                "own_errors": self._own_errors,
             }[request["op"]]  # fmt: skip
             return {"ok": True, **operation(request)}
-        except Exception as error:  # noqa: BLE001 - a student's code may raise anything
+        except _Missing as missing:
+            return {"ok": False, "missing": str(missing)[:2000]}
+        # sys.exit() in a constructor ends a program, but not the examination of it.
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - student's code may raise anything
             return {
                 "ok": False,
-                "error": f"{type(error).__name__}: {error}"[:2000],
-                "trace": _student_trace(error),
+                "error": described(error)[:2000],
+                "trace": student_trace(error),
             }
 
     @property
@@ -85,6 +101,7 @@ class Harness:
     def _close(self) -> None:
         self._nodes.clear()
         self._raised.clear()
+        self._threads.items.clear()
         session, self._session = self._session, None
         if session is not None:
             _close(session)
@@ -95,11 +112,13 @@ class Harness:
         self._session = self._open_session(int(request["threads"]), bool(request["sim_time"]))
         return {}
 
-    def _find(self, name: str, what: str = "class") -> Any:
+    def _find(self, name: str) -> Any:
         try:
             return self._namespace[name]
         except KeyError:
-            raise LookupError(f"there is no {what} named {name} in the notebook") from None
+            raise _Missing(
+                f"No {name} was defined: did its cell end with an error?{_last_error()}"
+            ) from None
 
     def _start(self, request: dict[str, Any]) -> dict[str, Any]:
         name = request["name"]
@@ -114,19 +133,19 @@ class Harness:
             self._raised.append(raised.error)
             raise raised.error from None
 
-    def _start_all(self, request: dict[str, Any]) -> dict[str, Any]:
+    def _declare(self, request: dict[str, Any]) -> dict[str, Any]:
         name = request["name"]
-        design = self._find(name, "design")
+        design = self._find(name)
         if not hasattr(design, "node_factories"):
             kind = type(design).__name__
             raise TypeError(f"{name} is of type {kind}, which has no nodes; a course.Design has")
         factories = design.node_factories()
-        return {
-            "nodes": {
-                str(label): self._run(f"{name}.{label}", factory)
-                for label, factory in factories.items()
-            }
-        }
+        self._declared = {str(label): factory for label, factory in factories.items()}
+        return {"labels": list(self._declared)}
+
+    def _start_declared(self, request: dict[str, Any]) -> dict[str, Any]:
+        label = request["label"]
+        return {"node": self._run(f"{request['name']}.{label}", self._declared[label])}
 
     def _run(self, name: str, factory: Any) -> str:
         # Two classes may share a node name, or come out of one function: both have to run.
@@ -139,10 +158,21 @@ class Harness:
         return {}
 
     def _stop(self, request: dict[str, Any]) -> dict[str, Any]:
-        node = self._nodes.pop(request["name"], None)
-        if node is not None:
+        name = request["name"]
+        if request["bare"]:
+            self._destroy_unaided(self._nodes[name])
+        elif (node := self._nodes.pop(name, None)) is not None:
             self._hosting.stop(node)
+            sweep(node)  # a session does not know what it has let go of
         return {}
+
+    def _destroy_unaided(self, node: Any) -> None:
+        self._hosting.let_go(node)
+        try:
+            node.destroy_node()
+        except BaseException:
+            sweep(node)
+            raise
 
     def _collect(self, request: dict[str, Any]) -> dict[str, Any]:
         gc.collect()
@@ -173,7 +203,7 @@ class Harness:
             return {"value": repr(returned)[:1000]}
 
     def _value(self, request: dict[str, Any]) -> dict[str, Any]:
-        found = self._find(request["name"], "variable")
+        found = self._find(request["name"])
         try:
             return {"value": _as_json(found)}
         except (TypeError, ValueError, RecursionError):
@@ -194,12 +224,28 @@ class Harness:
             }
         }
 
+    def _wall_waits(self, request: dict[str, Any]) -> dict[str, Any]:
+        waits = [one for one in self._hosting.blocked_callbacks(0.0) if one.wall_wait]
+        return {"waits": [f"{one.wall_wait}: {one.what}"[:500] for one in waits]}
+
     def _errors(self, request: dict[str, Any]) -> dict[str, Any]:
         recent = self._hosting.errors[-5:]
         return {
             "errors": [
-                f"{e.callback} of {e.node}: {type(e.exception).__name__}: {e.exception}"[:500]
+                f"{e.callback} of {e.node}: {described(e.exception)}"[:500]
+                + (MUST_NOT_SPIN if spins(e.exception) else "")
                 for e in recent
+            ],
+            "of_threads": [str(error)[:500] for error in self._threads.items[-5:]],
+        }
+
+    def _own_errors(self, request: dict[str, Any]) -> dict[str, Any]:
+        found = [(error, own_line(error.exception)) for error in self._hosting.errors]
+        return {
+            "errors": [
+                {"told": f"{e.callback} {e.problem} (at {line})"[:500], "count": e.count}
+                for e, line in found
+                if line
             ]
         }
 
@@ -211,10 +257,22 @@ def _marker(name: str) -> Node:
     return node
 
 
+class _Missing(Exception):  # noqa: N818 - nothing of the student's raised it
+    """The notebook has not defined what the examiner asks for; the message says so."""
+
+
+def _last_error() -> str:
+    """Return, as a sentence, what a cell last ended with, if IPython knows of an error."""
+    error = getattr(sys, "last_value", None)
+    if error is None:
+        return ""
+    return f" The last error of a cell was {described(error)[:MAX_TOLD].rstrip('.')}."
+
+
 class _RaisedUnaided(Exception):  # noqa: N818 - it wraps an error, and is none itself
     """Carries what a constructor raised past a session, without the traceback."""
 
-    def __init__(self, error: Exception) -> None:
+    def __init__(self, error: Exception | SystemExit) -> None:
         super().__init__(str(error))
         self.error = error
 
@@ -228,7 +286,7 @@ def _unaided(factory: Callable[[], Any]) -> Callable[[], Any]:
     def make() -> Any:
         try:
             return factory()
-        except Exception as error:  # noqa: BLE001 - a student's code may raise anything
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - student's code may raise anything
             raised = _RaisedUnaided(error)
         raise raised from None
 
@@ -238,7 +296,9 @@ def _unaided(factory: Callable[[], Any]) -> Callable[[], Any]:
 def _close(session: Session) -> None:
     """Close a session, whatever the student's cleanups raise."""
     for _ in range(MOST_CLEANUPS):
-        with suppress(Exception):  # close() can be called again, and goes on where it was
+        with suppress(
+            Exception, SystemExit
+        ):  # close() can be called again, and goes on where it was
             session.close()
             return
 
@@ -249,18 +309,3 @@ def _as_json(value: Any) -> Any:
     if len(text) > MAX_VALUE:
         raise ValueError(f"{len(text)} characters are more than the {MAX_VALUE} that are read")
     return json.loads(text)
-
-
-_NOT_THEIRS = tuple({sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")})
-_OURS = tuple(str(Path(__file__).parent.parent / part) for part in ("autograder", "course"))
-
-
-def _student_trace(error: BaseException) -> str:
-    """Return the last frames of ``error`` that are the student's: not Python's, rclpy's or ours."""
-    frames = [
-        frame
-        for frame in traceback.extract_tb(error.__traceback__)
-        if not frame.filename.startswith((*_NOT_THEIRS, *_OURS))
-        and not frame.filename.startswith("<frozen")
-    ]
-    return "".join(traceback.format_list(frames[-TRACE_LINES:]))[:4000]

@@ -94,13 +94,13 @@ def of_course(root: Path, folders: Iterable[Path], mode: str, exams: tuple[str, 
     """Return a digest of what all students' grades depend on.
 
     Args:
-        root: the course root, whose configuration counts.
+        root: the course root, whose configuration and quizzes count.
         folders: the assignment's source and release.
         mode: how submissions are run (see `autograder.sandbox.Abilities`).
         exams: sorted names of the assignment's exams.
     """
     state = hashlib.sha256(f"{mode} {digests.of_grading(exams)}".encode())
-    for path in (root / "nbgrader_config.py", *folders):
+    for path in (root / "nbgrader_config.py", root / "authoring" / "banks", *folders):
         state.update(of_folder(path).encode())
     return state.hexdigest()
 

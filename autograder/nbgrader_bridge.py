@@ -88,7 +88,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
             root / WORK_FOLDER / "outcomes", trust=self.trust_submissions, hidden=[root]
         )
         outcome = store.outcome(program, files)
-        return quiz_marks.with_quizzes(outcome, nb, Path(folder), student)
+        return quiz_marks.with_quizzes(outcome, nb, Path(folder), student, root)
 
 
 class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]

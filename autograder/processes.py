@@ -21,8 +21,11 @@ if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
     from autograder.sandbox.place import Process
 
 MAX_ANSWER = 1024 * 1024
-EXAM_TIMEOUT = 120.0
-"""Seconds one part of an exam may take in all: its own deadlines end it long before."""
+EXAM_TIMEOUT = 180.0
+"""Seconds one part of an exam may take in all: its own deadlines end it long before.
+
+The longest is that of a camera driver which needs a second to start and another one to end.
+"""
 
 Spawn = Callable[..., "Process"]
 

@@ -11,13 +11,8 @@ from collections.abc import Iterable
 
 from autograder.bench import StudentError
 from autograder.exam import Exam, Failed
-from autograder.rigs.architecture import (
-    ArchitectureRig,
-    GoalRejectedError,
-    UnknownTypeError,
-    architecture_rig,
-    load_type,
-)
+from autograder.rigs.architecture import ArchitectureRig, architecture_rig
+from autograder.rigs.pouring import POURS, GoalRejectedError, Poured
 from autograder.rigs.robot_jobs import ACTION, MOTORS, MOTORS_TYPE, SENSORS, STREAMS
 from autograder.rigs.robot_reasons import (
     alike,
@@ -31,12 +26,14 @@ from autograder.rigs.robot_reasons import (
     why_no_planner,
     why_no_pose,
 )
+from autograder.rigs.robot_types import UnknownTypeError, load_type
 from course import WaitTimeout
 from course.design import dye
 
 EXAM: Exam[ArchitectureRig] = Exam("architecture", architecture_rig)
 
 MOST_JOBS = 2
+READINGS = {"/scan": "a scan", "/camera/image": "an image"}
 
 READ_NODES = "Chapter 5, “Nodes: the processing units”"
 READ_TOPICS = "Chapter 5, “Topics: continuous data sharing”"
@@ -124,7 +121,7 @@ def navigation_action(rig: ArchitectureRig) -> None:
         raise Failed(expected=expected, actual=f"No node is its server{instead(rig.graph)}.")
     if len(servers) > 1:
         raise Failed(expected=expected, actual=f"It has {len(servers)} servers: {nodes(servers)}.")
-    fed = rig.graph.reached(rig.jobs.reading(SENSORS, ()), ("topic",))
+    fed = rig.graph.reached(rig.jobs.reading(SENSORS, ()) | rig.jobs.drivers - servers, ("topic",))
     if not servers & fed:
         raise Failed(
             expected=expected,
@@ -351,24 +348,31 @@ def goal_reaches_motors(rig: ArchitectureRig) -> None:
     if not dye.has_room(action_type.Goal):
         raise Failed(expected=expected, actual=f"A goal of {name} holds neither number nor text.")
     try:
-        arrived = rig.colour_goal(ACTION, action_type, [MOTORS])
+        poured = rig.colour_goal(ACTION, action_type, [MOTORS])
     except WaitTimeout as timeout:
         raise Failed(expected=expected, actual=str(timeout)) from None
     except GoalRejectedError:
-        raise Failed(expected=expected, actual=f"The server of {ACTION} rejected it.") from None
-    if not arrived:
-        raise Failed(expected=expected, actual=_stranded(rig, [MOTORS]))
+        raise Failed(
+            expected=expected,
+            actual=f"The server of {ACTION} rejected each of {POURS} goals, with sensor readings "
+            "coming in between.",
+        ) from None
+    if not poured.enough:
+        raise Failed(expected=expected, actual=_stranded(rig, poured, [MOTORS]))
 
 
-def _stranded(rig: ArchitectureRig, wanted: Iterable[str]) -> str:
+def _stranded(rig: ArchitectureRig, poured: Poured, wanted: Iterable[str]) -> str:
     """Return how far the dye got instead, and what the student's callbacks raised."""
-    never = f"never on {listed(wanted, 'or')}"
-    got_to = rig.got_to()
-    where = (
-        f"It was seen on {listed(got_to)}, but {never}"
-        if got_to
-        else f"It was seen on no topic, and so {never}"
-    )
+    there = listed(wanted, "or")
+    way = f"{listed(poured.lost_on)}, but" if poured.lost_on else "no topic, and so"
+    where = f"It was seen on {way} never on {there}"
+    if poured.arrived:
+        others = (
+            f"; the others were seen on {way} never there" if poured.marks > poured.arrived else ""
+        )
+        where = f"Of {poured.marks} marks {poured.arrived} was seen on {there}{others}"
+    if poured.aside:
+        where += f"; {poured.aside}"
     raised = rig.subject.errors()
     why = f"; a callback raised {raised[-1]}" if raised else ""
     return f"{where}{why}."
@@ -395,13 +399,16 @@ def scan_reaches_motors(rig: ArchitectureRig) -> None:
             expected="Obstacle information has a message type that is installed.",
             actual=f"{topic.name} is of type {listed(topic.types)}, unknown to the examiner.",
         )
-    if not rig.colour_topics([rig.graph.topic("/scan")], topics):
+    eye = rig.jobs.eye(topics.values())
+    poured = rig.colour_topics([rig.graph.topic(eye)], topics)
+    if not poured.enough:
         raise Failed(
-            expected=f"The mark of a scan on /scan is seen on {listed(topics, 'or')}.",
-            actual=_stranded(rig, topics),
+            expected=f"The mark of {READINGS[eye]} on {eye} is seen on {listed(topics, 'or')}.",
+            actual=_stranded(rig, poured, topics),
         )
-    if not rig.colour_topics(topics.values(), [MOTORS]):
+    poured = rig.colour_topics(topics.values(), [MOTORS])
+    if not poured.enough:
         raise Failed(
             expected=f"The mark of a message on {listed(topics, 'or')} is seen on {MOTORS}.",
-            actual=_stranded(rig, [MOTORS]),
+            actual=_stranded(rig, poured, [MOTORS]),
         )

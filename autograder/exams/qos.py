@@ -15,30 +15,20 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from autograder.bench import StudentError
 from autograder.exam import Exam, Failed
 from autograder.rigs.gap import Aftermath, radio_gap
-from autograder.rigs.sensors import (
-    CAMERA,
-    CONSUMERS,
-    DRIVERS,
-    IMU,
-    LIDAR,
-    SENSORS,
-    STOP,
-    Heard,
-    Sensor,
-    SensorRig,
-    lossless,
-    mismatch,
-    sensor_rig,
-    undemanding,
+from autograder.rigs.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Heard, Sensor
+from autograder.rigs.sensor_node import lossless
+from autograder.rigs.sensors import CONSUMERS, DRIVERS, SensorRig, mismatch, sensor_rig
+from autograder.rigs.stalling import BURST, backlog, require_burst, require_fresh
+from autograder.rigs.stops import (
+    EVENTS,
+    amiss,
+    around,
+    require_all_heard,
+    require_no_repeats,
+    require_told_apart,
 )
-from autograder.rigs.stalling import BURST, backlog, few, lost, require_burst, require_fresh
 
 EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
-
-CAMERA_NEWEST = 10  # frames: 1 s at 10 Hz
-LIDAR_FRESH = 5  # scans: 0.5 s at 10 Hz
-IMU_BOUND = 50  # readings: 0.5 s at 100 Hz
-EVENTS = 5
 
 READ_RELIABILITY = "Chapter 5, “QoS profiles: reliability”"
 READ_HISTORY = "Chapter 5, “QoS profiles: history”"
@@ -143,10 +133,18 @@ def _why_silent(rig: SensorRig, sensor: Sensor) -> str:
     if reasons := _mismatches(rig, sensor):
         return f"Nothing of {sensor.name} arrives, because DDS refuses the pair: {reasons[0]}"
     if not rig.node.witnessed[sensor.name]:
+        if sensor.topic in rig.node.foreign:
+            return _changed(sensor.topic, f"hardware/{sensor.name} delivered")
         return f"Nothing of {sensor.name} is published on {sensor.topic}."
+    if (target := f"consumer/{sensor.name}") in rig.node.foreign:
+        return _changed(target, f"{sensor.topic} carried")
     raised = rig.subject.errors()
     why = f" (a callback raised {raised[-1]})" if raised else ""
-    return f"{sensor.topic} carries readings, but none comes out on consumer/{sensor.name}{why}."
+    return f"{sensor.topic} carries readings, but none comes out on {target}{why}."
+
+
+def _changed(topic: str, what: str) -> str:
+    return f"{topic} carries messages, but not what {what}: their content was changed."
 
 
 @EXAM.check(
@@ -184,7 +182,7 @@ def _reliable(endpoint: TopicEndpointInfo) -> bool:
     hints=(
         "Where do frames wait while the consumer is busy, and how many of them?",
         "The depth of the subscription's KEEP_LAST is the length of that queue.",
-        f"KEEP_LAST with a depth of 1 to {CAMERA_NEWEST} keeps the picture live.",
+        f"KEEP_LAST with a depth of 1 to {CAMERA.most} keeps the picture live.",
     ),
     read=READ_HISTORY,
 )
@@ -194,8 +192,8 @@ def camera_newest(rig: SensorRig) -> None:
     A deep queue makes a slow reader live in the past: it works through old pictures while the
     robot drives on.
     """
-    expected = f"After a pause at most the last {CAMERA_NEWEST} frames (1 s) are processed."
-    require_fresh(rig, CAMERA, CAMERA_NEWEST, expected)
+    expected = f"After a pause at most the last {CAMERA.most} frames (1 s) are processed."
+    require_fresh(rig, CAMERA, expected)
 
 
 @EXAM.check(
@@ -203,7 +201,7 @@ def camera_newest(rig: SensorRig) -> None:
     hints=(
         "How old is the oldest scan in a queue of depth 10, at 10 Hz?",
         "Obstacle avoidance needs the latest scan; a few more do no harm.",
-        f"KEEP_LAST with depth 1 gives the latest scan only; up to {LIDAR_FRESH} are accepted.",
+        f"KEEP_LAST with depth 1 gives the latest scan only; up to {LIDAR.most} are accepted.",
     ),
     read=READ_HISTORY,
 )
@@ -212,8 +210,8 @@ def lidar_fresh(rig: SensorRig) -> str:
 
     An old scan shows obstacles where they were: at 1 m/s half a second is half a metre.
     """
-    expected = f"After a pause no scan older than 0.5 s (the last {LIDAR_FRESH}) is acted on."
-    require_fresh(rig, LIDAR, LIDAR_FRESH, expected)
+    expected = f"After a pause no scan older than 0.5 s (the last {LIDAR.most}) is acted on."
+    require_fresh(rig, LIDAR, expected)
     return _practice(rig, LIDAR)
 
 
@@ -234,7 +232,7 @@ def _practice(rig: SensorRig, sensor: Sensor) -> str:
     hints=(
         "Count how many readings come in while the consumer is busy for 50 ms, at 100 Hz.",
         "A queue that is too short drops part of the burst; an endless one replays the past.",
-        f"KEEP_LAST with a depth of {BURST} to {IMU_BOUND} fits; the chapter takes 10.",
+        f"KEEP_LAST with a depth of {BURST} to {IMU.most} fits; the chapter takes 10.",
     ),
     read=READ_HISTORY,
 )
@@ -246,9 +244,9 @@ def imu_burst(rig: SensorRig) -> str:
     """
     expected = (
         f"All {BURST} readings of a pause of 50 ms are processed, and after a longer one at most "
-        f"the last {IMU_BOUND} (0.5 s)."
+        f"the last {IMU.most} (0.5 s)."
     )
-    require_fresh(rig, IMU, IMU_BOUND, expected)
+    require_fresh(rig, IMU, expected)
     require_burst(rig, expected)
     return _practice(rig, IMU)
 
@@ -268,25 +266,9 @@ def stop_reaches_all(rig: SensorRig) -> None:
     A safety node asks for RELIABLE, a logger on Wi-Fi perhaps for BEST_EFFORT: neither may miss a
     stop. Only a RELIABLE offer serves both.
     """
-    reliable: Heard = defaultdict(list)
-    casual: Heard = defaultdict(list)
-    rig.node.listen(STOP, STOP.topic, lossless(), reliable)
-    rig.node.listen(STOP, STOP.topic, undemanding(), casual)
     offers_all = all(map(_reliable, rig.offered(STOP.topic)))
-    for heard, who in ((reliable, "RELIABLE"), (casual, "BEST_EFFORT")):
-        if rig.probe([STOP], heard, give_up=lambda _: not offers_all):
-            raise Failed(
-                expected="A consumer that asks for RELIABLE and one for BEST_EFFORT both hear it.",
-                actual=f"A consumer that asks for {who} heard nothing on emergency/stop.",
-            )
-    rig.burst(STOP, "event", EVENTS)
-    for heard in (reliable, casual):
-        rig.wait(lambda h=heard: len(rig.indices(h, STOP, "event")) >= EVENTS)  # type: ignore[misc]
-        if (got := rig.indices(heard, STOP, "event")) != list(range(EVENTS)):
-            raise Failed(
-                expected=f"{EVENTS} stops arrive as {EVENTS} stops, in order.",
-                actual=f"A consumer heard {few(got)}.",
-            )
+    listeners = require_all_heard(rig, give_up=not offers_all)
+    require_no_repeats(rig, listeners)
     if not any(map(_reliable, rig.requested(STOP.topic))):
         raise Failed(
             expected="Your own consumer cannot lose a stop on a bad network either.",
@@ -311,17 +293,16 @@ def stop_complete(rig: SensorRig) -> str:
     found = backlog(rig, STOP)
     count, kept = found.count, found.kept
     if kept != list(range(count)):
-        missing = count - len(set(kept))
-        what = lost(missing, count) if missing else "Some came twice or out of order"
         raise Failed(
             expected=f"All {count} events of the pause are handled, once and in order.",
-            actual=f"{what}: the consumer handled {few(kept)}.",
+            actual=f"{amiss(kept, count)}: the consumer handled {around(kept)}.",
         )
     if rig.expires(STOP):
         raise Failed(
             expected="A stop event waits for a busy consumer as long as it must.",
             actual="A lifespan on emergency/stop throws events away when they get old.",
         )
+    require_told_apart(rig)
     durable = any(
         e.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
         for e in rig.offered(STOP.topic)
@@ -386,11 +367,11 @@ def stop_repaired(rig: SensorRig) -> None:
     )
     if not found.heard:
         raise Failed(expected=expected, actual="Not even the next one arrived.")
-    if found.heard != list(range(found.count + 1)):
-        missing = found.count + 1 - len(set(found.heard))
+    count = found.count + 1
+    if found.heard != list(range(count)):
         raise Failed(
             expected=expected,
-            actual=f"{missing} of {found.count + 1} never came: it got {few(found.heard)}.",
+            actual=f"{amiss(found.heard, count)}: it got {around(found.heard)}.",
         )
 
 

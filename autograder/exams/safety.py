@@ -29,7 +29,7 @@ READ_GROUPS = "ROS 2 documentation, “Using callback groups”"
     read=READ_SERVICES,
 )
 def gripper_answers(rig: RobotRig) -> None:
-    """The gripper client reports a grip that the gripper carried out, also after 0.8 s.
+    """The gripper client reports a grip that the gripper carried out, also after 0.7 s.
 
     The rest of the robot waits for this word: the arm lifts only what is held.
     """

@@ -24,7 +24,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32
 
-from autograder.bench import Bench, StudentError
+from autograder.bench import REPLY_TIMEOUT, Bench, StudentError, SubjectGone
 from autograder.exam import Failed
 from autograder.rigs.process import Process
 from course import WaitTimeout
@@ -118,6 +118,7 @@ class CameraRig:
         self.memory = bench.memory
         self._ghosts: set[bytes] = set()
         self._clean = False
+        self._provoked = False
         self._clients: dict[str, Any] = {}
 
     # The subject.
@@ -125,7 +126,7 @@ class CameraRig:
     def fresh(self) -> None:
         """Begin a new session on simulated time; nothing of an earlier one goes on."""
         self.subject.open(sim_time=True)
-        self._clean = True
+        self._clean, self._provoked = True, False
 
     @contextmanager
     def life(self, name: str, *args: Any) -> Iterator[str]:
@@ -158,9 +159,10 @@ class CameraRig:
     def trying(self) -> Iterator[None]:
         """Begin with a clean session, and leave none to the next check if this one fails.
 
-        What a wrong design has left on the graph by now is not held against it again.
+        What a wrong design has left on the graph by now is not held against it again, and what the
+        examiner made a callback raise in an earlier check explains nothing in this one.
         """
-        if not self._clean:
+        if not self._clean or self._provoked:
             self.fresh()
         self.wait(lambda: not self.endpoints(), GHOSTS)
         self._ghosts = {end for _, end in self._endpoints()}
@@ -179,13 +181,28 @@ class CameraRig:
                 actual=error.told,
             ) from None
 
-    def stop(self, name: str) -> None:
-        """Have the node taken out of its executor and destroyed."""
-        self._cleanup(name, lambda: self.subject.stop(name))
+    def stop(self, name: str, *, bare: bool = False) -> None:
+        """Have the node taken out of its executor and destroyed.
+
+        A session tidies up after its ``destroy_node()``; ``bare``: nobody does.
+        """
+        self._cleanup(name, lambda: self.subject.stop(name, bare=bare))
 
     def destroy(self, name: str) -> None:
         """Have ``destroy_node()`` called while the node spins."""
         self._cleanup(name, lambda: self.subject.call(name, "destroy_node"))
+
+    def destroy_again(self, name: str) -> None:
+        """Have ``destroy_node()`` called a second time, which must return as well."""
+        try:
+            self.destroy(name)
+        except SubjectGone as gone:
+            if not self.subject.hangs:
+                raise
+            raise Failed(
+                expected="destroy_node() can be called a second time.",
+                actual=f"The second call did not return within {REPLY_TIMEOUT:.0f} s.",
+            ) from gone
 
     def drop(self, name: str) -> None:
         """Have the session let go of a node that is destroyed; it destroys it once more."""
@@ -218,6 +235,7 @@ class CameraRig:
 
     def refused_zoom(self, factor: int) -> None:
         """Send a zoom that the camera does not have; it is with the driver when this returns."""
+        self._provoked = True
         self.node.zoom.publish(Int32(data=factor))
         self.node.zoom.wait_for_all_acked(Duration(seconds=SETTLE))
 
@@ -281,6 +299,15 @@ class CameraRig:
             if self.wait(condition, PERIOD):
                 return True
         return False
+
+    def catch_up(self) -> None:
+        """Wait until every endpoint that the subject has by now is known here.
+
+        A participant's endpoints are told in order: those of a mark that is made now come last.
+        """
+        mark = f"mark_{secrets.token_hex(4)}"
+        self.subject.mark(mark)
+        self.wait(lambda: self.node.count_publishers(mark) and self.node.count_subscribers(mark))
 
     def publishers(self) -> int:
         """Return how many publishers there are on the image topic."""

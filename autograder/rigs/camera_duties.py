@@ -12,9 +12,11 @@ from autograder.exam import Failed
 from autograder.rigs.camera import IMAGE, PERIOD, SETTLE, SNAPSHOT, ZOOM, CameraRig, phrase
 from course.runtime.waiting import Deadline
 
-STEPS = 10
+STEPS = 10  # at least, in which a rate is counted
+KEEP_UP = 0.25  # s of wall time that a picture which is due is waited for before time moves on
 FURTHER = 3  # pictures: one may have been under way with another zoom
 STANDSTILL = 0.5  # s of wall time without two pictures: they stand still
+BURST = 4  # snapshots that are asked for at once
 BACKLOG = 3.0  # s of wall time in which pictures may come that had been ordered before
 
 
@@ -30,32 +32,47 @@ def require_endpoints(rig: CameraRig, node: str) -> None:
     )
 
 
-def require_picture(rig: CameraRig, device: str) -> None:
+def require_picture(rig: CameraRig, device: str, when: str = "") -> None:
     """Fail unless a picture of ``device`` comes over the topic."""
     if not rig.see(device):
+        pictures = f"{when} pictures" if when else "Pictures"
         raise Failed(
-            expected=f"Pictures of the camera {device!r} come on {IMAGE}.",
+            expected=f"{pictures} of the camera {device!r} come on {IMAGE}.",
             actual=f"In {SETTLE / PERIOD * PERIOD:.0f} s of the robot's time none came"
             f"{rig.raised()}.",
         )
 
 
-def require_rate(rig: CameraRig, device: str, rate: float, when: str = "") -> None:
-    """Fail unless in a second of simulated time about ``rate`` pictures of ``device`` come."""
-    before = len(rig.pictures(device))
+def require_rate(
+    rig: CameraRig, device: str, rate: float, when: str = "", seconds: int = 1
+) -> None:
+    """Fail unless ``rate`` pictures of ``device`` come a second of simulated time, or about that.
+
+    Time moves on picture by picture: a thread may publish a moment after the timer, and a design
+    may keep one order at a time and drop the next one while it is busy.
+    """
+    wanted = rate * seconds
+    steps = max(STEPS, round(wanted))
+    before, late = len(rig.pictures(device)), 0
     deadline = Deadline(SETTLE)
-    for step in range(1, STEPS + 1):
-        rig.advance(1 / STEPS)
-        # A thread may publish a moment after the timer: let it keep up.
-        due = before + int(rate / STEPS * step) - 1
-        rig.wait(lambda due=due: len(rig.pictures(device)) >= due, deadline.left)  # type: ignore[misc]
+
+    def came() -> int:
+        return len(rig.pictures(device)) - before
+
+    for step in range(1, steps + 1):
+        rig.advance(seconds / steps)
+        due = int(wanted * step / steps)
+        # By its phase a design may be one picture behind, and stay so: it is not waited for twice.
+        if not rig.wait(lambda least=due - late: came() >= least, KEEP_UP):  # type: ignore[misc]
+            rig.wait(lambda least=due - 1: came() >= least, deadline.left)  # type: ignore[misc]
+        late = max(0, due - came())
     let_arrive(rig, device)
-    came = len(rig.pictures(device)) - before
-    # Some of those before may have been on their way: not more than one step's.
-    if abs(came - rate) > max(1.0, rate / STEPS):
+    # Some of those before may have been on their way: not more than come in a tenth of a second.
+    if abs(came() - wanted) > max(1.0, rate / STEPS):
+        time = "one second" if seconds == 1 else f"{seconds} seconds"
         raise Failed(
-            expected=f"In one second {rate:.0f} pictures come{when}.",
-            actual=f"In one second of the robot's time {came} came{rig.raised()}.",
+            expected=f"In {time} {wanted:.0f} pictures come{when}.",
+            actual=f"In {time} of the robot's time {came()} came{rig.raised()}.",
         )
 
 
@@ -123,7 +140,7 @@ def require_gone(rig: CameraRig, device: str, when: str, node: str = "") -> None
 
 def require_snapshot(rig: CameraRig, device: str, when: str) -> None:
     """Fail unless a snapshot is answered, and its picture comes without time passing."""
-    before = len(rig.pictures(device))
+    before, asked = len(rig.pictures(device)), sum(rig.cameras(device))
     reply = rig.ask(Trigger, SNAPSHOT, Trigger.Request())
     if reply is None:
         raise Failed(
@@ -138,6 +155,38 @@ def require_snapshot(rig: CameraRig, device: str, when: str) -> None:
         raise Failed(
             expected=f"{when} {SNAPSHOT} publishes a picture on {IMAGE} at once.",
             actual="It answered, but no picture came.",
+        )
+    # A thread may read all the time, and the snapshot publish what it read last.
+    if not rig.wait(lambda: sum(rig.cameras(device)) > asked):
+        raise Failed(
+            expected=f"{when} {SNAPSHOT} takes a picture.",
+            actual="It published an old one: the camera was not asked.",
+        )
+
+
+def require_snapshots_under_way(rig: CameraRig, device: str) -> None:
+    """Ask for some snapshots; fail unless one is answered. A callback waits for the next one then.
+
+    rclpy 7.1 resumes a callback that awaits a future when its executor has something else to do: on
+    a robot, at the next tick. Here time stands still, so that ticks ask the camera for no picture,
+    and a zoom is that something.
+    """
+    snapshot = rig.client(Trigger, SNAPSHOT)
+    asked = sum(rig.cameras(device))
+    replies = [snapshot.call_async(Trigger.Request()) for _ in range(BURST)]
+
+    def next_one_waits() -> bool:
+        """Whether a first answer is here, and a callback waits for a further picture."""
+        done = [reply.done() for reply in replies]
+        return all(done) or (any(done) and sum(rig.cameras(device)) >= asked + 2)
+
+    deadline = Deadline(SETTLE)
+    while not rig.wait(next_one_waits, min(PERIOD, deadline.left)) and deadline.left:
+        rig.node.zoom.publish(Int32(data=1))
+    if not any(reply.done() for reply in replies):
+        raise Failed(
+            expected=f"The service {SNAPSHOT} answers when the picture is there.",
+            actual=f"No answer came within {SETTLE:.0f} s{rig.raised()}.",
         )
 
 
@@ -163,6 +212,18 @@ def require_zoom_kept(rig: CameraRig, device: str, factor: int, when: str) -> No
         raise Failed(
             expected=f"{when} the next pictures have a zoom of {factor}, until another one is set.",
             actual=f"They had a zoom of {rig.pictures(device)[-1].zoom}{rig.raised()}.",
+        )
+
+
+def require_threads_ended(rig: CameraRig, among: set[int], when: str) -> None:
+    """Fail if a thread goes on that is here now and is not ``among`` those of before."""
+    new = rig.process.thread_ids() - among
+    if not rig.wait(lambda: not new & rig.process.thread_ids()):
+        left = len(new & rig.process.thread_ids())
+        raise Failed(
+            expected=f"{when} every thread of the driver has ended.",
+            actual=f"{SETTLE:.0f} s later {left} of those that it had started went on: whoever "
+            "starts a thread tells it to end, whoever makes a pool shuts it down.",
         )
 
 

@@ -5,27 +5,34 @@
 from __future__ import annotations
 
 import importlib
+from concurrent.futures import Future
 from contextlib import suppress
 from typing import Any, NoReturn
 
-from rcl_interfaces.srv import GetParameters
+from rclpy.qos import ReliabilityPolicy
 
 from autograder.bench import SubjectGone
 from autograder.exam import Failed
-from autograder.rigs.robot import SETTLE, RobotRig
+from autograder.rigs import filming, odometry
+from autograder.rigs.listening import acquaint, hear_out
+from autograder.rigs.robot import SETTLE, STEP, RobotRig
 from autograder.rigs.scenarios import NAMES
 from course import GoalRun, GoalState, WaitTimeout
 
 NAME = NAMES["navigation"]
 ACTIONS = "example_interfaces/action/Fibonacci or test_msgs/action/Fibonacci"
 """The chapter's Fibonacci, and what stands in for it on a machine without a compiler."""
+FEEDBACK = f"{NAME}/_action/feedback"
+SPEED_MARGIN = 0.011  # m/s
 PART_OF_THE_WAY = 0.7
 """Of the metre between two stations: who rounds a position is at the next one too early."""
-BLOCKED, BLOCKED_WALL = 12, 0.3
-"""Steps of the node's clock, and then seconds on the wall, for which the robot cannot get on."""
-LOOKING, STOPPING = 0.6, 4.0
-"""Seconds of wall time for those who look by the wall's clock whether they are called off, and for
-a stop to become visible."""
+BLOCKED, BLOCKED_WALL = 1.2, 0.3
+"""Seconds of the node's clock, and then on the wall, for which the robot cannot get on."""
+FILMED = (8.0, 12.0)
+"""Pictures a second, as far as such a short time tells."""
+LOOKING, STOPPING, UNDER_WAY = 0.6, 4.0, 2.0
+"""Seconds of wall time for those who look by the wall's clock whether they are called off, for a
+stop to become visible, and for one that was under way when the result came."""
 CLEARING = 2.0
 """Seconds of wall time that a goal gets to end after its check has failed."""
 
@@ -48,14 +55,18 @@ class Drive:
         self._rig = rig
         rig.report("position", float(start))
         action = _action_type(rig.memory["offers"]["navigation"]["action"])
-        self._listener = rig.node.listen(
-            action.Impl.FeedbackMessage, f"{NAME}/_action/feedback", self._hear
-        )
-        _acquaint(rig)
+        self._listener = rig.node.listen(action.Impl.FeedbackMessage, FEEDBACK, self._hear)
+        acquaint(rig)
         rig.node.speeds.clear()
         try:
-            run = rig.session.send_goal(action, NAME, action.Goal(order=goal), timeout=SETTLE)
+            run = rig.answer(
+                "a goal",
+                lambda: rig.session.send_goal(
+                    action, NAME, action.Goal(order=goal), timeout=SETTLE
+                ),
+            )
         except WaitTimeout:
+            _require_feedback_for_all(rig)
             raise Failed(
                 expected=f"A goal on {NAME} is accepted at once; the drive itself comes after.",
                 actual=f"The goal (station {goal}) got no answer{rig.because()}.",
@@ -99,7 +110,7 @@ class Drive:
         rig = self._rig
         rig.wait_stepping(lambda: rig.speed > 0 or self.run.done)
         rig.step(0.01)
-        _hear_out(rig)  # a goal that has ended here, not at the next station, is told so
+        hear_out(rig)  # a goal that has ended here, not at the next station, is told so
         self._require_going_on()
         if rig.speed <= 0:
             speeds = "hardware/speed said nothing"
@@ -110,6 +121,12 @@ class Drive:
                 actual=f"Speed {self.where}: {speeds}{rig.because()}.",
             )
 
+    def top_speed(self, limit: float) -> float:
+        """Return the highest speed so far, once it is ``limit``, or will not be."""
+        rig = self._rig
+        rig.wait_stepping(lambda: rig.speed >= limit - SPEED_MARGIN or self.run.done)
+        return max(rig.node.speeds, default=0.0)
+
     def _require_going_on(self) -> None:
         if self.run.done:
             raise Failed(
@@ -117,19 +134,38 @@ class Drive:
                 actual=f"It ended as {self.run.status.name} {self.where}{self._rig.because()}.",
             )
 
-    def cancel(self) -> bool:
-        """Ask for the goal to be cancelled; return whether that was agreed to.
+    def cancel_within(self, seconds: float) -> bool:
+        """Ask for the goal to be cancelled; return whether the robot is told to stop in time.
+
+        The time counts from the request on: the answer, too, may wait for the node's clock.
+
+        Args:
+            seconds: of the node's clock until the stop.
 
         Raises:
-            Failed: there was no answer.
+            Failed: the request was refused, or got no answer.
         """
+        answer = self._rig.ask("to cancel", lambda: self.run.cancel(SETTLE))
+        if answer.done():
+            self._require_agreed(answer)
+        in_time = self._stops_within(seconds)
+        self._rig.wait_stepping(answer.done)
+        self._require_agreed(answer)
+        return in_time
+
+    def _require_agreed(self, answer: Future[bool]) -> None:
         try:
-            return self.run.cancel(SETTLE)
+            agreed = answer.result()
         except WaitTimeout:
             raise Failed(
                 expected="A request to cancel a drive is answered.",
                 actual=f"It got no answer, {self.where}{self._rig.because()}.",
             ) from None
+        if not agreed:
+            raise Failed(
+                expected="A request to cancel a drive is accepted.",
+                actual=f"It was refused, {self.where}{self._rig.because()}.",
+            )
 
     def roll_on(self) -> None:
         """Let the robot drive to the next station."""
@@ -162,11 +198,42 @@ class Drive:
             Failed: the feedback goes on, so it does not look where the robot is, or not closely.
         """
         self._leave()
-        for _ in range(BLOCKED):
-            self._rig.step()
+        stretch = filming.Stretch(self._rig)
+        if self._rig.films:
+            stretch.run(BLOCKED, sum(FILMED) / 2)
+        else:
+            for _ in range(round(BLOCKED / STEP)):
+                self._rig.step()
         if self._rig.wait(lambda: self._latest > self.station, BLOCKED_WALL):
             self._complain()
         self._require_going_on()
+        self._require_the_rest(stretch)
+
+    def _require_the_rest(self, stretch: filming.Stretch) -> None:
+        """Fail if the drive holds up what worked without one: the camera, or the position.
+
+        ``stretch`` is a part of the drive.
+        """
+        rig = self._rig
+        where = self.where.replace("while", "While", 1)
+        if rig.films:
+            rates = stretch.rates()
+            wrong = "" if rates is None else filming.rate_fault(rates, FILMED)
+            if wrong or rates is None:
+                came = f"they came at {wrong} a second" if wrong else "no picture came"
+                raise Failed(
+                    expected="While the robot drives, pictures come as they did before, 10 a "
+                    "second: the drive holds nobody up.",
+                    actual=f"{where}, {came}{rig.because()}.",
+                )
+        if rig.asker is None:
+            return
+        if answer := odometry.fault(rig, rig.asker, self.station + PART_OF_THE_WAY):
+            raise Failed(
+                expected="While the robot drives, whoever wants to know the position gets it, at "
+                f"most {odometry.AGE:g} s old: the drive holds nobody up.",
+                actual=f"{where}, at {self.station + PART_OF_THE_WAY:g} m, {answer}",
+            )
 
     def _complain(self) -> NoReturn:
         lists = ", ".join(str(stations) for stations in self.heard[-4:])
@@ -181,7 +248,7 @@ class Drive:
     def _latest(self) -> int:
         return max((number for stations in list(self.heard) for number in stations), default=-1)
 
-    def stops_within(self, seconds: float) -> bool:
+    def _stops_within(self, seconds: float) -> bool:
         """Return whether the robot is told to stop in so many seconds of the node's clock.
 
         Who looks by the clock on the wall gets the time to do so before that one moves on.
@@ -193,12 +260,13 @@ class Drive:
         self._rig.wait(stopped, LOOKING)
         return self._rig.wait_stepping(stopped, seconds, STOPPING)
 
-    def require_end(self, state: GoalState, expected: str) -> None:
+    def require_end(self, state: GoalState, expected: str, *, stopped: bool = False) -> None:
         """Wait for the end of the goal, and for the robot to stand still.
 
         Args:
             state: how the goal must end.
             expected: what is needed, as a sentence.
+            stopped: whether the robot must stand when the result comes, not a while later.
 
         Raises:
             Failed: it does not end, ends otherwise, or the robot goes on.
@@ -211,14 +279,23 @@ class Drive:
                 expected=f"{expected} The goal ends as {state.name}.",
                 actual=f"The goal {how}, {self._place}{rig.because()}.",
             )
+        # Which of two messages comes first is the transport's affair: a stop may be under way.
+        late = stopped and not rig.wait(lambda: rig.speed == 0, UNDER_WAY)
+        told = rig.speed
         rig.wait_stepping(lambda: rig.speed == 0)
         rig.step(0.5)
-        _acquaint(rig)  # whatever was on its way has come in by now
+        acquaint(rig)  # whatever was on its way has come in by now
         if not rig.node.speeds or rig.speed != 0:
             raise Failed(
                 expected=f"{expected} The robot is told to stop: hardware/speed is 0.0.",
                 actual=f"The goal ended as {state.name}, but the last speed that the motors were "
                 f"told was {rig.speed:g} m/s: the robot drives on.",
+            )
+        if late:
+            raise Failed(
+                expected=f"{expected} The robot is told to stop first, and then the goal ends.",
+                actual=f"The result came while the motors were still told {told:g} m/s; only later "
+                "were they told to stop.",
             )
 
     @property
@@ -238,7 +315,8 @@ class Drive:
                 self.require_report()
             if self.station == self.start + 1 < self.goal:
                 self.hold()
-        self.require_end(GoalState.SUCCEEDED, "At the station named the robot has arrived.")
+        arrived = "At the station named the robot has arrived."
+        self.require_end(GoalState.SUCCEEDED, arrived, stopped=True)
 
     def require_result(self) -> None:
         """Fail unless the result has the stations of the whole drive, in order."""
@@ -252,6 +330,17 @@ class Drive:
             )
 
 
+def _require_feedback_for_all(rig: RobotRig) -> None:
+    """Fail if the feedback is published so that an ordinary client cannot hear it."""
+    offers = rig.node.get_publishers_info_by_topic(FEEDBACK)
+    if any(offer.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT for offer in offers):
+        raise Failed(
+            expected="Whoever sends a goal hears its feedback.",
+            actual=f"The goal could not be sent: the feedback of {NAME} is BEST_EFFORT, and an "
+            "ordinary client asks for RELIABLE.",
+        )
+
+
 def _last(stations: list[int]) -> int:
     return max(stations, default=-1)
 
@@ -259,30 +348,3 @@ def _last(stations: list[int]) -> int:
 def _action_type(name: str) -> Any:
     package, kind, cls = name.split("/")
     return getattr(importlib.import_module(f"{package}.{kind}"), cls)
-
-
-def _acquaint(rig: RobotRig) -> None:
-    """Return when the subject knows every endpoint that the examiner has made so far.
-
-    DDS makes endpoints known in the order in which they were made. So once a client that is newer
-    than all of them gets an answer, the subject's writers know the earlier readers, too.
-    """
-    if name := _answering(rig):
-        client = rig.node.create_client(GetParameters, name)
-        if rig.wait(client.service_is_ready):
-            rig.wait(client.call_async(GetParameters.Request()).done)
-        rig.node.destroy_client(client)
-
-
-def _hear_out(rig: RobotRig) -> None:
-    """Return when what the subject has sent so far has come in: it has answered since."""
-    if name := _answering(rig):
-        rig.call(GetParameters, name, GetParameters.Request())
-
-
-def _answering(rig: RobotRig) -> str | None:
-    """Return a service that every node of the subject's has, unless it was made without."""
-    for name, types in rig.node.get_service_names_and_types():
-        if types == ["rcl_interfaces/srv/GetParameters"] and rig.node.count_services(name):
-            return name
-    return None

@@ -12,7 +12,9 @@ from dataclasses import dataclass
 from rclpy.qos import ReliabilityPolicy
 
 from autograder.rigs.radio import radio
-from autograder.rigs.sensors import CAMERA, STOP, Heard, Sensor, SensorRig, lossless, undemanding
+from autograder.rigs.readings import CAMERA, STOP, Heard, Sensor
+from autograder.rigs.sensor_node import lossless, undemanding
+from autograder.rigs.sensors import SensorRig
 
 LOST = {STOP.name: 90, CAMERA.name: 5}
 """Readings sent while the link is down; the task promises at most 100 stop events."""

@@ -67,6 +67,7 @@ class GripUser(Player):
         super().__init__("grip_user")
         self.tries: list[Try] = []
         self.outcomes: list[str] = []
+        self.before: list[str] = []  # the outcome of the request before this one, if there was any
         self.beats: list[float] = []
         self.holds = 0
         self._request = self.speak(Bool, "grip/request")
@@ -82,7 +83,8 @@ class GripUser(Player):
         return Gripper(lambda close, reply: self.tries.append(Try(self.now, close, reply)))
 
     def request(self, close: bool) -> None:
-        """Ask for a grip, and forget what was before."""
+        """Ask for a grip, and forget what was before, but for how it ended."""
+        self.before = self.outcomes[-1:]
         self.tries, self.outcomes, self.beats, self.holds = [], [], [], 0
         self._request.publish(Bool(data=close))
 

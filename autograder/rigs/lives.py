@@ -6,13 +6,20 @@ threads of its own. What grows with each of 50 lives, in both halves of them, is
 
 from __future__ import annotations
 
+import time
+from typing import NamedTuple
+
 from autograder.bench import StudentError
 from autograder.exam import Failed
 from autograder.rigs.camera import CameraRig
 from autograder.rigs.process import Usage
 
 DRIVER = "CameraDriver"
-WARM_UP, LIVES = 5, 25
+WARM_UP, LIVES = 5, 50
+FEWEST = 26
+"""Lives of a driver that takes its time: a camera may need a second to get warm."""
+TIME = 50.0
+"""Seconds of wall time for all lives after the warm-up, if more than the fewest are to be made."""
 MEMORY = 100  # KiB a life
 WORDS = {"threads": "threads", "files": "open files"}
 PICTURES = 0.5  # s of simulated time that a life lasts: five pictures of 64 KiB
@@ -30,37 +37,58 @@ def live(rig: CameraRig, lives: int) -> None:
     rig.subject.collect()
 
 
-def growth(rig: CameraRig) -> Usage:
-    """Return what the process has grown by in 25 lives: the lesser of two times, item by item."""
+class Growth(NamedTuple):
+    """What a process has grown by in so many lives: the lesser of two times, item by item."""
+
+    usage: Usage
+    lives: int
+    pace: float  # s that a life takes
+
+    @property
+    def made(self) -> int:
+        """How many lives there were, the warm-up aside."""
+        return 2 * self.lives
+
+    def leaks(self) -> list[str]:
+        """Return what these lives leaked, a phrase each."""
+        return _leaks(self.usage, self.lives)
+
+
+def growth(rig: CameraRig) -> Growth:
+    """Return what the process has grown by in 25 lives, or in as many as there is time for."""
+    began = time.monotonic()
     live(rig, WARM_UP)
-    halves = []
-    for _ in range(2):
-        before = rig.process.usage()
-        live(rig, LIVES)
-        rig.wait(lambda since=before: not leaks(rig.process.usage().grown(since)))  # type: ignore[misc]
-        halves.append(rig.process.usage().grown(before))
-    first, second = halves
-    return Usage(
+    pace = (time.monotonic() - began) / WARM_UP
+    lives = max(FEWEST, min(LIVES, int(TIME / pace))) // 2
+    first, second = (_grown(rig, lives) for _ in range(2))
+    usage = Usage(
         min(first.threads, second.threads),
         min(first.files, second.files),
         min(first.memory, second.memory),
     )
+    return Growth(usage, lives, pace)
 
 
-def leaks(grown: Usage) -> list[str]:
-    """Return what ``grown`` says that 25 lives leaked, a phrase each."""
+def _grown(rig: CameraRig, lives: int) -> Usage:
+    before = rig.process.usage()
+    live(rig, lives)
+    rig.wait(lambda: not _leaks(rig.process.usage().grown(before), lives))
+    return rig.process.usage().grown(before)
+
+
+def _leaks(grown: Usage, lives: int) -> list[str]:
     found = []
-    if grown.threads >= LIVES / 2:
-        found.append(f"{_each(grown.threads)} of its threads")
-    if grown.files >= LIVES / 2:
-        found.append(f"{_each(grown.files)} of its open files")
-    if grown.memory >= LIVES * MEMORY:
-        found.append(f"{grown.memory // LIVES} KiB of memory")
+    if grown.threads >= lives / 2:
+        found.append(f"{_each(grown.threads / lives)} of its threads")
+    if grown.files >= lives / 2:
+        found.append(f"{_each(grown.files / lives)} of its open files")
+    if grown.memory >= lives * MEMORY:
+        found.append(f"{grown.memory // lives} KiB of memory")
     return found
 
 
-def _each(grown: int) -> str:
-    return {1: "one", 2: "two"}.get(round(grown / LIVES), "some")
+def _each(a_life: float) -> str:
+    return {1: "one", 2: "two"}.get(round(a_life), "some")
 
 
 def failing_starts(rig: CameraRig, kind: str, times: int) -> None:
@@ -68,6 +96,13 @@ def failing_starts(rig: CameraRig, kind: str, times: int) -> None:
     before = rig.process.usage()
     for _ in range(times):
         attempt(rig, rig.device(kind))
+    require_flat(
+        rig, before, times, "A driver that cannot start leaves nothing behind,", "such starts"
+    )
+
+
+def require_flat(rig: CameraRig, before: Usage, times: int, expected: str, rounds: str) -> None:
+    """Fail if since ``before`` the process has kept threads or files of so many ``rounds``."""
     rig.subject.collect()
     # Half of them: a notebook has threads of its own, which come and go.
     for what in ("threads", "files"):
@@ -77,8 +112,8 @@ def failing_starts(rig: CameraRig, kind: str, times: int) -> None:
 
         if not rig.wait(lambda grown=grown: grown() < times / 2):  # type: ignore[misc]
             raise Failed(
-                expected="A driver that cannot start leaves nothing behind, no thread and no file.",
-                actual=f"After {times} such starts the process had {grown()} more {WORDS[what]} "
+                expected=f"{expected} no thread and no file.",
+                actual=f"After {times} {rounds} the process had {grown()} more {WORDS[what]} "
                 "than before.",
             )
 

@@ -13,8 +13,14 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
 
 from autograder.exam import Failed
-from autograder.rigs.camera import IMAGE, RESEND, SETTLE, CameraRig
-from autograder.rigs.camera_duties import require_closed
+from autograder.rigs.camera import IMAGE, RESEND, SETTLE, CameraRig, phrase
+from autograder.rigs.camera_duties import (
+    require_closed,
+    require_open,
+    require_picture,
+    require_rate,
+)
+from autograder.rigs.lives import require_flat
 
 TRANSITIONS = {
     "configure": (Transition.TRANSITION_CONFIGURE, "inactive"),
@@ -22,6 +28,7 @@ TRANSITIONS = {
     "deactivate": (Transition.TRANSITION_DEACTIVATE, "inactive"),
     "cleanup": (Transition.TRANSITION_CLEANUP, "unconfigured"),
 }
+ROUNDS = 10
 STATES = ("unconfigured", "inactive", "active", "finalized")
 SHUTDOWNS = {
     "unconfigured": Transition.TRANSITION_UNCONFIGURED_SHUTDOWN,
@@ -41,18 +48,27 @@ class Managed:
 
     def set(self, **values: str | float) -> bool:
         """Set parameters; return whether the node took them all."""
+        return not self._refused(values)
+
+    def _refused(self, values: dict[str, str | float]) -> list[str]:
+        """Set parameters; return what the node refused, and why."""
         self._rate = f" with a rate of {values['rate']:g} Hz" if "rate" in values else ""
         parameters = [Parameter(name=name, value=_value(value)) for name, value in values.items()]
         request = SetParameters.Request(parameters=parameters)
         reply = self._ask(SetParameters, "set_parameters", request)
-        return all(result.successful for result in reply.results)
+        return [
+            f"{name}={value!r}" + (f" ({result.reason.rstrip('.')})" if result.reason else "")
+            for (name, value), result in zip(values.items(), reply.results, strict=True)
+            if not result.successful
+        ]
 
     def require(self, **values: str | float) -> None:
         """Set parameters that the node must take."""
-        if not self.set(**values):
+        if refused := self._refused(values):
             shown = ", ".join(f"{name}={value!r}" for name, value in values.items())
             raise Failed(
-                expected=f"The parameters {shown} can be set.", actual="The node refused them."
+                expected=f"The parameters {shown} can be set.",
+                actual=f"The node refused {phrase(refused)}.",
             )
 
     def state(self) -> str:
@@ -131,6 +147,54 @@ def require_still(rig: CameraRig, device: str, transition: str) -> None:
         )
 
 
+def require_still_held(rig: CameraRig, device: str) -> None:
+    """Fail unless a node that was deactivated has kept its camera open, and its publisher.
+
+    A participant's endpoints are told in order: a publisher that went with “deactivate” is not
+    known here any more when a mark that is made now is.
+    """
+    rig.catch_up()
+    gone = [] if rig.cameras(device) else ["its camera was closed"]
+    gone += [] if rig.publishers() else [f"its publisher on {IMAGE} was gone"]
+    if gone:
+        raise Failed(
+            expected="After “deactivate” your node holds its open camera and its publisher until "
+            "“cleanup”: inactive is one state, whichever way it came there.",
+            actual=f"While it was inactive again {phrase(gone)}.",
+        )
+
+
+def require_fresh(rig: CameraRig, device: str, sent: int, asked: int) -> None:
+    """Fail unless pictures come again, and all but the first ``sent`` are new ones.
+
+    Those that the camera took before it was ``asked`` so often are old.
+    """
+    # Pictures of one publisher arrive in order: what was sent earlier is here by then.
+    if not rig.see(device, lambda: rig.pictures(device)[-1].number >= asked):
+        raise Failed(
+            expected="After a second “activate” pictures come again.",
+            actual=f"None came{rig.raised()}.",
+        )
+    if old := [p for p in rig.pictures(device)[sent:] if p.number < asked]:
+        raise Failed(
+            expected="An inactive node publishes nothing.",
+            actual=f"It published {len(old)} pictures between deactivate and activate.",
+        )
+
+
+def require_refused(rig: CameraRig, node: Managed, what: str, rate: float, kind: str) -> None:
+    """Fail unless the node stays unconfigured, and closes the camera of that ``kind``."""
+    device = rig.device(kind)
+    if not node.set(device=device, rate=rate):
+        return  # refused even earlier: a parameter callback is as good
+    if (state := node.attempt("configure")) != "unconfigured":
+        raise Failed(
+            expected=f"Configured with {what}, your node stays unconfigured.",
+            actual=f"It is {state}.",
+        )
+    require_closed(rig, device, f"After a “configure” with {what}")
+
+
 def require_nothing_held(rig: CameraRig, device: str, when: str) -> None:
     """Fail if a managed node holds a camera or a publisher."""
     require_closed(rig, device, when)
@@ -147,4 +211,60 @@ def require_one_publisher(rig: CameraRig) -> None:
         raise Failed(
             expected=f"A configured node has one publisher on {IMAGE}.",
             actual=f"It had {rig.publishers()}.",
+        )
+
+
+def require_no_publisher_yet(rig: CameraRig) -> None:
+    """Fail if a node that has never been configured has a publisher on the image topic."""
+    rig.catch_up()
+    if rig.publishers():
+        raise Failed(
+            expected=f"Before the first “configure” there is no publisher on {IMAGE}.",
+            actual="There was one: your node makes it in its constructor.",
+        )
+
+
+def require_configuration(
+    rig: CameraRig, node: Managed, rate: float, *, seconds: int = 1, later: float = 0.0
+) -> None:
+    """Fail unless a node that is configured with ``rate`` works by it, and gives everything back.
+
+    ``later`` is a rate that is set once it is configured: good for the next time, or refused.
+    """
+    device = rig.device()
+    node.require(device=device, rate=rate)
+    node.go("configure")
+    require_open(rig, device)
+    require_one_publisher(rig)
+    when = "" if seconds == 1 else f" with a rate of {rate:g} Hz"
+    if later and node.set(rate=later):
+        when = f": {rate:g} Hz was set at “configure”, the {later:g} Hz set since are for the next"
+    node.go("activate")
+    require_picture(rig, device)
+    require_rate(rig, device, rate, when, seconds)
+    node.go("deactivate", "cleanup")
+    require_nothing_held(rig, device, "After “cleanup”")
+
+
+def require_flat_rounds(rig: CameraRig, node: Managed) -> None:
+    """Fail if rounds through the states leave threads or files in the process."""
+    device = rig.device()
+    node.require(device=device, rate=10.0)
+    before = rig.process.usage()
+    for _ in range(ROUNDS):
+        node.go("configure", "activate")
+        rig.advance(0.3)
+        node.go("deactivate", "cleanup")
+    expected = f"{ROUNDS} rounds from “configure” to “cleanup” leave nothing behind,"
+    require_flat(rig, before, ROUNDS, expected, "rounds")
+
+
+def require_off_graph(rig: CameraRig, node: str, when: str) -> None:
+    """Fail if the ``node`` itself is on the graph."""
+    name = f"the node {node}"
+    if not rig.wait(lambda: name not in rig.endpoints(node)):
+        raise Failed(
+            expected=f"{when} the node is off the graph.",
+            actual=f"{SETTLE:.0f} s later {name} was still there: only the inherited "
+            "destroy_node() takes it down.",
         )

@@ -5,10 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from contextlib import AbstractContextManager
 from typing import Any
 
+from action_msgs.srv import CancelGoal
 from geometry_msgs.msg import Twist
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
@@ -23,6 +24,29 @@ from autograder.rigs.safety import Player
 from course.runtime.executor import BackgroundExecutor
 
 
+class _PlainServer(ActionServer):
+    """An action server that says in `return_code`, too, that it refuses to cancel.
+
+    rclpy only leaves the goal out of `goals_canceling`, and the code at ERROR_NONE. By the comments
+    of action_msgs/srv/CancelGoal a refusal has the code ERROR_REJECTED, as rclcpp's servers answer:
+    a client may read either.
+    """
+
+    def __init__(self, node: Node, refuses: Callable[[], Awaitable[bool]], **options: Any) -> None:
+        """Serve `navigate` of ``node``; ``refuses`` says of each request whether it is refused."""
+        self._refuses = refuses
+        super().__init__(node, Drive, "navigate", **options)
+
+    async def _execute_cancel_request(self, request_header_and_message: Any) -> None:
+        """Answer a refused request here; rclpy deals with one that is accepted."""
+        if not await self._refuses():
+            await super()._execute_cancel_request(request_header_and_message)
+            return
+        header, _request = request_header_and_message
+        answer = CancelGoal.Response(return_code=CancelGoal.Response.ERROR_REJECTED)
+        self._handle.send_cancel_response(header, answer)
+
+
 class Navigator(Node):
     """The server of `navigate`: takes goals and does with them what it is told to."""
 
@@ -30,11 +54,12 @@ class Navigator(Node):
         """Serve; what arrives is noted with ``user``, who also decides what is accepted."""
         super().__init__("navigator", start_parameter_services=False, enable_rosout=False)
         self._user = user
-        self._server = ActionServer(
-            self, Drive, "navigate",
+        self._server = _PlainServer(
+            self, self._refuses,
             execute_callback=lambda _: Drive.Result(),
             goal_callback=self._goal, handle_accepted_callback=user.goals.append,
-            cancel_callback=self._cancel, callback_group=ReentrantCallbackGroup(),
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+            callback_group=ReentrantCallbackGroup(),
         )  # fmt: skip
 
     async def _goal(self, goal: Drive.Goal) -> GoalResponse:
@@ -43,10 +68,10 @@ class Navigator(Node):
         await self._user.hesitate(self)
         return GoalResponse.ACCEPT if self._user.accepts else GoalResponse.REJECT
 
-    async def _cancel(self, _goal: ServerGoalHandle) -> CancelResponse:
+    async def _refuses(self) -> bool:
         self._user.cancels.append(self._user.now)
         await self._user.pause(self)
-        return CancelResponse.ACCEPT if self._user.obeys else CancelResponse.REJECT
+        return not self._user.obeys
 
     def destroy_node(self) -> None:
         """Take the server down, too: rclpy leaves it alive."""
@@ -69,6 +94,7 @@ class NavigatorUser(Player):
         self.goals: list[ServerGoalHandle] = []
         self.cancels: list[float] = []
         self.outcomes: list[str] = []
+        self.before: list[str] = []  # the outcome of the request before this one, if there was any
         self.speeds: list[bool] = []
         self._request = self.speak(Int32, "navigate/request")
         self.hear(String, "navigate/outcome", lambda message: self.outcomes.append(message.data))
@@ -85,6 +111,7 @@ class NavigatorUser(Player):
 
         A navigator that ``hesitates`` answers the goal when it is told to `decide`.
         """
+        self.before = self.outcomes[-1:]
         self.accepts, self.obeys, self.hesitates = accepts, obeys, hesitates
         for noted in (self.orders, self.goals, self.cancels, self.outcomes, self.speeds):
             noted.clear()
@@ -145,6 +172,7 @@ class Dispatcher(Player):
         super().__init__("dispatcher")
         self.speeds: list[bool] = []
         self.commands: list[Twist] = []
+        self.told: list[float] = []  # when each came, in simulated s
         self.faults: list[str] = []
         self._jam = self.speak(Bool, "hardware/jammed")
         self.hear(Twist, "cmd_vel", self._command)
@@ -155,6 +183,7 @@ class Dispatcher(Player):
 
     def _command(self, message: Twist) -> None:
         self.commands.append(message)
+        self.told.append(self.now)
         self.speeds.append(moves(message))
 
     def jam(self, jammed: bool) -> None:
@@ -165,6 +194,7 @@ class Dispatcher(Player):
         """Send a goal; forgets what was before."""
         self.speeds.clear()
         self.commands.clear()
+        self.told.clear()
         self.faults.clear()
         drive = Drives()
 

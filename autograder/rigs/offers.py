@@ -85,7 +85,10 @@ def require(rig: RobotRig, scenario: Scenario, wanted: dict[str, str], needed: s
                 actual=f"On the ROS graph it is {_a(pattern)} of type {found[pattern]}.",
             )
         return pattern
-    if not found:
+    if not found and scenario == "parameters":
+        actual = f"No node has a parameter {SPEED} with a number as its value, and there is no "
+        actual += f"service or topic {name}{rig.because()}."
+    elif not found:
         actual = f"Nothing of the name {name} is on the ROS graph{rig.because()}."
     else:
         pattern = next(iter(found))
@@ -136,6 +139,7 @@ def set_speed_limit(rig: RobotRig, value: float) -> tuple[bool, str]:
     Raises:
         Failed: there was no answer, or not one result for one parameter.
     """
+    rig.untouched = False
     prefix = parameter_node(rig)
     service = f"{prefix}/set_parameters" if prefix is not None else f"/{NAMES['parameters']}"
     parameter = Parameter(

@@ -24,7 +24,8 @@ from rclpy.qos import QoSProfile
 
 from autograder.bench import Bench
 from autograder.exam import NotExaminable
-from autograder.rigs.sensors import ExaminerNode, Heard, Sensor
+from autograder.rigs.readings import Heard, Sensor
+from autograder.rigs.sensor_node import ExaminerNode
 from course import Session
 
 TABLE = "inet ros2_course_radio"

@@ -14,6 +14,8 @@ import secrets
 import time
 from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import wait as wait_for
 from contextlib import contextmanager, suppress
 from operator import itemgetter
 from typing import Any, NamedTuple, TypeVar, overload
@@ -31,10 +33,16 @@ from course import WaitTimeout
 
 T = TypeVar("T")
 
+Asker = Callable[["RobotRig"], tuple[str, list[float]]]
+"""Finds out the position: what came, as a clause, and the numbers in it."""
+
 NODE = "RobotInterface"
 THREADS = 4
 SETTLE = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
+ANSWERED, AGAIN = 1.0, 0.1
+"""Seconds of wall time for an answer before the clock moves on, which it may wait for: the first
+time, and where one has been found to wait."""
 STEP = 0.1
 """Seconds of simulated time in one step."""
 
@@ -42,10 +50,12 @@ STEP = 0.1
 class Picture(NamedTuple):
     """What is kept of a picture: when it was published (ns), and what its fields say.
 
-    Not its pixels: a camera of 640 x 480 sends nearly 10 MB a second.
+    Not its pixels: a camera of 640 x 480 sends nearly 10 MB a second. ``number`` is the writer's
+    count, which goes on where a picture is lost on the way; 0 if the middleware has none.
     """
 
     published: int
+    number: int
     height: int
     width: int
     step: int
@@ -152,12 +162,21 @@ class ExaminerNode(Node):
 
 
 def _picture(image: Image, info: dict[str, Any]) -> Picture:
-    published, size = int(info["source_timestamp"]), len(image.data)
-    return Picture(published, image.height, image.width, image.step, size)
+    published, number = int(info["source_timestamp"]), int(info["publication_sequence_number"] or 0)
+    return Picture(published, number, image.height, image.width, image.step, len(image.data))
 
 
 class RobotRig:
-    """The examiner's view of one subject during the pattern exam."""
+    """The examiner's view of one subject during the pattern exam.
+
+    Attributes:
+        still: since when (ns, as messages are stamped) the student's clock stands still.
+        elapsed: seconds of simulated time so far.
+        untouched: whether the speed limit is still what it was at the start.
+        first_top: the highest speed of the first drive, if the limit was untouched until then.
+        films: whether the camera has been found to stream.
+        asker: how the position has been found out, once it has been.
+    """
 
     def __init__(self, bench: Bench) -> None:
         """Bring up the examiner's endpoints on the subject's domain."""
@@ -169,7 +188,15 @@ class RobotRig:
         assert isinstance(node, ExaminerNode)
         self.node = node
         self.still = 0
+        self.elapsed = 0.0
+        self.untouched = True
+        self.first_top: float | None = None
+        self.films = False
+        self.asker: Asker | None = None
+        self._steps = [(0, 0.0)]
+        self._beside = ThreadPoolExecutor(thread_name_prefix="asking")
         self._clients: dict[str, Any] = {}
+        self._by_the_clock: set[str] = set()
         self._told: set[str] = set()
 
     # Time.
@@ -193,11 +220,20 @@ class RobotRig:
         try:
             self.subject.advance(seconds)
         except StudentError as error:
+            told = str(error).partition(": ")[2] or str(error)  # without the exception's name
             raise Failed(
                 expected="Your callbacks end, sleep or await, so that the others get their turn.",
-                actual=f"The node did not follow its clock: {error}.",
+                actual=f"{told.rstrip('.')}. A callback that runs long needs a callback group of "
+                "its own.",
             ) from None
+        self.elapsed = round(self.elapsed + seconds, 6)
         self.stands_still()
+        self._steps.append((self.still, self.elapsed))
+
+    def clock_at(self, moment: int) -> tuple[float, float]:
+        """Return between which simulated times (s) the student's clock was at a ``moment`` (ns)."""
+        at = bisect_left(self._steps, (moment, 0.0))
+        return self._steps[at - 1][1], self._steps[at][1] if at < len(self._steps) else self.elapsed
 
     def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
         """Wait until ``condition`` holds, the student's clock standing still; return whether."""
@@ -207,41 +243,79 @@ class RobotRig:
         return False
 
     def wait_stepping(
-        self, condition: Callable[[], Any], seconds: float | None = None, timeout: float = SETTLE
+        self,
+        condition: Callable[[], Any],
+        seconds: float | None = None,
+        timeout: float = SETTLE,
+        step: float = STEP,
     ) -> bool:
         """Let the student's clock run until ``condition`` holds; return whether it did.
 
         Args:
-            condition: a function without arguments.
+            condition: a function without arguments. Where it moves the clock itself, as a call
+                may, that counts.
             seconds: of simulated time that there are; None is as many as it takes.
             timeout: seconds of wall time that it has to become visible here.
+            step: seconds of simulated time between two looks.
         """
         deadline = time.monotonic() + timeout
-        left = seconds
+        began = self.elapsed
         while not condition():
             if time.monotonic() >= deadline:
                 return False
-            if left is not None and left <= STEP / 2:
+            if seconds is not None and seconds - (self.elapsed - began) <= step / 2:
                 return self.wait(condition, deadline - time.monotonic())
-            self.step()
-            left = None if left is None else left - STEP
+            self.step(step)
             self.wait(condition, 0.01)
         return True
 
     # Asking.
 
     def call(self, srv_type: Any, name: str, request: Any) -> Any | None:
-        """Call a service of the subject's; return its answer, or None if there was none in time."""
+        """Call a service of the subject's; return its answer, or None if there was none in time.
+
+        An answer that does not come at once may wait for the node's clock, which then moves on.
+        """
         if name not in self._clients:
             self._clients[name] = self.node.create_client(srv_type, name)
         client = self._clients[name]
         if not self.wait(client.service_is_ready):
             return None
         future = client.call_async(request)
-        if self.wait(future.done):
+        patience = self._patience(name)
+        if self.wait(future.done, patience):
+            return future.result()
+        if self.wait_stepping(future.done, timeout=SETTLE - patience):
+            self._by_the_clock.add(name)
             return future.result()
         client.remove_pending_request(future)
         return None
+
+    def _patience(self, name: str) -> float:
+        """Return for how long the clock stands still for an answer (s of wall time)."""
+        return AGAIN if name in self._by_the_clock else ANSWERED
+
+    def ask(self, name: str, function: Callable[[], T]) -> Future[T]:
+        """Run a function that waits for an answer beside the check; return what it will return.
+
+        Most answers are there at once. One that is not may wait for the node's clock, so whoever
+        needs it moves that on. ``name`` is what it asks for.
+        """
+        answer = self._beside.submit(function)
+        wait_for([answer], self._patience(name))
+        return answer
+
+    def answer(self, name: str, function: Callable[[], T]) -> T:
+        """Return what a function that waits for an answer returns, or raise what it raises."""
+        answer = self.ask(name, function)
+        if not answer.done() and self.wait_stepping(answer.done):
+            self._by_the_clock.add(name)
+        return answer.result()
+
+    def close(self) -> None:
+        """Take the examiner's endpoints down."""
+        self._beside.shutdown(wait=False)
+        self.session.stop(self.node)
 
     # The hardware.
 
@@ -284,4 +358,4 @@ def robot_rig(bench: Bench) -> Iterator[RobotRig]:
     try:
         yield rig
     finally:
-        bench.session.stop(rig.node)
+        rig.close()

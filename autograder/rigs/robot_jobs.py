@@ -6,10 +6,11 @@ the sensors' topics, the map, the motors' topic and the action.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from functools import cached_property
 
 from autograder.rigs.robot_graph import Offer, RobotGraph, Topic
+from autograder.rigs.robot_types import bears_marks
 
 ACTION = "/navigate_to"
 MAP, MAP_TYPE = "/map", "nav_msgs/msg/OccupancyGrid"
@@ -20,7 +21,10 @@ SENSORS = {
     "/wheel/odometry": "nav_msgs/msg/Odometry",
 }
 EYES = ("/scan", "/camera/image")
+WHEELS = "/wheel/odometry"
 GET_MAP = "nav_msgs/srv/GetMap"
+MAP_SERVICES = frozenset(f"nav_msgs/srv/{name}" for name in ("GetMap", "LoadMap", "SetMap"))
+"""Types of services that hand the map out or take one: none of them plans."""
 
 POSES = frozenset(
     ["nav_msgs/msg/Odometry"]
@@ -80,8 +84,14 @@ class Jobs:
 
     @cached_property
     def sensing(self) -> set[str]:
-        """The nodes that read some sensor."""
-        return self.reading(SENSORS, IMAGES | CLOUDS | OTHER_READINGS)
+        """The nodes that know of some sensor: they read one, or drive one of the three."""
+        readings = {
+            topic.name
+            for topic in self.graph.topics.values()
+            if topic.writers and any(name.startswith("sensor_msgs/msg/") for name in topic.types)
+        }
+        read = self.reading({*SENSORS, *readings}, IMAGES | CLOUDS | OTHER_READINGS)
+        return read | self.drivers
 
     def reading(self, topics: Collection[str], readings: Collection[str]) -> set[str]:
         """Return who reads ``topics``, also where a node filters and hands on raw readings."""
@@ -111,9 +121,16 @@ class Jobs:
             if topic.written_by & self.detectors
             and topic.name not in {*SENSORS, MAP, MOTORS}
             and not set(topic.types) & NOT_OBSTACLES
+            and bears_marks(topic.types)
             and topic.read_by - topic.written_by
             and self.leads_to_motors(topic, ONWARD)
         ]
+
+    def eye(self, topics: Iterable[Topic]) -> str:
+        """Return the sensor that these topics are made from: the LIDAR where it is one of them."""
+        writers = {node for topic in topics for node in topic.written_by}
+        made = [eye for eye in EYES if writers & self.reading([eye], IMAGES | CLOUDS)]
+        return (made or EYES)[0]
 
     def leads_to_motors(self, topic: Topic, kinds: Collection[str]) -> bool:
         """Whether what is on a topic can get to the motors' node, or anywhere if there is none."""
@@ -137,7 +154,7 @@ class Jobs:
 
     @cached_property
     def pose_topics(self) -> list[Topic]:
-        """The topics on which a node that reads sensors publishes the pose."""
+        """The topics on which a node that knows of a sensor publishes the pose."""
         return [
             topic
             for topic in self.graph.topics.values()
@@ -148,7 +165,7 @@ class Jobs:
 
     @cached_property
     def map_readers(self) -> set[str]:
-        """The nodes that know the map: from its topic, from its service, or from a costmap."""
+        """The nodes that read the map: from its topic, from its service, or from a costmap."""
         asking = {
             node
             for offer in self.graph.services.values()
@@ -158,6 +175,13 @@ class Jobs:
         topic = self.graph.topic(MAP)
         readers = self.reading([MAP], [MAP_TYPE]) if MAP_TYPE in topic.types else set()
         return readers | asking
+
+    @cached_property
+    def knowing_map(self) -> set[str]:
+        """The nodes that know the map: who reads it, and who publishes it or hands it out."""
+        publishers = {end.node for end in self.graph.topic(MAP).writers if end.type == MAP_TYPE}
+        offers = [offer for offer in self.graph.services.values() if offer.type == GET_MAP]
+        return self.map_readers.union(publishers, *(offer.servers for offer in offers))
 
     @cached_property
     def goal_reaches(self) -> set[str]:
@@ -175,8 +199,8 @@ class Jobs:
         return [
             offer
             for offer in self.graph.services.values()
-            if offer.servers & self.map_readers
-            and offer.type != GET_MAP
+            if offer.servers & self.knowing_map
+            and offer.type not in MAP_SERVICES
             and (offer.clients - offer.servers) & self.goal_reaches
         ]
 

@@ -8,19 +8,23 @@ from collections.abc import Iterable, Iterator
 
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
-from autograder.rigs.architecture import UnknownTypeError, load_type
 from autograder.rigs.robot_graph import Offer, RobotGraph, Topic
 from autograder.rigs.robot_jobs import (
     ACTION,
+    CLOUDS,
+    IMAGES,
     MAP,
+    MAP_SERVICES,
     MAP_TYPE,
     MOTORS,
     NO_PLACE,
     NOT_OBSTACLES,
     POSES,
     SENSORS,
+    WHEELS,
     Jobs,
 )
+from autograder.rigs.robot_types import UnknownTypeError, bears_marks, load_type
 from course.design import dye
 
 
@@ -67,7 +71,7 @@ def why_no_obstacles(jobs: Jobs) -> str:
         if (
             offer.servers & jobs.detectors
             and offer.clients
-            and not offer.servers & jobs.map_readers
+            and not offer.servers & jobs.knowing_map
         ):
             return (
                 f"{nodes(offer.servers)} hands it out by the service {offer.name} to "
@@ -83,6 +87,11 @@ def _why_no_obstacle(topic: Topic, jobs: Jobs) -> str:
     types = set(topic.types)
     if types & NO_PLACE:
         return f"({listed(topic.types)}) cannot say where the obstacle is"
+    if not bears_marks(types):
+        return (
+            f"({listed(topic.types)}) has no room for a mark: take a type with a number of 32 bits "
+            "or a text"
+        )
     if types & NOT_OBSTACLES or topic.name in (MAP, MOTORS):
         return f"({listed(topic.types)}) is no obstacle information"
     if not topic.read_by - topic.written_by:
@@ -105,6 +114,12 @@ def why_no_pose(jobs: Jobs) -> str:
     ]  # fmt: skip
     if asked:
         return f"The pose can only be asked for, by the service {asked[0].name}: it is a stream."
+    wheels = graph.topic(WHEELS)
+    if own := wheels.written_by & jobs.reading(SENSORS, IMAGES | CLOUDS):
+        return (
+            f"{does(own, 'publish')} {'its' if len(own) == 1 else 'their'} pose on {WHEELS}, the "
+            "encoders' topic: it needs one of its own."
+        )
     return "No node publishes a topic with a pose type."
 
 
@@ -117,25 +132,44 @@ def why_no_planner(jobs: Jobs) -> str:
         return f"{offer.name} ({offer.type}): its request has no room for a goal."
     graph, readers = jobs.graph, jobs.map_readers
     services = [o for o in graph.services.values() if o.servers]
-    actions = [o for o in graph.actions.values() if o.servers & readers and o.name != ACTION]
+    known = [o for o in services if o.servers & jobs.knowing_map and o.type not in MAP_SERVICES]
+    fitting = [o for o in known if _gets_goal(o, jobs)]
     if not readers:
         types = graph.topic(MAP).types
         if types and MAP_TYPE not in types:
             return f"{MAP} has type {listed(types)}, not {MAP_TYPE}."
-        return f"No node reads {MAP}."
-    known = [offer for offer in services if offer.servers & readers]
+        if not known:
+            return f"No node reads {MAP}."
+    # What a node with the goal calls comes first: it is what the student takes for the planner.
+    called = [o for o in services if _callers(o, jobs)] if not fitting else []
+    for offer in called if known else ():
+        if not offer.servers & jobs.knowing_map and _gets_goal(offer, jobs):
+            return (
+                f"{does(_callers(offer, jobs), 'call')} {offer.name} of {nodes(offer.servers)}, "
+                "which does not know the map."
+            )
+    for offer in called:
+        if offer.type in MAP_SERVICES and offer.servers & readers:
+            kind = offer.type.rsplit("/", 1)[-1]
+            return f"{offer.name} is a {kind}: it hands out the map and takes no goal."
+    actions = [o for o in graph.actions.values() if o.servers & readers and o.name != ACTION]
     if not known and actions:
         return f"{does(readers, 'plan')} by the action {actions[0].name}: the task is a service."
     if not known:
         serving = f" ({listed([o.name for o in services])} does not know it)" if services else ""
         return f"{does(readers, 'read')} the map, but no service comes from there{serving}."
-    offer = known[0]
+    offer = (fitting or known)[0]
     if not offer.clients - offer.servers:
         return f"{does(offer.servers, 'serve')} {offer.name}, but no other node calls it."
     return (
         f"{does(offer.clients, 'call')} {offer.name}, but no navigation goal gets there: "
         f"nothing leads to it from {ACTION}."
     )
+
+
+def _callers(offer: Offer, jobs: Jobs) -> set[str]:
+    """Return the nodes with the goal that call a service of another's."""
+    return (offer.clients - offer.servers) & jobs.goal_reaches
 
 
 def _gets_goal(offer: Offer, jobs: Jobs) -> bool:

@@ -16,7 +16,14 @@ from typing import Any, TypeVar
 
 from rclpy.executors import Executor
 from rclpy.node import Node
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import (
+    DurabilityPolicy,
+    HistoryPolicy,
+    QoSCompatibility,
+    QoSProfile,
+    ReliabilityPolicy,
+    qos_check_compatible,
+)
 from rclpy.task import Future
 
 from autograder.bench import Bench, Endpoints, StudentError
@@ -30,6 +37,11 @@ COARSE = 0.5  # s between two looks where it does not matter when exactly someth
 ROUNDS = 10  # of requests that may follow from each other while time stands still
 SETTLE = 8.0  # s of wall time that endpoints may take to find each other; 0.3 s as a rule
 
+# Which QoS a student's subscription has is free: what is offered meets every demand but a deadline.
+# Only one that joins later and demands it is sent the last message again.
+LATCHED = QoSProfile(
+    depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+)
 LOSSLESS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 UNDEMANDING = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -88,7 +100,18 @@ class Player(Node):
     def speak(self, msg_type: Any, topic: str) -> Any:
         """Return a publisher on a topic that the student's node listens to."""
         self.spoken.append(topic)
-        return self.create_publisher(msg_type, topic, LOSSLESS)
+        return self.create_publisher(msg_type, topic, LATCHED)
+
+    def unheard(self) -> str:
+        """Return which of the node's subscriptions cannot be served, and why; empty if none."""
+        for topic in self.spoken:
+            offers = [end.qos_profile for end in self.get_publishers_info_by_topic(topic)]
+            demands = [end.qos_profile for end in self.get_subscriptions_info_by_topic(topic)]
+            pairs = [qos_check_compatible(offer, demand) for offer in offers for demand in demands]
+            if pairs and all(verdict == QoSCompatibility.ERROR for verdict, _why in pairs):
+                why = str(pairs[0][1]).partition(";")[0].removeprefix("ERROR: ")
+                return f"Its subscription to {topic} demands more than any publisher offers: {why}."
+        return ""
 
     def uses(self, service: str) -> None:
         """Say that the examiner is a client of a service that the student's node serves."""
@@ -119,6 +142,8 @@ class Robot:
             Failed: it cannot be made, or lacks an endpoint of the task.
         """
         self.name, self._bench, self._player, self._still = name, bench, player, still
+        self._unserved = False
+        self._known = bench.subject.own_errors()  # of earlier nodes of the same session
         try:
             bench.subject.start(name)
         except StudentError as error:
@@ -129,6 +154,8 @@ class Robot:
         self.wait(lambda: not player.missing())
         if lacking := player.missing():
             raise Failed(expected=f"{name} has every endpoint of the task.", actual=lacking)
+        if unheard := player.unheard():
+            raise Failed(expected=f"{name} can hear what it is told.", actual=unheard)
         player.attend()
         self.sees(
             {"publishers": player.spoken, "subscribers": player.heard, "clients": player.used}
@@ -176,7 +203,23 @@ class Robot:
         """Let so much time pass."""
         self.run(lambda: False, seconds, stride)
 
+    @contextmanager
+    def unserved(self) -> Iterator[None]:
+        """Let no callback wait by the wall clock within the block: nobody serves what it asks for.
+
+        How much simulated time such a wait takes depends on the machine, and so would every
+        observation. Threads of the student's own may wait as they like.
+        """
+        self._unserved = True
+        try:
+            yield
+        finally:
+            self._unserved = False
+
     def _go_on(self, seconds: float) -> None:
+        # Now, and not after the stride: what the node does has just come to rest, so that a wait
+        # has only begun, while a stride with a blocked callback takes long in real time.
+        waits = self._bench.subject.wall_waits() if self._unserved else []
         self._player.now += seconds  # before: what comes in on the way bears the stride's end
         try:
             self._bench.subject.advance(seconds)
@@ -184,14 +227,40 @@ class Robot:
             raise Failed(
                 expected=f"No callback of {self.name} blocks while something is slow or broken.",
                 actual="A callback held up the node so that even its clock stood still."
+                + _of_waits(waits)
                 + self.complaint(),
             ) from None
+        if waits:
+            raise Failed(
+                expected=f"All waiting of {self.name} runs on the node's clock.",
+                actual=_of_waits(waits).strip(),
+            )
         self.rest()
 
     def complaint(self) -> str:
-        """Return what a callback raised last, as a half-sentence to add; empty if none did."""
-        raised = self._bench.subject.errors()
-        return f" A callback raised {raised[-1].rstrip('.')}." if raised else ""
+        """Return what a callback and a thread raised last, a sentence each; empty if none did."""
+        raised, ended = self._bench.subject.errors(), self._bench.subject.thread_errors()
+        told = f" A callback raised {raised[-1].rstrip('.')}." if raised else ""
+        return told + (f" A thread of yours ended with {ended[-1].rstrip('.')}." if ended else "")
+
+    def require_no_errors(self) -> None:
+        """Require that nothing of the student's own has left a callback since the node was made."""
+        for told, count in self._bench.subject.own_errors().items():
+            if count > self._known.get(told, 0):
+                raise Failed(
+                    expected="Nothing leaves a callback as an exception.",
+                    actual=f"What was seen from outside was right, but {told.rstrip('.')}.",
+                )
+
+
+def following(before: list[str]) -> str:
+    """Return which request a request follows, to put behind it; empty if it is the first one."""
+    return f", the next one after “{before[0]}”" if before else ""
+
+
+def _of_waits(waits: list[str]) -> str:
+    """Return a sentence on callbacks that wait by the wall clock, to add; empty if none does."""
+    return f" A callback waits on the wall clock in {waits[0].rstrip('.')}." if waits else ""
 
 
 class RobotRig:
@@ -237,6 +306,15 @@ class RobotRig:
         if self._robot is not None:
             self.bench.subject.stop(self._robot.name)
         self.clear()
+
+    def begin_anew(self) -> None:
+        """Have the next check begin with a fresh node in a fresh session, whose time begins at 0.
+
+        A constructor always finds the clock at 0. In a session where time has gone on, a thread
+        that it starts has to catch up with it first.
+        """
+        self.clear()
+        self._fresh = False
 
     def once(self, trial: Callable[[RobotRig], None]) -> None:
         """Run a trial that others build on, unless an earlier part of the exam has passed it."""

@@ -10,33 +10,17 @@ ends belong to the examiner, and so does a witness that listens on the topic bet
 
 from __future__ import annotations
 
-import re
-import secrets
-import threading
-import time
-from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
-from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
-from rclpy.qos import (
-    DurabilityPolicy,
-    HistoryPolicy,
-    QoSCompatibility,
-    QoSProfile,
-    ReliabilityPolicy,
-    qos_check_compatible,
-)
-from rclpy.time import Time
+from rclpy.qos import QoSCompatibility, ReliabilityPolicy, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
-from sensor_msgs.msg import Image, Imu, LaserScan
-from std_msgs.msg import String
 
 from autograder.bench import Bench
+from autograder.rigs.readings import SENSORS, Heard, Sensor, Tag
+from autograder.rigs.sensor_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
 from course import WaitTimeout
 
 DRIVERS, CONSUMERS = "SensorDrivers", "SensorConsumers"
@@ -45,213 +29,8 @@ SETTLE = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
 ENDLESS = 3600 * 10**9
 """Nanoseconds: a lifespan of an hour or more is as good as none."""
-AHEAD, LAG = 4, 1.0
-"""Readings that may be on their way into a driver, and for how many seconds the next one waits."""
 PROBE_PERIOD = 0.1
 """Seconds between two probes while endpoints find each other."""
-
-
-class Tag(NamedTuple):
-    """What tells readings apart: a nonce of this run, a phase of the exam, a running number."""
-
-    nonce: int
-    phase: int
-    number: int
-
-    def __str__(self) -> str:
-        """Return the tag as text."""
-        return f"{self.nonce}/{self.phase}/{self.number}"
-
-    @classmethod
-    def read(cls, text: str) -> Tag | None:
-        """Return the tag that ``text`` is, or None."""
-        found = re.fullmatch(r"(\d{1,9})/(\d{1,9})/(\d{1,9})", text)
-        return cls(*map(int, found.groups())) if found else None
-
-
-@dataclass(frozen=True)
-class Sensor:
-    """One sensor of the exercise: its topic, message type and rate (Hz), and how it is tagged."""
-
-    name: str
-    topic: str
-    type: Any
-    rate: float
-
-    def message(self, tag: Tag, stamp: Time) -> Any:
-        """Return a reading that carries ``tag`` and was taken at ``stamp``."""
-        if self.type is String:
-            return String(data=str(tag))
-        message = self.type()
-        message.header.frame_id = str(tag)
-        message.header.stamp = stamp.to_msg()
-        # A driver may well set the frame id, so the tag is in the reading itself, too.
-        numbers = [float(number) for number in tag]
-        if self.type is Image:
-            message.data = str(tag).encode()
-            message.height, message.width, message.step = 1, len(message.data), len(message.data)
-            message.encoding = "mono8"
-        elif self.type is LaserScan:
-            message.ranges = numbers
-        else:
-            message.orientation.x, message.orientation.y, message.orientation.z = numbers
-        return message
-
-    def tag(self, message: Any) -> Tag | None:
-        """Return the tag of a reading, or None if it is not the examiner's."""
-        if self.type is String:
-            return Tag.read(message.data)
-        if (tag := Tag.read(message.header.frame_id)) is not None:
-            return tag
-        if self.type is Image:
-            return Tag.read(bytes(message.data).decode(errors="replace"))
-        if self.type is LaserScan:
-            numbers = list(message.ranges)[:3]
-        else:
-            numbers = [message.orientation.x, message.orientation.y, message.orientation.z]
-        return Tag.read("/".join(f"{number:.0f}" for number in numbers))
-
-    def unchanged(self, message: Any, tag: Tag) -> bool:
-        """Whether a reading is what the hardware delivered; its header is the driver's to fill."""
-        delivered = self.message(tag, Time())
-        if self.type is not String:
-            delivered.header = message.header
-        return bool(message == delivered)
-
-
-SENSORS = (
-    Sensor("camera", "camera/image", Image, 10),
-    Sensor("lidar", "scan", LaserScan, 10),
-    Sensor("imu", "imu/data", Imu, 100),
-    Sensor("emergency_stop", "emergency/stop", String, 80),
-)
-CAMERA, LIDAR, IMU, STOP = SENSORS
-
-
-def lossless(durability: DurabilityPolicy = DurabilityPolicy.VOLATILE) -> QoSProfile:
-    """Return the profile of a cable: every reading, in order."""
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_ALL,
-        reliability=ReliabilityPolicy.RELIABLE,
-        durability=durability,
-    )
-
-
-def undemanding() -> QoSProfile:
-    """Return the profile of a reader that matches every writer and keeps all it gets."""
-    return QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-Heard = dict[str, list[Tag]]
-"""Tags in the order of their arrival, by sensor name."""
-
-
-class ExaminerNode(Node):
-    """The examiner's endpoints: hardware outputs, a witness a topic, and the consumers' ends."""
-
-    def __init__(self) -> None:
-        """Create what does not depend on the student; a nonce of this run tags readings."""
-        self.nonce = secrets.randbelow(2**24)  # that a float32 still holds exactly
-        super().__init__(
-            f"examiner_{self.nonce}", start_parameter_services=False, enable_rosout=False
-        )
-        self._phases: dict[str, int] = {}
-        self.hardware = {
-            s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless()) for s in SENSORS
-        }
-        self.consumed: Heard = defaultdict(list)
-        self.witnessed: Heard = defaultdict(list)
-        self.altered: set[str] = set()  # topics with readings that the hardware did not deliver so
-        self.published: dict[tuple[str, Tag], int] = {}  # when the driver did, in ns since 1970
-        for sensor in SENSORS:
-            self.listen(sensor, sensor.topic, undemanding(), self.witnessed)
-
-    def listen(
-        self,
-        sensor: Sensor,
-        topic: str,
-        qos: QoSProfile,
-        heard: Heard,
-        on_incompatible: Callable[[Any], None] | None = None,
-        on: Node | None = None,
-    ) -> Any:
-        """Subscribe to ``topic`` and note the tags of this run's readings in ``heard``.
-
-        ``on`` is the node that gets the subscription, if not this one.
-        """
-
-        def keep(message: Any, info: Any) -> None:
-            tag = sensor.tag(message)
-            if tag is not None and tag.nonce == self.nonce:
-                heard[sensor.name].append(tag)
-                if not sensor.unchanged(message, tag):
-                    self.altered.add(topic)
-                if heard is self.witnessed:
-                    self.published.setdefault((sensor.name, tag), info["source_timestamp"])
-
-        note: Callable[..., None] = keep  # rclpy's stubs know nothing of the second argument
-        # Without a handler of ours rclpy would log an incompatible profile as a warning.
-        events = SubscriptionEventCallbacks(
-            incompatible_qos=on_incompatible or (lambda _: None), use_default_callbacks=False
-        )
-        node = on or self
-        return node.create_subscription(sensor.type, topic, note, qos, event_callbacks=events)
-
-    def phase(self, name: str) -> int:
-        """Return the number of a phase of the exam."""
-        return self._phases.setdefault(name, len(self._phases) + 1)
-
-    def publish(self, sensor: Sensor, phase: str, index: int) -> None:
-        """Feed one reading, taken now, into a sensor's hardware."""
-        tag = Tag(self.nonce, self.phase(phase), index)
-        self.hardware[sensor.name].publish(sensor.message(tag, self.get_clock().now()))
-
-
-class Stream:
-    """Readings that come in at the sensor's rate until it is stopped or ``limit`` are out.
-
-    No faster than the driver gets its turn: on a busy machine it would lose what it could not take.
-    """
-
-    def __init__(self, node: ExaminerNode, sensor: Sensor, phase: str, limit: int = 2**31) -> None:
-        """Begin at once."""
-        self.sensor = sensor
-        self.sent = 0
-        self._node, self._phase, self._limit = node, phase, limit
-        self._since = time.monotonic()
-        self._turn = threading.Lock()
-        self._timer = node.create_timer(1 / sensor.rate, self._tick)
-
-    def _tick(self) -> None:
-        with self._turn:
-            if self.sent < self._limit and not self._ahead():
-                self._node.publish(self.sensor, self._phase, self.sent)
-                self.sent += 1
-                self._since = time.monotonic()
-
-    def _ahead(self) -> bool:
-        """Whether the driver has not yet come to what was sent; one that drops it is not it."""
-        if time.monotonic() - self._since > LAG:
-            return False
-        phase = self._node.phase(self._phase)
-        heard = self._node.witnessed[self.sensor.name]
-        newest = heard[-1].number if heard and heard[-1].phase == phase else -1
-        return self.sent - newest > AHEAD
-
-    @contextmanager
-    def held(self) -> Iterator[None]:
-        """Send nothing for the length of the block."""
-        with self._turn:
-            limit, self._limit = self._limit, 0
-        try:
-            yield
-        finally:
-            self._limit = limit
-
-    def stop(self) -> None:
-        """Send no more."""
-        self._limit = 0
-        self._timer.cancel()
 
 
 class SensorRig:
@@ -350,20 +129,37 @@ class SensorRig:
         for index in range(count):
             self.node.publish(sensor, phase, index)
             if takes:
-                takes = self.wait(partial(self._taken, sensor, phase, index - AHEAD), LAG)
-        return self.wait(partial(self._taken, sensor, phase, count - 1))
+                takes = self.wait(partial(self.taken, sensor, phase, index - AHEAD), LAG)
+        return self.wait(partial(self.taken, sensor, phase, count - 1))
 
-    def _taken(self, sensor: Sensor, phase: str, index: int) -> bool:
+    def taken(self, sensor: Sensor, phase: str, index: int) -> bool:
+        """Whether the driver has published a reading of a phase, or a later one."""
         return max(self.witnessed(sensor, phase), default=-1) >= index
 
     def witnessed(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings as they went over the sensor's topic."""
         return self.indices(self.node.witnessed, sensor, phase)
 
+    def publications(self, sensor: Sensor, phase: str) -> dict[int, int]:
+        """Return when the driver published the readings of a phase: {index: ns since 1970}."""
+        number = self.node.phase(phase)
+        noted = list(self.node.published.items())
+        return {
+            tag.number: when
+            for (name, tag), when in noted
+            if name == sensor.name and tag.phase == number
+        }
+
     def published(self, sensor: Sensor, phase: str, index: int) -> int:
         """Return when the driver published a reading, in ns since 1970; 0 if it was not seen."""
         tag = Tag(self.node.nonce, self.node.phase(phase), index)
         return self.node.published.get((sensor.name, tag), 0)
+
+    def handed(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
+        """Return which readings of a phase the consumer passed on, and when (ns since 1970)."""
+        number = self.node.phase(phase)
+        noted = list(self.node.handed[sensor.name])
+        return [(tag.number, when) for tag, when in noted if tag.phase == number]
 
     def consumed(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings in the order the consumer passed them on."""

@@ -12,18 +12,13 @@ import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 
 from autograder.exam import Failed, NotExaminable
-from autograder.rigs.sensors import (
-    CONSUMERS,
-    IMU,
-    SENSORS,
-    SETTLE,
-    STOP,
-    Sensor,
-    SensorRig,
-    Stream,
-)
+from autograder.rigs.pursuit import Handing, left_behind
+from autograder.rigs.readings import IMU, SENSORS, STOP, Sensor
+from autograder.rigs.sensor_node import LAG, Stream
+from autograder.rigs.sensors import CONSUMERS, SETTLE, SensorRig
 
 PAUSE = 1.5  # s that the consumer is busy
 EVENTS = 100  # stop events in that time
@@ -35,6 +30,7 @@ PROMPT, YOUNG = 0.15, 0.35
 its first reading on in which it must: a design that goes by the age of a reading (0.5 s is old) may
 rightly find a later one too old, and then it is the machine that is slow."""
 TRIES = 8
+TURNS = BURST + 2  # of a driver, after which a consumer has had one for each reading of a burst
 
 
 @dataclass(frozen=True)
@@ -44,12 +40,16 @@ class Backlog:
     ``published`` is how many of these the driver put on the topic. ``kept`` has the numbers in the
     order in which the consumer passed them on; those from ``count`` on came in after the pause.
     ``oldest`` is how old the first of them was at the end of the pause, in s since its publication.
+    ``early`` says that some came out while the consumer was held back, ``behind`` what it handed on
+    when it had fallen far behind later on, if it did.
     """
 
     count: int
     published: int
     kept: list[int]
     oldest: float
+    early: bool
+    behind: Handing | None
 
 
 @dataclass(frozen=True)
@@ -78,18 +78,22 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
         published = {s.name: _published(rig, s, phase, counts[s.name]) for s in SENSORS}
         # So that a reading is clearly on this side of a bound or on that one, whatever the jitter.
         rig.wait(lambda: _youngest(rig, phase, counts) >= LULL)
+        early = {s.name for s in SENSORS if rig.consumed(s, phase)}
         resumed = time.time_ns()
         rig.subject.resume(CONSUMERS)
     # All but the events go on, as on a robot.
     for sensor in SENSORS:
         _drain(rig, sensor, phase, counts[sensor.name])
+    behind = left_behind(rig, phase, resumed)
     for stream in streams.values():
         stream.stop()
     found = {}
     for s in SENSORS:
         kept = rig.consumed(s, phase)
         oldest = (resumed - rig.published(s, phase, min(kept))) / 1e9 if kept else 0.0
-        found[s.name] = Backlog(counts[s.name], published[s.name], kept, oldest)
+        found[s.name] = Backlog(
+            counts[s.name], published[s.name], kept, oldest, s.name in early, behind.get(s.name)
+        )
     return found
 
 
@@ -119,10 +123,11 @@ def _published(rig: SensorRig, sensor: Sensor, phase: str, count: int) -> int:
 
 def _drain(rig: SensorRig, sensor: Sensor, phase: str, count: int) -> None:
     """Wait until the consumer has passed on the newest, for as long as it makes progress."""
+    newest = max((n for n in rig.witnessed(sensor, phase) if n < count), default=-1)
     passed = -1
     while passed < (now := len(rig.consumed(sensor, phase))):
         passed = now
-        if rig.wait(lambda: max(rig.consumed(sensor, phase), default=-1) >= count - 1):
+        if rig.wait(lambda: max(rig.consumed(sensor, phase), default=-1) >= newest):
             break
     if sensor is STOP:  # one that handles the newest first has lost nothing
         rig.wait(lambda: len(set(rig.consumed(sensor, phase))) >= count, PROMPT)
@@ -143,24 +148,47 @@ def short_pause(rig: SensorRig) -> Burst:
 
 def _burst(rig: SensorRig, phase: str, patience: float) -> Burst:
     rig.subject.pause(CONSUMERS)
-    started = time.monotonic()
     stream = Stream(rig.node, IMU, phase, BURST)
     _published(rig, IMU, phase, BURST)
     rig.subject.resume(CONSUMERS)
     rig.wait(lambda: BURST - 1 in rig.consumed(IMU, phase), patience)
     stream.stop()
-    if aged := BURST - 1 not in rig.consumed(IMU, phase) or time.monotonic() - started > YOUNG:
-        # Once a later reading has come out, all of the burst has been decided about.
-        silent = rig.probe([IMU], rig.node.consumed)
-        aged = bool(silent) or time.monotonic() - started > YOUNG
+    handed = dict(rig.handed(IMU, phase)).get(BURST - 1)
+    decided = _turns_later(rig, f"{phase}, later") if handed is None else handed
     rig.wait(lambda: len(set(rig.consumed(IMU, phase))) == BURST, PROMPT)
-    return Burst(rig.consumed(IMU, phase), aged)
+    return Burst(rig.consumed(IMU, phase), decided - rig.published(IMU, phase, 0) > YOUNG * 1e9)
+
+
+def _turns_later(rig: SensorRig, phase: str) -> int:
+    """Send readings one by one until one comes out; return when the machine had come to the burst.
+
+    Once a later one has come out, all of the burst has been decided about. But a consumer that
+    hands on few or none takes as long as it likes, so what tells of a slow machine is the driver:
+    it shares a thread with the consumer, and after as many of its turns (ns) the consumer has had
+    its own.
+    """
+    deadline = time.monotonic() + SETTLE
+    number = 0
+    while number < TURNS or not (rig.consumed(IMU, phase) or time.monotonic() > deadline):
+        rig.node.publish(IMU, phase, number)
+        rig.wait(partial(rig.taken, IMU, phase, number), LAG)
+        number += 1
+    return rig.published(IMU, phase, TURNS - 1) or time.time_ns()
 
 
 def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
-    """Return what became of one sensor's readings; fail if the driver keeps readings back."""
+    """Return what became of one sensor's readings.
+
+    Fail if the driver keeps readings back, or if the consumer cannot be held back.
+    """
     backlogs: dict[str, Backlog] = rig.once(busy_consumer)
     found = backlogs[sensor.name]
+    if found.early:
+        raise Failed(
+            expected="Only callbacks of your consumer, which ROS 2 calls, hand readings on.",
+            actual="Your consumer went on while its callbacks were held back: does a thread, or "
+            "another executor, do its work?",
+        )
     if found.published < (found.count if sensor is STOP else (found.count - 1) * THINNED):
         raise Failed(
             expected=f"The driver publishes each {sensor.name} reading as it comes in.",
@@ -169,16 +197,22 @@ def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
     return found
 
 
-def require_fresh(rig: SensorRig, sensor: Sensor, most: int, expected: str) -> None:
-    """Fail unless the consumer goes on with the newest ``most`` readings after a long pause."""
+def require_fresh(rig: SensorRig, sensor: Sensor, expected: str) -> None:
+    """Fail unless the consumer goes on with the newest after a long pause, and keeps up then."""
     found = backlog(rig, sensor)
-    count, kept = found.count, found.kept
+    count, kept, most = found.count, found.kept, sensor.most
     if max(kept, default=-1) < count - 1:
         actual = f"Of {count} readings in a pause the newest never came out: it got {few(kept)}."
     elif min(kept) < count - most and found.oldest > most / sensor.rate:
         actual = f"It then worked through the last {count - min(kept)} of {count} readings."
     elif kept != sorted(kept):
         actual = f"It passed them on out of order: {few(kept)}."
+    elif found.behind is not None:
+        actual = (
+            f"Afterwards it fell further and further behind: while readings came in at "
+            f"{sensor.rate:.0f} Hz, it handed on one that was {found.behind.age:.1f} s old, and "
+            f"{found.behind.waiting} newer ones were waiting."
+        )
     else:
         return
     raise Failed(expected=expected, actual=actual)
@@ -193,7 +227,11 @@ def require_burst(rig: SensorRig, expected: str) -> None:
             "person will look at it."
         )
     if found.missing:
-        actual = f"Of {BURST} readings that came in while it was busy {lost(found.missing)}."
+        passed = BURST - found.missing
+        actual = (
+            f"Of {BURST} readings that came in while it was busy {lost(found.missing)}, "
+            f"{passed or 'none'} {'were' if passed > 1 else 'was'} passed on."
+        )
     elif found.kept != sorted(found.kept):
         actual = f"It passed them on out of order: {few(found.kept)}."
     else:

@@ -237,4 +237,4 @@ def test_every_grade_cell_of_the_table_of_points_is_in_an_assignment() -> None:
             data = cell["metadata"].get("nbgrader", {})
             if data.get("grade"):
                 found[data["grade_id"]] = data["points"]
-    assert found == points.of_grade_cells() | quiz_marks.of_grade_cells()
+    assert found == points.of_grade_cells() | quiz_marks.of_grade_cells(content_root())

@@ -84,6 +84,31 @@ def test_a_subject_that_ends_fails_the_check(exam: Exam[list[str]]) -> None:
     assert (check.status, check.actual) == ("failed", "It left.")
 
 
+@pytest.mark.parametrize("told", [False, True])
+def test_what_comes_after_a_subject_is_gone_is_not_at_fault(
+    exam: Exam[list[str]], told: bool
+) -> None:
+    @exam.check()
+    def loses(rig: list[str]) -> None:
+        """It comes back."""
+        try:
+            raise SubjectGone("It left.")
+        except SubjectGone as gone:
+            if not told:
+                raise
+            raise Failed(expected="It comes back.", actual="It did not.") from gone
+
+    @exam.check()
+    def later(rig: list[str]) -> None:
+        """It stays."""
+        raise SubjectGone("It left.")
+
+    points.table()["toy"].parts["late"] = {"loses": 1.0, "later": 1.0}
+    first, second = exam.sit("late", BENCH).checks
+    assert (first.status, second.status) == ("failed", "not_checked")
+    assert "“It comes back.”" in second.actual
+
+
 def test_each_check_runs_once_a_sitting(exam: Exam[list[str]]) -> None:
     seen: list[str] = []
 

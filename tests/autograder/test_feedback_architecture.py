@@ -10,7 +10,7 @@ import pytest
 from autograder import corpus, exams, points
 from autograder.corpus import trials
 from autograder.report import Report
-from autograder.rigs.architecture import NAVIGATE_TO, NAVIGATE_TO_TEXT
+from autograder.rigs.robot_types import NAVIGATE_TO, NAVIGATE_TO_TEXT
 from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS

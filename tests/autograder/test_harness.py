@@ -7,19 +7,27 @@ from __future__ import annotations
 import inspect
 import re
 import socket
+import sys
 import threading
 from collections import deque
 from collections.abc import Iterator
+from functools import partial
+from typing import Any, ClassVar
 
 import pytest
+import rclpy
 from lifecycle_msgs.srv import GetState
+from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.lifecycle import LifecycleNode
 from rclpy.node import Node
+from rclpy.task import Future
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
-from autograder.bench import StudentError, Subject
+from autograder.bench import StudentError, Subject, SubjectGone
 from autograder.harness import Harness
-from autograder.wire import Channel
+from autograder.raised import MUST_NOT_SPIN
+from autograder.wire import Channel, ChannelTimeout
 from course import Session
 
 
@@ -41,6 +49,22 @@ class OneCleanupOnly(Node):
         super().destroy_node()
 
 
+class NoCleanup(Node):
+    """Its destroy_node() does not call the inherited one."""
+
+    def __init__(self) -> None:
+        super().__init__("careless")
+        self.create_publisher(String, "talk", 1)
+
+    def destroy_node(self) -> None:
+        pass
+
+
+class Exits(Node):
+    def __init__(self) -> None:
+        raise SystemExit(1)
+
+
 class Managed(LifecycleNode):
     def __init__(self) -> None:
         super().__init__("managed")
@@ -54,7 +78,73 @@ class Deaf(Node):
         self.create_subscription(String, "talk", deque[String]().append, 1)
 
 
-CLASSES = {cls.__name__: cls for cls in (Named, OneCleanupOnly, Managed, Deaf)}
+class Speechless(Node):
+    def __init__(self) -> None:
+        super().__init__("speechless")
+        raise AssertionError
+
+
+class Spinner(Node):
+    """Its callback spins. What is passed as an executor is none: so nothing is left behind."""
+
+    def __init__(self) -> None:
+        super().__init__("spinner")
+        self.create_timer(0.05, self.wait)
+
+    def wait(self) -> None:
+        rclpy.spin_until_future_complete(self, Future(), executor=object())  # type: ignore[arg-type]
+
+
+class Raiser(Node):
+    def __init__(self) -> None:
+        super().__init__("raiser")
+        self.create_timer(0.05, self.drive)
+
+    def drive(self) -> None:
+        raise KeyError("speed")
+
+
+class Robot:
+    def node_factories(self) -> dict[str, Any]:
+        return {"ada": partial(Named, "ada"), "bob": partial(Named, "bob")}
+
+
+class Careless(Node):
+    """Raises in a callback and in a thread; and once more it is rclpy that raises."""
+
+    def __init__(self) -> None:
+        super().__init__("careless")
+        self.create_timer(0.01, self.fail)
+        self.create_timer(0.01, self.misuse)
+        threading.Thread(target=self.fail).start()
+
+    def fail(self) -> None:
+        raise ValueError("mine")
+
+    def misuse(self) -> None:
+        self.declare_parameter("")
+
+
+class Waiting(Node):
+    """Waits in a callback, by the wall clock, for a service that nobody offers."""
+
+    def __init__(self) -> None:
+        super().__init__("waiting")
+        group = ReentrantCallbackGroup()
+        self.asked = self.create_client(Trigger, "nobody", callback_group=group)
+        self.create_timer(0.01, self.wait, callback_group=group)
+
+    def wait(self) -> None:
+        self.asked.wait_for_service(timeout_sec=60.0)
+
+
+CLASSES = {
+    cls.__name__: cls
+    for cls in (
+        Named, OneCleanupOnly, NoCleanup, Exits, Managed, Deaf, Speechless, Spinner, Raiser,
+        Careless, Waiting,
+    )
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -70,7 +160,9 @@ def subject(outside: Session) -> Iterator[Subject]:
 
     ours, theirs = socket.socketpair()
     channel, other = Channel(ours), Channel(theirs)
-    served = threading.Thread(target=Harness(open_session, CLASSES).serve, args=(other,))
+    served = threading.Thread(
+        target=Harness(open_session, {**CLASSES, "robot": Robot()}).serve, args=(other,)
+    )
     served.start()
     subject = Subject(channel)
     yield subject
@@ -101,6 +193,33 @@ def test_a_session_tidies_up_after_a_constructor_unless_it_is_asked_not_to(
     outside.until(lambda: not observer.count_publishers("talk"))
 
 
+def test_a_session_tidies_up_after_a_cleanup_unless_it_is_asked_not_to(
+    subject: Subject, outside: Session
+) -> None:
+    observer = outside.run(Node, "observer")
+    subject.start("NoCleanup")
+    outside.until(lambda: observer.count_publishers("talk") == 1)
+    subject.stop("NoCleanup", bare=True)
+    subject.start("Named")
+    outside.until(lambda: observer.count_publishers("talk") == 2)
+    subject.stop("NoCleanup")
+    outside.until(lambda: observer.count_publishers("talk") == 1)
+
+
+def test_without_a_session_a_cleanup_is_called_once(subject: Subject) -> None:
+    subject.start("OneCleanupOnly")
+    subject.stop("OneCleanupOnly", bare=True)
+    subject.stop("OneCleanupOnly")
+    assert subject.start("OneCleanupOnly") == "/fragile"
+
+
+@pytest.mark.parametrize("bare", [False, True])
+def test_a_constructor_that_exits_has_raised(subject: Subject, bare: bool) -> None:
+    with pytest.raises(StudentError, match="SystemExit: 1"):
+        subject.start("Exits", bare=bare)
+    assert subject.start("Named") == "/nobody"
+
+
 def test_a_cleanup_that_raises_keeps_nobody_from_a_new_session(subject: Subject) -> None:
     subject.start("OneCleanupOnly")
     subject.call("OneCleanupOnly", "destroy_node")
@@ -121,8 +240,96 @@ def test_a_destroyed_lifecycle_node_is_gone_once_it_is_collected(
     outside.until(lambda: not observer.count_services(f"{node}/get_state"))
 
 
+def test_every_declared_node_is_brought_up_and_known_by_its_label(subject: Subject) -> None:
+    assert subject.start_all("robot") == {"ada": "/ada", "bob": "/bob"}
+    assert subject.sees("robot.bob", {"publishers": ["talk"]})["publishers"]["talk"]
+
+
+def test_a_node_that_does_not_come_up_is_named() -> None:
+    class Silent:
+        """Answers what is declared, and then no more."""
+
+        answers: ClassVar[list[dict[str, Any]]] = [
+            {"ok": True, "labels": ["ada", "bob"]},
+            {"ok": True, "node": "/ada"},
+        ]
+
+        def send(self, request: dict[str, Any]) -> None:
+            pass
+
+        def receive(self, timeout: float) -> dict[str, Any]:
+            if not self.answers:
+                raise ChannelTimeout
+            return self.answers.pop(0)
+
+    subject = Subject(Silent())  # type: ignore[arg-type]
+    with pytest.raises(SubjectGone, match="bring up the nodes of `robot`, and bob did not come up"):
+        subject.start_all("robot")
+
+
+def test_who_spins_in_a_callback_is_told_so_and_nobody_else(
+    subject: Subject, outside: Session
+) -> None:
+    subject.start("Spinner")
+    outside.until(subject.errors, what="an error")
+    assert "AttributeError" in subject.errors()[0]
+    assert subject.errors()[0].endswith(MUST_NOT_SPIN)
+    subject.open()
+    subject.start("Raiser")
+    outside.until(subject.errors, what="an error")
+    assert subject.errors()[0].endswith("KeyError: 'speed'")
+
+
 def test_a_trace_has_the_students_lines_only(subject: Subject) -> None:
     with pytest.raises(StudentError, match="no signature found") as raised:
         subject.start("Deaf")
     assert re.findall(r'File "(.*)", line', raised.value.trace) == [__file__]
     assert inspect.__file__ not in raised.value.trace
+
+
+def test_what_is_missing_is_not_said_to_have_raised(
+    subject: Subject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(sys, "last_value", raising=False)
+    with pytest.raises(StudentError) as raised:
+        subject.start("Nobody")
+    sentence = "No Nobody was defined: did its cell end with an error?"
+    assert raised.value.told == sentence
+    monkeypatch.setattr(sys, "last_value", ValueError("no depth."), raising=False)
+    with pytest.raises(StudentError) as raised:
+        subject.value("Nobody")
+    assert raised.value.told == f"{sentence} The last error of a cell was ValueError: no depth."
+
+
+def test_an_error_without_a_message_is_told_by_its_name(subject: Subject) -> None:
+    with pytest.raises(StudentError) as raised:
+        subject.start("Speechless")
+    assert raised.value.told.startswith("It raised AssertionError. It happened here:\n")
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_errors_of_the_students_own_lines_are_told_from_those_of_rclpy(
+    subject: Subject, outside: Session
+) -> None:
+    subject.start("Careless")
+    outside.until(lambda: len(subject.errors()) == 2)
+    (told,) = subject.own_errors()
+    assert re.fullmatch(
+        r"Careless\.fail raised ValueError: mine \(at line \d+: raise ValueError\(.mine.\)\)", told
+    )
+    (ended,) = subject.thread_errors()
+    assert re.fullmatch(r"ValueError: mine \(at line \d+: raise .*\)", ended)
+    subject.open()
+    assert not subject.own_errors()
+    assert not subject.thread_errors()
+
+
+def test_a_callback_that_waits_by_the_wall_clock_is_seen_while_it_does(
+    subject: Subject, outside: Session
+) -> None:
+    subject.open(threads=2)
+    subject.start("Waiting")
+    told, *_ = outside.until(subject.wall_waits)  # each thread may run one
+    assert re.fullmatch(
+        r"wait_for_service: Waiting\.wait of /waiting \(at line \d+: self\.asked.*\)", told
+    )

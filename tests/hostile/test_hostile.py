@@ -15,6 +15,7 @@ While it runs, so does a neighbour's right submission, which must get what it ge
 from __future__ import annotations
 
 import json
+import os
 import re
 import socket
 import subprocess
@@ -23,7 +24,7 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -129,18 +130,24 @@ def host() -> Iterator[tuple[int, list[socket.socket]]]:
 
 
 @pytest.fixture
-def namespaces(monkeypatch: pytest.MonkeyPatch) -> set[int]:
-    """Collect the process namespaces of the sandboxes that are made from now on."""
+def namespaces(monkeypatch: pytest.MonkeyPatch) -> Iterator[set[int]]:
+    """Collect the process namespaces of the sandboxes that are made from now on.
+
+    Each is held open: the kernel gives the number of one that is gone to the next that is made,
+    which may be the sandbox of a test in another worker.
+    """
     made: set[int] = set()
     find = network.child
+    with ExitStack() as held:
 
-    def spy(info: int, process: subprocess.Popen[bytes]) -> int:
-        init = find(info, process)
-        made.add(Path(f"/proc/{init}/ns/pid").stat().st_ino)
-        return init
+        def spy(info: int, process: subprocess.Popen[bytes]) -> int:
+            init = find(info, process)
+            namespace = held.enter_context(Path(f"/proc/{init}/ns/pid").open("rb"))
+            made.add(os.fstat(namespace.fileno()).st_ino)
+            return init
 
-    monkeypatch.setattr(network, "child", spy)
-    return made
+        monkeypatch.setattr(network, "child", spy)
+        yield made
 
 
 def running(namespaces: set[int]) -> list[str]:

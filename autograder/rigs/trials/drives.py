@@ -5,18 +5,19 @@
 
 from __future__ import annotations
 
-from itertools import groupby
+from itertools import groupby, pairwise
 
 from action_msgs.msg import GoalStatus
 
 from autograder.bench import StudentError
 from autograder.exam import Failed
 from autograder.rigs.navigation import Dispatcher, Drives, moves
-from autograder.rigs.safety import Robot, RobotRig
+from autograder.rigs.safety import STRIDE, Robot, RobotRig
 
 PROMPT = 1.0  # s for an answer
 STOP = 0.5  # s from the end of a drive to the stop
 CANCEL = 0.5  # s from a cancel to the end of the drive
+COMMAND = 0.5  # s between two commands to the wheels
 ABORT = 1.0  # s from a jam to the end of the drive
 TOLERANCE = 0.25  # s: what the task allows, and strides
 SLACK = 1.0  # s by which a drive of some seconds may be longer or shorter
@@ -88,10 +89,12 @@ def _require_speed(dispatcher: Dispatcher) -> None:
 
 
 def canceled(rig: RobotRig) -> None:
-    """The longest drive, which is canceled after 1.5 s, and another one."""
+    """The longest drive, which is canceled when a metre has just begun, and another one."""
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
         drive = _driving(robot, dispatcher, LONGEST)
-        robot.spend(1.5)
+        # Who looks for a cancel at each mark only has then most of a metre before the next look.
+        robot.run(lambda: any(drive.feedback), 1.0 + SLACK)
+        robot.spend(STRIDE)
         dispatcher.cancel(drive)
         robot.run(lambda: drive.canceling is not None, CANCEL)
         if not drive.canceling:
@@ -103,28 +106,58 @@ def canceled(rig: RobotRig) -> None:
             )
         _ends(robot, drive, "A canceled goal", "canceled", CANCEL)
         _stands(robot, dispatcher, "been canceled")
-        drive = _driving(robot, dispatcher, 1)
+        drive = _driving(robot, dispatcher, 1, "after a canceled one")
         _ends(robot, drive, "The goal after a canceled one", "succeeded", 1.0 + SLACK)
 
 
 def aborted(rig: RobotRig) -> None:
-    """The wheels jam on the way, come loose, and are needed again."""
+    """The wheels jam on the way, are jammed for the next goal too, and come loose."""
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
         drive = _driving(robot, dispatcher, LONG)
         robot.spend(1.5)
+        jammed = dispatcher.now
         dispatcher.jam(True)
         _ends(robot, drive, "A goal whose wheels jam", "aborted", ABORT)
         _stands(robot, dispatcher, "been aborted")
-        if not any(fault.strip() for fault in dispatcher.faults):
-            raise Failed(
-                expected="The reason is published on drive/fault, in words.",
-                actual="The goal was aborted, and nothing came on drive/fault.",
-            )
+        _require_reason(robot, dispatcher, "The goal")
+        _require_commands(dispatcher, jammed)
+        _jammed_from_the_start(robot, dispatcher)
         dispatcher.jam(False)
         robot.rest()
-        drive = _driving(robot, dispatcher, 1)
+        drive = _driving(robot, dispatcher, 1, "after the jam, with free wheels,")
         _ends(robot, drive, "A goal of 1 m after the jam", "succeeded", 1.0 + SLACK)
         _stands(robot, dispatcher, "succeeded")
+        robot.require_no_errors()
+
+
+def _jammed_from_the_start(robot: Robot, dispatcher: Dispatcher) -> None:
+    """Send a goal while the wheels are jammed: the first command raises, not one on the way."""
+    what = "A goal whose wheels are jammed from the start"
+    drive = _accepted(robot, dispatcher, 1, "while the wheels are jammed")
+    _ends(robot, drive, what, "aborted", ABORT)
+    robot.spend(STOP)
+    _require_reason(robot, dispatcher, what)
+
+
+def _require_reason(robot: Robot, dispatcher: Dispatcher, what: str) -> None:
+    """Require that whoever looks at drive/fault learns why the goal was aborted."""
+    if not any(fault.strip() for fault in dispatcher.faults):
+        raise Failed(
+            expected="The reason is published on drive/fault, in words.",
+            actual=f"{what} was aborted, and nothing came on drive/fault.{robot.complaint()}",
+        )
+
+
+def _require_commands(dispatcher: Dispatcher, jammed: float) -> None:
+    """Require commands so often that a jam is noticed: until the wheels jammed, that is."""
+    times = [at for at in dispatcher.told if at <= jammed]
+    silence = max(after - before for before, after in pairwise([*times, jammed]))
+    if silence > COMMAND + TOLERANCE:
+        raise Failed(
+            expected=f"On the way the wheels get a command at least every {COMMAND:g} s: they "
+            "notice a jam only then.",
+            actual=f"For {silence:.1f} s nothing came on cmd_vel.",
+        )
 
 
 def shutdown(rig: RobotRig) -> None:
@@ -156,21 +189,34 @@ def _shut_down(rig: RobotRig, when: str) -> None:
         ) from None
 
 
-def _driving(robot: Robot, dispatcher: Dispatcher, metres: int) -> Drives:
-    """Send a goal, and wait until it is accepted and the robot moves."""
+def _accepted(robot: Robot, dispatcher: Dispatcher, metres: int, occasion: str = "") -> Drives:
+    """Send a goal, and wait until it is accepted.
+
+    ``occasion`` says what went before it, if that matters.
+    """
     drive = dispatcher.send(metres)
     drive.began = dispatcher.now
     robot.run(lambda: drive.handle is not None, PROMPT)
     if drive.handle is None or not drive.handle.accepted:
         raise Failed(
-            expected=f"A goal of {metres} m is accepted.",
+            expected=f"A {_goal(metres, occasion)} is accepted.",
             actual=f"It was not answered.{robot.complaint()}"
             if drive.handle is None
             else "It was rejected.",
         )
+    return drive
+
+
+def _goal(metres: int, occasion: str) -> str:
+    return f"goal of {metres} m {occasion}".rstrip()
+
+
+def _driving(robot: Robot, dispatcher: Dispatcher, metres: int, occasion: str = "") -> Drives:
+    """Send a goal, and wait until it is accepted and the robot moves."""
+    drive = _accepted(robot, dispatcher, metres, occasion)
     if not robot.run(lambda: any(dispatcher.speeds), PROMPT):
         raise Failed(
-            expected=f"With a goal of {metres} m the robot drives: cmd_vel is not zero.",
+            expected=f"With a {_goal(metres, occasion)} the robot drives: cmd_vel is not zero.",
             actual=f"The goal was accepted, and the wheels were never told to drive."
             f"{robot.complaint()}",
         )

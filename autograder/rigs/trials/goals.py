@@ -12,7 +12,7 @@ from rclpy.action.server import ServerGoalHandle
 
 from autograder.exam import Failed
 from autograder.rigs.navigation import NavigatorUser, services_of
-from autograder.rigs.safety import COARSE, STRIDE, Robot, RobotRig, serving
+from autograder.rigs.safety import COARSE, STRIDE, Robot, RobotRig, following, serving
 
 NAVIGATOR = {"services": services_of("navigate")}
 
@@ -34,7 +34,8 @@ def _user(rig: RobotRig, navigator: bool = True) -> Iterator[tuple[Robot, Naviga
                 yield robot, user
         else:
             robot.sees(NAVIGATOR, there=False)
-            yield robot, user
+            with robot.unserved():
+                yield robot, user
 
 
 def _accepted(robot: Robot, user: NavigatorUser, *, obeys: bool = True) -> None:
@@ -50,7 +51,8 @@ def _sent(robot: Robot, user: NavigatorUser) -> None:
     if user.orders[:1] != [METRES]:
         order = f"a goal with order={user.orders[0]}" if user.orders else "no goal"
         raise Failed(
-            expected=f"After navigate/request {METRES}, a goal with order={METRES} is sent.",
+            expected=f"After navigate/request {METRES}{following(user.before)}, a goal with "
+            f"order={METRES} is sent.",
             actual=f"The request was published, and the navigator got {order}." + robot.complaint(),
         )
 
@@ -78,24 +80,32 @@ def _outcome(
 
 
 def _once(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
+    """Require that the outcome stays the only one, past any timer of the goal's."""
     robot.spend(AFTER, COARSE)
     _outcome(robot, user, when, word)
 
 
 def ended(rig: RobotRig) -> None:
-    """Goals that succeed, are rejected, are aborted."""
+    """Goals that succeed, are rejected, are aborted; nothing of them is left behind."""
     with _user(rig) as (robot, user):
         _accepted(robot, user)
         user.feedback(1)
         user.end(ServerGoalHandle.succeed)
-        _outcome(robot, user, "When the goal succeeded", "arrived")
+        _ends(robot, user, "When the goal succeeded", "arrived")
         user.request(METRES, accepts=False)
         _sent(robot, user)
-        _outcome(robot, user, "When the navigator rejected the goal", "rejected")
+        _ends(robot, user, "When the navigator rejected the goal", "rejected")
         _accepted(robot, user)
         user.feedback(1)
         user.end(ServerGoalHandle.abort)
-        _outcome(robot, user, "When the navigator aborted the goal", "aborted")
+        _ends(robot, user, "When the navigator aborted the goal", "aborted")
+        robot.require_no_errors()
+
+
+def _ends(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
+    """Require an outcome at once, and none after it: a timer of the goal's may still run."""
+    _outcome(robot, user, when, word)
+    _once(robot, user, f"{when}, and for {AFTER:g} s after that", word)
 
 
 def stalled(rig: RobotRig) -> None:

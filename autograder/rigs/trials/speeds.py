@@ -54,6 +54,7 @@ def bad(rig: RobotRig) -> None:
             robot, operator, "linear = 0.4, angular = 0.8, after nonsense", (0.4, 0.8),
             linear=0.4, angular=0.8,
         )  # fmt: skip
+        robot.require_no_errors()
 
 
 def atomic(rig: RobotRig) -> None:

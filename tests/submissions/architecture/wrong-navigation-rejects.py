@@ -1,6 +1,6 @@
 # title: A navigation node that rejects every goal
 # fails: goal_reaches_motors
-# says: goal_reaches_motors: The server of /navigate_to rejected it.
+# says: goal_reaches_motors: The server of /navigate_to rejected each of 8 goals
 
 from rclpy.action import ActionServer, GoalResponse
 from rclpy.node import Node

@@ -1,6 +1,6 @@
 # title: A stop publisher that keeps only the last event for who missed it
 # fails: stop_repaired
-# says: stop_repaired: of 91 never came
+# says: stop_repaired: of 91 were lost
 
 camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 lidar_qos = QoSProfile(depth=1)

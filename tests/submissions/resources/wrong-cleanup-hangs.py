@@ -1,6 +1,7 @@
 # title: Cleanup that waits for a thread which nobody tells to end
-# fails: driver_runs, managed_runs
+# fails: driver_runs
 # says: driver_runs: a cleanup wait for ever?
+# says: managed_runs: Your program hung or ended in
 # seconds: 15
 
 

@@ -31,18 +31,20 @@
 # Six jobs have to be done:
 #
 # 1. **Drivers** publish the readings of all three sensors.
-# 2. **State estimation** reads one sensor or more and publishes the robot's pose: as `Odometry`,
-#    `PoseStamped` or `PoseWithCovarianceStamped`, on a topic other than `wheel/odometry`. The
-#    navigation node does not do this.
-# 3. **Obstacle detection** reads `scan` or `camera/image` and publishes obstacle information: more
-#    than a reading passed on, not a velocity and not a pose, and able to say where or how far (a
-#    `Bool` is not). Another node reads it. Navigation and control do not do the detection.
-# 4. **Path planning** is a service. Its node knows the map; another node, which has the goal, calls
-#    it, and the request (or a topic) brings the goal.
+# 2. **State estimation** reads one sensor or more (an IMU that you add is one, too), or is the driver
+#    of one, and publishes the robot's pose: as `Odometry` or one of the Pose types (`Pose`,
+#    `PoseStamped`, `PoseWithCovariance`, `PoseWithCovarianceStamped`), on a topic other than
+#    `wheel/odometry`. The navigation node does not do this.
+# 3. **Obstacle detection** reads `scan` or `camera/image` and publishes obstacle information: of
+#    another type than a reading (so no `LaserScan` and no `Image`), not a velocity and not a pose,
+#    able to say where or how far (a `Bool` is not), and with room for a 32-bit number or a text (a
+#    `UInt16` has none). Another node reads it. Navigation and control do not do the detection.
+# 4. **Path planning** is a service. Its node knows the map: it reads it, or is the one that hands it
+#    out. Another node, which has the goal, calls it, and the request (or a topic) brings the goal.
 # 5. **Navigation** is the server of the action `navigate_to` and accepts its goals. Topics bring it
 #    what the sensors see: readings, obstacle information, or the pose.
 # 6. **Control**: exactly one node publishes `motors/command`. From the navigation node links lead to
-#    it, of whichever kind.
+#    it: topics, services or action goals, whichever you like.
 #
 # And four rules for the whole:
 #
@@ -56,8 +58,13 @@
 #   `diagnostic_msgs`, …).
 #
 # Your design is examined as it comes up on the ROS graph. At the end dye is poured in: a marked
-# goal and a marked scan, which each node of the design passes on along its links. Both marks must
-# reach `motors/command`.
+# goal and a marked scan (a marked image, if the node that detects obstacles does not read the scan),
+# which each node of the design passes on along its links. Both marks must reach `motors/command`.
+# The nodes that the library makes do that by themselves. A node that you write yourself passes a
+# mark on by copying the header of what it received, or with `course.design.carry(received, sent)`,
+# just before it sends. A mark stands in a message's `frame_id` or, where there is none, in its text
+# or its numbers, so turn no message away because of these. While scans are poured in, a goal is
+# under way; before another goal is sent, the one before is cancelled.
 #
 # **20 points:** 10 for the visible checks, 5 for checks that run when your work is graded, 5 for
 # your explanation.

@@ -275,7 +275,7 @@ class SpeedServer(Node):
 # | `aborted` | the navigator gave up on the way |
 # | `stalled` | no feedback for 2 s: you asked to cancel, and the navigator accepted |
 # | `runaway` | no feedback for 2 s: you asked to cancel, and the navigator refused |
-# | `lost` | no answer at all for 1 s: to the goal, or to the request to cancel |
+# | `lost` | no answer at all for 1 s: to the goal, or to the request to cancel (at once if nobody serves the action is right, too) |
 #
 # - The 2 s begin when the goal is accepted, and again with each feedback. A drive may take as long
 #   as it likes while feedback comes in.

@@ -66,7 +66,7 @@ choices = {
 # |---|---|---|
 # | position | `robot/position` | Whoever wants to know gets the robot's position in metres, never older than 0.5 s. |
 # | camera | `robot/camera` | 10 pictures a second (9 to 11). |
-# | navigation | `robot/navigate` | Somebody names a station further along the line, and the robot drives there at `max_speed`. At each station they hear which stations it has passed so far on this drive, and at the end, when it has stopped, which it passed in all. They can call it off: then the robot stops where it is, within 0.5 s, and does not wait for the next station. The aisle may be blocked for a while; then the robot waits, and where it is tells `hardware/position`, not the time. |
+# | navigation | `robot/navigate` | Somebody names a station further along the line, and the robot drives there at `max_speed`. At each station they hear which stations it has passed so far on this drive, and at the end, when it has stopped, which it passed in all. They can call it off: then the robot stops where it is, within 0.5 s, and does not wait for the next station; which stations the result then has is up to you. Pictures and the position go on while it drives. The aisle may be blocked for a while; then the robot waits, and where it is tells `hardware/position`, not the time. |
 # | parameters | `max_speed` | The highest speed in m/s, 0.5 at the start. Whoever changes it hears whether the new value holds. Values from 0.1 to 1.0 are good; any other is refused with a reason, and the old one stays. A new value counts from the next goal on, or sooner. |
 # | battery | `robot/battery` | Everyone who is interested knows a new level within 1 s. So does whoever joins later, within 1 s: the hardware reports the level only when it changes. |
 #

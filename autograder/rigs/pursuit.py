@@ -1,0 +1,95 @@
+"""Whether a consumer keeps up with what comes in, or falls further and further behind.
+
+A list that fills faster than it is emptied is a queue without end, whatever DDS keeps. It shows
+after a pause, while readings go on coming in: a sound consumer soon hands on one that is fresh,
+with the other each is older than the one before. Both times, of publication and of handing on, are
+the student's own: how fast the examiner hears of them plays no part.
+"""
+
+from __future__ import annotations
+
+import time
+from bisect import bisect_right
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from autograder.rigs.readings import SENSORS, STOP, Sensor
+from autograder.rigs.sensors import SensorRig
+
+WATCHED = 0.8  # s after a pause; from then on one fresh reading shows that a consumer keeps up
+FRESH = 0.2  # s: a control loop at 5 Hz that acts on the newest hands it on within this time
+GENEROUS = 2  # times what a consumer may find waiting: beyond it is not just a busy moment
+LASTING = 0.5  # s for which it has to stay beyond
+QUIET = 2.0  # s without a reading after which there is nothing more to see
+PATIENCE = 8.0  # s for those that are neither fresh nor far behind
+
+
+@dataclass(frozen=True)
+class Handing:
+    """A reading that was handed on: when (ns), how old it was (s), and how many newer ones wait."""
+
+    when: int
+    age: float
+    waiting: int
+
+
+def left_behind(rig: SensorRig, phase: str, resumed: int) -> dict[str, Handing]:
+    """Watch what is handed on since ``resumed`` (ns); return where each that falls behind was.
+
+    To be called while readings go on coming in.
+    """
+    pursuits = [Pursuit(rig, sensor, phase, resumed) for sensor in SENSORS if sensor is not STOP]
+    rig.wait(lambda: all(pursuit.settled() for pursuit in pursuits), WATCHED + PATIENCE)
+    return {p.sensor.name: p.behind for p in pursuits if p.behind is not None}
+
+
+class Pursuit:
+    """One sensor's consumer, and whether it keeps up."""
+
+    def __init__(self, rig: SensorRig, sensor: Sensor, phase: str, resumed: int) -> None:
+        """Watch what was handed on since ``resumed`` (ns)."""
+        self.sensor = sensor
+        self.behind: Handing | None = None
+        self._rig, self._phase, self._resumed = rig, phase, resumed
+        self._settled = False
+
+    def settled(self) -> bool:
+        """Whether it has been seen that the consumer keeps up, or that it does not."""
+        if not self._settled and time.time_ns() > self._resumed + WATCHED * 1e9:
+            self._settled = self._look()
+        return self._settled
+
+    def _look(self) -> bool:
+        handings = self._handings()
+        if not handings or time.time_ns() > handings[-1].when + QUIET * 1e9:
+            return True
+        if any(self._fresh(handing) for handing in handings):
+            return True
+        late = list(self._late_at_last(handings))
+        if late and late[0].when - late[-1].when > LASTING * 1e9:
+            self.behind = late[0]
+        return self.behind is not None
+
+    def _fresh(self, handing: Handing) -> bool:
+        return handing.when > self._resumed + WATCHED * 1e9 and handing.age <= FRESH
+
+    def _late_at_last(self, handings: list[Handing]) -> Iterable[Handing]:
+        """Go back through those that are late until one is not."""
+        most = GENEROUS * self.sensor.most
+        for handing in reversed(handings):
+            if handing.waiting <= most or handing.age <= most / self.sensor.rate:
+                return
+            yield handing
+
+    def _handings(self) -> list[Handing]:
+        published = self._rig.publications(self.sensor, self._phase)
+        moments = sorted(published.values())
+        return [
+            Handing(
+                when,
+                (when - published[number]) / 1e9,
+                bisect_right(moments, when) - bisect_right(moments, published[number]),
+            )
+            for number, when in self._rig.handed(self.sensor, self._phase)
+            if when > self._resumed and number in published
+        ]

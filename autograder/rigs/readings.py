@@ -1,0 +1,111 @@
+"""The readings of the QoS exam: four sensors, and the tags by which their readings are told apart.
+
+A tag stands in several places of a reading: a driver may set the header, and a consumer may change
+it, or clean a scan, before it hands on what it acts on.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from rclpy.time import Time
+from sensor_msgs.msg import Image, Imu, LaserScan
+from std_msgs.msg import String
+
+FAR = 2.0**30
+"""The range of the LIDAR: what is cleaned by it still has the numbers of its tag."""
+
+
+class Tag(NamedTuple):
+    """What tells readings apart: a nonce of this run, a phase of the exam, a running number."""
+
+    nonce: int
+    phase: int
+    number: int
+
+    def __str__(self) -> str:
+        """Return the tag as text."""
+        return f"{self.nonce}/{self.phase}/{self.number}"
+
+    @classmethod
+    def read(cls, text: str) -> Tag | None:
+        """Return the tag that ``text`` is, or None."""
+        found = re.fullmatch(r"(\d{1,9})/(\d{1,9})/(\d{1,9})", text)
+        return cls(*map(int, found.groups())) if found else None
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One sensor of the exercise: its topic, message type and rate (Hz), and how it is tagged.
+
+    ``most`` is how many of its last readings a consumer may go on with after a pause.
+    """
+
+    name: str
+    topic: str
+    type: Any
+    rate: float
+    most: int
+
+    def message(self, tag: Tag, stamp: Time) -> Any:
+        """Return a reading that carries ``tag`` and was taken at ``stamp``."""
+        if self.type is String:
+            return String(data=str(tag))
+        message = self.type()
+        message.header.frame_id = str(tag)
+        message.header.stamp = stamp.to_msg()
+        numbers = [float(number) for number in tag]
+        if self.type is Image:
+            message.data = str(tag).encode()
+            message.height, message.width, message.step = 1, len(message.data), len(message.data)
+            message.encoding = "mono8"
+        elif self.type is LaserScan:
+            message.angle_min, message.angle_max, message.angle_increment = -0.5, 0.5, 0.5
+            message.range_min, message.range_max = 0.0, FAR
+            message.ranges = message.intensities = numbers
+        else:
+            for vector in _vectors(message):
+                vector.x, vector.y, vector.z = numbers
+        return message
+
+    def tag(self, message: Any) -> Tag | None:
+        """Return the tag of a reading, or None if it has none."""
+        return next(filter(None, map(Tag.read, self._places(message))), None)
+
+    def _places(self, message: Any) -> list[str]:
+        """Return what stands where a tag may stand."""
+        if self.type is String:
+            return [message.data]
+        header = str(message.header.frame_id)
+        if self.type is Image:
+            return [header, bytes(message.data).decode(errors="replace")]
+        if self.type is LaserScan:
+            threes = [list(message.ranges)[:3], list(message.intensities)[:3]]
+        else:
+            threes = [[vector.x, vector.y, vector.z] for vector in _vectors(message)]
+        return [header, *("/".join(f"{number:.0f}" for number in three) for three in threes)]
+
+    def unchanged(self, message: Any, tag: Tag) -> bool:
+        """Whether a reading is what the hardware delivered; its header is the driver's to fill."""
+        delivered = self.message(tag, Time())
+        if self.type is not String:
+            delivered.header = message.header
+        return bool(message == delivered)
+
+
+def _vectors(imu: Imu) -> tuple[Any, Any, Any]:
+    return imu.orientation, imu.angular_velocity, imu.linear_acceleration
+
+
+SENSORS = (
+    Sensor("camera", "camera/image", Image, 10, most=10),  # 1 s
+    Sensor("lidar", "scan", LaserScan, 10, most=5),  # 0.5 s
+    Sensor("imu", "imu/data", Imu, 100, most=50),  # 0.5 s
+    Sensor("emergency_stop", "emergency/stop", String, 80, most=100),
+)
+CAMERA, LIDAR, IMU, STOP = SENSORS
+
+Heard = dict[str, list[Tag]]
+"""Tags in the order of their arrival, by sensor name."""

@@ -1,0 +1,167 @@
+"""The examiner's node of the QoS exam: it feeds readings in, and hears what becomes of them."""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+import secrets
+import threading
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+
+from autograder.rigs.readings import SENSORS, STOP, Heard, Sensor, Tag
+
+AHEAD, LAG = 4, 1.0
+"""Readings that may be on their way into a driver, and for how many seconds the next one waits."""
+
+
+def lossless(durability: DurabilityPolicy = DurabilityPolicy.VOLATILE) -> QoSProfile:
+    """Return the profile of a cable: every reading, in order."""
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_ALL,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=durability,
+    )
+
+
+def undemanding() -> QoSProfile:
+    """Return the profile of a reader that matches every writer and keeps all it gets."""
+    return QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class ExaminerNode(Node):
+    """The examiner's endpoints: hardware outputs, a witness a topic, and the consumers' ends."""
+
+    def __init__(self) -> None:
+        """Create what does not depend on the student; a nonce of this run tags readings."""
+        self.nonce = secrets.randbelow(2**24)  # that a float32 still holds exactly
+        super().__init__(
+            f"examiner_{self.nonce}", start_parameter_services=False, enable_rosout=False
+        )
+        self._phases: dict[str, int] = {}
+        self.hardware = {
+            s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless()) for s in SENSORS
+        }
+        self.consumed: Heard = defaultdict(list)
+        self.witnessed: Heard = defaultdict(list)
+        self.altered: set[str] = set()  # topics with readings that the hardware did not deliver so
+        self.foreign: set[str] = set()  # topics with messages that cannot be told to be readings
+        # When the driver published a reading, and when the consumer handed readings on, in order.
+        self.published: dict[tuple[str, Tag], int] = {}  # ns since 1970
+        self.handed: dict[str, list[tuple[Tag, int]]] = defaultdict(list)
+        self._stamps: dict[tuple[str, int], Tag] = {}  # ns since 1970
+        for sensor in SENSORS:
+            self.listen(sensor, sensor.topic, undemanding(), self.witnessed)
+
+    def listen(
+        self,
+        sensor: Sensor,
+        topic: str,
+        qos: QoSProfile,
+        heard: Heard,
+        on_incompatible: Callable[[Any], None] | None = None,
+        on: Node | None = None,
+    ) -> Any:
+        """Subscribe to ``topic`` and note the tags of this run's readings in ``heard``.
+
+        ``on`` is the node that gets the subscription, if not this one.
+        """
+
+        def keep(message: Any, info: Any) -> None:
+            tag = self._tag(sensor, message)
+            if tag is None:
+                self.foreign.add(topic)
+            elif tag.nonce == self.nonce:
+                heard[sensor.name].append(tag)
+                if not sensor.unchanged(message, tag):
+                    self.altered.add(topic)
+                if heard is self.witnessed:
+                    self.published.setdefault((sensor.name, tag), info["source_timestamp"])
+                elif heard is self.consumed:
+                    self.handed[sensor.name].append((tag, info["source_timestamp"]))
+
+        note: Callable[..., None] = keep  # rclpy's stubs know nothing of the second argument
+        # Without a handler of ours rclpy would log an incompatible profile as a warning.
+        events = SubscriptionEventCallbacks(
+            incompatible_qos=on_incompatible or (lambda _: None), use_default_callbacks=False
+        )
+        node = on or self
+        return node.create_subscription(sensor.type, topic, note, qos, event_callbacks=events)
+
+    def phase(self, name: str) -> int:
+        """Return the number of a phase of the exam."""
+        return self._phases.setdefault(name, len(self._phases) + 1)
+
+    def publish(self, sensor: Sensor, phase: str, index: int) -> None:
+        """Feed one reading, taken now, into a sensor's hardware."""
+        tag = Tag(self.nonce, self.phase(phase), index)
+        now = self.get_clock().now()
+        self._stamps[sensor.name, now.nanoseconds] = tag
+        self.hardware[sensor.name].publish(sensor.message(tag, now))
+
+    def _tag(self, sensor: Sensor, message: Any) -> Tag | None:
+        """Return the tag of a reading, by its stamp if nothing else is left of it."""
+        if (tag := sensor.tag(message)) is not None or sensor is STOP:
+            return tag
+        return self._stamps.get((sensor.name, Time.from_msg(message.header.stamp).nanoseconds))
+
+
+class Stream:
+    """Readings that come in at the sensor's rate until it is stopped or ``limit`` are out.
+
+    No faster than the driver gets its turn: on a busy machine it would lose what it could not take.
+    Of stop events, of which none may get lost, only one is ever on its way into a driver.
+    """
+
+    def __init__(self, node: ExaminerNode, sensor: Sensor, phase: str, limit: int = 2**31) -> None:
+        """Begin at once."""
+        self.sensor = sensor
+        self.sent = 0
+        self._node, self._phase, self._limit = node, phase, limit
+        self._ahead = 1 if sensor is STOP else AHEAD
+        self._drops = False
+        self._since = time.monotonic()
+        self._turn = threading.Lock()
+        self._timer = node.create_timer(1 / sensor.rate, self._tick)
+
+    def _tick(self) -> None:
+        with self._turn:
+            if self.sent < self._limit and not self._waits():
+                self._node.publish(self.sensor, self._phase, self.sent)
+                self.sent += 1
+                self._since = time.monotonic()
+
+    def _waits(self) -> bool:
+        """Whether the driver has not yet come to what was sent; one that drops it is not it."""
+        phase = self._node.phase(self._phase)
+        heard = self._node.witnessed[self.sensor.name]
+        newest = heard[-1].number if heard and heard[-1].phase == phase else -1
+        if time.monotonic() - self._since > LAG:
+            seen = {tag.number for tag in heard if tag.phase == phase}
+            self._drops = self.sensor is STOP and len(seen) <= newest
+            return False
+        return not self._drops and self.sent - newest > self._ahead
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Send nothing for the length of the block."""
+        with self._turn:
+            limit, self._limit = self._limit, 0
+        try:
+            yield
+        finally:
+            self._limit = limit
+
+    def stop(self) -> None:
+        """Send no more."""
+        self._limit = 0
+        self._timer.cancel()

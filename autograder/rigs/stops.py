@@ -1,0 +1,116 @@
+"""What becomes of stop events at consumers that differ in what they ask for and when they join."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+from autograder.exam import Failed
+from autograder.rigs.readings import STOP, Heard
+from autograder.rigs.sensor_node import LAG, lossless, undemanding
+from autograder.rigs.sensors import SensorRig
+from autograder.rigs.stalling import few, lost
+
+EVENTS = 5
+PRESSES = (0, 1, 0, 1)
+"""Events that bear the same words again, as pressed, released, pressed, released do."""
+
+
+def require_all_heard(rig: SensorRig, *, give_up: bool) -> Sequence[Heard]:
+    """Fail unless a RELIABLE and a BEST_EFFORT consumer hear all events; return what they hear.
+
+    ``give_up`` says that to wait for a silent one is pointless.
+    """
+    reliable: Heard = defaultdict(list)
+    casual: Heard = defaultdict(list)
+    rig.node.listen(STOP, STOP.topic, lossless(), reliable)
+    rig.node.listen(STOP, STOP.topic, undemanding(), casual)
+    for heard, who in ((reliable, "RELIABLE"), (casual, "BEST_EFFORT")):
+        if rig.probe([STOP], heard, give_up=lambda _: give_up):
+            raise Failed(
+                expected="A consumer that asks for RELIABLE and one for BEST_EFFORT both hear it.",
+                actual=f"A consumer that asks for {who} heard nothing on emergency/stop.",
+            )
+    took = rig.burst(STOP, "event", EVENTS)
+    for heard in (reliable, casual) if took else ():  # else there is nothing left to wait for
+        rig.wait(lambda h=heard: len(rig.indices(h, STOP, "event")) >= EVENTS)  # type: ignore[misc]
+    published = {
+        number
+        for heard in (rig.node.witnessed, reliable, casual)
+        for number in rig.indices(heard, STOP, "event")
+    }
+    for heard in (reliable, casual):
+        if (got := rig.indices(heard, STOP, "event")) != list(range(EVENTS)):
+            raise Failed(
+                expected=f"{EVENTS} stops arrive as {EVENTS} stops, in order.",
+                actual=f"A consumer heard {few(got)}."
+                if len(published) == EVENTS
+                else f"Of {EVENTS} that came in, the driver published {len(published)} on "
+                f"{STOP.topic}.",
+            )
+    return reliable, casual
+
+
+def require_no_repeats(rig: SensorRig, listeners: Sequence[Heard]) -> None:
+    """Fail if an event of before comes again, at any that were there, when one more joins."""
+    late: Heard = defaultdict(list)
+    rig.node.listen(STOP, STOP.topic, lossless(), late)
+    there = (*listeners, rig.node.witnessed, rig.node.consumed)
+    # The late one hears the first after the driver has found it, so what the driver then does comes
+    # before the second. All hear in order: who has heard what comes after that has heard it, too.
+    for heard in (late, late, *there):
+        if rig.probe([STOP], heard):
+            raise Failed(
+                expected="Every consumer hears the stops that come after it joined.",
+                actual=f"When one more had joined, one heard nothing on {STOP.topic} any more.",
+            )
+    for heard in there:
+        if again := _repeated(rig.indices(heard, STOP, "event")):
+            if heard is rig.node.consumed:  # the last: on the topic none was
+                raise Failed(
+                    expected="Your consumer hands on each stop event once.",
+                    actual=f"{len(again)} of {EVENTS} went over {STOP.topic} once, and came out on "
+                    f"consumer/{STOP.name} more than once.",
+                )
+            raise Failed(
+                expected="Each stop event is handed out once, whoever joins later.",
+                actual=f"An event is repeated: when one more consumer joined, {len(again)} of "
+                f"{EVENTS} came again where they had been heard before. A consumer would brake "
+                "again for an event that is over.",
+            )
+
+
+def require_told_apart(rig: SensorRig) -> None:
+    """Fail unless the consumer also hands on events that bear the words of earlier ones."""
+    for sent, number in enumerate(PRESSES, 1):
+        rig.node.publish(STOP, "presses", number)
+        # Of stop events only one is ever on its way into a driver.
+        rig.wait(lambda n=sent: len(rig.witnessed(STOP, "presses")) >= n, LAG)  # type: ignore[misc]
+    rig.wait(lambda: len(rig.consumed(STOP, "presses")) >= len(PRESSES))
+    if (got := rig.consumed(STOP, "presses")) != list(PRESSES):
+        raise Failed(
+            expected="A stop event is handled even if it bears the words of an earlier one, as one "
+            "press of the button does of another.",
+            actual=f"{len(PRESSES)} events came in, the last two with the words of the first two. "
+            f"The driver published {len(rig.witnessed(STOP, 'presses'))} of them, and your "
+            f"consumer handed on {len(got)}.",
+        )
+
+
+def amiss(got: list[int], count: int) -> str:
+    """Return what is wrong with ``got``, which is not 0 to ``count - 1`` in order, as a phrase."""
+    if missing := count - len(set(got)):
+        return lost(missing, count)
+    if again := _repeated(got):
+        return f"{len(again)} of {count} came more than once"
+    return "Some came out of order"
+
+
+def around(got: list[int]) -> str:
+    """Return the numbers from one before the first that is out of place on, as a phrase."""
+    first = next((place for place, number in enumerate(got) if number != place), len(got))
+    return few(got[max(0, first - 1) :])
+
+
+def _repeated(numbers: list[int]) -> set[int]:
+    return {number for number in numbers if numbers.count(number) > 1}

@@ -1,0 +1,25 @@
+# title: The base reads its encoders and publishes both the counts and the pose that it makes of them
+# fails: nothing
+
+design = course.Design(outside=["motors/command", "navigate_to"])
+(design.node("base")  # two jobs: driver of the encoders, dead reckoning from them
+    .publishes("wheel/odometry", Odometry)
+    .publishes("pose", PoseStamped))
+design.node("lidar").publishes("scan", LaserScan)
+design.node("camera").publishes("camera/image", Image)
+design.node("maps").publishes("map", OccupancyGrid)
+(design.node("detector")
+    .subscribes("scan", LaserScan)
+    .subscribes("camera/image", Image)
+    .publishes("obstacles", PointCloud2))
+design.node("planner").subscribes("map", OccupancyGrid).serves("plan", GetPlan)
+(design.node("navigator")
+    .action_server("navigate_to", NavigateTo)
+    .subscribes("pose", PoseStamped)
+    .subscribes("obstacles", PointCloud2)
+    .calls("plan", GetPlan)
+    .publishes("cmd_vel", Twist))
+(design.node("speed_control")
+    .subscribes("cmd_vel", Twist)
+    .subscribes("wheel/odometry", Odometry)
+    .publishes("motors/command", Twist))
