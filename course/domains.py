@@ -13,6 +13,7 @@ import socket
 import weakref
 from pathlib import Path
 
+from course import port_files
 from course.errors import DomainError
 
 MIN_DOMAIN, MAX_DOMAIN = 0, 101
@@ -59,11 +60,13 @@ def lease_domain() -> DomainLease:
     """Lease a domain id from 1 to 101 that nobody on this machine uses.
 
     Domain 0 is left out: it is everyone's default. A domain whose RTPS ports are open belongs to
-    some other ROS program, leased or not, and is passed over.
+    some other ROS program, leased or not, and is passed over. What a killed program has left on a
+    domain so that DDS would hang there is removed first.
 
     Raises:
         DomainError: every domain is taken.
     """
+    port_files.clear()
     in_use = domains_in_use()
     candidates = list(range(MIN_DOMAIN + 1, MAX_DOMAIN + 1))
     # A random order: a class of kernels that start at once must not race for the same first id.
