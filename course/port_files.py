@@ -2,8 +2,8 @@
 
 Fast DDS makes a file for each port, sizes it, and marks it as initialised. Whoever opens one that
 is not yet marked waits for its maker, without a deadline (Boost.Interprocess,
-``managed_open_or_create_impl``). If the maker was killed just then, as a kernel
-is that does not end when it is restarted, every later participant on this port hangs for ever.
+``managed_open_or_create_impl``). If the maker was killed just then, as a kernel is that does not
+end by itself when it is restarted, every later participant on this port hangs for ever.
 """
 
 from __future__ import annotations

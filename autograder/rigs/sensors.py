@@ -89,9 +89,10 @@ class SensorRig:
         self._probes += 1
         phase = f"probe{self._probes}"
         silent = list(sensors)
-        for _ in range(int(SETTLE / PROBE_PERIOD)):
+        for attempt in range(int(SETTLE / PROBE_PERIOD)):
             for sensor in silent:
-                self.node.publish(sensor, phase, 0)
+                # No two alike: what becomes of repeated words is another check's question.
+                self.node.publish(sensor, phase, attempt)
             self.wait(partial(self._all_heard, silent, heard, phase), PROBE_PERIOD)
             silent = self._silent(silent, heard, phase)
             if all(give_up is not None and give_up(sensor) for sensor in silent):

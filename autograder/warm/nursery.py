@@ -53,6 +53,7 @@ class Zygote:
                     start_new_session=True,
                 )  # fmt: skip
             except FileNotFoundError as error:
+                self._tasks.close()
                 raise ZygoteError(f"there is no {error.filename}") from error
             theirs.close()
             self.pid = self._ready(said)
