@@ -31,9 +31,9 @@ def of_notebooks(root: Path, notebooks: Iterable[NotebookNode]) -> dict[Path, by
     found: dict[Path, bytes] = {}
     for notebook in notebooks:
         for name in quiz_marks.in_cells(notebook):
-            bank = quiz_marks.find_bank(root, name) if name in known else None
-            if bank is None:
+            if name not in known:
                 continue
+            bank = quiz_marks.find_bank(root, name)
             if bank.closed:
                 found[Path(closing.filename(name))] = closing.sheet(bank).encode()
                 found |= {Path(source): _picture(bank.folder / source)
