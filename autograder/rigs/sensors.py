@@ -45,7 +45,7 @@ class SensorRig:
         assert isinstance(node, ExaminerNode)
         self.node = node
         self._experiments = bench.memory
-        self._probes = 0
+        self._probes = self._sent = 0  # how often probed, and with how many readings the last time
 
     def offered(self, topic: str) -> list[TopicEndpointInfo]:
         """Return the publishers on ``topic`` that are not the examiner's."""
@@ -90,6 +90,7 @@ class SensorRig:
         phase = f"probe{self._probes}"
         silent = list(sensors)
         for attempt in range(int(SETTLE / PROBE_PERIOD)):
+            self._sent = attempt + 1
             for sensor in silent:
                 # No two alike: what becomes of repeated words is another check's question.
                 self.node.publish(sensor, phase, attempt)
@@ -98,6 +99,11 @@ class SensorRig:
             if all(give_up is not None and give_up(sensor) for sensor in silent):
                 break
         return silent
+
+    def probed(self, sensor: Sensor) -> str:
+        """Return what the driver did with the newest probes of a sensor, as a phrase."""
+        passed = len(set(self.witnessed(sensor, f"probe{self._probes}")))
+        return f"while the driver published {passed} of the {self._sent} that came in"
 
     def _all_heard(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> bool:
         return not self._silent(sensors, heard, phase)

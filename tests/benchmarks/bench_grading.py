@@ -51,11 +51,12 @@ c.ClearSolutions.code_stub = {"python": "# Your work goes here."}
 
 @dataclass
 class Run:
-    """What grading a class took. Processor time is that of all processes, memory their peak."""
+    """What grading a class took. Processor time and memory are those of all processes."""
 
     submissions: int
     wall: float
     cpu: float
+    mean_mib: float
     peak_mib: float
     own_peak_mib: float
     load: float
@@ -75,6 +76,7 @@ class Memory:
         """Begin to look."""
         self._pid = pid
         self.peak = self.own_peak = 0.0
+        self._seen: list[float] = []
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
@@ -84,11 +86,17 @@ class Memory:
         self._over.set()
         self._thread.join()
 
+    @property
+    def mean(self) -> float:
+        """What was held on average; the highest of many looks is higher than that of few."""
+        return statistics.fmean(self._seen or [0.0])
+
     def _run(self) -> None:
         while not self._over.wait(self.PERIOD):
             tree = list(descendants(self._pid))
             # Memory that processes share counts in parts.
-            self.peak = max(self.peak, sum(proportional(pid) for pid in tree))
+            self._seen.append(sum(proportional(pid) for pid in tree))
+            self.peak = max(self.peak, self._seen[-1])
             self.own_peak = max(self.own_peak, proportional(self._pid))
 
 
@@ -174,7 +182,7 @@ def grade(root: Path, command: list[str], number: int) -> Run:
     if process.returncode != 0:
         raise SystemExit((root / "output.txt").read_text()[-3000:])
     cpu = usage.ru_utime + usage.ru_stime
-    return Run(number, wall, cpu, memory.peak, memory.own_peak, load)
+    return Run(number, wall, cpu, memory.mean, memory.peak, memory.own_peak, load)
 
 
 def ours(root: Path, name: str, number: int, jobs: int) -> Run:
@@ -231,6 +239,7 @@ def growth(given: Assignment, sizes: list[int], jobs: int) -> dict[str, object]:
         rows[str(number)] = {
             "s a submission": run.wall / number,
             "cpu s a submission": run.cpu / number,
+            "mean MiB, all processes": run.mean_mib,
             "peak MiB, all processes": run.peak_mib,
             "peak MiB, the engine": run.own_peak_mib,
             "load": run.load,
