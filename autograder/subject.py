@@ -21,6 +21,7 @@ from autograder.sandbox.limits import Limits
 from autograder.shell import make_shell, run_cell
 from autograder.wire import Channel, ChannelClosed
 from course import Session
+from course.domains import reserve_domain
 
 SHELL = (
     "IPython.core.application", "IPython.core.completer", "IPython.core.completerlib",
@@ -74,12 +75,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.limits:
         Limits.from_json(options.limits).apply()
     os.environ[SUBJECT_ENV] = "1"
+    # A session of the student's own that leases a domain must not come to the one of the exam.
+    lease = reserve_domain(options.domain)
     engine = Channel(socket.socket(fileno=options.engine))
     control = Channel(socket.socket(fileno=options.control))
     try:
         run(engine, control, options.domain)
     except ChannelClosed:
         return 1
+    finally:
+        if lease is not None:  # else whoever runs the exam on this machine has leased it
+            lease.release()
     return 0
 
 

@@ -80,6 +80,12 @@ def lease_domain() -> DomainLease:
     )
 
 
+def reserve_domain(domain_id: int) -> DomainLease | None:
+    """Lease this one domain id, so that `lease_domain` gives it to nobody; None if it is leased."""
+    sock = _claim(check_domain_id(domain_id))
+    return None if sock is None else DomainLease(domain_id, sock)
+
+
 def domains_in_use() -> set[int]:
     """Return the domain ids whose RTPS ports are open in this network namespace."""
     domains = set()

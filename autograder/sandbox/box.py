@@ -22,6 +22,7 @@ from autograder.sandbox.boxed import BoxedSubject, WarmSubject
 from autograder.sandbox.host import tethered, write_files
 from autograder.sandbox.limits import MIB, Limits
 from autograder.sandbox.place import Process
+from course.domains import MAX_DOMAIN
 
 USER = 1000
 """The subject's user id as it sees it, where it has a user namespace."""
@@ -36,7 +37,7 @@ HOLDER = ("sh", "-c", "echo up; exec sleep infinity >/dev/null 2>&1")
 class Box:
     """The namespaces of one submission."""
 
-    domain_id = 1  # the network is ours alone, and so is every domain on it
+    domain_id = MAX_DOMAIN  # all are ours alone here; a program that names one names another
     own_network = True
 
     def __init__(

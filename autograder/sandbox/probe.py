@@ -114,15 +114,17 @@ def _try() -> bool:
 
 def _try_warm() -> bool:
     """Return whether a subject can be forked: without anything to run it ends at once."""
-    command = [sys.executable, "-m", "autograder.subject"]
     try:
         with Box(warm=True) as box, _in_the_network(box, "read -r _"), ExitStack() as stack:
             (engine, ours), (control, theirs) = socket.socketpair(), socket.socketpair()
             for end in (engine, ours, control, theirs):
                 stack.enter_context(end)
             fds = [engine.fileno(), control.fileno()]
-            options = ["--engine", str(fds[0]), "--control", str(fds[1]), "--domain", "1"]
-            subject = stack.enter_context(box.start_subject([*command, *options], {}, fds))
+            command = [
+                sys.executable, "-m", "autograder.subject", "--engine", str(fds[0]),
+                "--control", str(fds[1]), "--domain", str(box.domain_id),
+            ]  # fmt: skip
+            subject = stack.enter_context(box.start_subject(command, {}, fds))
             ours.close()
             return subject.fate() == "exit code 1"
     except (BoxError, ZygoteError):

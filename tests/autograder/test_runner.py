@@ -112,6 +112,21 @@ def test_exit_in_a_cell_does_not_end_the_notebook() -> None:
     assert outcome.outputs[1][0]["data"]["text/plain"] == "'still here'"
 
 
+def test_no_session_of_a_student_leases_the_domain_of_the_exam() -> None:
+    every = """
+from course.domains import lease_domain
+from course.errors import DomainError
+leases = []
+try:
+    while True:
+        leases.append(lease_domain())
+except DomainError:
+    print(len(leases), {lease.domain_id for lease in leases}.isdisjoint({101}))
+"""
+    outcome = runner.run(program(every))
+    assert text_of(outcome.outputs[0]) == "100 True\n"
+
+
 def test_an_outcome_survives_the_store_and_a_damaged_one_is_ignored(tmp_path: Path) -> None:
     store = OutcomeStore(tmp_path / "outcomes")
     outcome = Outcome([[]], {}, ["note"], 1.5)
