@@ -25,6 +25,9 @@ class Process(Protocol):
     def wait(self, timeout: float | None = None) -> int:
         """Return how it ended; raises `subprocess.TimeoutExpired` if it has not in time."""
 
+    def kill(self) -> None:
+        """Kill it, if it has not ended."""
+
 
 class RunningSubject(Protocol):
     """A subject's process. Leaving its block ends it with everything it started."""

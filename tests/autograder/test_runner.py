@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import socket
+import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from autograder import runner
+from autograder.processes import ExaminerProcess
 from autograder.runner import Outcome
+from autograder.sandbox import BoxError
 from autograder.store import OutcomeStore
 from autograder.submission import Cell, Program
 from tests.machine import needs_sandbox
@@ -135,6 +140,25 @@ def test_an_outcome_survives_the_store_and_a_damaged_one_is_ignored(tmp_path: Pa
     (file,) = (tmp_path / "outcomes").iterdir()
     file.write_text(file.read_text()[:20])
     assert store.get(program(), {}) is None
+
+
+def test_an_examiner_is_ended_even_before_it_leads_its_processes() -> None:
+    """As one that is killed right after its fork, when a sandbox is refused."""
+    started: list[subprocess.Popen[bytes]] = []
+
+    def spawn(command: list[str], **options: Any) -> subprocess.Popen[bytes]:
+        process = subprocess.Popen(["cat"], **{**options, "start_new_session": False})
+        started.append(process)
+        return process
+
+    control, subject = socket.socketpair()
+    with (
+        subject,
+        pytest.raises(BoxError, match="out of processes"),
+        ExaminerProcess(control, 1, spawn=spawn),
+    ):
+        raise BoxError("out of processes")
+    assert started[0].returncode is not None
 
 
 def test_an_examiner_that_cannot_be_started_leaves_no_socket_open(
