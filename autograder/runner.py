@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import socket
-import sys
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
@@ -108,10 +107,7 @@ def _start(
     place: Place, engine: socket.socket, control: socket.socket, files: Mapping[str, bytes]
 ) -> RunningSubject:
     fds = [engine.fileno(), control.fileno()]
-    command = [
-        sys.executable, "-m", "autograder.subject", "--engine", str(fds[0]),
-        "--control", str(fds[1]), "--domain", str(place.domain_id),
-    ]  # fmt: skip
+    command = sandbox.subject_command(engine, control, place.domain_id)
     with engine, control:
         return place.start_subject(command, files, fds)
 

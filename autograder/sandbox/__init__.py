@@ -5,10 +5,10 @@ bubblewrap, with limits; the examiner shares nothing with the submission but tha
 """
 
 from autograder.sandbox.network import BoxError
-from autograder.sandbox.place import Place, RunningSubject
+from autograder.sandbox.place import Place, RunningSubject, subject_command
 from autograder.sandbox.probe import Abilities, SandboxError, abilities, place, require
 
 __all__ = [
     "Abilities", "BoxError", "Place", "RunningSubject", "SandboxError", "abilities", "place",
-    "require",
+    "require", "subject_command",
 ]  # fmt: skip

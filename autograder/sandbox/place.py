@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import socket
+import sys
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import IO, Any, Protocol, Self
@@ -27,6 +29,14 @@ class Process(Protocol):
 
     def kill(self) -> None:
         """Kill it, if it has not ended."""
+
+
+def subject_command(engine: socket.socket, control: socket.socket, domain_id: int) -> list[str]:
+    """Return the command of a subject, which gets its ends of these two channels."""
+    return [
+        sys.executable, "-m", "autograder.subject", "--engine", str(engine.fileno()),
+        "--control", str(control.fileno()), "--domain", str(domain_id),
+    ]  # fmt: skip
 
 
 class RunningSubject(Protocol):

@@ -16,7 +16,7 @@ from pathlib import Path
 from autograder.sandbox.box import Box
 from autograder.sandbox.host import Host
 from autograder.sandbox.network import BoxError
-from autograder.sandbox.place import Place
+from autograder.sandbox.place import Place, subject_command
 from autograder.warm import ZygoteError
 from course.errors import CourseError
 
@@ -120,10 +120,7 @@ def _try_warm() -> bool:
             for end in (engine, ours, control, theirs):
                 stack.enter_context(end)
             fds = [engine.fileno(), control.fileno()]
-            command = [
-                sys.executable, "-m", "autograder.subject", "--engine", str(fds[0]),
-                "--control", str(fds[1]), "--domain", str(box.domain_id),
-            ]  # fmt: skip
+            command = subject_command(engine, control, box.domain_id)
             subject = stack.enter_context(box.start_subject(command, {}, fds))
             ours.close()
             return subject.fate() == "exit code 1"

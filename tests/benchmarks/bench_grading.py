@@ -75,7 +75,7 @@ class Memory:
     def __init__(self, pid: int) -> None:
         """Begin to look."""
         self._pid = pid
-        self.peak = self.own_peak = 0.0
+        self.own_peak = 0.0
         self._seen: list[float] = []
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run)
@@ -91,12 +91,16 @@ class Memory:
         """What was held on average; the highest of many looks is higher than that of few."""
         return statistics.fmean(self._seen or [0.0])
 
+    @property
+    def peak(self) -> float:
+        """The most that was seen."""
+        return max(self._seen, default=0.0)
+
     def _run(self) -> None:
         while not self._over.wait(self.PERIOD):
             tree = list(descendants(self._pid))
             # Memory that processes share counts in parts.
             self._seen.append(sum(proportional(pid) for pid in tree))
-            self.peak = max(self.peak, self._seen[-1])
             self.own_peak = max(self.own_peak, proportional(self._pid))
 
 
