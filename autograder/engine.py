@@ -82,7 +82,8 @@ def grade(
     names = _notebooks(gradebook, assignment)
     students, wrong = _students(gradebook, assignment)
     if not trust and not scheduler:
-        sandbox.require()
+        with sandbox.warming_up():
+            sandbox.require()
     refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
     store = OutcomeStore(root / bridge.WORK_FOLDER / "outcomes", trust=trust, hidden=[root])
     with ExitStack() as stack:

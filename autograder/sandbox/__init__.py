@@ -6,9 +6,16 @@ bubblewrap, with limits; the examiner shares nothing with the submission but tha
 
 from autograder.sandbox.network import BoxError
 from autograder.sandbox.place import Place, RunningSubject, subject_command
-from autograder.sandbox.probe import Abilities, SandboxError, abilities, place, require
+from autograder.sandbox.probe import (
+    Abilities,
+    SandboxError,
+    abilities,
+    place,
+    require,
+    warming_up,
+)
 
 __all__ = [
     "Abilities", "BoxError", "Place", "RunningSubject", "SandboxError", "abilities", "place",
-    "require", "subject_command",
+    "require", "subject_command", "warming_up",
 ]  # fmt: skip

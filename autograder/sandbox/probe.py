@@ -8,11 +8,13 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from autograder.sandbox import warmth
 from autograder.sandbox.box import Box
 from autograder.sandbox.host import Host
 from autograder.sandbox.network import BoxError
@@ -71,10 +73,28 @@ def _abilities() -> Abilities:
             f"Submissions cannot be sandboxed here because {lacking}: "
             f"run `sudo apt install {packages}`, {TRUST}."
         )
+    with ThreadPoolExecutor() as pool:  # each mostly waits for one process
+        loss, warm = pool.submit(_try), pool.submit(_try_warm)
+        try:
+            return Abilities(loss=loss.result(), warm=warm.result())
+        except BoxError as error:
+            return Abilities(_advice(str(error)))
+
+
+@contextmanager
+def warming_up() -> Iterator[None]:
+    """Start what examiners are forked from while something else is done in the block."""
+
+    def start() -> None:
+        with suppress(ZygoteError):  # whoever needs it hears of it
+            warmth.examiners()
+
+    starting = threading.Thread(target=start)
+    starting.start()
     try:
-        return Abilities(loss=_try(), warm=_try_warm())
-    except BoxError as error:
-        return Abilities(_advice(str(error)))
+        yield
+    finally:
+        starting.join()
 
 
 def place(*, trust: bool = False, hidden: Iterable[Path] = ()) -> Place:

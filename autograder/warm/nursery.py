@@ -126,6 +126,7 @@ class Nursery:
         """Start none yet."""
         self._zygotes: dict[str, Zygote] = {}
         self._lock = threading.Lock()
+        self._starting: dict[str, threading.Lock] = {}  # one a module: they start side by side
         self._owner = os.getpid()
 
     def zygote(
@@ -138,7 +139,9 @@ class Nursery:
         """
         with self._lock:
             if self._owner != os.getpid():  # a fork of ours has no say over our children
-                self._zygotes, self._owner = {}, os.getpid()
+                self._zygotes, self._starting, self._owner = {}, {}, os.getpid()
+            starting = self._starting.setdefault(module, threading.Lock())
+        with starting:
             known = self._zygotes.get(module)
             if known is None or not known.alive or known.environment != environment:
                 if known is not None:
@@ -157,14 +160,17 @@ class Nursery:
             zygote.kill_forked()
 
     def _of_this_process(self) -> list[Zygote]:
-        # Without the lock, which is held for as long as a zygote takes to start.
+        # Without the locks: one is held for as long as a zygote takes to start.
         return list(self._zygotes.values()) if self._owner == os.getpid() else []
 
     def close(self) -> None:
         """Let all zygotes end; what they have forked goes on."""
-        with self._lock:
-            while self._zygotes and self._owner == os.getpid():
-                self._zygotes.popitem()[1].close()
+        if self._owner != os.getpid():
+            return
+        for module, starting in list(self._starting.items()):
+            with starting:
+                if (known := self._zygotes.pop(module, None)) is not None:
+                    known.close()
 
 
 shared = Nursery()
