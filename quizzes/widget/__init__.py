@@ -6,6 +6,7 @@ anything that it gets before an attempt is submitted.
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,8 @@ class QuizWidget(anywidget.AnyWidget):
         self._quiz = quiz
         self._shown: tuple[int, int] | None = None
         self._trouble = ""
+        self._newest: dict[tuple[str, int], int] = {}
+        self._one_by_one = threading.RLock()
         super().__init__()
         self.layout.width = "100%"
         self.on_msg(self._on_message)
@@ -60,9 +63,16 @@ class QuizWidget(anywidget.AnyWidget):
         display({"text/html": _SAVED, "text/plain": _GONE}, raw=True)  # type: ignore[no-untyped-call]
 
     def _on_message(self, _widget: Any, content: Any, _buffers: Any) -> None:
-        """Do what the browser asks; whatever else it sends is passed over."""
-        if not isinstance(content, dict):
-            return
+        """Do what the browser asks; whatever else it sends is passed over.
+
+        JupyterLab sends a new widget's first messages to the kernel's main thread and later ones to
+        another, so two may come at a time, and the second before the first.
+        """
+        if isinstance(content, dict):
+            with self._one_by_one:
+                self._obey(content)
+
+    def _obey(self, content: dict[str, Any]) -> None:
         kind = content.get("type")
         if kind == "hello":
             self.send({"type": "here", "id": content.get("id")})
@@ -76,14 +86,32 @@ class QuizWidget(anywidget.AnyWidget):
     def _do(self, kind: str, content: dict[str, Any]) -> None:
         try:
             if kind == "answer":
-                self._quiz.answer(content.get("number", 0), content.get("answer"))
+                self._answer(content, content.get("number", 0), content.get("answer"))
             elif kind == "submit":
+                self._answer_all(content)
                 self._quiz.submit()
             elif kind == "retry" and self._quiz.result is not None:
                 self._quiz.retry()
             self._trouble = ""
         except QuizError as error:
             self._trouble = str(error)
+
+    def _answer(self, content: dict[str, Any], number: Any, answer: Any) -> None:
+        """Answer a question, unless the same page has sent a newer answer before."""
+        view, order = content.get("view"), content.get("order")
+        if isinstance(view, str) and isinstance(order, int) and isinstance(number, int):
+            if order < self._newest.get((view, number), 0):
+                return
+            self._newest[view, number] = order
+        self._quiz.answer(number, answer)
+
+    def _answer_all(self, content: dict[str, Any]) -> None:
+        """Take up what the page showed when it was submitted: an answer may still be on its way."""
+        shown = content.get("answers")
+        if self._quiz.result is None and isinstance(shown, dict):
+            for item in self._quiz.items:
+                if (answer := shown.get(str(item.number), "")) != "":
+                    self._answer(content, item.number, answer)
 
     def _update(self) -> None:
         quiz = self._quiz

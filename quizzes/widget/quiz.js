@@ -74,7 +74,8 @@ class QuizView {
   send(content) {
     const id = `${this.id}-${(this.messages += 1)}`;
     this.pending.add(id);
-    this.model.send({ ...content, attempt: this.paper.attempt, id });
+    const place = { view: this.id, order: this.messages }; // they may arrive out of order
+    this.model.send({ ...content, ...place, attempt: this.paper.attempt, id });
     clearTimeout(this.timer);
     this.timer = setTimeout(() => this.setConnection("silent"), REPLY_WAIT);
     this.showSaved();
@@ -259,17 +260,17 @@ class QuizView {
         return;
       }
     }
-    this.ask("submit", "result");
+    this.ask({ type: "submit", answers: this.answers }, "result");
   }
 
   onRetry() {
-    if (this.waitingFor === undefined) this.ask("retry", "title");
+    if (this.waitingFor === undefined) this.ask({ type: "retry" }, "title");
   }
 
-  ask(type, focusOn) {
+  ask(content, focusOn) {
     this.announce("");
     this.focusOn = focusOn;
-    this.send({ type });
+    this.send(content);
     this.waitingFor = `${this.id}-${this.messages}`;
     for (const button of [this.submit, this.retry]) button.disabled = true;
   }

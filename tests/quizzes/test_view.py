@@ -213,3 +213,35 @@ def test_a_message_of_an_attempt_that_is_over_is_dropped(make_quiz: MakeQuiz) ->
     assert quiz.attempt == 2
     widget._on_message(widget, {"type": "submit", "attempt": 1}, [])
     assert len(quiz.attempts) == 1
+
+
+def sent(quiz: Quiz, order: int, **content: Any) -> dict[str, Any]:
+    return {"attempt": quiz.attempt, "view": "page", "order": order, **content}
+
+
+def test_an_answer_that_was_overtaken_does_not_replace_the_newer_one(make_quiz: MakeQuiz) -> None:
+    quiz = make_quiz()
+    widget = QuizWidget(quiz)
+    (number, newer, older) = 1, *quiz.item(1).letters[:2]
+    widget._on_message(widget, sent(quiz, 3, type="answer", number=number, answer=newer), [])
+    widget._on_message(widget, sent(quiz, 2, type="answer", number=number, answer=older), [])
+    assert widget.answers["1"] == newer
+    other = sent(quiz, 1, type="answer", number=number, answer=older)
+    widget._on_message(widget, {**other, "view": "another window"}, [])
+    assert widget.answers["1"] == older
+
+
+def test_what_the_page_shows_is_submitted_even_if_an_answer_is_on_its_way(
+    make_quiz: MakeQuiz,
+) -> None:
+    quiz = make_quiz()
+    widget = QuizWidget(quiz)
+    keys = {item.number: model.key(item) for item in quiz.items}
+    for order, (number, key) in enumerate(list(keys.items())[:-1], start=1):
+        widget._on_message(widget, sent(quiz, order, type="answer", number=number, answer=key), [])
+    shown = {str(number): key for number, key in keys.items()}
+    widget._on_message(widget, sent(quiz, 6, type="submit", answers=shown), [])
+    late = sent(quiz, 5, type="answer", number=len(keys), answer=keys[len(keys)])
+    widget._on_message(widget, {**late, "attempt": 1}, [])
+    (attempt,) = quiz.attempts
+    assert (attempt.right, widget.notice) == (len(keys), "")
