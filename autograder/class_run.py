@@ -6,6 +6,7 @@ once the last of their outcomes is there.
 
 from __future__ import annotations
 
+import tempfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -17,14 +18,11 @@ from autograder.interruption import Interruption
 from autograder.ledger import Entry, Ledger, Standing
 from autograder.progress import Progress
 from autograder.runner import Outcome
-from autograder.sandbox import BoxError, SandboxError
-from autograder.store import OutcomeStore
-from autograder.warm import ZygoteError
+from autograder.sandbox import SandboxError
+from autograder.shortage import is_full, passes
+from autograder.store import OutcomeStore, StoreError
 from autograder.workers import Done, Workers
 from course.errors import CourseError
-
-PASSING = (BoxError, ZygoteError)
-"""What may be over a moment later: a machine that has no process or no memory to spare just now."""
 
 MOST_STARTS = 3
 """Times that a notebook is started in vain before the run ends with the reason."""
@@ -181,7 +179,7 @@ class ClassRun:
 
     def _finish(self, done: Done) -> None:
         again = False
-        if isinstance(done.error, PASSING):
+        if passes(done.error):
             self._refusals[done.key] += 1
             again = self._refusals[done.key] < MOST_STARTS
         elif done.result is not None and done.result.outcome.spoilt:
@@ -191,11 +189,17 @@ class ClassRun:
             self._start(done.key, self._running[done.key][0])
             return
         pieces = self._running.pop(done.key)
-        if isinstance(done.error, PASSING):
+        if passes(done.error):
             raise SandboxError(
-                f"No sandbox could be made for {pieces[0].work.student}'s submission in "
-                f"{MOST_STARTS} tries ({done.error}): see what is wrong with `course doctor`; the "
-                "same command then goes on where this one ended."
+                f"{pieces[0].work.student}'s submission could not be started in {MOST_STARTS} "
+                f"tries ({done.error}): see what is wrong with `course doctor`, or run fewer at a "
+                "time with --jobs; the same command then goes on where this one ended."
+            ) from done.error
+        if is_full(done.error):
+            raise StoreError(
+                f"There is no room for the files of a running submission ({done.error}): make room "
+                f"in {tempfile.gettempdir()} and run the same command again; what was graded so "
+                "far is kept."
             ) from done.error
         if isinstance(done.error, CourseError):
             raise done.error  # no room, no sandbox: the next one would fare no better

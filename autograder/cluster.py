@@ -7,6 +7,7 @@ pickle between its processes, which no submission can reach.
 
 from __future__ import annotations
 
+import itertools
 import json
 import logging
 import socket
@@ -18,7 +19,8 @@ from urllib.parse import urlsplit
 
 from autograder import jobs
 from autograder.jobs import Job, Result
-from autograder.sandbox import Abilities
+from autograder.sandbox import Abilities, BoxError
+from autograder.warm import ZygoteError
 from autograder.workers import Done, Keep, Queue
 from course.errors import CourseError
 
@@ -53,11 +55,16 @@ def perform(text: str, hidden: list[str]) -> str:
 
     Returns:
         ``{"result": ...}`` or ``{"problem": a phrase, "where": host name}``, as JSON.
+
+    Raises:
+        BoxError, ZygoteError: there is none just now; a moment later there may be.
     """
     from distributed import Status, get_worker
 
     try:
         result = jobs.run(Job.from_json(text), [Path(folder) for folder in hidden])
+    except (BoxError, ZygoteError):
+        raise
     except CourseError as error:
         return json.dumps({"problem": str(error), "where": socket.gethostname()})
     if get_worker().status not in (Status.running, Status.paused):
@@ -99,6 +106,7 @@ class Cluster:
         self._futures: dict[str, Any] = {}
         self._jobs: dict[str, Job] = {}
         self._lonely = False
+        self._numbers = itertools.count()
         self._client = _connect(address)
         self.wake = self._queue.wake
         possible = [Abilities(loss=True).mode(trust=trust), Abilities().mode(trust=trust)]
@@ -122,7 +130,8 @@ class Cluster:
                 self._hidden,
                 pure=False,
                 retries=RETRIES,
-                key=f"{'-'.join(job.exams)}-{key}",
+                # Dask takes a job of a name that it has met for that one, done as it may be.
+                key=f"{'-'.join(job.exams)}-{key}-{next(self._numbers)}",
             )
         except Exception as error:
             raise self._lost() from error

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import select
 import signal
 import socket
 import subprocess
@@ -15,6 +14,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from autograder.descriptors import readable
 from autograder.verdict import Verdict, VerdictError
 from course.errors import CourseError
 
@@ -27,6 +27,9 @@ EXAM_TIMEOUT = 180.0
 
 The longest is that of a camera driver which needs a second to start and another one to end.
 """
+
+LAST_WORDS = 65536
+"""Bytes that are kept of what an examiner says on standard error."""
 
 Spawn = Callable[..., "Process"]
 
@@ -79,6 +82,7 @@ class ExaminerProcess:
         finally:
             control.close()
         self._buffer = b""
+        self._said, self._mute = b"", False
         self.hangs = ""
 
     def request(
@@ -126,8 +130,9 @@ class ExaminerProcess:
         deadline = time.monotonic() + timeout
         stream = self._process.stdout.fileno()
         while b"\n" not in self._buffer:
-            ready, _, _ = select.select([stream], [], [], max(0.0, deadline - time.monotonic()))
-            if not ready:
+            if stream not in self._wait(deadline - time.monotonic()):
+                if time.monotonic() < deadline:
+                    continue
                 raise ExaminerError(f"The examiner gave no verdict within {timeout:.0f} s.")
             chunk = os.read(stream, 65536)
             if not chunk or len(self._buffer) > MAX_ANSWER:
@@ -141,10 +146,26 @@ class ExaminerProcess:
         except (ValueError, KeyError, TypeError, VerdictError) as error:
             raise ExaminerError(f"What the examiner wrote is no verdict: {error}") from None
 
+    def _wait(self, timeout: float) -> list[int]:
+        """Return which of its streams can be read, and take what is said on standard error.
+
+        A student's nodes can have its libraries warn for ever; it must not wait for a reader.
+        """
+        streams = [self._process.stdout, self._process.stderr][: 1 if self._mute else 2]
+        ready = readable([stream for stream in streams if stream is not None], timeout)
+        assert self._process.stderr is not None
+        if (errors := self._process.stderr.fileno()) in ready:
+            said = os.read(errors, 65536)
+            self._mute = not said
+            self._said = (self._said + said)[-LAST_WORDS:]
+        return ready
+
     def _last_words(self) -> str:
         self._kill()
         assert self._process.stderr is not None
-        lines = self._process.stderr.read(65536).decode(errors="replace").strip().splitlines()
+        while self._process.stderr.fileno() in self._wait(0.0):
+            pass
+        lines = self._said.decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else f"exit code {self._process.returncode}"
 
     def _kill(self) -> None:

@@ -14,10 +14,11 @@ from autograder.sandbox import network, warmth
 from autograder.sandbox.host import fate_of
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.network import BoxError
+from autograder.sandbox.place import END_TIMEOUT
 from autograder.sandbox.watch import Watch
 from autograder.warm import ForkedProcess
 
-END_TIMEOUT = 10.0
+KILL_TIMEOUT = 10.0
 """Seconds until a killed subject must have ended: the kernel takes a moment for its memory."""
 
 
@@ -41,10 +42,10 @@ class BoxedSubject:
         children = Path(f"/proc/{self._init}/task/{self._init}/children").read_text().split()
         self.pid = int(children[0]) if children else 0
 
-    def fate(self) -> str:
-        """Return how the process ended, in words."""
+    def fate(self, timeout: float = END_TIMEOUT) -> str:
+        """Return in words how the process ended, or that it has not within ``timeout`` seconds."""
         try:
-            code = self._process.wait(timeout=5)
+            code = self._process.wait(timeout)
         except subprocess.TimeoutExpired:
             return "it closed its connection to the grader"
         if self._watch.reason:
@@ -102,12 +103,12 @@ class WarmSubject(BoxedSubject):
     def ready(self) -> None:
         """Need nothing: the process is the one that was forked."""
 
-    def fate(self) -> str:
-        """Return how the process ended, in words."""
+    def fate(self, timeout: float = END_TIMEOUT) -> str:
+        """Return in words how the process ended, or that it has not within ``timeout`` seconds."""
         if self._forked is None:
-            return super().fate()
+            return super().fate(timeout)
         try:
-            code = self._forked.wait(timeout=5)
+            code = self._forked.wait(timeout)
         except subprocess.TimeoutExpired:
             return "it closed its connection to the grader"
         return self._watch.reason or fate_of(code)
@@ -129,7 +130,7 @@ class WarmSubject(BoxedSubject):
         if self._forked is not None:
             # First: process 1 cannot go before everybody has, and been taken note of.
             with suppress(subprocess.TimeoutExpired):
-                self._forked.wait(END_TIMEOUT)
+                self._forked.wait(KILL_TIMEOUT)
             if self._forked.stderr is not None:
                 self._forked.stderr.close()
         super().__exit__(*details)

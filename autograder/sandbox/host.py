@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from autograder.files import scratch_folder
-from autograder.sandbox.place import Process
+from autograder.sandbox.place import END_TIMEOUT, Process
 from course.domains import lease_domain
 
 
@@ -73,10 +73,10 @@ class HostSubject:
         """Return why it did not start, in words."""
         return self.fate()
 
-    def fate(self) -> str:
-        """Return how the process ended, in words."""
+    def fate(self, timeout: float = END_TIMEOUT) -> str:
+        """Return in words how the process ended, or that it has not within ``timeout`` seconds."""
         with suppress(subprocess.TimeoutExpired):
-            return fate_of(self._process.wait(timeout=5))
+            return fate_of(self._process.wait(timeout))
         return "it closed its connection to the grader"
 
     def __enter__(self) -> Self:

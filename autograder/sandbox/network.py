@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import os
-import select
 import subprocess
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
+from autograder.descriptors import readable
 from course.errors import CourseError
 
 Namespaces = dict[str, int]
@@ -134,7 +134,7 @@ def require_word(stream: IO[Any], process: subprocess.Popen[bytes]) -> None:
     Raises:
         BoxError: it does neither; it is killed.
     """
-    if not select.select([stream], [], [], TOOL_TIMEOUT)[0]:
+    if not readable([stream], TOOL_TIMEOUT):
         process.kill()
         raise BoxError(f"it was not there after {TOOL_TIMEOUT:.0f} s")
 

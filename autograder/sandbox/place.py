@@ -8,6 +8,9 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import IO, Any, Protocol, Self
 
+END_TIMEOUT = 5.0
+"""Seconds in which a subject that says no more must have ended."""
+
 
 class Process(Protocol):
     """A process with pipes to its standard streams: what of `subprocess.Popen` is made use of."""
@@ -52,8 +55,8 @@ class RunningSubject(Protocol):
     def failed(self) -> str:
         """Return why it did not start, in words."""
 
-    def fate(self) -> str:
-        """Return how the process ended, in words."""
+    def fate(self, timeout: float = END_TIMEOUT) -> str:
+        """Return in words how the process ended, or that it has not within ``timeout`` seconds."""
 
     def __enter__(self) -> Self:
         """Return itself."""

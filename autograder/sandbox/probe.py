@@ -17,7 +17,7 @@ from pathlib import Path
 from autograder.sandbox import warmth
 from autograder.sandbox.box import Box
 from autograder.sandbox.host import Host
-from autograder.sandbox.network import BoxError
+from autograder.sandbox.network import TOOL_TIMEOUT, BoxError
 from autograder.sandbox.place import Place, subject_command
 from autograder.warm import ZygoteError
 from course.errors import CourseError
@@ -127,7 +127,7 @@ def _try() -> bool:
             _in_the_network(box, f"{nft} && echo yes; read -r _") as said,
             box.start([sys.executable, "-c", "import rclpy"], {}, ()) as subject,
         ):
-            if subject.fate() != "exit code 0":
+            if subject.fate(TOOL_TIMEOUT) != "exit code 0":
                 raise BoxError(subject.failed())
     return said == [b"yes"]
 
@@ -143,7 +143,7 @@ def _try_warm() -> bool:
             command = subject_command(engine, control, box.domain_id)
             subject = stack.enter_context(box.start_subject(command, {}, fds))
             ours.close()
-            return subject.fate() == "exit code 1"
+            return subject.fate(TOOL_TIMEOUT) == "exit code 1"
     except (BoxError, ZygoteError):
         return False
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import select
 import signal
 import socket
 import subprocess
@@ -12,6 +11,7 @@ import threading
 from contextlib import suppress
 from typing import IO, Any
 
+from autograder.descriptors import readable
 from course.errors import CourseError
 
 FORK_TIMEOUT = 60.0
@@ -64,7 +64,7 @@ class ForkedProcess:
             subprocess.TimeoutExpired: it has not ended within ``timeout`` seconds.
         """
         if self.returncode is None:
-            if not select.select([self._report], [], [], timeout)[0]:
+            if not readable([self._report], timeout):
                 raise subprocess.TimeoutExpired(self._what, timeout or 0.0)
             text = self._report.recv(4096)
             # Without its keeper, which only the machine itself can have ended, nobody knows.

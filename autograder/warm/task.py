@@ -15,9 +15,6 @@ from pathlib import Path
 
 from autograder.warm import linux
 
-_HIGH = 512
-"""Descriptors are moved above this number while those below are put in order."""
-
 
 @dataclass(frozen=True)
 class Task:
@@ -123,12 +120,11 @@ def _differing(pidfd: int) -> int:
 
 def _put_in_order(wanted: Mapping[int, int]) -> None:
     """Give each descriptor its number, as in {number: descriptor}, and close all others."""
+    above = max(wanted) + 1  # where none is overwritten while they are moved
     high = {
-        number: fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, _HIGH)
+        number: fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, above)
         for number, descriptor in wanted.items()
     }
-    if max(wanted) >= _HIGH:
-        raise ValueError(f"descriptor {max(wanted)} is over {_HIGH - 1}")
     for number, descriptor in high.items():
         os.dup2(descriptor, number)
     close_others(wanted)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import sqlite3
 import subprocess
@@ -23,7 +24,7 @@ from autograder.engine import AssignmentError, Graded
 from autograder.gradebook import CourseGradebook, Grade
 from autograder.progress import Progress
 from tests.killing import fresh_copy
-from tests.machine import needs_sandbox
+from tests.machine import needs_own_mounts, needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed
 
@@ -204,6 +205,45 @@ def test_a_disk_that_fills_up_in_the_middle_is_one_sentence(
     assert len(said.strip().splitlines()) == 1
     assert ((result / "code-later").read_text(), (result / "said-later").read_text()) == ("0\n", "")
     assert grades(Course(result)) == class_.grades
+
+
+SHORT = """
+set -e
+{shortage}
+set +e
+autograder grade {assignment} --root "$1" 2>"$1/said"
+echo $? > "$1/code"
+"""
+
+
+@needs_own_mounts
+@pytest.mark.parametrize(
+    ("shortage", "sentence"),
+    [
+        ('mount -t tmpfs -o nr_inodes=2 none "$TMPDIR"', "make room"),
+        ('mount -t tmpfs -o nr_inodes=3 none "$TMPDIR"', "make room"),
+        ("ulimit -n 48", "could not be started|cannot be sandboxed"),
+    ],
+)
+def test_what_the_machine_is_short_of_costs_no_student_a_grade(
+    course: Course, class_: Undisturbed, tmp_path: Path, shortage: str, sentence: str
+) -> None:
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    shutil.rmtree(course.root / OUTCOMES)
+    script = SHORT.format(assignment=ASSIGNMENT, shortage=shortage)
+    done = subprocess.run(
+        ["unshare", "-rm", "bash", "-c", script, "bash", course.root],
+        env={**os.environ, "TMPDIR": str(scratch)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    said = (course.root / "said").read_text()
+    assert (course.root / "code").read_text() == "1\n", said
+    assert re.search(sentence, said), said
+    assert len(said.strip().splitlines()) == 1, said
+    shutil.copytree(class_.graded / OUTCOMES, course.root / OUTCOMES, dirs_exist_ok=True)
+    grade(course)
+    assert grades(course) == class_.grades
 
 
 def test_every_full_disk_is_recognised() -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from autograder import runner
+from autograder import descriptors, runner
 from autograder.submission import Cell
 from autograder.warm import ForkedProcess, Nursery, Zygote, ZygoteError
 from autograder.warm.task import Task
@@ -181,6 +181,18 @@ def test_two_subjects_are_two_processes_with_chances_of_their_own() -> None:
     assert not set(runs[0]) & set(runs[1])
 
 
+@needs_warm_starts
+def test_any_number_of_jobs_can_run_beside_one() -> None:
+    descriptors.allow_many()
+    others = [os.open(os.devnull, os.O_RDONLY) for _ in range(1200)]  # as of sixty jobs
+    try:
+        outcome = runner.run((Cell("print(6 * 7)"),))
+    finally:
+        for other in others:
+            os.close(other)
+    assert (outcome.outputs[0][0]["text"], outcome.notes) == ("42\n", [])
+
+
 def subjects_of(pid: int) -> list[int]:
     """Return those descendants of a process that run under a system call filter."""
     found = []
@@ -196,7 +208,7 @@ def subjects_of(pid: int) -> list[int]:
 @needs_warm_starts
 def test_a_subject_ends_with_an_engine_that_is_killed() -> None:
     program = """
-from autograder import runner
+from autograder import descriptors, runner
 from autograder.submission import Cell
 runner.run((Cell("while True: pass"),), cell_timeout=600)
 """
