@@ -41,6 +41,7 @@ class GradebookError(CourseError):
 class Grade:
     """One student's result: points earned and possible, and whether a person must still look.
 
+    ``score`` is less what the course's rules take off for lateness, as in nbgrader's own export.
     ``cells`` is {notebook: {grade id: points, or None while a manual grade is missing}}.
     """
 
@@ -180,7 +181,7 @@ def _grade(submission: Any) -> Grade:
         }
     return Grade(
         submission.student.id,
-        float(submission.score),
+        max(0.0, float(submission.score) - float(submission.late_submission_penalty)),
         float(submission.max_score),
         bool(submission.needs_manual_grade),
         cells,

@@ -23,6 +23,9 @@ FOLDER = "entered"
 MAX_FILE = MAX_NOTEBOOK + MAX_EXTRAS
 """Bytes of one file beyond which only its size and date are looked at: it is not read anyway."""
 
+NOT_COUNTED = {".ipynb_checkpoints", "__pycache__"}
+"""Folders that appear by themselves when somebody opens or runs what is beside them."""
+
 MAX_FILES = 2000
 """Files of one submission that are looked at one by one."""
 
@@ -118,6 +121,7 @@ def of_folder(folder: Path) -> str:
 def _walk(folder: Path) -> list[Path]:
     found: list[Path] = []
     for place, folders, files in os.walk(folder):
+        folders[:] = [name for name in folders if name not in NOT_COUNTED]
         links = [name for name in folders if (Path(place) / name).is_symlink()]
         found += [Path(place) / name for name in (*files, *links)]
         if len(found) > MAX_FILES:

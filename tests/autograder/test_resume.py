@@ -82,6 +82,9 @@ def again(course: Course, **options: bool) -> Seen:
 
 def test_what_has_not_changed_is_left_as_it_is(class_: Undisturbed, tmp_path: Path) -> None:
     course = course_of(class_, tmp_path)
+    opened = course.root / "source" / ASSIGNMENT / ".ipynb_checkpoints"
+    opened.mkdir()
+    (opened / f"{NOTEBOOK}-checkpoint.ipynb").write_text("{}")  # as JupyterLab makes one
     seen = again(course)
     assert (seen.run, seen.unchanged, seen.entered) == (0, 4, [])
     problems = {g.student: g.problem for g in engine.grade(course.root, ASSIGNMENT)}
@@ -123,6 +126,18 @@ def test_marks_that_a_person_gives_get_into_the_feedback(
     assert seen.run == 3
     found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
     assert found["right"].score == class_.grades["right"].score + 4
+
+
+def test_a_penalty_for_lateness_is_taken_off(class_: Undisturbed, tmp_path: Path) -> None:
+    course = course_of(class_, tmp_path)
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        for student, penalty in (("right", 1.5), ("wrong", 1000.0)):
+            late = book.find_submission_notebook(NOTEBOOK, ASSIGNMENT, student)
+            late.late_submission_penalty = penalty
+        book.db.commit()
+    found = {g.student: g.score for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    assert found["right"] == class_.grades["right"].score - 1.5
+    assert (found["wrong"], found["same"]) == (0.0, class_.grades["same"].score)
 
 
 def test_scores_that_somebody_else_entered_are_put_right(
