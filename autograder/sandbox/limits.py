@@ -24,6 +24,7 @@ class Limits:
         data: writable memory that one process may reserve; beyond it Python raises MemoryError.
         tasks: processes and threads at a time.
         processes: processes at a time; a bomb is ended before it has slowed others down.
+        busy: processes and threads that want a processor at a time, for more than a moment.
         cpu: processor time of all its processes together.
         file: largest file.
         open_files: open file descriptors of one process.
@@ -35,6 +36,7 @@ class Limits:
     data: int = 2048 * MIB
     tasks: int = 200
     processes: int = 48
+    busy: int = 8
     cpu: int = 300
     file: int = 64 * MIB
     open_files: int = 2048

@@ -1,6 +1,7 @@
 """The system calls that a submission does without: a filter for `bwrap --seccomp`.
 
-Refused is what no limit reaches (memory that belongs to no process), what opens large parts of the
+Refused is what no limit reaches (memory that belongs to no process, or may go on when it has been
+let go of: a map that is shared and has no file), what opens large parts of the
 kernel to a stranger (new user namespaces, io_uring, bpf, keyrings, tracing), and sockets that lead
 out of a network namespace (VM sockets). Written for x86-64, the one machine that ROS 2 wheels are
 made for. The format is that of seccomp(2): an array of ``struct sock_filter``.
@@ -13,7 +14,7 @@ import socket
 import struct
 
 _LOAD, _EQUAL, _GREATER_EQUAL, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
-_NUMBER, _ARCHITECTURE, _ARGUMENT_0 = 0, 4, 16  # offsets in struct seccomp_data
+_NUMBER, _ARCHITECTURE, _ARGUMENT_0, _ARGUMENT_3 = 0, 4, 16, 40  # offsets in struct seccomp_data
 _X86_64 = 0xC000003E
 _X32 = 0x40000000  # the first number of the x32 calls
 _ALLOW, _KILL, _ERRNO = 0x7FFF0000, 0x80000000, 0x00050000
@@ -28,7 +29,8 @@ REFUSED = {
     "userfaultfd": 323, "io_uring_setup": 425, "open_tree": 428, "move_mount": 429, "fsopen": 430,
     "fsconfig": 431, "fsmount": 432, "fspick": 433, "mount_setattr": 442, "memfd_secret": 447,
 }  # fmt: skip
-_CLONE, _CLONE3, _SOCKET = 56, 435, 41
+_MMAP, _CLONE, _CLONE3, _SOCKET = 9, 56, 435, 41
+_SHARED, _ANONYMOUS = 0x01, 0x20  # of a map's flags
 FAMILIES = (socket.AF_UNIX, socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK)
 """Kinds of sockets that remain; DDS looks network interfaces up over netlink."""
 
@@ -52,6 +54,8 @@ def program() -> bytes:
     for number in REFUSED.values():
         steps += [_step(_EQUAL, number, 0, 1), _refuse(errno.EPERM)]
     steps += [
+        _step(_EQUAL, _MMAP, 0, 5), _step(_LOAD, _ARGUMENT_3), _step(_ANY_BIT, _ANONYMOUS, 0, 2),
+        _step(_ANY_BIT, _SHARED, 0, 1), _refuse(errno.EPERM), _step(_RETURN, _ALLOW),
         _step(_EQUAL, _CLONE, 0, 4), _step(_LOAD, _ARGUMENT_0),
         _step(_ANY_BIT, _NEW_USER_NAMESPACE, 0, 1), _refuse(errno.EPERM), _step(_RETURN, _ALLOW),
         _step(_EQUAL, _SOCKET, 0, 2 + len(FAMILIES)), _step(_LOAD, _ARGUMENT_0),
