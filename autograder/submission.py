@@ -21,6 +21,7 @@ import nbformat.validator
 from nbformat import NotebookNode
 
 from autograder import keys, points
+from autograder.files import walk
 from course.errors import CourseError
 
 MAX_NOTEBOOK = 20 * 1024 * 1024
@@ -113,15 +114,15 @@ def _text(path: Path) -> str:
 def extras(folder: Path) -> dict[str, bytes]:
     """Return {relative path: content} of a submission's other files, a helper module perhaps.
 
-    Links, hidden files, notebooks and what is over `MAX_EXTRAS` bytes in all are left out.
+    Links, hidden files, notebooks, what is over `MAX_EXTRAS` bytes in all, and what `walk` does
+    not find are left out.
     """
     found: dict[str, bytes] = {}
     room = MAX_EXTRAS
-    for path in sorted(folder.rglob("*")):
+    for path in sorted(walk(folder)):
         name = path.relative_to(folder)
         hidden = any(part.startswith((".", "__")) for part in name.parts)
-        linked = any(parent.is_symlink() for parent in (path, *path.parents) if parent != folder)
-        if hidden or linked or path.suffix == ".ipynb" or name == Path("timestamp.txt"):
+        if hidden or path.suffix == ".ipynb" or name == Path("timestamp.txt"):
             continue
         status = path.lstat()
         if stat.S_ISREG(status.st_mode) and status.st_size <= room:
