@@ -179,12 +179,37 @@ def _outputs(message: dict[str, Any], number: int) -> list[dict[str, Any]]:
     outputs = message.get("outputs")
     if message.get("ran") != number or not isinstance(outputs, list):
         raise ChannelBroken("it is no answer to what was asked")
+    if not all(_is_output(output) for output in outputs):
+        raise ChannelBroken("what it says of a cell's outputs is none")
     return outputs
+
+
+def _is_output(output: Any) -> bool:
+    """Whether something is an output as `autograder.shell` makes them, which nbgrader can take."""
+    match output:
+        case {"output_type": "stream", "name": "stdout" | "stderr", "text": str(), **more}:
+            return not more
+        case {
+            "output_type": "display_data",
+            "data": dict() as data,
+            "metadata": dict() as about,
+            **more,
+        }:
+            return not more and not about and all(isinstance(shown, str) for shown in data.values())
+        case {
+            "output_type": "error",
+            "ename": str(),
+            "evalue": str(),
+            "traceback": list() as lines,
+            **more,
+        }:
+            return not more and all(isinstance(line, str) for line in lines)
+    return False
 
 
 def _note_error(outcome: Outcome, number: int) -> None:
     for output in outcome.outputs[number]:
-        if isinstance(output, dict) and output.get("output_type") == "error":
+        if output["output_type"] == "error":
             what = f"{output.get('ename')}: {output.get('evalue')}"
             outcome.notes.append(f"Code cell {number + 1} of the notebook raised {what[:300]}")
 

@@ -112,6 +112,40 @@ def test_nothing_that_a_student_prints_is_a_verdict() -> None:
     assert outcome.verdicts["qos-visible"].score == 0
 
 
+FORGED = """
+import json, os, sys
+outputs = {outputs}
+line = json.dumps({{"ran": 0, "outputs": outputs}}).encode() + b"\\n"
+for descriptor in range(3, 64):
+    try:
+        os.write(descriptor, line)
+    except OSError:
+        pass
+"""
+
+
+@pytest.mark.parametrize(
+    "outputs",
+    [
+        [5], [{}], [{"output_type": "stream", "name": "stdout", "text": ["x"]}],
+        [{"output_type": "display_data", "data": {"text/plain": 5}, "metadata": {}}],
+        [{"output_type": "display_data", "data": {}, "metadata": {}, "more": 1}],
+        [{"output_type": "execute_result", "data": {"text/plain": "10.0"}, "metadata": {}}],
+        [{"output_type": "error", "ename": "E", "evalue": "", "traceback": [5]}],
+    ],
+)  # fmt: skip
+def test_outputs_that_are_none_are_not_taken(outputs: list[Any]) -> None:
+    outcome = runner.run(program(FORGED.format(outputs=outputs)))
+    ((status, reason),) = verdict_reasons(outcome)
+    assert (status, "the grader's own channel" in reason) == ("not_checked", True)
+    assert outcome.outputs == [[], []]
+
+
+def test_what_is_forged_as_an_output_can_be_written() -> None:
+    source = FORGED.format(outputs=[{"output_type": "stream", "name": "stdout", "text": "\ud800"}])
+    assert text_of(runner.run(program(source)).outputs[0]) == "?"
+
+
 def test_exit_in_a_cell_does_not_end_the_notebook() -> None:
     outcome = runner.run((Cell("import sys; sys.exit(0)"), Cell("'still here'")))
     assert outcome.outputs[1][0]["data"]["text/plain"] == "'still here'"
