@@ -126,14 +126,23 @@ class CourseGradebook:
             if result["success"]:
                 return
             said = f"{result.get('log', '')}\n{result.get('error') or ''}"
+            raised = self._engines.raised
             # Each try waits for the lock by itself, so this loop does not spin.
-            if not database.is_locked(said) or time.monotonic() > deadline:
+            if not database.is_locked(raised) or time.monotonic() > deadline:
                 break
-        if unusable := database.unusable(said, self.root):
+        if unusable := (
+            database.full(said, self.root, self._written()) or database.unusable(raised, self.root)
+        ):
             raise unusable
         raise GradebookError(
             f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: {_why(said)}"
         )
+
+    def _written(self) -> list[Path]:
+        """Return the folders that nbgrader writes to, as far as they are there."""
+        names = (self.coursedir.autograded_directory, self.coursedir.feedback_directory)
+        folders = [self.root, *(self.root / name for name in names)]
+        return [folder for folder in folders if folder.is_dir()]
 
     @contextmanager
     def _open(self) -> Iterator[Gradebook]:
@@ -161,7 +170,7 @@ def _why(said: str) -> str:
     """Return the line of nbgrader's log that names the cause: of a traceback, the last line."""
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     causes = [line for line in lines if re.match(r"[\w.]+(Error|Exception|Entry)\b", line)]
-    return (causes or lines or ["no reason given"])[-1]
+    return (causes or lines or ["no reason given"])[-1][:300]
 
 
 def _digest(rows: list[list[Any]]) -> str:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
+import resource
 import shutil
 import sqlite3
 import subprocess
+import time
 from contextlib import closing
 from pathlib import Path
 
+import nbformat
 import pytest
 from nbgrader.api import Gradebook
 
+from autograder import database as words
 from autograder import engine, gradebook, grades_csv, submission
 from autograder.database import (
     DiskFullError,
@@ -20,7 +24,7 @@ from autograder.database import (
     OldGradebookError,
 )
 from autograder.engine import AssignmentError, Graded
-from autograder.gradebook import CourseGradebook, Grade
+from autograder.gradebook import CourseGradebook, Grade, GradebookError
 from autograder.progress import Progress
 from tests.killing import fresh_copy
 from tests.machine import needs_sandbox
@@ -207,8 +211,6 @@ def test_a_disk_that_fills_up_in_the_middle_is_one_sentence(
 
 
 def test_every_full_disk_is_recognised() -> None:
-    from autograder import database as words
-
     for said in (
         "database or disk is full",
         "[Errno 28] No space left on device",
@@ -216,6 +218,38 @@ def test_every_full_disk_is_recognised() -> None:
     ):
         assert isinstance(words.unusable(said, Path("/c")), DiskFullError)
     assert words.unusable("InvalidEntry: no such thing", Path("/c")) is None
+
+
+def test_a_disk_is_full_only_if_there_is_no_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = "ValidationError: No space left on device"
+    assert words.full(said, Path("/c"), [tmp_path, tmp_path]) is None
+    assert list(tmp_path.iterdir()) == []
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (words.ROOM - 1, limits[1]))
+    try:
+        assert isinstance(words.full(said, Path("/c"), [tmp_path]), DiskFullError)
+        assert words.full("ValidationError: no", Path("/c"), [tmp_path]) is None
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+@pytest.mark.parametrize("said", ["No space left on device", "database is locked"])
+def test_what_a_student_writes_into_nbgraders_log_is_about_that_student_only(
+    course: Course, monkeypatch: pytest.MonkeyPatch, said: str
+) -> None:
+    book = CourseGradebook(course.root, staged="staged")
+    folder = course.root / "staged" / "forger" / ASSIGNMENT
+    folder.mkdir(parents=True)
+    forged = {"schema_version": 3, "grade": False, "locked": False, "solution": False}
+    released = course.released
+    released.cells[0].metadata["nbgrader"] = {**forged, "cell_type": said}
+    nbformat.write(released, folder / f"{NOTEBOOK}.ipynb")
+    started = time.monotonic()
+    with pytest.raises(GradebookError, match="failed for ch05 and forger"):
+        book.autograde(ASSIGNMENT, "forger")
+    assert time.monotonic() - started < gradebook.LOCK_PATIENCE
 
 
 def test_nobody_at_all_is_one_sentence(course: Course) -> None:
