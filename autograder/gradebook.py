@@ -109,6 +109,11 @@ class CourseGradebook:
             rows = database.standing_rows(gradebook.db, assignment, student)
         return {name: Standing(*map(_digest, both)) for name, both in rows.items()}
 
+    @property
+    def excluded(self) -> frozenset[str]:
+        """The students whom nbgrader passes over, as the course's configuration says."""
+        return frozenset(self.coursedir.student_id_exclude.split(",")) - {""}
+
     def roster(self) -> Roster:
         """Return which students the gradebook knows, and whether there may be others."""
         with self._open() as gradebook:

@@ -16,7 +16,7 @@ import pytest
 from nbgrader.api import Gradebook
 
 from autograder import database as words
-from autograder import engine, gradebook, grades_csv, submission
+from autograder import engine, gradebook, grades_csv, ledger, roster, submission
 from autograder.database import (
     DiskFullError,
     GradebookLockedError,
@@ -250,6 +250,86 @@ def test_what_a_student_writes_into_nbgraders_log_is_about_that_student_only(
     with pytest.raises(GradebookError, match="failed for ch05 and forger"):
         book.autograde(ASSIGNMENT, "forger")
     assert time.monotonic() - started < gradebook.LOCK_PATIENCE
+
+
+def test_whatever_goes_wrong_with_one_submission_stops_nobody(
+    course: Course, class_: Undisturbed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for student in ("looked-at", "staged", "entered"):
+        shutil.copytree(course.root / "submitted" / "right", course.root / "submitted" / student)
+    of_folder, remarks, autograde = ledger.of_folder, roster.remarks, CourseGradebook.autograde
+    refused: list[str] = []
+
+    def fails_to_look(folder: Path) -> str:
+        if "looked-at" in folder.parts:
+            raise RecursionError("too deep")
+        return of_folder(folder)
+
+    def fails_to_stage(folder: Path) -> list[str]:
+        if "staged" in folder.parts:
+            raise UnicodeError("no text")
+        return remarks(folder)
+
+    def fails_to_enter(self: CourseGradebook, assignment: str, student: str) -> None:
+        if student == "entered" and not refused:
+            refused.append(student)
+            raise GradebookError("nbgrader cannot.")
+        autograde(self, assignment, student)
+
+    monkeypatch.setattr(ledger, "of_folder", fails_to_look)
+    monkeypatch.setattr(roster, "remarks", fails_to_stage)
+    monkeypatch.setattr(CourseGradebook, "autograde", fails_to_enter)
+    graded = grade(course)
+    found = grades(course)
+
+    reasons = {
+        "looked-at": "(RecursionError: too deep): a person has to look at it",
+        "staged": "(UnicodeError: no text): a person has to look at it",
+        "entered": "nbgrader cannot.",
+    }
+    for student, reason in reasons.items():
+        assert graded[student].entered
+        assert reason in graded[student].problem
+        assert graded[student].points == found[student].score == 0
+        assert found[student].needs_manual_grade
+        copy = course.root / "autograded" / student / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
+        assert reason in copy.read_text(), "a person sees it there, and the student in the feedback"
+    assert {student: found[student] for student in class_.grades} == class_.grades
+
+    monkeypatch.undo()
+    later = grade(course)
+    assert {later[student].points for student in reasons} == {graded["right"].points}
+
+
+def test_grades_stand_although_feedback_on_them_cannot_be_written(
+    course: Course, class_: Undisturbed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    generate = CourseGradebook.generate_feedback
+
+    def fails(self: CourseGradebook, assignment: str, student: str) -> None:
+        if student == "right":
+            raise GradebookError("nbconvert cannot.")
+        generate(self, assignment, student)
+
+    monkeypatch.setattr(CourseGradebook, "generate_feedback", fails)
+    graded = {one.student: one for one in engine.grade(course.root, ASSIGNMENT)}
+    assert graded["right"].problem == "It is graded, but there is no feedback: nbconvert cannot."
+    assert grades(course) == class_.grades
+    monkeypatch.undo()
+    graded = {one.student: one for one in engine.grade(course.root, ASSIGNMENT)}
+    assert graded["right"].problem == ""
+    assert (course.root / "feedback" / "right" / ASSIGNMENT / f"{NOTEBOOK}.html").is_file()
+
+
+def test_who_is_left_out_by_the_configuration_is_left_out(
+    course: Course, class_: Undisturbed
+) -> None:
+    with (course.root / "nbgrader_config.py").open("a") as config:
+        config.write("\nc.CourseDirectory.student_id_exclude = 'same,nobody'\n")
+    graded = grade(course)
+    assert "student_id_exclude" in graded["same"].problem
+    rest = {student: one for student, one in class_.grades.items() if student != "same"}
+    assert grades(course) == rest
 
 
 def test_nobody_at_all_is_one_sentence(course: Course) -> None:
