@@ -175,7 +175,9 @@ def _why(said: str) -> str:
     """Return the line of nbgrader's log that names the cause: of a traceback, the last line."""
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     causes = [line for line in lines if re.match(r"[\w.]+(Error|Exception|Entry)\b", line)]
-    return (causes or lines or ["no reason given"])[-1][:300]
+    # Of what nbgrader itself raises in the end, none says why.
+    told = [line for line in causes if "NbGraderException" not in line]
+    return (told or causes or lines or ["no reason given"])[-1][:300]
 
 
 def _digest(rows: list[list[Any]]) -> str:
