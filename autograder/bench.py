@@ -2,20 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
-from autograder.wire import Channel, ChannelClosed, ChannelTimeout
+from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 from course import Session
 
 REPLY_TIMEOUT = 10.0
 """Seconds a subject may take over one request (making a node, say) before it counts as hung."""
+
+MAX_REPLY = 512 * 1024
+"""Bytes of a reply that are received; a harness cuts values and errors well below it."""
+
+MOST_TOLD = 200
+"""Nodes, errors and waits that a reply may list."""
+
+MAX_ERROR, MAX_TRACE, MAX_NAME = 2000, 4000, 500
+"""Characters of an error, of where it came from, and of a node's or a label's name."""
 
 PATIENCE = 3.0
 """Seconds of wall time that a callback of a subject's may hold up a step of simulated time."""
 
 Endpoints = Mapping[str, Sequence[str]]
 """Names of topics and services by kind: "publishers", "subscribers", "services", "clients"."""
+
+
+T = TypeVar("T")
 
 
 class SubjectGone(Exception):  # noqa: N818 - it is a finding, not a fault of ours
@@ -45,6 +57,9 @@ class StudentError(Exception):
 
 class Subject:
     """The examiner's end of the control channel. It asks; it does not believe.
+
+    What is no answer to what was asked comes from the student's code, not from the harness: it ends
+    the examination like a process that ended.
 
     ``name`` is always a name of the notebook's: of a class, or of anything that makes a node.
     ``hangs`` says in a sentence that the subject did not answer in time, once it did not.
@@ -83,7 +98,8 @@ class Subject:
             StudentError: the class is missing or its constructor raised.
             SubjectGone: the process ended or hangs.
         """
-        return str(self._ask("start", name, args=args, bare=bare)["node"])
+        reply = self._ask("start", name, args=args, bare=bare)
+        return self._read(lambda: _text(reply["node"], MAX_NAME))
 
     def start_all(self, name: str) -> dict[str, str]:
         """Make every node that an object of the notebook declares; return {label: node name}.
@@ -94,17 +110,15 @@ class Subject:
         Raises:
             StudentError: the object is missing or declares nothing, or a node could not be made.
         """
-        labels = self._ask("declare", name, doing=f"bring up the nodes of `{name}`")["labels"]
+        reply = self._ask("declare", name, doing=f"bring up the nodes of `{name}`")
+        labels = self._read(lambda: _texts(reply["labels"], MAX_NAME))
         # One by one: if a constructor does not return, it is known whose.
-        return {
-            str(label): str(
-                self._ask(
-                    "start_declared", name, label=label,
-                    doing=f"bring up the nodes of `{name}`, and {str(label)[:60]} did not come up",
-                )["node"]
-            )
-            for label in labels
-        }  # fmt: skip
+        return {label: self._start_declared(name, label) for label in labels}
+
+    def _start_declared(self, name: str, label: str) -> str:
+        doing = f"bring up the nodes of `{name}`, and {label[:60]} did not come up"
+        reply = self._ask("start_declared", name, label=label, doing=doing)
+        return self._read(lambda: _text(reply["node"], MAX_NAME))
 
     def mark(self, name: str) -> None:
         """Make a node called ``name`` with one publisher and one subscription on topic ``name``.
@@ -178,7 +192,8 @@ class Subject:
         Raises:
             StudentError: there is no such variable, or it is made of something else.
         """
-        return self._ask("value", name)["value"]
+        reply = self._ask("value", name)
+        return self._read(lambda: reply["value"])
 
     def sees(self, name: str, endpoints: Endpoints) -> dict[str, dict[str, int]]:
         """Return how many endpoints of a kind and name the node made of a class has discovered.
@@ -192,23 +207,31 @@ class Subject:
                 "services", "clients".
         """
         wanted = {kind: list(names) for kind, names in endpoints.items()}
-        counts = self._ask("sees", name, endpoints=wanted)["counts"]
-        return {kind: {n: int(counts[kind][n]) for n in names} for kind, names in wanted.items()}
+        reply = self._ask("sees", name, endpoints=wanted)
+        return self._read(
+            lambda: {
+                kind: {n: int(reply["counts"][kind][n]) for n in names}
+                for kind, names in wanted.items()
+            }
+        )
 
     def wall_waits(self) -> list[str]:
         """Return in which methods of rclpy's callbacks wait by the wall clock now, and where.
 
         Each is like ``wait_for_service: Asker.ask of /asker (at line 7: ...)``.
         """
-        return [str(line) for line in self._ask("wall_waits", "its waits")["waits"]]
+        reply = self._ask("wall_waits", "its waits")
+        return self._read(lambda: _texts(reply["waits"], MAX_ERROR))
 
     def errors(self) -> list[str]:
         """Return what the student's callbacks raised: for an explanation, never as evidence."""
-        return [str(line) for line in self._ask("errors", "its errors").get("errors", [])]
+        reply = self._ask("errors", "its errors")
+        return self._read(lambda: _texts(reply["errors"], MAX_ERROR))
 
     def thread_errors(self) -> list[str]:
         """Return what ended threads of the student's: for an explanation, never as evidence."""
-        return [str(line) for line in self._ask("errors", "its errors").get("of_threads", [])]
+        reply = self._ask("errors", "its errors")
+        return self._read(lambda: _texts(reply["of_threads"], MAX_ERROR))
 
     def own_errors(self) -> dict[str, int]:
         """Return what left the student's callbacks and was raised by a line of theirs, how often.
@@ -216,8 +239,13 @@ class Subject:
         What rclpy raised, in a call of theirs or elsewhere, is not among it: that may be a race of
         its own.
         """
-        found = self._ask("own_errors", "its errors")["errors"]
-        return {str(error["told"]): int(error["count"]) for error in found}
+        reply = self._ask("own_errors", "its errors")
+        return self._read(
+            lambda: {
+                _text(error["told"], MAX_ERROR): int(error["count"])
+                for error in reply["errors"][:MOST_TOLD]
+            }
+        )
 
     def _ask(
         self,
@@ -234,6 +262,8 @@ class Subject:
         try:
             self._channel.send({"op": operation, "name": what, **more})
             reply = self._channel.receive(timeout)
+        except ChannelBroken as error:
+            raise self._broken(str(error)) from None
         except ChannelClosed:
             self._gone = f"Your program ended while it was asked to {doing}."
             raise SubjectGone(self._gone) from None
@@ -245,10 +275,27 @@ class Subject:
             self.hangs = self._gone
             raise SubjectGone(self._gone) from None
         if "missing" in reply:
-            raise StudentError(str(reply["missing"]), missing=True)
+            missing = self._read(lambda: _text(reply["missing"], MAX_ERROR))
+            raise StudentError(missing, missing=True)
         if not reply.get("ok"):
-            raise StudentError(str(reply.get("error", "unknown")), str(reply.get("trace", "")))
+            raised = self._read(lambda: _text(reply["error"], MAX_ERROR))
+            raise StudentError(raised, self._read(lambda: _text(reply.get("trace", ""), MAX_TRACE)))
         return reply
+
+    def _read(self, found: Callable[[], T]) -> T:
+        """Return what is found in a reply, if it is one of the harness's.
+
+        Raises:
+            SubjectGone: it is not.
+        """
+        try:
+            return found()
+        except (LookupError, TypeError, ValueError, ArithmeticError):
+            raise self._broken("it is no answer to what was asked") from None
+
+    def _broken(self, how: str) -> SubjectGone:
+        self._gone = f"Something in the notebook wrote to the grader's own channel: {how}."
+        return SubjectGone(self._gone)
 
     def release(self) -> None:
         """Let the harness go: it stops its nodes and returns to whoever started it."""
@@ -256,6 +303,18 @@ class Subject:
             self._channel.send({"op": "done"})
         except ChannelClosed:
             self._gone = self._gone or "Your program ended."
+
+
+def _text(found: Any, most: int) -> str:
+    if not isinstance(found, str):
+        raise TypeError("no text")
+    return found[:most]
+
+
+def _texts(found: Any, most: int) -> list[str]:
+    if not isinstance(found, list):
+        raise TypeError("no list")
+    return [_text(line, most) for line in found[:MOST_TOLD]]
 
 
 class Bench:

@@ -21,6 +21,7 @@ from autograder.runner import Outcome
 from autograder.sandbox import SandboxError
 from autograder.shortage import is_full, passes
 from autograder.store import OutcomeStore, StoreError
+from autograder.submission import SubmissionError
 from autograder.workers import Done, Workers
 from course.errors import CourseError
 
@@ -103,7 +104,7 @@ class ClassRun:
         changed: list[Work] = []
         for student in students:
             self._interruption.check()
-            work = self._desk.work(student, self._course)
+            work = self._work(student)
             if (left := self._unchanged(work, standings.get(student))) is not None:
                 self._graded.append(left)
             else:
@@ -114,6 +115,12 @@ class ClassRun:
             self._progress.done(graded)
         self._run(self._pieces(changed))
         return self._graded
+
+    def _work(self, student: str) -> Work:
+        try:
+            return self._desk.work(student, self._course)
+        except Exception as error:  # noqa: BLE001 - one student's data must not end the class
+            return Work(student, "", failure=_reason(error))
 
     def _unchanged(self, work: Work, standing: Standing | None) -> Graded | None:
         """Return what is known of a submission that needs nothing, bar new feedback, or None."""
@@ -137,7 +144,17 @@ class ClassRun:
 
     def _pieces(self, changed: list[Work]) -> Iterator[Piece]:
         for work in changed:
-            yield from self._desk.pieces(work)
+            # All of them before the first is run: then nothing of it is on its way if one fails.
+            pieces: list[Piece] = []
+            try:
+                pieces = [] if work.failure else list(self._desk.pieces(work))
+            except Exception as error:  # noqa: BLE001 - one student's data must not end the class
+                work.failure = _reason(error)
+            if work.failure:
+                for _ in self._desk.notebooks:
+                    self._progress.ran(waited=False)
+                self._settle(work, self._set_aside(work))
+            yield from pieces
 
     def _run(self, pieces: Iterator[Piece]) -> None:
         more = True
@@ -219,28 +236,53 @@ class ClassRun:
             outcome, verdicts={**outcome.verdicts, **piece.marks}
         )
         if len(work.outcomes) == len(self._desk.notebooks):
-            graded = self._enter(work)
-            work.outcomes.clear()
-            self._progress.done(graded)
-            self._graded.append(replace(graded, outcomes={}))
+            self._settle(work, self._enter(work))
+
+    def _settle(self, work: Work, graded: Graded) -> None:
+        work.outcomes.clear()
+        self._progress.done(graded)
+        self._graded.append(replace(graded, outcomes={}))
 
     def _enter(self, work: Work) -> Graded:
-        graded = _summary(work, self._desk.notebooks)
         self._ledger.remove(work.student)
         try:
-            self._desk.enter(work, feedback=self._feedback)
-        except GradebookError as error:
-            return replace(graded, problem=f"{graded.problem} {error}".strip(), entered=False)
+            graded = _summary(work, self._desk.notebooks)
+            standing = self._desk.enter(work)
+            missing = self._missing_feedback(work)
+        except Exception as error:  # noqa: BLE001 - one student's data must not end the class
+            work.failure = _reason(error)
+            return self._set_aside(work)
         if not any(outcome.spoilt for outcome in work.outcomes.values()):
-            standing = self._desk.gradebook.standings(self._desk.assignment, work.student)
             self._ledger.put(
                 work.student,
                 Entry(
-                    work.made_of, standing[work.student], graded.points, graded.max_points,
-                    graded.seconds, graded.problem, self._feedback,
+                    work.made_of, standing, graded.points, graded.max_points, graded.seconds,
+                    graded.problem, self._feedback and not missing,
                 ),
             )  # fmt: skip
-        return graded
+        return replace(graded, problem=f"{graded.problem} {missing}".strip())
+
+    def _missing_feedback(self, work: Work) -> str:
+        """Write feedback on grades that are entered, or say why there is none: they stand."""
+        if self._feedback:
+            try:
+                self._desk.gradebook.generate_feedback(self._desk.assignment, work.student)
+            except GradebookError as error:
+                return f"It is graded, but there is no feedback: {error}"
+        return ""
+
+    def _set_aside(self, work: Work) -> Graded:
+        """Enter nothing but why a submission could not be graded, for a person to look at."""
+        self._ledger.remove(work.student)
+        try:
+            self._desk.set_aside(work, work.failure)
+            graded = _summary(work, self._desk.notebooks)
+            self._desk.enter(work)
+            missing = self._missing_feedback(work)
+        except Exception as error:  # noqa: BLE001 - one student's data must not end the class
+            problem = " ".join(dict.fromkeys([*work.problems, work.failure, _reason(error)]))
+            return Graded(work.student, {}, problem=problem, entered=False)
+        return replace(graded, problem=f"{graded.problem} {missing}".strip())
 
 
 def _summary(work: Work, notebooks: list[str]) -> Graded:
@@ -249,10 +291,24 @@ def _summary(work: Work, notebooks: list[str]) -> Graded:
     problems = list(work.problems)
     for outcome in outcomes.values():
         problems += outcome.notes if outcome.unreadable else []
+    problems = list(dict.fromkeys(problems))  # a reason may be that of every notebook
     return Graded(
         work.student, outcomes, sum(v.score for v in verdicts), sum(v.max_score for v in verdicts),
         sum(outcome.seconds for outcome in outcomes.values()), " ".join(problems),
     )  # fmt: skip
+
+
+def _reason(error: Exception) -> str:
+    """Return why one student's submission could not be graded.
+
+    What concerns everybody is raised again: a full disk, say.
+    """
+    if isinstance(error, (GradebookError, SubmissionError)):
+        return str(error)
+    if isinstance(error, CourseError) or is_full(error):
+        raise error
+    what = f"{type(error).__name__}: {error}".splitlines()[0][:300]
+    return f"This submission could not be graded ({what}): a person has to look at it."
 
 
 def _exams(assignment: str) -> tuple[str, ...]:

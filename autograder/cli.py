@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import sys
@@ -289,6 +290,10 @@ def _root(root: Path | None) -> Path:
 
 def main() -> None:
     """Run the command; a `CourseError` is printed as its sentence, with its exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        # The name of a student's folder may be no text in any encoding.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         app()
     except CourseError as error:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import errno
+import tempfile
+from collections.abc import Callable, Iterable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -43,19 +45,45 @@ class OldGradebookError(GradebookUnusable):
     """The gradebook has the tables of another version of nbgrader."""
 
 
+FULL = ("disk is full", "No space left on device", "Disk quota exceeded", "File too large")
+ROOM = 8 * 1024 * 1024
+"""Bytes for which there is room on a disk that is not full: far more than one student needs."""
+
+
+def full(said: str, root: Path, folders: Iterable[Path]) -> DiskFullError | None:
+    """Return the sentence for a full disk, if something failed for want of room.
+
+    Args:
+        said: a log that seems to say so; as a student may have written what it quotes, it is also
+            looked whether there is room.
+        root: the course root.
+        folders: where was written.
+    """
+    failed = any(words in said for words in (*FULL, "disk I/O error"))
+    return _full(root) if failed and not all(map(_has_room, folders)) else None
+
+
+def _has_room(folder: Path) -> bool:
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(ROOM))
+    except OSError as error:
+        return error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+    return True
+
+
 def is_locked(said: str) -> bool:
     """Whether an error's text says that another program holds the database."""
     return "database is locked" in said or "database table is locked" in said
 
 
 def unusable(said: str, root: Path) -> GradebookUnusable | None:
-    """Return the sentence for an error of the database that concerns everybody, if it is one."""
-    full = ("disk is full", "No space left on device", "Disk quota exceeded", "File too large")
-    if any(words in said for words in full):
-        return DiskFullError(
-            f"The disk of {root} is full: make room there and run the same command again; what was "
-            "graded so far is kept."
-        )
+    """Return the sentence for an error of the database that concerns everybody, if it is one.
+
+    ``said`` is what the database itself raised: never a log, in which a student's words may stand.
+    """
+    if any(words in said for words in FULL):
+        return _full(root)
     if is_locked(said):
         return GradebookLockedError(
             f"Another program holds the gradebook of {root}: wait until it is done, or end it, and "
@@ -104,6 +132,13 @@ def _this_schema() -> str | None:
     config = AlembicConfig()
     config.set_main_option("script_location", dbutil.ALEMBIC_DIR)
     return ScriptDirectory.from_config(config).get_current_head()
+
+
+def _full(root: Path) -> DiskFullError:
+    return DiskFullError(
+        f"The disk of {root} is full: make room there and run the same command again; what was "
+        "graded so far is kept."
+    )
 
 
 def _old(root: Path) -> OldGradebookError:

@@ -13,8 +13,9 @@ from nbformat import NotebookNode
 
 from autograder import ledger, quiz_marks, roster, runner, submission
 from autograder import nbgrader_bridge as bridge
-from autograder.gradebook import CourseGradebook
+from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.jobs import Job
+from autograder.ledger import Standing
 from autograder.runner import Outcome
 from autograder.submission import SubmissionError
 from autograder.verdict import Status, Verdict
@@ -29,12 +30,14 @@ class Work:
         student: whose it is.
         made_of: digest of it and of all that its grades depend on.
         problems: what a person should know about it.
+        failure: why it cannot be graded at all, once that is known.
         outcomes: {notebook: outcome}, as far as they are there.
     """
 
     student: str
     made_of: str
     problems: list[str] = field(default_factory=list)
+    failure: str = ""
     outcomes: dict[str, Outcome] = field(default_factory=dict)
 
 
@@ -88,12 +91,8 @@ class Desk:
 
     def pieces(self, work: Work) -> Iterator[Piece]:
         """Stage a submission's notebooks one by one."""
-        submitted, staged = self._submitted(work.student), self._staged(work.student)
-        shutil.rmtree(staged, ignore_errors=True)
-        staged.mkdir(parents=True)
+        submitted, staged = self._submitted(work.student), self._stage(work.student)
         work.problems += roster.remarks(submitted)
-        if (time := roster.timestamp(submitted / "timestamp.txt")) is not None:
-            (staged / "timestamp.txt").write_text(time, encoding="utf-8")
         for name in self.notebooks:
             notebook, piece = self._piece(work, submitted / f"{name}.ipynb")
             marked = quiz_marks.with_quizzes(
@@ -102,13 +101,24 @@ class Desk:
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
             yield replace(piece, marks=marked.verdicts)
 
+    def set_aside(self, work: Work, reason: str) -> None:
+        """Stage the released notebooks in place of a submission's, with ``reason`` as outcomes."""
+        staged = self._stage(work.student)
+        for name in self.notebooks:
+            notebook, outcome = self._unreadable(name, reason, "grader_error")
+            nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
+            marked = quiz_marks.unmarked(outcome, notebook, self.root, reason)
+            work.outcomes[name] = marked
+
     def refused(self, piece: Piece, reason: str, status: Status) -> Outcome:
         """Return the outcome of a notebook that could not be run after all, for ``reason``."""
         assert piece.job is not None
         return runner.refuse(piece.job.program, reason, status)
 
-    def enter(self, work: Work, *, feedback: bool) -> None:
-        """Enter one student's outcomes into the gradebook. Only ever in the one writer.
+    def enter(self, work: Work) -> Standing:
+        """Enter one student's outcomes into the gradebook; return how the student then stands.
+
+        Only ever in the one writer.
 
         Raises:
             GradebookError: nbgrader cannot enter this student.
@@ -118,12 +128,27 @@ class Desk:
             bridge.prepared[self.assignment, work.student, name] = outcome
         try:
             self.gradebook.autograde(self.assignment, work.student)
-            if feedback:
-                self.gradebook.generate_feedback(self.assignment, work.student)
         finally:
             for name in work.outcomes:
                 bridge.prepared.pop((self.assignment, work.student, name), None)
         shutil.rmtree(self._staged(work.student).parent, ignore_errors=True)
+        standings = self.gradebook.standings(self.assignment, work.student)
+        if work.student not in standings:
+            raise GradebookError(
+                f"nbgrader entered nothing for {work.student}, and did not say why: look whether "
+                "nbgrader_config.py leaves this student out."
+            )
+        return standings[work.student]
+
+    def _stage(self, student: str) -> Path:
+        """Return an empty folder for a submission's notebooks, with the time it was handed in."""
+        staged = self._staged(student)
+        shutil.rmtree(staged, ignore_errors=True)
+        staged.mkdir(parents=True)
+        time = roster.timestamp(self._submitted(student) / "timestamp.txt")
+        if time is not None:
+            (staged / "timestamp.txt").write_text(time, encoding="utf-8")
+        return staged
 
     def _piece(self, work: Work, path: Path) -> tuple[NotebookNode, Piece]:
         source, released = self._originals[path.stem]

@@ -31,6 +31,11 @@ STAGED = f"{bridge.WORK_FOLDER}/staged"
 LOCK = f"{bridge.WORK_FOLDER}/engine.lock"
 
 
+EXCLUDED = (
+    "Left out, as nbgrader_config.py says (CourseDirectory.student_id_exclude): nothing was run."
+)
+
+
 class AssignmentError(CourseError):
     """An assignment that does not exist or is not ready; the message names what there is."""
 
@@ -85,6 +90,8 @@ def grade(
         with sandbox.warming_up():
             sandbox.require()
     refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
+    refused += [Graded(s, {}, problem=EXCLUDED) for s in students if s in gradebook.excluded]
+    students = [s for s in students if s not in gradebook.excluded]
     store = OutcomeStore(root / bridge.WORK_FOLDER / "outcomes", trust=trust, hidden=[root])
     with ExitStack() as stack:
         stack.enter_context(_alone(root))

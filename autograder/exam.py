@@ -21,6 +21,10 @@ from course.errors import CourseError
 RigT = TypeVar("RigT")
 
 
+MAX_TEXT = 7000
+"""Characters of a text in a verdict: of an error in a student's code, 6000 are told."""
+
+
 class ExamError(CourseError):
     """An exam that does not exist, or whose definition does not hold together."""
 
@@ -154,7 +158,16 @@ class Exam(Generic[RigT]):
 
 
 def _worth(result: CheckResult, points: float) -> CheckResult:
-    return replace(result, points=points if result.passed else 0.0, max_points=points)
+    # A check may quote what a student's code said of itself, at any length.
+    expected, actual, note = (_cut(t) for t in (result.expected, result.actual, result.note))
+    earned = points if result.passed else 0.0
+    return replace(
+        result, points=earned, max_points=points, expected=expected, actual=actual, note=note
+    )
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= MAX_TEXT else f"{text[:MAX_TEXT]} [{len(text) - MAX_TEXT} more]"
 
 
 def _result_of(check: Check[RigT], status: Status) -> CheckResult:

@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from typing import Any, TextIO
 
 from autograder import exams
-from autograder.bench import Bench, Subject
+from autograder.bench import MAX_REPLY, Bench, Subject
 from autograder.verdict import CheckResult, Verdict
 from autograder.wire import Channel
 from course import Session
@@ -98,7 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # end up among them.
     verdicts = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    subject = Subject(Channel(socket.socket(fileno=options.control)))
+    subject = Subject(Channel(socket.socket(fileno=options.control), MAX_REPLY))
     with Session(domain_id=options.domain) as session:
         session.explains = False  # it asks whether something comes, and says itself what it means
         serve(sys.stdin, verdicts, session, subject, own_network=options.own_network)

@@ -14,6 +14,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from itertools import islice
 from pathlib import Path
 
 from course.files import PARTIAL, replacing
@@ -21,6 +22,15 @@ from course.files import PARTIAL, replacing
 SCRATCH = "ros2-course-scratch-"
 PRIVATE = 0o600
 """Mode of what is written: grades are nobody else's business."""
+
+MAX_FILES = 2000
+"""Files of one submission that are looked at, and folders."""
+
+NOT_COUNTED = {".ipynb_checkpoints", "__pycache__"}
+"""Folders that appear when somebody merely opens or runs what is beside them."""
+
+MAX_DEPTH = 20
+"""Folders within each other in which they are found."""
 
 _OLD = 600.0
 """Seconds after which a partial file belongs to nobody: writing one takes a moment."""
@@ -35,6 +45,40 @@ def write_whole(path: Path, text: str) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path, PRIVATE) as file:
         file.write(text.encode("utf-8", errors="replace"))
+
+
+def walk(folder: Path) -> list[Path]:
+    """Return the files anywhere in a stranger's folder, the upper ones first; no link is followed.
+
+    There may be any number of them, as deep as paths go: no more than `MAX_FILES` are returned, and
+    none that lies deeper than `MAX_DEPTH`. What cannot be listed is passed over, and so are folders
+    that appear by themselves (`NOT_COUNTED`).
+    """
+    found: list[Path] = []
+    level, seen = [folder], 0
+    for _ in range(MAX_DEPTH):
+        below: list[Path] = []
+        for place in level[: max(0, MAX_FILES - seen)]:
+            files, folders = _listed(place)
+            found += files
+            below += folders
+            seen += 1
+            if len(found) >= MAX_FILES:
+                return found[:MAX_FILES]
+        level = below
+    return found
+
+
+def _listed(folder: Path) -> tuple[list[Path], list[Path]]:
+    """Return the files (links, pipes and devices, too) and the folders right in a folder."""
+    try:
+        with os.scandir(folder) as entries:
+            counted = (entry for entry in entries if entry.name not in NOT_COUNTED)
+            some = sorted(islice(counted, 2 * MAX_FILES), key=lambda entry: os.fsencode(entry.name))
+            kinds = [(Path(entry.path), entry.is_dir(follow_symlinks=False)) for entry in some]
+    except OSError:
+        return [], []
+    return [p for p, deeper in kinds if not deeper], [p for p, deeper in kinds if deeper]
 
 
 def remove_partial(folder: Path) -> None:

@@ -110,6 +110,11 @@ class CourseGradebook:
             rows = database.standing_rows(gradebook.db, assignment, student)
         return {name: Standing(*map(_digest, both)) for name, both in rows.items()}
 
+    @property
+    def excluded(self) -> frozenset[str]:
+        """The students whom nbgrader passes over, as the course's configuration says."""
+        return frozenset(self.coursedir.student_id_exclude.split(",")) - {""}
+
     def roster(self) -> Roster:
         """Return which students the gradebook knows, and whether there may be others."""
         with self._open() as gradebook:
@@ -127,14 +132,23 @@ class CourseGradebook:
             if result["success"]:
                 return
             said = f"{result.get('log', '')}\n{result.get('error') or ''}"
+            raised = self._engines.raised
             # Each try waits for the lock by itself, so this loop does not spin.
-            if not database.is_locked(said) or time.monotonic() > deadline:
+            if not database.is_locked(raised) or time.monotonic() > deadline:
                 break
-        if unusable := database.unusable(said, self.root):
+        if unusable := (
+            database.full(said, self.root, self._written()) or database.unusable(raised, self.root)
+        ):
             raise unusable
         raise GradebookError(
             f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: {_why(said)}"
         )
+
+    def _written(self) -> list[Path]:
+        """Return the folders that nbgrader writes to, as far as they are there."""
+        names = (self.coursedir.autograded_directory, self.coursedir.feedback_directory)
+        folders = [self.root, *(self.root / name for name in names)]
+        return [folder for folder in folders if folder.is_dir()]
 
     @contextmanager
     def _open(self) -> Iterator[Gradebook]:
@@ -162,7 +176,9 @@ def _why(said: str) -> str:
     """Return the line of nbgrader's log that names the cause: of a traceback, the last line."""
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     causes = [line for line in lines if re.match(r"[\w.]+(Error|Exception|Entry)\b", line)]
-    return (causes or lines or ["no reason given"])[-1]
+    # Of what nbgrader itself raises in the end, none says why.
+    told = [line for line in causes if "NbGraderException" not in line]
+    return (told or causes or lines or ["no reason given"])[-1][:300]
 
 
 def _digest(rows: list[list[Any]]) -> str:

@@ -15,19 +15,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from autograder import digests
-from autograder.files import write_whole
+from autograder.files import walk, write_whole
 from autograder.submission import MAX_EXTRAS, MAX_NOTEBOOK
 
 VERSION = 1
 FOLDER = "entered"
 MAX_FILE = MAX_NOTEBOOK + MAX_EXTRAS
 """Bytes of one file beyond which only its size and date are looked at: it is not read anyway."""
-
-NOT_COUNTED = {".ipynb_checkpoints", "__pycache__"}
-"""Folders that appear by themselves when somebody opens or runs what is beside them."""
-
-MAX_FILES = 2000
-"""Files of one submission that are looked at one by one."""
 
 
 @dataclass(frozen=True)
@@ -111,22 +105,11 @@ def of_course(root: Path, folders: Iterable[Path], mode: str, exams: tuple[str, 
 def of_folder(folder: Path) -> str:
     """Return a digest of a file or of a folder's files: names, kinds and contents."""
     state = hashlib.sha256()
-    paths = [folder] if folder.is_file() else sorted(_walk(folder))
+    paths = [folder] if folder.is_file() else sorted(walk(folder))
     for path in paths:
         name = os.fsencode(path.relative_to(folder) if path != folder else path.name)
         state.update(name + b"\0" + _content(path) + b"\0")
     return state.hexdigest()
-
-
-def _walk(folder: Path) -> list[Path]:
-    found: list[Path] = []
-    for place, folders, files in os.walk(folder):
-        folders[:] = [name for name in folders if name not in NOT_COUNTED]
-        links = [name for name in folders if (Path(place) / name).is_symlink()]
-        found += [Path(place) / name for name in (*files, *links)]
-        if len(found) > MAX_FILES:
-            break
-    return found[:MAX_FILES]
 
 
 def _content(path: Path) -> bytes:

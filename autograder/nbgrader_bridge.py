@@ -7,6 +7,7 @@ nbgrader's own steps save, flag and report the scores as everyone knows them.
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,8 @@ class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ship
     def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:
         """Mend ``nb`` against the source and the released notebook; remember what was mended."""
         source, released = originals(_coursedir(self), *_names(resources)[::2])
+        # nbgrader has read it by itself: it must be what the engine would read.
+        nb = submission.parse(json.dumps(nb), f"{_names(resources)[2]}.ipynb")
         nb, notes = submission.restore(nb, source, released)
         nb.metadata[NOTES_KEY] = notes
         return nb, resources

@@ -1,5 +1,7 @@
 """What nbgrader does anew for every submission, and need do only once a run.
 
+And what its database really raised: nbgrader itself passes on a log, in which anything may stand.
+
 Its converters compile every HTML template for each student, and each of its many openings of the
 gradebook makes a database engine of its own, whose SQL is then compiled from nothing. Both took
 half of the time in which a student's scores and feedback are written.
@@ -17,6 +19,7 @@ import sqlalchemy
 from jinja2 import BytecodeCache, Environment
 from jinja2.bccache import Bucket
 from nbconvert.exporters import HTMLExporter
+from sqlalchemy.exc import DataError, IntegrityError
 
 
 class _Compiled(BytecodeCache):
@@ -51,19 +54,33 @@ class Engines:
     def __init__(self) -> None:
         """Have none yet."""
         self._engines: dict[str, Any] = {}
+        self._raised: list[str] = []
+
+    @property
+    def raised(self) -> str:
+        """What the database raised since nbgrader last began to use these engines."""
+        return "\n".join(self._raised)
 
     def engine(self, url: str, **options: Any) -> Any:
         """Return the engine for ``url``; ``options`` are those of `sqlalchemy.create_engine`."""
         if url not in self._engines:
-            self._engines[url] = sqlalchemy.create_engine(url, **options)
+            engine = sqlalchemy.create_engine(url, **options)
+            sqlalchemy.event.listen(engine, "handle_error", self._note)
+            self._engines[url] = engine
         return self._engines[url]
 
     @contextmanager
     def shared(self) -> Iterator[None]:
         """Have nbgrader use these engines. What it closes, an engine opens again when needed."""
+        self._raised.clear()
         own = nbgrader.api.create_engine
         nbgrader.api.create_engine = self.engine
         try:
             yield
         finally:
             nbgrader.api.create_engine = own
+
+    def _note(self, context: Any) -> None:
+        # An entry that contradicts another one says nothing about the database.
+        if not isinstance(context.sqlalchemy_exception, (IntegrityError, DataError)):
+            self._raised.append(str(context.original_exception))

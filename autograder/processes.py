@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from autograder.descriptors import readable
 from autograder.verdict import Verdict, VerdictError
+from autograder.wire import parse
 from course.errors import CourseError
 
 if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
@@ -140,7 +141,7 @@ class ExaminerProcess:
             self._buffer += chunk
         line, self._buffer = self._buffer.split(b"\n", 1)
         try:
-            answer = json.loads(line)
+            answer = parse(line)
             self.hangs = str(answer["hangs"])
             return Verdict.from_data(answer["verdict"])
         except (ValueError, KeyError, TypeError, VerdictError) as error:

@@ -87,6 +87,20 @@ def with_quizzes(
     return replace(outcome, verdicts={**outcome.verdicts, **marked}) if marked else outcome
 
 
+def unmarked(outcome: Outcome, notebook: NotebookNode, root: Path, reason: str) -> Outcome:
+    """Return the outcome of a notebook that is not graded, with its quizzes, for ``reason``.
+
+    Raises:
+        QuizMarksError: a bank is not sound.
+    """
+    asked = [name for name in in_cells(notebook) if name in names(root)]
+    marks = {
+        f"{PREFIX}{name}": _unmarked(find_bank(root, name), reason, status="grader_error")
+        for name in asked
+    }
+    return replace(outcome, verdicts={**outcome.verdicts, **marks})
+
+
 def verdict(bank: Bank, folder: Path, student: str) -> Verdict:
     """Mark the best attempt that lies in ``folder``."""
     name = record.filename(bank.quiz)
@@ -100,7 +114,14 @@ def verdict(bank: Bank, folder: Path, student: str) -> Verdict:
         return _unmarked(bank, reason)
     except OSError as error:
         return _unmarked(bank, f"{name} cannot be read ({error.strerror or error}).")
-    marked = regrade.mark_file(bank, content)
+    try:
+        marked = regrade.mark_file(bank, content)
+    except Exception as error:  # noqa: BLE001 - one student's data must not end the class
+        reason = (
+            f"The attempts in {name} could not be marked ({type(error).__name__}: {error}): a "
+            "person has to look at them."
+        )
+        return _unmarked(bank, reason[:500], status="grader_error")
     if marked.best is None:
         return _none_counts(bank, name, marked)
     checks = tuple(_check(mark) for mark in marked.best.marks)

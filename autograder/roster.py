@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from nbgrader.utils import parse_utc
 
+from course.files import read_plain
+
 GLOB = "*?[]"
 LONGEST_ID = 128
 """Characters of a student id in nbgrader's gradebook."""
+
+LONGEST_TIME = 200
+"""Bytes of a ``timestamp.txt``; a date has some thirty."""
 
 COPYING = (".part", ".partial", ".filepart", ".crdownload", ".tmp")
 """How copying programs name what they have not finished."""
@@ -60,7 +66,7 @@ def remarks(folder: Path) -> list[str]:
             "grade again."
         )
     file = folder / "timestamp.txt"
-    if file.is_file() and timestamp(file) is None:
+    if os.path.lexists(file) and timestamp(file) is None:
         found.append("timestamp.txt holds no date, so the time of submission is unknown.")
     return found
 
@@ -68,9 +74,12 @@ def remarks(folder: Path) -> list[str]:
 def timestamp(file: Path) -> str | None:
     """Return a time of submission that nbgrader can read, or None."""
     try:
-        text = file.read_text(encoding="utf-8").strip()
+        content = read_plain(file, LONGEST_TIME + 1)
+        if len(content) > LONGEST_TIME:
+            return None
+        text = content.decode("utf-8").strip()
         parse_utc(text)
-    except (ValueError, OverflowError, UnicodeError, OSError):
+    except Exception:  # noqa: BLE001 - a stranger's text: dateutil fails in many ways
         return None
     return text
 
@@ -96,7 +105,7 @@ def _misplaced(folder: Path, assignment: str) -> str:
     """Return what is wrong if a student's work is not where nbgrader looks for it."""
     place = folder / assignment
     if place.is_dir():
-        return ""
+        return _elsewhere(folder, place)
     if place.exists() or place.is_symlink():
         return (
             f"submitted/{folder.name}/{assignment} is no folder: put the submission's files in one."
@@ -105,6 +114,26 @@ def _misplaced(folder: Path, assignment: str) -> str:
         return (
             f"Its notebooks lie in submitted/{folder.name} itself: move them to "
             f"submitted/{folder.name}/{assignment}, if they belong to this assignment."
+        )
+    return ""
+
+
+def _elsewhere(folder: Path, place: Path) -> str:
+    """Return what is wrong if a link leads from a student's folder to what others handed in.
+
+    That all of ``submitted`` or a student's folder is a link to another disk, say, is an
+    instructor's choice.
+    """
+    home, others = folder.resolve(), folder.parent.resolve()
+    if folder.is_symlink() and home.is_relative_to(others):
+        return (
+            f"submitted/{folder.name} is a link to what another student handed in: put the "
+            "submission's own files there, then grade again."
+        )
+    if not place.resolve().is_relative_to(home):
+        return (
+            f"submitted/{folder.name}/{place.name} is a link that leads out of the student's own "
+            "folder: put the submission's own files there, then grade again."
         )
     return ""
 

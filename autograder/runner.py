@@ -25,6 +25,12 @@ CELL_TIMEOUT = 30.0
 START_TIMEOUT = 60.0
 """Seconds until a subject must have started: it takes half a second on a machine that is idle."""
 
+NOT_RUN = {
+    "output_type": "error", "ename": "NotRun", "evalue": "this cell was not run to its end",
+    "traceback": ["NotRun: this cell was not run to its end"],
+}  # fmt: skip
+"""The output of a cell with a grade id that was not reached: nbgrader takes none for right."""
+
 NO_FILES: Mapping[str, bytes] = {}
 
 
@@ -135,7 +141,7 @@ def _follow(
                 moved_on = False
                 if examiner.hangs:
                     # The examiner has waited long enough: it would find the same in every part.
-                    _give_up(program, outcome, examiner.hangs)
+                    _give_up(program, outcome, examiner.hangs, reached=number)
                     return
             else:
                 moved_on = True
@@ -148,17 +154,20 @@ def _follow(
             f"Code cell {number + 1} was still running after {cell_timeout:.0f} s, so nothing "
             "after it was examined: a cell that never ends (rclpy.spin, an endless loop) blocks "
             "a notebook.",
+            reached=number,
         )
     except ChannelBroken as error:
         _give_up(
             program,
             outcome,
             f"Something in the notebook wrote to the grader's own channel: {error}.",
+            reached=number,
         )
     except ChannelClosed:
-        _give_up(program, outcome, f"The notebook's process ended: {subject.fate()}.")
+        fate = f"The notebook's process ended: {subject.fate()}."
+        _give_up(program, outcome, fate, reached=number)
     except ExaminerError as error:
-        _give_up(program, outcome, str(error), "grader_error")
+        _give_up(program, outcome, str(error), "grader_error", reached=number)
 
 
 def _await(channel: Channel, subject: RunningSubject) -> None:
@@ -179,21 +188,53 @@ def _outputs(message: dict[str, Any], number: int) -> list[dict[str, Any]]:
     outputs = message.get("outputs")
     if message.get("ran") != number or not isinstance(outputs, list):
         raise ChannelBroken("it is no answer to what was asked")
+    if not all(_is_output(output) for output in outputs):
+        raise ChannelBroken("what it says of a cell's outputs is none")
     return outputs
+
+
+def _is_output(output: Any) -> bool:
+    """Whether something is an output as `autograder.shell` makes them, which nbgrader can take."""
+    match output:
+        case {"output_type": "stream", "name": "stdout" | "stderr", "text": str(), **more}:
+            return not more
+        case {
+            "output_type": "display_data",
+            "data": dict() as data,
+            "metadata": dict() as about,
+            **more,
+        }:
+            return not more and not about and all(isinstance(shown, str) for shown in data.values())
+        case {
+            "output_type": "error",
+            "ename": str(),
+            "evalue": str(),
+            "traceback": list() as lines,
+            **more,
+        }:
+            return not more and all(isinstance(line, str) for line in lines)
+    return False
 
 
 def _note_error(outcome: Outcome, number: int) -> None:
     for output in outcome.outputs[number]:
-        if isinstance(output, dict) and output.get("output_type") == "error":
+        if output["output_type"] == "error":
             what = f"{output.get('ename')}: {output.get('evalue')}"
             outcome.notes.append(f"Code cell {number + 1} of the notebook raised {what[:300]}")
 
 
 def _give_up(
-    program: Program, outcome: Outcome, reason: str, status: Status = "not_checked"
+    program: Program,
+    outcome: Outcome,
+    reason: str,
+    status: Status = "not_checked",
+    *,
+    reached: int = 0,
 ) -> None:
     outcome.notes.append(reason)
-    for cell in program:
+    for number, cell in enumerate(program):
+        if number >= reached and cell.grade_id and not cell.exam:
+            outcome.outputs[number] = [dict(NOT_RUN)]
         if cell.exam and cell.grade_id not in outcome.verdicts:
             exam = exams.load(cell.exam)
             outcome.verdicts[cell.grade_id] = unexamined(exam, cell.part, reason, status)

@@ -8,7 +8,7 @@ from autograder.sandbox import BoxError
 from autograder.warm import ZygoteError
 
 _PASSING = {errno.EAGAIN, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.ENOBUFS}
-_FULL = {errno.ENOSPC, errno.EDQUOT}
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 
 
 def passes(error: BaseException | None) -> bool:
@@ -21,5 +21,5 @@ def passes(error: BaseException | None) -> bool:
 
 
 def is_full(error: BaseException | None) -> bool:
-    """Whether an error says that a disk is full, or this user's share of it."""
+    """Whether an error says that nothing more can be written, to a disk that is full perhaps."""
     return isinstance(error, OSError) and error.errno in _FULL

@@ -6,6 +6,7 @@ test cell is put back, a duplicated one is disarmed), and each mend is noted for
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 import stat
@@ -20,7 +21,8 @@ import nbformat.v4
 import nbformat.validator
 from nbformat import NotebookNode
 
-from autograder import keys, points
+from autograder import bounds, keys, points
+from autograder.files import walk
 from course.errors import CourseError
 
 MAX_NOTEBOOK = 20 * 1024 * 1024
@@ -58,7 +60,15 @@ def read(path: Path) -> NotebookNode:
     Raises:
         SubmissionError: missing, no plain file, too large, not JSON, or not a notebook of format 4.
     """
-    text = _text(path)
+    return parse(_text(path), path.name)
+
+
+def parse(text: str, name: str) -> NotebookNode:
+    """Return the notebook in a file's ``text``; ``name`` is the file's, for what is said of it.
+
+    Raises:
+        SubmissionError: it is too large, not JSON, or not a notebook of format 4.
+    """
     try:
         data = json.loads(text)
         versions = (data["nbformat"], data["nbformat_minor"])
@@ -66,24 +76,32 @@ def read(path: Path) -> NotebookNode:
             raise KeyError("nbformat")
     except (KeyError, TypeError):
         raise SubmissionError(
-            f"{path.name} is not a notebook of format 4: open it in JupyterLab, save it, and hand "
+            f"{name} is not a notebook of format 4: open it in JupyterLab, save it, and hand "
             "it in again."
         ) from None
     except (ValueError, RecursionError) as error:
         raise SubmissionError(
-            f"{path.name} is not valid JSON ({str(error)[:120]}): the file was cut off or damaged; "
+            f"{name} is not valid JSON ({str(error)[:120]}): the file was cut off or damaged; "
             "hand in the original again."
         ) from None
+    if bounds.is_too_deep(data):
+        raise SubmissionError(
+            f"{name} is nested more than {bounds.MAX_NESTING} levels deep: clear its outputs, or "
+            "begin with a new copy of the notebook, and hand it in again."
+        )
     try:
         # Half of a surrogate pair is legal in JSON, but no text that anything could write again.
         clean = json.dumps(data, ensure_ascii=False).encode("utf-8", "replace").decode()
-        return _sound(nbformat.v4.reads(clean))  # type: ignore[no-untyped-call]
+        notebook = _sound(nbformat.v4.reads(clean))  # type: ignore[no-untyped-call]
     except Exception as error:  # noqa: BLE001 - a stranger's data: nbformat fails in many ways
         reason = (str(error) or type(error).__name__).splitlines()[0][:160]
         raise SubmissionError(
-            f"{path.name} does not follow the notebook format ({reason}): open it in JupyterLab, "
+            f"{name} does not follow the notebook format ({reason}): open it in JupyterLab, "
             "save it, and hand it in again."
         ) from None
+    if excess := bounds.excess(notebook):
+        raise SubmissionError(f"{name} {excess}")
+    return notebook
 
 
 def _text(path: Path) -> str:
@@ -113,15 +131,15 @@ def _text(path: Path) -> str:
 def extras(folder: Path) -> dict[str, bytes]:
     """Return {relative path: content} of a submission's other files, a helper module perhaps.
 
-    Links, hidden files, notebooks and what is over `MAX_EXTRAS` bytes in all are left out.
+    Links, hidden files, notebooks, what is over `MAX_EXTRAS` bytes in all, and what `walk` does
+    not find are left out.
     """
     found: dict[str, bytes] = {}
     room = MAX_EXTRAS
-    for path in sorted(folder.rglob("*")):
+    for path in sorted(walk(folder)):
         name = path.relative_to(folder)
         hidden = any(part.startswith((".", "__")) for part in name.parts)
-        linked = any(parent.is_symlink() for parent in (path, *path.parents) if parent != folder)
-        if hidden or linked or path.suffix == ".ipynb" or name == Path("timestamp.txt"):
+        if hidden or path.suffix == ".ipynb" or name == Path("timestamp.txt"):
             continue
         status = path.lstat()
         if stat.S_ISREG(status.st_mode) and status.st_size <= room:
@@ -164,8 +182,8 @@ def restore(
     """Return the submission with the instructor's cells as they should be, and what was mended.
 
     Locked cells get the text of ``source`` (hidden tests included), deleted cells come back as
-    they stand in ``released``, a second cell with the same grade id loses it, and nbgrader's
-    metadata are always the instructor's.
+    they stand in ``released``, and a second cell with the same grade id loses it. All metadata are
+    the instructor's: nbgrader and the templates of feedback trust what stands there.
     """
     reference = {grade_id(cell): cell for cell in released.cells if grade_id(cell)}
     originals = {grade_id(cell): cell for cell in source.cells if grade_id(cell)}
@@ -174,16 +192,18 @@ def restore(
     chosen = _choose(submitted, reference, notes)
     for cell in submitted.cells:
         name = grade_id(cell)
-        if name and chosen.get(name) is not cell:
-            cell.metadata.pop("nbgrader")
-        elif name:
+        counts = bool(name) and chosen.get(name) is cell
+        if counts:
             cell = _mend(cell, reference[name], originals.get(name, reference[name]), notes)
+        else:
+            cell.metadata = nbformat.from_dict({})  # type: ignore[no-untyped-call]
         kept.append(cell)
     order = [name for cell in kept if (name := grade_id(cell))]
     if order != [name for name in reference if name in order]:
         notes.append("The cells of the assignment had been moved; they were run as they stood.")
     _put_back(kept, reference, originals, notes)
     mended = nbformat.from_dict({**submitted, "cells": kept})  # type: ignore[no-untyped-call]
+    mended.metadata = copy.deepcopy(released.metadata)
     mended.metadata["kernelspec"] = dict(source.metadata.get("kernelspec", {}))
     return mended, notes
 
@@ -218,7 +238,7 @@ def _mend(
         if cell.source.strip() != reference.source.strip():
             notes.append(f"The text of cell '{name}' had been changed; the original was used.")
         cell.source = original.source
-    cell.metadata["nbgrader"] = dict(metadata(reference))
+    cell.metadata = copy.deepcopy(reference.metadata)
     return cell
 
 
@@ -243,11 +263,11 @@ def _put_back(
 
 
 def _copy(cell: NotebookNode, source: str) -> NotebookNode:
-    copy: NotebookNode = nbformat.from_dict({**cell, "source": source})  # type: ignore[no-untyped-call]
-    copy.metadata = nbformat.from_dict(dict(cell.metadata))  # type: ignore[no-untyped-call]
-    if copy.cell_type == "code":
-        copy.outputs, copy.execution_count = [], None
-    return copy
+    same = copy.deepcopy(cell)
+    same.source = source
+    if same.cell_type == "code":
+        same.outputs, same.execution_count = [], None
+    return same
 
 
 def program(notebook: NotebookNode) -> Program:

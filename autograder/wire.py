@@ -27,12 +27,30 @@ class ChannelTimeout(Exception):  # noqa: N818
     """The other side did not answer before the deadline."""
 
 
+def parse(line: bytes) -> Any:
+    """Return what is in a line of JSON, in UTF-8.
+
+    Half of a surrogate pair is replaced, as `Channel.send` does: it is legal in JSON, but nothing
+    could write it again.
+
+    Raises:
+        ValueError: it is no JSON.
+        RecursionError: it is nested too deep.
+    """
+    text = line.decode("utf-8")
+    data = json.loads(text)
+    if "\\ud" in text.lower():
+        data = json.loads(json.dumps(data, ensure_ascii=False).encode(errors="replace"))
+    return data
+
+
 class Channel:
     """A line-based JSON channel over a connected stream socket."""
 
-    def __init__(self, sock: socket.socket) -> None:
-        """Take ownership of ``sock``."""
+    def __init__(self, sock: socket.socket, most: int = MAX_LINE) -> None:
+        """Take ownership of ``sock``; messages of more than ``most`` bytes are not received."""
         self._sock = sock
+        self._most = most
         self._buffer = b""
 
     def send(self, message: dict[str, Any]) -> None:
@@ -61,12 +79,12 @@ class Channel:
         """
         deadline = None if timeout is None else time.monotonic() + timeout
         while b"\n" not in self._buffer:
-            if len(self._buffer) > MAX_LINE:
-                raise ChannelBroken(f"a message of more than {MAX_LINE} bytes was sent")
+            if len(self._buffer) > self._most:
+                raise ChannelBroken(f"a message of more than {self._most} bytes was sent")
             self._fill(deadline)
         line, self._buffer = self._buffer.split(b"\n", 1)
         try:
-            message = json.loads(line)
+            message = parse(line)
         except (ValueError, RecursionError) as error:
             raise ChannelBroken("a message that is not JSON was sent") from error
         if not isinstance(message, dict):

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import codecs
 import json
-import os
-import stat
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from course.files import read_plain
 from quizzes.answers import Answer, number
 
 VERSION = 1
@@ -69,12 +68,7 @@ def handed_in(folder: Path, quiz: str) -> bytes:
         FileNotFoundError: there is no such file.
         OSError: it cannot be read.
     """
-    path = folder / filename(quiz)
-    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    with os.fdopen(handle, "rb") as file:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise OSError("it is not a plain file")
-        return file.read(MAX_FILE + 1)
+    return read_plain(folder / filename(quiz), MAX_FILE + 1)
 
 
 def parse(content: bytes) -> tuple[list[Attempt], int]:
@@ -95,6 +89,8 @@ def _attempt(line: bytes) -> Attempt:
     if len(line) > MAX_LINE:
         raise ValueError("too long")
     data = json.loads(line.decode("utf-8"))
+    # Half of a surrogate pair is legal in JSON, but no text that can be hashed or written.
+    json.dumps(data, ensure_ascii=False).encode("utf-8")
     if data["version"] != VERSION or not data.keys() <= Attempt.__dataclass_fields__.keys():
         raise ValueError("not of this version")
     for name in ("quiz", "student", "edition", "submitted"):

@@ -36,7 +36,7 @@ class Limits:
     data: int = 2048 * MIB
     tasks: int = 200
     processes: int = 48
-    busy: int = 8
+    busy: int = 12
     cpu: int = 300
     file: int = 64 * MIB
     open_files: int = 2048

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import os
 import re
+import resource
 import shutil
 import sqlite3
 import subprocess
+import time
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from nbgrader.api import Gradebook
 
-from autograder import engine, gradebook, grades_csv, submission
+from autograder import database as words
+from autograder import engine, gradebook, grades_csv, ledger, roster, submission
 from autograder.database import (
     DiskFullError,
     GradebookLockedError,
@@ -21,7 +26,7 @@ from autograder.database import (
     OldGradebookError,
 )
 from autograder.engine import AssignmentError, Graded
-from autograder.gradebook import CourseGradebook, Grade
+from autograder.gradebook import CourseGradebook, Grade, GradebookError
 from autograder.progress import Progress
 from tests.killing import fresh_copy
 from tests.machine import needs_own_mounts, needs_sandbox
@@ -247,8 +252,6 @@ def test_what_the_machine_is_short_of_costs_no_student_a_grade(
 
 
 def test_every_full_disk_is_recognised() -> None:
-    from autograder import database as words
-
     for said in (
         "database or disk is full",
         "[Errno 28] No space left on device",
@@ -256,6 +259,120 @@ def test_every_full_disk_is_recognised() -> None:
     ):
         assert isinstance(words.unusable(said, Path("/c")), DiskFullError)
     assert words.unusable("InvalidEntry: no such thing", Path("/c")) is None
+
+
+def test_a_disk_is_full_only_if_there_is_no_room(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = "ValidationError: No space left on device"
+    assert words.full(said, Path("/c"), [tmp_path, tmp_path]) is None
+    assert list(tmp_path.iterdir()) == []
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (words.ROOM - 1, limits[1]))
+    try:
+        assert isinstance(words.full(said, Path("/c"), [tmp_path]), DiskFullError)
+        assert words.full("ValidationError: no", Path("/c"), [tmp_path]) is None
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+
+
+def named(function: Callable[..., Any]) -> Callable[..., Any]:
+    function.__name__ = "autograde"
+    return function
+
+
+@pytest.mark.parametrize("said", ["No space left on device", "database is locked"])
+def test_what_a_student_writes_into_nbgraders_log_is_about_that_student_only(
+    course: Course, monkeypatch: pytest.MonkeyPatch, said: str
+) -> None:
+    book = CourseGradebook(course.root)
+    log = f"[ERROR] Traceback ...\nValidationError: On instance: {{'cell_type': '{said}'}}\n"
+    answer = {"success": False, "log": log, "error": "NbGraderException: See the above traceback"}
+    monkeypatch.setattr(book._api, "autograde", named(lambda *_, **__: answer))
+    started = time.monotonic()
+    with pytest.raises(GradebookError, match=r"ValidationError: On instance"):
+        book.autograde(ASSIGNMENT, "forger")
+    assert time.monotonic() - started < gradebook.LOCK_PATIENCE
+
+
+def test_whatever_goes_wrong_with_one_submission_stops_nobody(
+    course: Course, class_: Undisturbed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for student in ("looked-at", "staged", "entered"):
+        shutil.copytree(course.root / "submitted" / "right", course.root / "submitted" / student)
+    of_folder, remarks, autograde = ledger.of_folder, roster.remarks, CourseGradebook.autograde
+    refused: list[str] = []
+
+    def fails_to_look(folder: Path) -> str:
+        if "looked-at" in folder.parts:
+            raise RecursionError("too deep")
+        return of_folder(folder)
+
+    def fails_to_stage(folder: Path) -> list[str]:
+        if "staged" in folder.parts:
+            raise UnicodeError("no text")
+        return remarks(folder)
+
+    def fails_to_enter(self: CourseGradebook, assignment: str, student: str) -> None:
+        if student == "entered" and not refused:
+            refused.append(student)
+            raise GradebookError("nbgrader cannot.")
+        autograde(self, assignment, student)
+
+    monkeypatch.setattr(ledger, "of_folder", fails_to_look)
+    monkeypatch.setattr(roster, "remarks", fails_to_stage)
+    monkeypatch.setattr(CourseGradebook, "autograde", fails_to_enter)
+    graded = grade(course)
+    found = grades(course)
+
+    reasons = {
+        "looked-at": "(RecursionError: too deep): a person has to look at it",
+        "staged": "(UnicodeError: no text): a person has to look at it",
+        "entered": "nbgrader cannot.",
+    }
+    for student, reason in reasons.items():
+        assert graded[student].entered
+        assert reason in graded[student].problem
+        assert graded[student].points == found[student].score == 0
+        assert found[student].needs_manual_grade
+        copy = course.root / "autograded" / student / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
+        assert reason in copy.read_text(), "a person sees it there, and the student in the feedback"
+    assert {student: found[student] for student in class_.grades} == class_.grades
+
+    monkeypatch.undo()
+    later = grade(course)
+    assert {later[student].points for student in reasons} == {graded["right"].points}
+
+
+def test_grades_stand_although_feedback_on_them_cannot_be_written(
+    course: Course, class_: Undisturbed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    generate = CourseGradebook.generate_feedback
+
+    def fails(self: CourseGradebook, assignment: str, student: str) -> None:
+        if student == "right":
+            raise GradebookError("nbconvert cannot.")
+        generate(self, assignment, student)
+
+    monkeypatch.setattr(CourseGradebook, "generate_feedback", fails)
+    graded = {one.student: one for one in engine.grade(course.root, ASSIGNMENT)}
+    assert graded["right"].problem == "It is graded, but there is no feedback: nbconvert cannot."
+    assert grades(course) == class_.grades
+    monkeypatch.undo()
+    graded = {one.student: one for one in engine.grade(course.root, ASSIGNMENT)}
+    assert graded["right"].problem == ""
+    assert (course.root / "feedback" / "right" / ASSIGNMENT / f"{NOTEBOOK}.html").is_file()
+
+
+def test_who_is_left_out_by_the_configuration_is_left_out(
+    course: Course, class_: Undisturbed
+) -> None:
+    with (course.root / "nbgrader_config.py").open("a") as config:
+        config.write("\nc.CourseDirectory.student_id_exclude = 'same,nobody'\n")
+    graded = grade(course)
+    assert "student_id_exclude" in graded["same"].problem
+    rest = {student: one for student, one in class_.grades.items() if student != "same"}
+    assert grades(course) == rest
 
 
 def test_nobody_at_all_is_one_sentence(course: Course) -> None:

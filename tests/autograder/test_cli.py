@@ -52,6 +52,21 @@ def test_the_demo_ends_with_grades(tmp_path: Path) -> None:
 
 
 @needs_sandbox
+def test_the_name_of_a_folder_may_be_no_text(
+    course: Course, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONIOENCODING", "utf-8:strict")
+    course.folder(os.fsdecode(b"M\xfcller"))
+    course.folder("nobody")
+    table = autograder("grade", "ch05", cwd=course.root, code=1).stdout
+    assert "M\\udcfcller" in table
+    data = json.loads(autograder("grade", "ch05", "--json", cwd=course.root, code=1).stdout)
+    assert "rename the folder" in data["problems"][os.fsdecode(b"M\xfcller")]
+    assert [grade["student"] for grade in data["grades"]] == ["nobody"]
+    autograder("report", "ch05", cwd=course.root)
+
+
+@needs_sandbox
 @pytest.mark.timeout(900)
 def test_the_demo_of_all_exercises(tmp_path: Path) -> None:
     result = autograder("demo", "--all", "--dir", "here", "--json", cwd=tmp_path, timeout=850)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -54,6 +55,17 @@ def exam(monkeypatch: pytest.MonkeyPatch) -> Exam[list[str]]:
 
 
 BENCH: Any = None
+
+
+def test_what_a_check_quotes_is_cut(exam: Exam[list[str]]) -> None:
+    exam.checks["second"] = replace(exam.checks["second"], run=quotes)
+    actual = exam.sit("visible", BENCH).checks[1].actual
+    assert len(actual) < 8000
+    assert actual.endswith("x [993000 more]")
+
+
+def quotes(rig: list[str]) -> None:
+    raise Failed(expected="a word", actual="x" * 1_000_000)
 
 
 def test_a_check_whose_need_failed_is_not_checked(exam: Exam[list[str]]) -> None:

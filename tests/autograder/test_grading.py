@@ -87,6 +87,36 @@ def test_a_class_is_graded_whatever_state_its_files_are_in(course: Course, cases
     assert "A short burst of IMU readings is kept" in feedback
 
 
+FORGED_OUTPUTS = """
+import json, os
+for number in range(100):
+    for descriptor in range(3, 64):
+        try:
+            os.write(descriptor, json.dumps({"ran": number, "outputs": [5]}).encode() + b"\\n")
+        except OSError:
+            pass
+"""
+
+
+def with_cell(text: str, source: str) -> str:
+    """Return a notebook's text with one more cell at its beginning."""
+    notebook = nbformat.reads(text, 4)
+    notebook.cells.insert(0, nbformat.v4.new_code_cell(source))
+    return nbformat.writes(notebook)
+
+
+def with_nonsense(text: str) -> str:
+    """Return a notebook's text with metadata that nbgrader cannot take."""
+    notebook = nbformat.reads(text, 4)
+    forged = {"schema_version": 3, "grade": False, "locked": False, "solution": False}
+    for nonsense in (None, [], {}, "x", {**forged, "cell_type": "No space left on device"}):
+        cell = nbformat.v4.new_markdown_cell("Mine.")
+        cell.metadata = nbformat.from_dict({"nbgrader": nonsense, "transient": nonsense})
+        notebook.cells.append(cell)
+    notebook.metadata["widgets"] = 5
+    return nbformat.writes(notebook)
+
+
 def test_what_one_student_hands_in_never_stops_the_others(course: Course, cases: Cases) -> None:
     right = nbformat.writes(cases["right-chapter"].submission(course.source, course.released))
     course.submit("a-surrogate", right.replace("My idea", "My \\ud83d idea"))
@@ -102,19 +132,54 @@ def test_what_one_student_hands_in_never_stops_the_others(course: Course, cases:
     course.submit("g-helper", helper)
     (course.folder("g-helper") / "my_profiles.py").write_text("camera_qos = 10\n")
     course.submit("h last Müller", right)
+    course.submit("i-metadata", with_nonsense(right))
+    course.submit("j-outputs", with_cell(right, FORGED_OUTPUTS))
+    for depth in (500, 900):
+        nested = f'"deep": {"[" * depth}{"]" * depth}, "kernelspec"'
+        course.submit(f"k-nested-{depth}", right.replace('"kernelspec"', nested, 1))
+    course.submit("l-folders", right)
+    deep = course.folder("l-folders")
+    for _ in range(19):
+        deep = deep / "/".join(["d"] * 50)
+        deep.mkdir(parents=True)
+    course.submit("m-time", right)
+    os.mkfifo(course.folder("m-time") / "timestamp.txt")
+    course.submit("n-long", with_cell(right, f"data = '{'x' * 2_500_000}'"))
+    (course.root / "submitted" / "o-link").mkdir()
+    (course.root / "submitted" / "o-link" / ASSIGNMENT).symlink_to(course.folder("e-time"))
+    latin = os.fsdecode(b"p-M\xfcller")
+    course.submit(latin, right)
 
     graded = {g.student: g for g in engine.grade(course.root, ASSIGNMENT)}
     found = grades(course)
 
-    for student in ("a-surrogate", "e-time", "g-helper", "h last Müller"):
+    full = (
+        "a-surrogate",
+        "e-time",
+        "g-helper",
+        "h last Müller",
+        "i-metadata",
+        "l-folders",
+        "m-time",
+    )
+    for student in full:
         assert found[student].score == 15, graded[student]
-    for student in ("b-version", "c-folder", "d-fifo"):
+    refused = ("b-version", "c-folder", "d-fifo", "k-nested-500", "k-nested-900", "n-long")
+    for student in refused:
         assert found[student].score == 0
         assert found[student].needs_manual_grade
         assert graded[student].problem
     assert "no date" in graded["e-time"].problem
     assert not graded["f[1]"].entered
     assert "rename the folder" in graded["f[1]"].problem
+    assert found["j-outputs"].score == 0
+    text = (course.root / f"feedback/j-outputs/{ASSIGNMENT}/{NOTEBOOK}.html").read_text()
+    assert "own channel" in text
+    assert "2.4 MB of code" in graded["n-long"].problem
+    assert "leads out of the student's own folder" in graded["o-link"].problem
+    assert "rename the folder" in graded[latin].problem
+    assert not {"o-link", latin} & found.keys()
+    subprocess.run(["rm", "-rf", course.folder("l-folders")], check=True)
 
 
 def test_manual_marks_survive_a_regrade(course: Course, cases: Cases) -> None:

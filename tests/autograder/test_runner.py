@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from autograder import runner
+from autograder import jobs, runner
 from autograder.processes import ExaminerProcess
 from autograder.runner import Outcome
 from autograder.sandbox import BoxError
@@ -110,6 +110,57 @@ def test_nothing_that_a_student_prints_is_a_verdict() -> None:
     forged = 'print(\'{"version": 1, "exam": "qos", "part": "visible", "checks": []}\')'
     outcome = runner.run(program(forged))
     assert outcome.verdicts["qos-visible"].score == 0
+
+
+FORGED = """
+import json, os, sys
+outputs = {outputs}
+line = json.dumps({{"ran": 0, "outputs": outputs}}).encode() + b"\\n"
+for descriptor in range(3, 64):
+    try:
+        os.write(descriptor, line)
+    except OSError:
+        pass
+"""
+
+
+@pytest.mark.parametrize(
+    "outputs",
+    [
+        [5], [{}], [{"output_type": "stream", "name": "stdout", "text": ["x"]}],
+        [{"output_type": "display_data", "data": {"text/plain": 5}, "metadata": {}}],
+        [{"output_type": "display_data", "data": {}, "metadata": {}, "more": 1}],
+        [{"output_type": "execute_result", "data": {"text/plain": "10.0"}, "metadata": {}}],
+        [{"output_type": "error", "ename": "E", "evalue": "", "traceback": [5]}],
+    ],
+)  # fmt: skip
+def test_outputs_that_are_none_are_not_taken(outputs: list[Any]) -> None:
+    outcome = runner.run(program(FORGED.format(outputs=outputs)))
+    ((status, reason),) = verdict_reasons(outcome)
+    assert (status, "the grader's own channel" in reason) == ("not_checked", True)
+    assert outcome.outputs == [[], []]
+
+
+def test_what_is_forged_as_an_output_can_be_written() -> None:
+    source = FORGED.format(outputs=[{"output_type": "stream", "name": "stdout", "text": "\ud800"}])
+    assert text_of(runner.run(program(source)).outputs[0]) == "?"
+
+
+def test_a_cell_that_was_not_reached_is_not_right() -> None:
+    """For nbgrader, an instructor's own test cell without any output has all its points."""
+    cells = (Cell("x = 1", "mine"), Cell("import os; os._exit(1)", "ends"), Cell("1", "own"))
+    outcome = runner.run((*cells, EXAM))
+    assert outcome.outputs == [[], [runner.NOT_RUN], [runner.NOT_RUN], []]
+    refused = runner.refuse((*cells, EXAM), "It is no notebook.")
+    assert refused.outputs == [[runner.NOT_RUN]] * 3 + [[]]
+
+
+def test_of_outputs_that_are_too_many_the_errors_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    outcome = runner.run((Cell("print('x' * 1000)\nassert False, 'y' * 1000", "own"),))
+    monkeypatch.setattr(jobs, "MAX_OUTCOME", 1000)
+    ((error,),) = jobs.bounded(outcome).outputs
+    assert error == {**runner.NOT_RUN, "ename": "AssertionError", "evalue": "y" * 200,
+                     "traceback": []}  # fmt: skip
 
 
 def test_exit_in_a_cell_does_not_end_the_notebook() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 from pathlib import Path
 
 import nbformat
@@ -11,8 +12,9 @@ import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from autograder import submission
+from autograder import bounds, files, ledger, submission
 from autograder.submission import SubmissionError
+from autograder.wire import MAX_LINE
 
 
 def cell(grade_id: str, source: str, **flags: bool) -> NotebookNode:
@@ -111,12 +113,26 @@ def test_foreign_grade_cells_are_disarmed() -> None:
     assert "gift" in notes[0]
 
 
-@pytest.mark.parametrize("nonsense", [None, [], "x", {"grade_id": ["a"]}, {"grade_id": None}])
-def test_nonsense_in_metadata_is_ignored(nonsense: object) -> None:
+FORGED = {"schema_version": 3, "grade": False, "locked": False, "solution": False}
+
+
+@pytest.mark.parametrize(
+    "nonsense",
+    [
+        None, [], {}, "x", {"grade_id": ["a"]}, {"grade_id": None},
+        {**FORGED, "cell_type": "No space left on device"},
+    ],
+)  # fmt: skip
+def test_nonsense_in_metadata_reaches_nobody(nonsense: object) -> None:
     nb = notebook()
-    nb.cells[0].metadata["nbgrader"] = nonsense
+    nb.metadata["widgets"] = nonsense
+    nb.cells[0].metadata = nbformat.from_dict({"nbgrader": nonsense, "transient": nonsense})
+    nb.cells[2].metadata["transient"] = nonsense
     mended, _ = restored(nb)
     assert ids(mended)[1:] == ["given", "qos-solution", "qos-visible", "tail"]
+    assert mended.cells[0].metadata == {}
+    assert mended.cells[2].metadata == RELEASED.cells[2].metadata
+    assert mended.metadata == {**RELEASED.metadata, "kernelspec": {}}
 
 
 def test_the_program_names_where_exams_are_sat() -> None:
@@ -177,6 +193,41 @@ def test_a_huge_notebook_is_refused_unread(tmp_path: Path, monkeypatch: pytest.M
         submission.read(path)
 
 
+@pytest.mark.parametrize("depth", [200, 500, 900, 5000])
+def test_a_notebook_that_is_nested_too_deep_is_refused(tmp_path: Path, depth: int) -> None:
+    path = tmp_path / "qos-design.ipynb"
+    text = json.dumps(nbformat.from_dict(notebook()))
+    path.write_text(
+        text.replace('"metadata": {}', f'"metadata": {{"x": {"[" * depth}{"]" * depth}}}', 1)
+    )
+    with pytest.raises(SubmissionError, match=r"nested|not valid JSON"):
+        submission.read(path)
+
+
+def test_more_cells_than_anybody_writes_are_refused(tmp_path: Path) -> None:
+    nb = notebook()
+    nb.cells += [new_code_cell("x = 1") for _ in range(1000)]
+    nbformat.write(nb, tmp_path / "qos-design.ipynb")
+    with pytest.raises(SubmissionError, match="has 1005 cells, more than the 1000"):
+        submission.read(tmp_path / "qos-design.ipynb")
+
+
+@pytest.mark.parametrize("letter", ["x", "\x01", "ü"])
+def test_code_that_no_channel_carries_is_refused(tmp_path: Path, letter: str) -> None:
+    nb = notebook()
+    path = tmp_path / "qos-design.ipynb"
+    sizes = {"x": 1, "\x01": 6, "ü": 2}
+    nb.cells[2].source = letter * ((bounds.MAX_CODE - 200) // sizes[letter])
+    nbformat.write(nb, path)
+    program = submission.program(submission.read(path))
+    told = json.dumps({"cells": [vars(cell) for cell in program]}, ensure_ascii=False)
+    assert len(told.encode()) < MAX_LINE
+    nb.cells[2].source += letter * 200
+    nbformat.write(nb, path)
+    with pytest.raises(SubmissionError, match=r"has 1\.0 MB of code.*into a file beside it"):
+        submission.read(path)
+
+
 def test_half_a_surrogate_pair_is_replaced(tmp_path: Path) -> None:
     nb = notebook()
     path = tmp_path / "qos-design.ipynb"
@@ -211,6 +262,52 @@ def test_other_files_of_a_submission_are_found_and_links_are_not(tmp_path: Path)
     (tmp_path / "link.py").symlink_to("/etc/hostname")
     (tmp_path / "away").symlink_to("/etc")
     assert submission.extras(tmp_path) == {"pack/more.py": b"x = 1", "profiles.py": b"depth = 5"}
+
+
+@pytest.mark.parametrize("linked", ["submitted", "submitted/bob"])
+def test_other_files_are_found_where_a_folder_above_is_a_link(tmp_path: Path, linked: str) -> None:
+    disk = tmp_path / "another-disk"
+    place = tmp_path / linked
+    place.parent.mkdir(exist_ok=True)
+    place.symlink_to(disk)
+    folder = tmp_path / "submitted" / "bob" / "ch05"
+    disk.mkdir()
+    folder.mkdir(parents=True)
+    (folder / "profiles.py").write_text("depth = 5")
+    assert submission.extras(folder) == {"profiles.py": b"depth = 5"}
+
+
+def test_of_very_many_files_the_upper_ones_are_taken(tmp_path: Path) -> None:
+    (tmp_path / "profiles.py").write_text("depth = 5")
+    deep = tmp_path / "many"
+    deep.mkdir()
+    for number in range(files.MAX_FILES):
+        (deep / f"{number:05}.py").touch()
+    found = submission.extras(tmp_path)
+    assert len(found) == files.MAX_FILES
+    assert "profiles.py" in found
+
+
+def nested(folder: Path, depth: int, name: str) -> None:
+    """Make a file under so many folders: more than a path can name."""
+    handle = os.open(folder, os.O_RDONLY)
+    for _ in range(depth):
+        os.mkdir("d", dir_fd=handle)
+        below = os.open("d", os.O_RDONLY, dir_fd=handle)
+        os.close(handle)
+        handle = below
+    os.close(os.open(name, os.O_CREAT | os.O_WRONLY, dir_fd=handle))
+    os.close(handle)
+
+
+@pytest.mark.parametrize("depth", [3, 1000, 3000])
+def test_folders_within_folders_are_looked_through_up_to_a_depth(
+    tmp_path: Path, depth: int
+) -> None:
+    nested(tmp_path, depth, "deep.py")
+    assert len(submission.extras(tmp_path)) == (1 if depth == 3 else 0)
+    assert ledger.of_folder(tmp_path)
+    subprocess.run(["rm", "-rf", tmp_path / "d"], check=True)  # pytest's own way is recursive
 
 
 def test_cells_that_were_moved_are_noted() -> None:

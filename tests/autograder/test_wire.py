@@ -53,6 +53,19 @@ def test_what_is_no_json_object_closes_the_channel(
         channel.receive(5)
 
 
+@pytest.mark.parametrize("half", [b"\\uD83D", b"\\udc00", b"\xed\xa0\x80"])
+def test_half_a_surrogate_pair_never_arrives(
+    ends: tuple[Channel, socket.socket], half: bytes
+) -> None:
+    channel, theirs = ends
+    theirs.sendall(b'{"' + half + b'": ["' + half + b'"], "whole": "\\ud83d\\ude00"}\n')
+    if half[:1] == b"\xed":
+        with pytest.raises(ChannelClosed, match="not JSON"):
+            channel.receive(5)
+    else:
+        assert channel.receive(5) == {"?": ["?"], "whole": "\U0001f600"}
+
+
 def test_an_endless_line_is_refused(ends: tuple[Channel, socket.socket]) -> None:
     channel, theirs = ends
     flood = threading.Thread(target=theirs.sendall, args=(b"x" * (MAX_LINE + 70_000),), daemon=True)

@@ -1,5 +1,5 @@
 # title: A hundred threads that never rest
-# told: it kept more than 8 processes and threads busy
+# told: it kept more than 12 processes and threads busy
 
 import hashlib
 import threading

@@ -1,5 +1,5 @@
 # title: Forty processes that never rest, each in a session of its own
-# told: it kept more than 8 processes and threads busy
+# told: it kept more than 12 processes and threads busy
 
 import os
 

@@ -1,0 +1,69 @@
+"""Folders of students that are not what they should be: known before anything is run."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from autograder import roster
+from autograder.roster import Roster
+
+
+@pytest.fixture
+def submitted(tmp_path: Path) -> Path:
+    (tmp_path / "submitted" / "alice" / "ch05").mkdir(parents=True)
+    return tmp_path / "submitted"
+
+
+def found(submitted: Path) -> tuple[list[str], dict[str, str]]:
+    return roster.submissions(submitted.parent, "ch05", Roster())
+
+
+def test_a_link_to_what_another_student_handed_in_is_refused(submitted: Path) -> None:
+    (submitted / "bob").mkdir()
+    (submitted / "bob" / "ch05").symlink_to("../alice/ch05")
+    (submitted / "carol").symlink_to("alice")
+    good, wrong = found(submitted)
+    assert good == ["alice"]
+    assert "leads out of the student's own folder" in wrong["bob"]
+    assert "a link to what another student handed in" in wrong["carol"]
+
+
+def test_links_that_an_instructor_makes_are_followed(submitted: Path, tmp_path: Path) -> None:
+    disk = tmp_path / "another-disk"
+    (disk / "dora" / "ch05").mkdir(parents=True)
+    (submitted / "dora").symlink_to(disk / "dora")
+    (submitted / "emil" / "late").mkdir(parents=True)
+    (submitted / "emil" / "ch05").symlink_to("late")
+    submitted.rename(tmp_path / "elsewhere")
+    submitted.symlink_to(tmp_path / "elsewhere")
+    assert found(submitted) == (["alice", "dora", "emil"], {})
+
+
+@pytest.mark.parametrize("kind", ["pipe", "huge", "link", "folder", "no date"])
+def test_a_time_stamp_that_is_none_is_not_waited_for(tmp_path: Path, kind: str) -> None:
+    file = tmp_path / "timestamp.txt"
+    if kind == "pipe":
+        os.mkfifo(file)
+    elif kind == "huge":
+        file.write_text("2026-01-01 12:00:00" + " " * 1000)
+    elif kind == "link":
+        (tmp_path / "another").write_text("2026-01-01 12:00:00")
+        file.symlink_to(tmp_path / "another")
+    elif kind == "folder":
+        file.mkdir()
+    else:
+        file.write_text("yesterday")
+    assert roster.timestamp(file) is None
+    assert roster.remarks(tmp_path) == [
+        "timestamp.txt holds no date, so the time of submission is unknown."
+    ]
+
+
+def test_a_time_stamp_is_read(tmp_path: Path) -> None:
+    assert roster.remarks(tmp_path) == []
+    (tmp_path / "timestamp.txt").write_text("2026-01-01 12:00:00 UTC\n")
+    assert roster.timestamp(tmp_path / "timestamp.txt") == "2026-01-01 12:00:00 UTC"
+    assert roster.remarks(tmp_path) == []
