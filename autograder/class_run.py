@@ -244,10 +244,12 @@ class ClassRun:
         self._graded.append(replace(graded, outcomes={}))
 
     def _enter(self, work: Work) -> Graded:
+        before = self._ledger.get(work.student)
+        same = before is not None and before.is_of(work.made_of)
         self._ledger.remove(work.student)
         try:
             graded = _summary(work, self._desk.notebooks)
-            standing = self._desk.enter(work)
+            standing = self._desk.enter(work, same=same)
             missing = self._missing_feedback(work)
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
             work.failure = _reason(error)

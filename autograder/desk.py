@@ -115,10 +115,11 @@ class Desk:
         assert piece.job is not None
         return runner.refuse(piece.job.program, reason, status)
 
-    def enter(self, work: Work) -> Standing:
+    def enter(self, work: Work, *, same: bool = False) -> Standing:
         """Enter one student's outcomes into the gradebook; return how the student then stands.
 
-        Only ever in the one writer.
+        Only ever in the one writer. ``same`` says that it is the submission that was entered the
+        last time: then what a person has graded need not be looked at again.
 
         Raises:
             GradebookError: nbgrader cannot enter this student.
@@ -126,6 +127,7 @@ class Desk:
         """
         for name, outcome in work.outcomes.items():
             bridge.prepared[self.assignment, work.student, name] = outcome
+        settled = self.gradebook.settled(self.assignment, work.student) if same else {}
         try:
             self.gradebook.autograde(self.assignment, work.student)
         finally:
@@ -138,6 +140,9 @@ class Desk:
                 f"nbgrader entered nothing for {work.student}, and did not say why: look whether "
                 "nbgrader_config.py leaves this student out."
             )
+        if settled:
+            self.gradebook.settle(self.assignment, work.student, settled)
+            standings = self.gradebook.standings(self.assignment, work.student)
         return standings[work.student]
 
     def _stage(self, student: str) -> Path:

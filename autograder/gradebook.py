@@ -115,6 +115,32 @@ class CourseGradebook:
         """The students whom nbgrader passes over, as the course's configuration says."""
         return frozenset(self.coursedir.student_id_exclude.split(",")) - {""}
 
+    def settled(self, assignment: str, student: str) -> dict[tuple[str, str], float | None]:
+        """Return {(notebook, cell): automatic score} of what a person has graded for good."""
+        with self._open() as gradebook:
+            return {
+                (notebook.name, grade.name): grade.auto_score
+                for submission in gradebook.assignment_submissions(assignment)
+                if submission.student_id == student
+                for notebook in submission.notebooks
+                for grade in notebook.grades
+                if grade.manual_score is not None and not grade.needs_manual_grade
+            }
+
+    def settle(
+        self, assignment: str, student: str, cells: dict[tuple[str, str], float | None]
+    ) -> None:
+        """Take a person's grades for good again, wherever the automatic score is still the same.
+
+        nbgrader wants each to be looked at again after autograding, as the work may be another.
+        """
+        with self._open() as gradebook:
+            for (notebook, cell), score in cells.items():
+                grade = gradebook.find_grade(cell, notebook, assignment, student)
+                if grade.manual_score is not None and grade.auto_score == score:
+                    grade.needs_manual_grade = False
+            gradebook.db.commit()
+
     def roster(self) -> Roster:
         """Return which students the gradebook knows, and whether there may be others."""
         with self._open() as gradebook:

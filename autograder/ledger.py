@@ -37,7 +37,7 @@ class Entry:
     """A record of one student's grades.
 
     Attributes:
-        made_of: digest of the submission and of all that its grades depend on.
+        made_of: digest of all that its grades depend on, a blank, and that of the submission.
         standing: how they stood in the gradebook afterwards.
         points: automatic points, of ``max_points``.
         seconds: wall time that the submission's notebooks ran.
@@ -52,6 +52,10 @@ class Entry:
     seconds: float
     problem: str
     feedback: bool
+
+    def is_of(self, made_of: str) -> bool:
+        """Whether the submission is the same, whatever became of the assignment meanwhile."""
+        return self.made_of.split()[-1] == made_of.split()[-1]
 
 
 class Ledger:

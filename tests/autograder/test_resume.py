@@ -126,6 +126,11 @@ def test_marks_that_a_person_gives_get_into_the_feedback(
     assert seen.run == 3
     found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
     assert found["right"].score == class_.grades["right"].score + 4
+    assert not found["right"].needs_manual_grade, "the work is the same"
+    course.submit("right", course.released)
+    again(course)
+    found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    assert found["right"].needs_manual_grade, "the work is another"
 
 
 def test_a_penalty_for_lateness_is_taken_off(class_: Undisturbed, tmp_path: Path) -> None:
@@ -213,7 +218,7 @@ def test_a_machine_that_goes_on_refusing_ends_the_run_with_the_reason(
 ) -> None:
     course = course_of(class_, tmp_path, graded=False)
     refuse(tmp_path, monkeypatch, 1000)
-    with pytest.raises(SandboxError, match=r"submission in 3 tries \(.*out of processes"):
+    with pytest.raises(SandboxError, match=r"not be started in 3 tries \(.*out of processes"):
         engine.grade(course.root, ASSIGNMENT, jobs=1)
     (tmp_path / "left").write_text("0")
     engine.grade(course.root, ASSIGNMENT, jobs=1)
