@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import os
+import signal
 import sys
 
 from course.platform_check import UnsupportedPlatformError, require_supported_platform
@@ -32,4 +33,8 @@ def _run(name: str) -> None:
     # whose folder need not be on the PATH (as with pipx).
     scripts = os.path.dirname(sys.executable)  # noqa: PTH120 - nothing else is imported yet
     os.environ["PATH"] = os.pathsep.join([scripts, os.environ.get("PATH", os.defpath)])
-    importlib.import_module(f"{name}.cli").main()
+    try:
+        importlib.import_module(f"{name}.cli").main()
+    except KeyboardInterrupt:  # it takes a second until the command itself sees to Ctrl-C
+        sys.stderr.write(f"{name}: stopped.\n")
+        sys.exit(128 + signal.SIGINT)

@@ -77,7 +77,8 @@ class Engine:
                 (os.killpg if group else os.kill)(process.pid, signum)
                 os.killpg(process.pid, signal.SIGCONT)
             said = "".join(process.communicate(timeout=60))
-        if "Traceback" in said:
+        # Python's own, of an engine that has not begun yet, is none of ours.
+        if "Traceback" in said and f"{os.sep}autograder{os.sep}" in said:
             raise LostError(said)
         _, alive = psutil.wait_procs(children, timeout=GONE)
         if alive:
