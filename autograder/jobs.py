@@ -11,7 +11,6 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from autograder import descriptors, digests, runner, sandbox
 from autograder.runner import Outcome
@@ -112,16 +111,5 @@ def bounded(outcome: Outcome) -> Outcome:
     """Return an outcome that is small enough to keep and to send: verdicts before outputs."""
     if len(outcome.to_json()) <= MAX_OUTCOME:
         return outcome
-    note = "The notebook printed more than is kept, so its outputs were left out."
-    outputs = [[_short(one) for one in of_cell if _counts(one)] for of_cell in outcome.outputs]
-    return replace(outcome, outputs=outputs, notes=[*outcome.notes, note])
-
-
-def _counts(output: dict[str, Any]) -> bool:
-    """Whether nbgrader takes a test cell with such an output for failed."""
-    return output["output_type"] == "error" or output.get("name") == "stderr"
-
-
-def _short(output: dict[str, Any]) -> dict[str, Any]:
-    cut = {name: text[:200] for name, text in output.items() if isinstance(text, str)}
-    return {**output, **cut, "traceback": []} if "traceback" in output else {**output, **cut}
+    outputs = [runner.shortened(of_cell) for of_cell in outcome.outputs]
+    return replace(outcome, outputs=outputs, notes=[*outcome.notes, runner.TOO_MUCH])

@@ -31,6 +31,14 @@ NOT_RUN = {
 }  # fmt: skip
 """The output of a cell with a grade id that was not reached: nbgrader takes none for right."""
 
+MAX_OUTPUTS = 8 * 1024 * 1024
+"""Characters of outputs, as JSON, that are kept of a notebook; a subject sends 64 kB of a cell."""
+
+TOO_MUCH = "The notebook printed more than is kept, so some of its outputs were left out."
+
+MOST_NOTES = 20
+"""Remarks on cells that raised; a notebook may have a thousand."""
+
 NO_FILES: Mapping[str, bytes] = {}
 
 
@@ -127,7 +135,7 @@ def _follow(
     cell_timeout: float,
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
-    moved_on, number = True, 0
+    moved_on, number, room = True, 0, MAX_OUTPUTS
     try:
         _await(channel, subject)
         channel.send({"cells": [_shown(cell) for cell in program]})
@@ -145,8 +153,12 @@ def _follow(
                     return
             else:
                 moved_on = True
-                outcome.outputs[number] = _outputs(message, number)
+                outcome.outputs[number] = outputs = _outputs(message, number)
                 _note_error(outcome, number)
+                before, room = room, room - len(json.dumps(outputs))
+                if room < 0:
+                    outcome.outputs[number] = shortened(outputs)
+                    outcome.notes += [TOO_MUCH] if before >= 0 else []
     except ChannelTimeout:
         _give_up(
             program,
@@ -216,9 +228,19 @@ def _is_output(output: Any) -> bool:
     return False
 
 
+def shortened(outputs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return what is kept of a cell's outputs if there are too many: why nbgrader fails a test."""
+    kept = []
+    for output in outputs:
+        if output["output_type"] == "error" or output.get("name") == "stderr":
+            cut = {name: text[:200] for name, text in output.items() if isinstance(text, str)}
+            kept.append({**output, **cut, **({"traceback": []} if "traceback" in output else {})})
+    return kept[-1:]
+
+
 def _note_error(outcome: Outcome, number: int) -> None:
     for output in outcome.outputs[number]:
-        if output["output_type"] == "error":
+        if output["output_type"] == "error" and len(outcome.notes) < MOST_NOTES:
             what = f"{output.get('ename')}: {output.get('evalue')}"
             outcome.notes.append(f"Code cell {number + 1} of the notebook raised {what[:300]}")
 

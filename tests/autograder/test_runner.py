@@ -163,6 +163,15 @@ def test_of_outputs_that_are_too_many_the_errors_are_kept(monkeypatch: pytest.Mo
                      "traceback": []}  # fmt: skip
 
 
+def test_what_all_cells_print_and_raise_is_bounded_together() -> None:
+    outcome = runner.run((Cell("print('x' * 60_000)\n1 / 0"),) * 200)
+    assert len(outcome.to_json()) < runner.MAX_OUTPUTS + 200_000
+    assert outcome.outputs[0][0]["output_type"] == "stream"
+    assert [output["ename"] for output in outcome.outputs[-1]] == ["ZeroDivisionError"]
+    assert outcome.notes.count(runner.TOO_MUCH) == 1
+    assert len(outcome.notes) == runner.MOST_NOTES + 1
+
+
 def test_exit_in_a_cell_does_not_end_the_notebook() -> None:
     outcome = runner.run((Cell("import sys; sys.exit(0)"), Cell("'still here'")))
     assert outcome.outputs[1][0]["data"]["text/plain"] == "'still here'"
