@@ -232,14 +232,22 @@ def test_the_labs_scenarios_are_buttons_that_keys_press(open_cells: Open) -> Non
 
 def test_what_is_read_only_stays_so_and_gaps_and_drops_are_marked(open_cells: Open) -> None:
     page = open_cells(
-        "from rcl_interfaces.msg import ParameterDescriptor\n"
-        "_ = robot.declare_parameter('serial', 'x1', ParameterDescriptor(read_only=True))",
+        "from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor\n"
+        "_ = robot.declare_parameter('serial', 'x1', ParameterDescriptor(read_only=True))\n"
+        "wide = [FloatingPointRange(from_value=0.0, to_value=2.0)]\n"
+        "wide = ParameterDescriptor(floating_point_range=wide)\n"
+        "_ = robot.declare_parameter('gain', 1.0, wide)",
         'session.parameters("robot")',
         'session.timeline("chatter", window=60.0)',
     )
     panel = region(page, "Parameter panel")
     expect(panel.get_by_label("speed")).to_be_enabled()
     expect(panel.get_by_label("serial")).to_be_disabled()
+    gain = panel.get_by_role("slider", name="gain")  # 1.0 is no whole number
+    expect(gain).to_have_attribute("step", "any")
+    gain.focus()
+    page.page.keyboard.press("ArrowRight")
+    expect(gain).to_have_value(re.compile(r"1\.\d+"))
     timeline = region(page, "Timeline")
     expect(timeline.locator(".rostimeline-rate")).to_have_attribute("points", re.compile(r"\S"))
     # The hidden reader keeps the last 1000: what is published while it is held is lost.

@@ -36,7 +36,7 @@ function row(entry, id, send) {
   const input = make("input", {
     id, type: slider ? "range" : entry.kind === "checkbox" ? "checkbox" : "text",
     min: entry.least, max: entry.most,
-    step: slider ? entry.step ?? (Number.isInteger(entry.least) && Number.isInteger(entry.value) ? 1 : "any") : null,
+    step: slider ? entry.step ?? "any" : null,
     disabled: entry.read_only, "aria-describedby": `${id}-about`, spellcheck: "false",
     onchange: () => {
       awaited = Math.max(awaited, drawn) + 1;
