@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import threading
 import time
@@ -95,6 +96,8 @@ class _Wrapped:
         self.callback: Any = coroutine
         if not inspect.iscoroutinefunction(original):
             self.callback = plain
+        # What is said of it, and its errors above all, names the learner's own callback.
+        functools.update_wrapper(self.callback, original, updated=())
         # rclpy reads the signature to know what to pass, and a moment lies between its two notes of
         # it: a message in that moment comes without its information.
         self.callback.__signature__ = inspect.signature(_with_info)

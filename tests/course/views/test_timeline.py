@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from pathlib import Path
 from typing import Any
@@ -134,7 +135,42 @@ def test_a_callback_that_raises_is_reported_as_ever(session: Session) -> None:
     session.publish("chatter", String())
     session.until(lambda: session.errors)
     assert str(session.errors[0].exception) == "as ever"
+    assert session.errors[0].callback == "test_a_callback_that_raises_is_reported_as_ever.broken"
     assert len(tap.since(0)) == 1
+
+
+class Broken:
+    """Can be called as a callback, and has no name of its own."""
+
+    def __call__(self, _message: String) -> None:
+        raise ZeroDivisionError
+
+    def method(self, _extra: int, _message: String) -> None:
+        raise ZeroDivisionError
+
+
+@pytest.mark.parametrize(
+    ("callback", "name"),
+    [
+        (functools.partial(Broken().method, 1), "Broken.method"),
+        (Broken(), "Broken.__call__"),
+    ],
+    ids=["partial", "callable"],
+)
+def test_a_callback_keeps_its_name_under_a_timeline(
+    session: Session, callback: Any, name: str
+) -> None:
+    node = session.run(lambda: Node("n"))
+    node.create_subscription(String, "chatter", callback, 10)
+    tap = CallbackTap("/chatter")
+    for listens in (False, True):
+        if listens:
+            tap.watch([node])
+        known = sum(error.count for error in session.errors)
+        session.publish("chatter", String())
+        session.until(lambda known=known: sum(e.count for e in session.errors) > known)  # type: ignore[misc]
+    assert len(tap.since(0)) == 1
+    assert [error.callback for error in session.errors] == [name]
 
 
 def test_its_messages_can_be_saved(session: Session, tmp_path: Path) -> None:
