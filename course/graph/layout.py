@@ -83,6 +83,11 @@ class _Link:
     bad: str = ""
 
 
+def count(graph: Graph) -> int:
+    """Return how many boxes a drawing of ``graph`` has; no place is worked out for them."""
+    return sum(1 for _ in _things(graph))
+
+
 def draw(graph: Graph) -> Drawing:
     """Return a drawing of ``graph`` with its arrows from publisher to subscription."""
     things = {(thing.kind, thing.name): thing for thing in _things(graph)}
