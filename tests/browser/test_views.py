@@ -124,6 +124,30 @@ def test_nodes_come_and_go_in_the_graph(open_cells: Open) -> None:
     expect(graph.locator("svg text", has_text="/listener")).to_be_visible()
 
 
+def test_a_graph_that_cannot_be_drawn_says_why_in_its_place(open_cells: Open) -> None:
+    page = open_cells(
+        "session.graph()",
+        "broken = session.graph()\n"
+        "def look(): raise OSError('no graph today')\n"
+        "broken.look = look\n"
+        "broken",
+        "session.graph()",
+    )
+    graph, broken, second = region(page, "ROS graph").all()
+    expect(broken.get_by_role("status")).to_contain_text("This view has stopped (OSError: no graph")
+    expect(second.locator("svg text", has_text="/robot")).to_be_visible()
+    # Each view draws with arrows of its own: no id is on the page twice.
+    ids = page.page.locator("marker").evaluate_all("all => all.map(marker => marker.id)")
+    assert len(ids) == len(set(ids)) == 4
+    crowd = "crowd = [robot.create_publisher(String, f't{n}', 1) for n in range(160)]"
+    run_in_kernel(page, f"from std_msgs.msg import String\n{crowd}")
+    expect(graph.locator(".rosview-stage")).to_contain_text("nobody can follow a drawing of more")
+    expect(graph.locator("svg")).to_have_count(0)
+    run_in_kernel(page, "for publisher in crowd: robot.destroy_publisher(publisher)")
+    expect(graph.locator("svg text", has_text="/robot")).to_be_visible()
+    assert page.errors == []
+
+
 def test_a_cell_that_runs_again_has_one_live_view(open_cells: Open) -> None:
     page = open_cells('view = session.timeline("chatter")\nview', "view", "session.graph()")
     expect(region(page, "Timeline")).to_have_count(2)

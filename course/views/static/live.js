@@ -73,7 +73,8 @@ function render({ model, el }) {
   let waiting = 0;
   const draw = () => {
     waiting = 0;
-    drawing.draw(model.get("frame"));
+    // None yet, if the first look failed or was too large to send: the status line says why.
+    if (Object.keys(model.get("frame")).length) drawing.draw(model.get("frame"));
     words.textContent = model.get("words");
     guard(root);
     send({ drawn: model.get("number") });
