@@ -9,7 +9,7 @@ import sys
 from course.domains import lease_domain
 from course.errors import CourseError
 from course.qoslab import link
-from course.qoslab.experiment import SCENARIOS, Experiment, Outcome
+from course.qoslab.experiment import LOSSY, SCENARIOS, Experiment, Outcome
 
 TIMEOUT = 240.0
 
@@ -31,8 +31,8 @@ def run(experiment: Experiment) -> Outcome:
     loss: object = experiment.loss
     if not isinstance(loss, int) or not 0 <= loss <= 90:
         raise LabError(f"A link loses 0 to 90 % of its packets, a whole number, not {loss!r}.")
-    remark = link.problem() if experiment.loss else ""
-    lossy = bool(experiment.loss and not remark)
+    remark = _no_loss(experiment)
+    lossy = bool(experiment.drops and not remark)
     command = [sys.executable, "-m", "course.qoslab.bench"]
     lease = lease_domain()
     try:
@@ -53,6 +53,13 @@ def run(experiment: Experiment) -> Outcome:
     outcome = Outcome.from_json(lines[-1])
     outcome.remark = remark
     return outcome
+
+
+def _no_loss(experiment: Experiment) -> str:
+    """Return why the link loses nothing although it was to, as a sentence; empty if it does."""
+    if experiment.loss and not experiment.drops:
+        return f"The link lost nothing here: it does so in {' and '.join(LOSSY)} only."
+    return link.problem() if experiment.loss else ""
 
 
 def _environment(domain_id: int, *, lossy: bool) -> dict[str, str]:

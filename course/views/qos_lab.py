@@ -167,7 +167,7 @@ def _shown(trial: Trial) -> dict[str, Any]:
     return {
         "title": f"{experiment.scenario}{loss}",
         "pair": f"{experiment.offered} -> {experiment.requested}",
-        "seen": _seen(outcome),
+        "seen": _seen(experiment, outcome),
         "why": " ".join(filter(None, [rules.explain(experiment, outcome), outcome.remark])),
         "right": trial.right,
         "verdict": f"You said: {said}. {truth}",
@@ -182,12 +182,14 @@ def _rule(rule: dict[str, Any]) -> str:
     return f"{rule['policy']}: {rule['offered']} -> {rule['requested']} {fits}. {rule['rule']}"
 
 
-def _seen(outcome: Outcome) -> str:
+def _seen(experiment: Experiment, outcome: Outcome) -> str:
     if not outcome.connected:
         return f"not connected ({outcome.broken.lower() or 'nothing was found'})"
     parts = [f"connected, {len(outcome.received)} of {outcome.sent} arrived"]
     if outcome.latency_ms:
-        parts.append(f"latency p50 {statistics.median(outcome.latency_ms):.2f} ms")
+        # What is replayed to a late reader waited in the writer's queue, and not on its way.
+        what = "age" if experiment.scenario == "late joiner" else "latency"
+        parts.append(f"{what} p50 {statistics.median(outcome.latency_ms):.2f} ms")
     if outcome.received and not outcome.in_order:
         parts.append("not in order")
     return ", ".join(parts)
