@@ -13,6 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from rclpy.qos import DurabilityPolicy
+
 from course.graph import reader
 from course.runtime.offers import fitting_qos, full_topic, type_on
 from course.runtime.recorder import Stamped
@@ -117,6 +119,8 @@ class Trace:
 
     def _subscribe(self) -> None:
         self._qos = fitting_qos(self._session.observer, self.topic, _DEPTH)
+        # Fits every offer, and brings nothing of the past: what is replayed is not what is late.
+        self._qos.durability = DurabilityPolicy.VOLATILE
         self._subscription = self._session.watch(self.msg_type, self.topic, self._take, self._qos)
 
     def since(self, moment_ns: int) -> list[Passage]:

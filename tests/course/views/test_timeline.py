@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from std_msgs.msg import String
 
 from course import Session
@@ -203,6 +203,20 @@ def test_a_talker_that_comes_back_as_best_effort_is_heard(session: Session) -> N
     before = session.observer.count_subscribers("/chatter")
     view.figures()
     assert session.observer.count_subscribers("/chatter") == before == 1
+
+
+def test_what_was_published_before_is_no_late_message(session: Session) -> None:
+    latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node = session.run(lambda: Node("mapper"))
+    publisher = node.create_publisher(String, "map", latched)
+    publisher.publish(String(data="old"))
+    assert session.next_message(String, "map").data == "old"
+    view = Timeline(session, [("map", None)])
+    session.until(lambda: publisher.get_subscription_count() == 1)
+    for number in range(3):
+        publisher.publish(String(data=f"{number}"))
+    session.until(lambda: view.figures()["/map"].count >= 3)
+    assert [row.message.data for row in view._rows[0][0].messages] == ["0", "1", "2"]
 
 
 def test_what_a_timeline_cannot_show_is_said(session: Session) -> None:
