@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import functools
+import gc
+import sys
 import time
+import weakref
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +22,8 @@ from course.views.timeline import Timeline, describe
 from course.watch import timeline
 from course.watch.callbacks import CallbackTap
 from course.watch.timeline import Passage
+from tests.robot import Listener as TalkListener
+from tests.robot import Robot
 
 MS = 1_000_000
 
@@ -121,7 +126,45 @@ def test_callbacks_run_as_before_and_are_seen(session: Session) -> None:
     ]  # fmt: skip
     assert [sum(lane["counts"]) for lane in topic["lanes"]] == [3, 3, 9]
     view.stop()
-    assert [subscription.callback for subscription in listener.subscriptions] == originals
+    publisher.publish(String(data="unseen"))
+    session.until(lambda: len(listener.seen) == 12)
+    assert len(view.runs("/chatter")) == 9
+    again = Timeline(session, [("chatter", None)])
+    inner = [subscription.callback.__wrapped__ for subscription in listener.subscriptions]
+    assert inner == originals, "wrapped once, however many timelines there were"
+    publisher.publish(String(data="seen"))
+    session.until(lambda: len(again.runs("/chatter")) == 3)
+
+
+def test_a_callback_is_given_what_it_takes_while_timelines_come_and_go(
+    request: pytest.FixtureRequest,
+) -> None:
+    # rclpy takes a message and calls the callback a moment later: threads that change more often
+    # make more of such moments.
+    request.addfinalizer(functools.partial(sys.setswitchinterval, sys.getswitchinterval()))
+    sys.setswitchinterval(1e-6)
+    with Session(threads=3) as session:
+        robot, listener = session.run(Robot, 1000.0), session.run(TalkListener)
+        assert isinstance(robot, Robot)
+        assert isinstance(listener, TalkListener)
+        session.until(lambda: listener.heard)
+        begun = time.monotonic()
+        while listener.heard < 2000 and not session.errors:
+            tap = CallbackTap("/chatter")
+            tap.watch([robot, listener])
+            tap.stop()
+            assert time.monotonic() - begun < 60
+        assert session.errors == []
+
+
+def test_a_listener_is_let_go_of_with_its_wrapped_callback(session: Session) -> None:
+    listener = session.run(Listener)
+    view = Timeline(session, [("chatter", String)])
+    view.stop()
+    gone = weakref.ref(listener)
+    session.stop(listener)
+    del listener
+    session.until(lambda: gc.collect() >= 0 and gone() is None)
 
 
 def test_a_callback_that_raises_is_reported_as_ever(session: Session) -> None:
