@@ -13,10 +13,12 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from course import Session
+from course.graph import reader
 from course.views import live
 from course.views.graph import GraphView
 from course.views.live import LiveView
 from course.views.saved import saved
+from course.watch.callbacks import CallbackTap
 from tests.kernel import Kernel
 
 
@@ -115,6 +117,58 @@ def test_a_view_that_fails_says_so_and_the_others_go_on(session: Session) -> Non
     assert broken.widget.ended == "This view has stopped (ZeroDivisionError: no rate yet)."
     before = sound.widget.number
     session.until(lambda: sound.widget.number > before)
+
+
+def test_a_node_that_is_destroyed_under_a_look_does_not_end_the_view(session: Session) -> None:
+    class Stumbling(Counter):
+        period = 60.0  # s: only this test looks
+        over_what: Node | None = None
+
+        def frame(self) -> dict[str, Any]:
+            if self.over_what is not None:
+                self.over_what.get_fully_qualified_name()
+            return super().frame()
+
+    gone = Node("gone", context=session.context)
+    gone.destroy_node()
+    view = Stumbling(session)
+    for _ in range(2):
+        before = view.widget.number
+        view.over_what = gone
+        for _ in range(live.STUMBLES - 1):
+            view._look()
+        assert (view.widget.ended, view.widget.number) == ("", before)
+        view.over_what = None
+        view._look()
+        assert view.widget.number > before
+    view.over_what = gone
+    for _ in range(live.STUMBLES):
+        view._look()
+    assert view.widget.ended.startswith("This view has stopped (InvalidHandle")
+
+
+def test_what_is_destroyed_in_between_is_passed_over(session: Session) -> None:
+    gone, sound = Node("gone", context=session.context), session.run(lambda: Node("sound"))
+    gone.destroy_node()
+    reader.read(session.observer, own=[gone, sound])
+    CallbackTap("/chatter").watch([gone, sound])
+
+
+def test_nodes_that_come_and_go_all_the_time_do_not_end_views(session: Session) -> None:
+    def talker() -> Node:
+        node = Node("talker")
+        node.create_publisher(String, "chatter", 10)
+        node.create_subscription(String, "chatter", lambda _message: None, 10)
+        return node
+
+    views = [session.graph(), session.timeline(("chatter", String))]
+    for view in views:
+        view.period = 0.0
+        view.widget  # noqa: B018 - shown from now on
+    for _ in range(20):
+        session.run(talker)
+        session.stop("talker")
+    assert [view.over for view in views] == ["", ""]
 
 
 def test_without_a_front_end_a_view_is_words_and_makes_no_widget(session: Session) -> None:
