@@ -244,6 +244,19 @@ def test_the_labs_scenarios_are_buttons_that_keys_press(open_cells: Open) -> Non
     expect(newest).to_contain_text("That was right.")
     expect(late).to_be_focused()
     expect(late).to_have_attribute("aria-disabled", "false")
+    loss = view.get_by_label("The link loses")
+    if loss.is_enabled():
+        loss.fill("")
+        loss.press_sequentially("e")  # a number may begin so, and this is none
+        group.get_by_role("button", name="Run stream").click()
+        expect(view.get_by_role("alert")).to_have_text(
+            "That is no number: type one, or leave it empty."
+        )
+        loss.fill("2.5")
+        group.get_by_role("button", name="Run stream").click()
+        expect(view.get_by_role("alert")).to_contain_text("a whole number, not 2.5.")
+        expect(view.locator(".roslab-state")).to_have_text("")
+        loss.fill("0")
     view.get_by_label("requested depth").fill("3")
     view.get_by_label("and that so many arrive").fill("3")
     group.get_by_role("button", name="Run slow reader").focus()

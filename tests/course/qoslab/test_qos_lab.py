@@ -6,6 +6,7 @@ import json
 import re
 from typing import Any
 
+import psutil
 import pytest
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
@@ -257,5 +258,62 @@ def test_the_view_keeps_the_prediction_beside_what_was_seen(session: Session) ->
     session.until(lambda: len(view.trials) == 3, timeout=60)
     assert view.trials[2].right is True
     session.until(lambda: not view.widget.frame["running"])
-    view._heard(view.widget, {"run": {**asked, "offered": {"depth": 0}}}, [])
-    session.until(lambda: "depth is 1 to 5000" in view.widget.frame["problem"])
+    for wrong, sentence in (
+        ({"offered": {"depth": 0}}, "depth is 1 to 5000"),
+        ({"loss": 2.5}, "0 to 90 % of its packets, a whole number, not 2.5."),
+        ({"arrive": 2.5}, "A prediction is a whole number of messages, 0 to 30, not 2.5."),
+    ):
+        view._heard(view.widget, {"run": {**asked, **wrong}}, [])
+        session.until(lambda said=sentence: said in view.widget.frame["problem"])  # type: ignore[misc]
+        assert not view.widget.frame["running"]
+    assert len(view.trials) == 3
+
+
+def test_an_experiment_that_fails_says_so_and_the_next_one_runs(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = session.qos_lab()
+    asked = {"offered": Profile().data(), "requested": Profile().data(), "scenario": "stream",
+             "connects": True, "arrive": None, "loss": 0}  # fmt: skip
+    with monkeypatch.context() as patch:
+        patch.setattr(lab.sys, "executable", "/nowhere/python")
+        view._heard(view.widget, {"run": asked}, [])
+        session.until(lambda: "The experiment failed (FileNotFoundErr" in view.frame()["problem"])
+    assert not view.frame()["running"]
+    view._heard(view.widget, {"run": asked}, [])
+    session.until(lambda: view.trials and not view.frame()["problem"], timeout=60)
+
+
+def children() -> list[psutil.Process]:
+    return [
+        process
+        for process in psutil.Process().children(recursive=True)
+        if any(part.startswith("course.qoslab.") for part in process.cmdline())
+    ]
+
+
+def test_an_experiment_ends_with_its_session() -> None:
+    with Session() as session:
+        view = session.qos_lab()
+        asked = {"offered": Profile(deadline=60).data(), "requested": Profile(deadline=60).data(),
+                 "scenario": "deadline", "connects": True, "loss": 0}  # fmt: skip
+        view._heard(view.widget, {"run": asked}, [])
+        session.until(lambda: len(children()) == 2, timeout=60)  # the bench and its writer
+        running = children()
+    _, alive = psutil.wait_procs(running, timeout=20)
+    assert alive == []
+    with pytest.raises(LabError, match="This QoS lab has ended"):
+        view.run("stream", connects=True)
+
+
+@needs_lossy_link
+def test_the_tools_of_a_lossy_link_are_found_by_an_ordinary_user(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    monkeypatch.setenv("PATH", "/usr/local/bin:/usr/bin:/bin")  # Debian has nft in /usr/sbin
+    link.problem.cache_clear()
+    request.addfinalizer(link.problem.cache_clear)
+    experiment = Experiment(best_effort(), best_effort(), "stream", loss=60)
+    outcome = lab.run(experiment)
+    assert (outcome.remark, outcome.lossy) == ("", True)
+    assert outcome.missing > 0
