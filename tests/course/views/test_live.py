@@ -119,6 +119,30 @@ def test_a_view_that_fails_says_so_and_the_others_go_on(session: Session) -> Non
     session.until(lambda: sound.widget.number > before)
 
 
+@pytest.mark.parametrize("also_at_its_end", [False, True])
+def test_a_view_whose_frame_cannot_be_sent_takes_no_other_down(
+    session: Session, also_at_its_end: bool
+) -> None:
+    unsent, sound = Counter(session), Counter(session)
+    assert unsent.widget
+    assert sound.widget
+    (thread,) = views_threads()
+
+    def refuse(*_args: object, **_options: object) -> None:
+        raise OSError("no such comm")
+
+    unsent.widget.observe(refuse, "number")
+    if also_at_its_end:
+        unsent.widget.observe(refuse, "ended")
+    session.until(lambda: unsent.over)
+    assert unsent.over == "This view has stopped (OSError: no such comm)."
+    before = sound.widget.number
+    session.until(lambda: sound.widget.number > before)
+    later = Counter(session)
+    session.until(lambda: later.widget.number > 2)
+    assert views_threads() == [thread]
+
+
 def test_a_node_that_is_destroyed_under_a_look_does_not_end_the_view(session: Session) -> None:
     class Stumbling(Counter):
         period = 60.0  # s: only this test looks
