@@ -223,6 +223,23 @@ def test_every_view_is_honest_after_a_restart_and_in_a_notebook_that_is_opened_a
         expect(copy).to_be_hidden()
 
 
+@pytest.mark.parametrize("how", ["shut down", "killed"])
+def test_every_view_says_that_its_kernel_is_gone(open_cells: Open, lab: Lab, how: str) -> None:
+    page = open_cells(*(source for source, _ in VIEWS.values()))
+    for _, label in VIEWS.values():
+        expect(region(page, label).locator(".rosview-status")).to_have_text("")
+    if how == "shut down":
+        page.page.evaluate("() => window.jupyterapp.shell.currentWidget.sessionContext.shutdown()")
+    else:
+        for process in lab.kernel_processes():
+            process.kill()
+    for _, label in VIEWS.values():
+        view = region(page, label)
+        expect(view.get_by_role("status").last).to_contain_text("Run this cell again")
+        for control in view.locator("button, input, select").all():
+            expect(control).to_be_disabled()
+
+
 def test_the_labs_scenarios_are_buttons_that_keys_press(open_cells: Open) -> None:
     page = open_cells("session.qos_lab()")
     view = region(page, "QoS lab")

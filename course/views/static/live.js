@@ -10,6 +10,7 @@ const SVG = "http://www.w3.org/2000/svg";
 const DEAD =
   "Not live any more: the kernel of this notebook was restarted or has ended. " +
   "Run this cell again.";
+const ENDINGS = ["terminating", "restarting", "autorestarting", "dead"]; // of a kernel
 const FOCUSABLE = "a, button, input, select, summary, textarea, [tabindex]";
 
 /** An id that nothing else on the page has: each view is a module of its own, with its own counters. */
@@ -53,6 +54,7 @@ function render({ model, el }) {
       model.send(message);
     } catch {
       dead = true; // the connection has been taken down
+      say();
     }
   };
   const stage = make("fieldset", { class: "rosview-stage", role: "presentation" });
@@ -106,12 +108,17 @@ function render({ model, el }) {
     }
   };
   const heard = (message) => message?.here && alive();
+  // The widgets' manager passes restarts on, and neither "Shut Down Kernel" nor a crash.
+  const session = model.widget_manager?.context?.sessionContext;
+  const kernelStatus = (_, now) => { if (ENDINGS.includes(now)) connection(); };
 
   model.on("change:number", refresh);
   model.on("change:ended", say);
   model.on("change:notice", say);
   model.on("comm_live_update", connection);
   model.on("msg:custom", heard);
+  session?.kernelChanged?.connect(connection);
+  session?.statusChanged?.connect(kernelStatus);
   draw();
   say();
   return () => {
@@ -121,6 +128,8 @@ function render({ model, el }) {
     model.off("change:notice", say);
     model.off("comm_live_update", connection);
     model.off("msg:custom", heard);
+    session?.kernelChanged?.disconnect(connection);
+    session?.statusChanged?.disconnect(kernelStatus);
     drawing.stop?.();
     root.remove();
   };
