@@ -8,6 +8,7 @@ from typing import Any
 
 from course import mcap_file
 from course.errors import SessionError
+from course.mcap_file import RecordingError
 from course.runtime import arguments
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
@@ -74,11 +75,18 @@ class Timeline(LiveView):
         ]
 
     def save(self, path: str | Path) -> Path:
-        """Write the last messages of all topics (up to 1000 each) to an MCAP file; return its path.
+        """Write the last messages of all topics to an MCAP file; return its path.
+
+        These are up to 1000 of each topic, or as many as have 32 MiB.
 
         Raises:
-            RecordingError: the file cannot be written.
+            RecordingError: the file cannot be written, or this timeline has ended.
         """
+        if self.over:
+            raise RecordingError(
+                "This timeline has ended, and has let its messages go: run its cell again, and "
+                "save while it is live."
+            )
         recordings = {trace.topic: (trace.msg_type, trace.messages) for trace, _ in self._rows}
         return mcap_file.write(path, recordings)
 

@@ -14,10 +14,12 @@ import pytest
 from mcap.reader import make_reader
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from course import Session
 from course.errors import SessionError, WaitTimeout
+from course.mcap_file import RecordingError
 from course.views.timeline import Timeline, describe
 from course.watch import timeline
 from course.watch.callbacks import CallbackTap
@@ -224,9 +226,33 @@ def test_its_messages_can_be_saved(session: Session, tmp_path: Path) -> None:
     publisher.publish(String(data="x"))
     session.until(lambda: view.figures()["/chatter"].count == 1)
     with view.save(tmp_path / "t.mcap").open("rb") as file:
-        assert [channel.topic for _, channel, _ in make_reader(file).iter_messages()] == [
-            "/chatter"
-        ]
+        ((_, channel, saved),) = make_reader(file).iter_messages()
+    assert channel.topic == "/chatter"
+    assert deserialize_message(saved.data, String).data == "x"
+    view.stop()
+    with pytest.raises(RecordingError, match="has let its messages go"):
+        view.save(tmp_path / "late.mcap")
+
+
+def test_the_memory_that_its_messages_take_is_bounded_and_given_back(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(timeline, "BYTES", 100_000)
+    monkeypatch.setattr(timeline, "MESSAGES", 20)
+    talker = session.run(lambda: Node("talker"))
+    publisher = talker.create_publisher(String, "chatter", 1000)
+    view = Timeline(session, [("chatter", String)])
+    (trace, _) = view._rows[0]
+    session.until(lambda: publisher.get_subscription_count() == 1)
+    for size, kept in ((10, 20), (30_000, 3), (200_000, 1), (10, 20)):
+        before = view.figures()["/chatter"].count
+        for _ in range(30):
+            publisher.publish(String(data="x" * size))
+        session.until(lambda n=before + 30: view.figures()["/chatter"].count == n, 20)  # type: ignore[misc]
+        assert len(trace.messages) == kept
+        assert trace._size == sum(len(cdr) for _, cdr in trace.messages)
+    view.stop()
+    assert (trace.messages, trace._size) == ([], 0)
 
 
 def test_a_talker_that_comes_back_as_best_effort_is_heard(session: Session) -> None:
@@ -259,7 +285,8 @@ def test_what_was_published_before_is_no_late_message(session: Session) -> None:
     for number in range(3):
         publisher.publish(String(data=f"{number}"))
     session.until(lambda: view.figures()["/map"].count >= 3)
-    assert [row.message.data for row in view._rows[0][0].messages] == ["0", "1", "2"]
+    kept = [deserialize_message(cdr, String) for _, cdr in view._rows[0][0].messages]
+    assert [message.data for message in kept] == ["0", "1", "2"]
 
 
 def test_what_a_timeline_cannot_show_is_said(session: Session) -> None:
