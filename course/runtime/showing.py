@@ -145,7 +145,8 @@ class Showing(Asking):
 
         Args:
             topics: names, or (name, message class) where nobody uses the topic yet; 1 to 6.
-            window: how many seconds it shows, up to 60.
+            window: how many seconds it shows, up to 60; of a topic with more than 20000 messages
+                in that time, the latest.
 
         Raises:
             SessionError: no topic, too many, a window out of range, or a closed session.

@@ -68,6 +68,12 @@ class CallbackTap:
             runs = list(self._runs)
         return [run for run in runs if run.started >= moment_ns]
 
+    @property
+    def complete_since(self) -> int:
+        """The moment (ns) since when no run has been let go of; 0 if none ever was."""
+        with _lock:
+            return self._runs[0].started if len(self._runs) == self._runs.maxlen else 0
+
     def stop(self) -> None:
         """Listen no more. Idempotent."""
         self.watch([])

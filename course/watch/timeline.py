@@ -20,7 +20,7 @@ from course.runtime.offers import fitting_qos, full_topic, type_on
 from course.runtime.session import Session
 
 KEPT = 20_000
-"""Messages of one topic that a trace remembers: 20 s at 1 kHz."""
+"""Messages of one topic that a trace remembers: 20 s at 1 kHz. More take long to draw."""
 
 COLUMNS = 200
 """Into how many columns a window is divided: more than an eye can tell apart."""
@@ -136,6 +136,13 @@ class Trace:
         with self._lock:
             passages = list(self._passages)
         return [passage for passage in passages if passage.received >= moment_ns]
+
+    @property
+    def complete_since(self) -> int:
+        """The moment (ns) since when no passage has been let go of; 0 if none ever was."""
+        with self._lock:
+            full = len(self._passages) == self._passages.maxlen
+            return self._passages[0].received if full else 0
 
     def _take(self, message: bytes, info: dict[str, int]) -> None:
         passage = Passage(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import gc
+import re
 import sys
 import time
 import weakref
@@ -21,7 +22,7 @@ from course import Session
 from course.errors import SessionError, WaitTimeout
 from course.mcap_file import RecordingError
 from course.views.timeline import Timeline, describe
-from course.watch import timeline
+from course.watch import callbacks, timeline
 from course.watch.callbacks import CallbackTap
 from course.watch.timeline import Passage
 from tests.robot import Listener as TalkListener
@@ -232,6 +233,24 @@ def test_its_messages_can_be_saved(session: Session, tmp_path: Path) -> None:
     view.stop()
     with pytest.raises(RecordingError, match="has let its messages go"):
         view.save(tmp_path / "late.mcap")
+
+
+@pytest.mark.parametrize("what", ["messages", "callbacks"])
+def test_a_window_with_more_than_is_kept_says_since_when_it_is_whole(
+    session: Session, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    monkeypatch.setattr(timeline if what == "messages" else callbacks, "KEPT", 50)
+    session.run(Robot, 40.0)
+    session.run(TalkListener)
+    view = session.timeline("chatter", window=60.0)
+    assert "s only: a timeline keeps" not in view.words()
+    (trace, tap) = view._rows[0]
+    session.until(lambda: len(trace.since(0)) >= 50 and len(tap.since(0)) >= 50)
+    (topic,) = view.frame()["topics"]
+    for text in (view.words(), topic["text"]):
+        found = re.search(r"\(of the last (\d+\.\d) s only: a timeline keeps \d+ messages", text)
+        assert found, text
+        assert 0.3 < float(found[1]) < 30
 
 
 def test_the_memory_that_its_messages_take_is_bounded_and_given_back(
