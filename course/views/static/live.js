@@ -77,9 +77,15 @@ function render({ model, el }) {
     waiting = 0;
     // None yet, if the first look failed or was too large to send: the status line says why.
     if (Object.keys(model.get("frame")).length) drawing.draw(model.get("frame"));
-    words.textContent = model.get("words");
+    retell();
     guard(root);
     send({ drawn: model.get("number") });
+  };
+  // Text that somebody has marked, to copy it, stands still until it is let go of.
+  const retell = () => {
+    const marked = document.getSelection();
+    if (marked && !marked.isCollapsed && marked.containsNode(words, true)) return;
+    if (words.textContent !== model.get("words")) words.textContent = model.get("words");
   };
   // At most one drawing a screen refresh, always of the latest frame.
   const refresh = () => {
@@ -112,6 +118,7 @@ function render({ model, el }) {
   const session = model.widget_manager?.context?.sessionContext;
   const kernelStatus = (_, now) => { if (ENDINGS.includes(now)) connection(); };
 
+  document.addEventListener("selectionchange", retell);
   model.on("change:number", refresh);
   model.on("change:ended", say);
   model.on("change:notice", say);
@@ -123,6 +130,7 @@ function render({ model, el }) {
   say();
   return () => {
     cancelAnimationFrame(waiting);
+    document.removeEventListener("selectionchange", retell);
     model.off("change:number", refresh);
     model.off("change:ended", say);
     model.off("change:notice", say);
