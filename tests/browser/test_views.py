@@ -240,6 +240,58 @@ def test_every_view_says_that_its_kernel_is_gone(open_cells: Open, lab: Lab, how
             expect(control).to_be_disabled()
 
 
+def test_what_is_being_read_or_used_is_left_alone(open_cells: Open) -> None:
+    page = open_cells(
+        "session.log_panel()",
+        'session.action("count")',
+        'session.parameters("robot")',
+        "from rclpy.node import Node\n"
+        "_ = course.run(lambda: Node('bare'))\n"
+        "session.parameters('bare')",
+        "from std_msgs.msg import String\n"
+        "robot.create_publisher(String, "
+        "'a_topic_with_a_name_that_is_far_too_long', 10)\n"
+        "session.timeline('a_topic_with_a_name_that_is_far_too_long')",
+    )
+    log = region(page, "Log panel")
+    # A line that stays is the same element, although others come: what is marked in it stays so.
+    line = log.locator("tbody tr").last.element_handle()
+    assert line is not None
+    said = words(log).text_content() or ""
+    expect(words(log)).not_to_have_text(said)
+    assert line.evaluate("element => element.isConnected")
+    expect(log.get_by_label("Search")).to_have_accessible_description(re.compile(r"lines \("))
+    # Marked words stand still, and catch up when they are let go of.
+    log.get_by_text("In words").click()
+    words(log).evaluate("element => document.getSelection().selectAllChildren(element)")
+    marked = words(log).text_content() or ""
+    before = log.locator("tbody tr").last.inner_text()
+    expect(log.locator("tbody tr").last).not_to_have_text(before)
+    assert words(log).text_content() == marked
+    page.page.evaluate("() => document.getSelection().removeAllRanges()")
+    expect(words(log)).not_to_have_text(marked)
+    # The focus of a Cancel button stays with its goal.
+    action = region(page, "Action view")
+    action.get_by_role("button", name="Send goal").click()
+    cancel = action.get_by_role("button", name="Cancel goal 1")
+    cancel.focus()
+    page.page.keyboard.press("Enter")
+    expect(action.locator("[aria-current]")).to_contain_text("CANCELED")
+    expect(action.get_by_role("listitem").first).to_be_focused()
+    # A key that is held moves the slider to where it is let go of.
+    slider = region(page, "Parameter panel").first.get_by_role("slider", name="speed")
+    slider.focus()
+    for key in ("ArrowRight", "ArrowRight", "ArrowLeft", "ArrowRight"):
+        page.page.keyboard.press(key)
+    expect(region(page, "Parameter panel").first.locator("output")).to_have_text("1.5")
+    run_in_kernel(page, "assert robot.get_parameter('speed').value == 1.5")
+    expect(region(page, "Parameter panel").last).to_contain_text("has declared no parameters")
+    for label in region(page, "Timeline").locator(".rostimeline-label").all():
+        left = "e => e.getBoundingClientRect().left - e.closest('svg').getBoundingClientRect().left"
+        assert label.evaluate(left) >= 0
+    assert page.errors == []
+
+
 def test_the_labs_scenarios_are_buttons_that_keys_press(open_cells: Open) -> None:
     page = open_cells("session.qos_lab()")
     view = region(page, "QoS lab")

@@ -232,6 +232,13 @@ def test_a_slider_moves_in_whole_steps_for_whole_numbers_alone(session: Session)
     assert (entries["gain"]["step"], entries["gear"]["step"]) == (None, 1)
 
 
+def test_a_node_without_parameters_says_so(session: Session) -> None:
+    session.run(lambda: Node("bare"))
+    panel = session.parameters("bare")
+    assert shown(panel)["entries"] == []
+    assert "  none: declare_parameter(…) makes one" in panel.words()
+
+
 def test_a_parameter_is_changed_and_a_refusal_has_its_reason(session: Session) -> None:
     robot = session.run(Robot)
     panel = session.parameters(robot)
