@@ -33,7 +33,8 @@ def write(
 
     Args:
         path: the file; ".mcap" is added if it has no suffix. One that is there is replaced.
-        recordings: {topic: (message class, [(time in ns, message), ...])}.
+        recordings: {topic: (message class, [(time in ns, message), ...])}, where a message that is
+            bytes is CDR already.
 
     Raises:
         RecordingError: the file cannot be written.
@@ -80,7 +81,7 @@ def _write(
     for number, (stamp, topic, message) in enumerate(_in_order(recordings)):
         writer.add_message(
             channels[topic], log_time=stamp, publish_time=stamp, sequence=number,
-            data=serialize_message(message),
+            data=message if isinstance(message, bytes) else serialize_message(message),
         )  # fmt: skip
     writer.finish()
 

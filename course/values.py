@@ -66,10 +66,11 @@ def to_plain(value: Any, longest: int | None = LONGEST) -> Any:
         return f"{value[:LONGEST_TEXT]}… {more} more" if more > 0 else value
     if isinstance(value, bool | int | float):
         return value
-    items = value.tolist() if hasattr(value, "tolist") else list(value)
-    kept = items if longest is None else items[:longest]
-    shown = [to_plain(item, longest) for item in kept]
-    return shown if len(kept) == len(items) else [*shown, f"… {len(items) - len(kept)} more"]
+    # Cut first: as a list of numbers a picture takes many times the memory.
+    kept = value if longest is None else value[:longest]
+    items = kept.tolist() if hasattr(kept, "tolist") else list(kept)
+    shown = [to_plain(item, longest) for item in items]
+    return shown if len(kept) == len(value) else [*shown, f"… {len(value) - len(kept)} more"]
 
 
 def from_text(msg_type: Any, text: str) -> Any:

@@ -60,7 +60,8 @@ def unspun(session: Session) -> Iterator[Finding]:
     own = {id(node) for node in session.nodes.values()}
     alive = set(reader.read(session.observer).nodes)
     for thing in gc.get_objects():
-        if not isinstance(thing, Node) or id(thing) in own or thing is session.observer:
+        # By its own type: isinstance asks what a weak proxy stands for, which may be gone.
+        if not issubclass(type(thing), Node) or id(thing) in own or thing is session.observer:
             continue
         name = _name(thing)
         if thing.executor is None and thing.context is session.context and name in alive:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import igraph
 
 from course.graph import words
-from course.graph.model import Exchange, Graph, Topic
+from course.graph.model import Exchange, Graph, Mismatch, Topic
 
 BOX_HEIGHT = 40  # px, with room for a name and a type below it
 _CHARACTER, _LEAST_WIDTH, _LONGEST_LABEL = 7.5, 80, 34
@@ -80,7 +80,13 @@ class _Link:
     target: tuple[str, str]
     kind: str
     tip: str
-    bad: str = ""
+    bad: bool = False
+    label: str = ""
+
+
+def count(graph: Graph) -> int:
+    """Return how many boxes a drawing of ``graph`` has; no place is worked out for them."""
+    return sum(1 for _ in _things(graph))
 
 
 def draw(graph: Graph) -> Drawing:
@@ -136,16 +142,21 @@ def _links(graph: Graph) -> Iterator[_Link]:
 
 def _topic_links(topic: Topic) -> Iterator[_Link]:
     here = ("topic", topic.name)
+    sent, heard = topic.broken
     for end in {end.node: end for end in topic.publishers}.values():
-        yield _Link(("node", end.node), here, "topic", f"{end.node} offers {words.qos(end)}")
-    refused = {pair.subscription: pair for pair in topic.mismatches}
+        pairs = sent.get(end.node, [])
+        tip = "\n".join([f"{end.node} offers {words.qos(end)}", *_told(topic, pairs)])
+        # What both arrows of a pair would say is said once, where it arrives.
+        untold = [pair for pair in pairs if pair not in heard.get(pair.subscription, [])]
+        yield _Link(("node", end.node), here, "topic", tip, bool(pairs), words.policies(untold))
     for end in {end.node: end for end in topic.subscriptions}.values():
-        pair = refused.get(end.node)
-        tip = f"{end.node} requests {words.qos(end)}"
-        if pair:
-            tip += "\n" + words.mismatch(topic.name, pair)
-        why = ", ".join(pair.policies).lower() if pair else ""
-        yield _Link(here, ("node", end.node), "topic", tip, why)
+        pairs = heard.get(end.node, [])
+        tip = "\n".join([f"{end.node} requests {words.qos(end)}", *_told(topic, pairs)])
+        yield _Link(here, ("node", end.node), "topic", tip, bool(pairs), words.policies(pairs))
+
+
+def _told(topic: Topic, pairs: list[Mismatch]) -> list[str]:
+    return [words.mismatch(topic.name, pair) for pair in pairs]
 
 
 def _exchange_links(kind: str, exchange: Exchange) -> Iterator[_Link]:
@@ -165,7 +176,9 @@ def _places(
     net = igraph.Graph(n=len(keys), edges=edges, directed=True)
     spots = net.layout_sugiyama(vgap=1, hgap=1, maxiter=200)[: len(keys)]
     columns = sorted({round(spot[1]) for spot in spots})
-    words_wide = max((len(link.bad) * _CHARACTER + 40 for link in links if link.bad), default=0.0)
+    words_wide = max(
+        (len(link.label) * _CHARACTER + 40 for link in links if link.label), default=0.0
+    )
     left, place = float(_MARGIN), {}
     for column in columns:
         inside = [n for n, spot in enumerate(spots) if round(spot[1]) == column]
@@ -219,8 +232,8 @@ def _line(link: _Link, source: Box, target: Box, end: float) -> Line:
         link.kind,
         path,
         link.tip,
-        bool(link.bad),
         link.bad,
+        link.label,
         *middle,
         max(y1, y2) if forward else low,
     )

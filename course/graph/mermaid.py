@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from course.graph.model import Exchange, Graph, Topic
+from course.graph import words
+from course.graph.model import Exchange, Graph, Mismatch, Topic
 
 
 def mermaid(graph: Graph) -> str:
@@ -34,17 +35,19 @@ def mermaid(graph: Graph) -> str:
 
 def _arrows(topic: Topic, ident: str, ids: dict[str, str]) -> Iterator[tuple[str, bool]]:
     """Yield (arrow, whether it is red) for each endpoint, and each pair that does not connect."""
+    sent, heard = topic.broken
     for node in dict.fromkeys(end.node for end in topic.publishers):
-        yield f"{ids[node]} --> {ident}", False
-    refused: dict[str, set[str]] = {}
-    for pair in topic.mismatches:
-        refused.setdefault(pair.subscription, set()).update(pair.policies)
+        pairs = sent.get(node, [])
+        untold = [pair for pair in pairs if pair not in heard.get(pair.subscription, [])]
+        yield _arrow(ids[node], ident, untold), bool(pairs)
     for node in dict.fromkeys(end.node for end in topic.subscriptions):
-        if node in refused:
-            why = ", ".join(sorted(refused[node])).lower()
-            yield f"{ident} -. {_quoted(f'{why} does not fit')} .-x {ids[node]}", True
-        else:
-            yield f"{ident} --> {ids[node]}", False
+        yield _arrow(ident, ids[node], heard.get(node, [])), node in heard
+
+
+def _arrow(source: str, target: str, pairs: list[Mismatch]) -> str:
+    if not pairs:
+        return f"{source} --> {target}"
+    return f"{source} -. {_quoted(f'{words.policies(pairs)} does not fit')} .-x {target}"
 
 
 def _exchange(kind: str, ident: str, exchange: Exchange, ids: dict[str, str]) -> Iterator[str]:

@@ -69,6 +69,27 @@ class Topic:
     mismatches: tuple[Mismatch, ...] = ()
 
     @property
+    def broken(self) -> tuple[dict[str, list[Mismatch]], dict[str, list[Mismatch]]]:
+        """The pairs that a drawing tells at each publisher's arrow, and at each subscription's.
+
+        An arrow through which nothing passes tells all its pairs; another one, only a pair that
+        would be told by neither end, and that is the subscription's.
+        """
+        writers = {end.node for end in self.publishers}
+        readers = {end.node for end in self.subscriptions}
+        pairs = {(pair.publisher, pair.subscription) for pair in self.mismatches}
+        unread = {w for w in writers if all((w, r) in pairs for r in readers)}
+        deaf = {r for r in readers if all((w, r) in pairs for w in writers)}
+        sent: dict[str, list[Mismatch]] = {}
+        heard: dict[str, list[Mismatch]] = {}
+        for pair in self.mismatches:
+            if pair.publisher in unread:
+                sent.setdefault(pair.publisher, []).append(pair)
+            if pair.subscription in deaf or pair.publisher not in unread:
+                heard.setdefault(pair.subscription, []).append(pair)
+        return sent, heard
+
+    @property
     def types(self) -> tuple[str, ...]:
         """The types that its endpoints have: more than one is a clash."""
         return tuple(sorted({end.type for end in (*self.publishers, *self.subscriptions)}))

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import defaultdict
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ from rclpy.action.graph import (
     get_action_server_names_and_types_by_node,
 )
 from rclpy.duration import Duration
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.topic_endpoint_info import TopicEndpointInfo
@@ -73,13 +75,14 @@ def read(
 def _known(nodes: Iterable[Node]) -> Own:
     own = Own({}, defaultdict(set))
     for node in nodes:
-        name = node.get_fully_qualified_name()
-        ends: list[tuple[str, Any]] = [("publisher", end) for end in node.publishers]
-        ends += [("subscription", end) for end in node.subscriptions]
-        for role, end in ends:
-            where = (name, end.topic_name, role)
-            own.queues[where] = end.qos_profile
-            own.broken[where] |= qos_events.policies(end)
+        with contextlib.suppress(InvalidHandle):  # what is destroyed just now has no more to tell
+            name = node.get_fully_qualified_name()
+            ends: list[tuple[str, Any]] = [("publisher", end) for end in node.publishers]
+            ends += [("subscription", end) for end in node.subscriptions]
+            for role, end in ends:
+                where = (name, end.topic_name, role)
+                own.queues[where] = end.qos_profile
+                own.broken[where] |= qos_events.policies(end)
     return own
 
 

@@ -44,6 +44,11 @@ def mismatch(topic: str, pair: Mismatch) -> str:
     )
 
 
+def policies(pairs: Iterable[Mismatch]) -> str:
+    """Return the policies that break pairs, each once."""
+    return ", ".join(dict.fromkeys(name.lower() for pair in pairs for name in pair.policies))
+
+
 def _topic(topic: Topic) -> Iterable[str]:
     yield f"topic {topic.name} ({', '.join(topic.types)})"
     for verb, ends in (("published by", topic.publishers), ("read by", topic.subscriptions)):

@@ -166,7 +166,7 @@ class Bench:
     def __init__(self, experiment: Experiment, *, lossy: bool) -> None:
         """Prepare ``experiment``; ``lossy`` says that the link can drop packets."""
         self._experiment = experiment
-        self._outcome = Outcome(lossy=lossy and experiment.loss > 0)
+        self._outcome = Outcome(lossy=lossy and experiment.drops > 0)
         self._context = Context()
         rclpy.init(args=[], context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self._writer = Writer()

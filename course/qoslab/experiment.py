@@ -17,18 +17,29 @@ SCENARIOS = {
 }
 """{scenario: what happens}."""
 
+LOSSY = ("stream", "slow reader")
+"""Scenarios that a loss says something about: in the others the link loses nothing."""
+
 COUNT = 30
 RATE = 50.0  # Hz
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """Two profiles in one scenario. ``loss`` is the share of packets that the link drops, in %."""
+    """Two profiles in one scenario.
+
+    ``loss`` is the share of packets that the link drops, in %, if the scenario is one of `LOSSY`.
+    """
 
     offered: Profile = field(default_factory=Profile)
     requested: Profile = field(default_factory=Profile)
     scenario: str = "stream"
     loss: int = 0
+
+    @property
+    def drops(self) -> int:
+        """The share of packets that the link drops in this scenario, in %."""
+        return self.loss if self.scenario in LOSSY else 0
 
     def to_json(self) -> str:
         """Return it as JSON."""

@@ -8,6 +8,9 @@ from course.graph.reader import incompatibilities
 from course.qoslab.experiment import COUNT, Experiment, Outcome
 from course.qoslab.profile import Profile
 
+OUTLIVES = 30.0
+"""Seconds that no message of an experiment grows old: a lifespan of so many has no say."""
+
 
 @dataclass(frozen=True)
 class Rule:
@@ -43,7 +46,7 @@ def compare(offered: Profile, requested: Profile) -> list[Rule]:
         ),
         Rule(
             "lifespan", _span(offered.lifespan), _span(requested.lifespan), True,
-            "The writer's: messages older than it are dropped. It never matters to connecting.",
+            "Each side's queue drops what is older than its own. It never matters to connecting.",
         ),
         Rule(
             "liveliness", _liveliness(offered), _liveliness(requested),
@@ -93,12 +96,20 @@ def _stream(experiment: Experiment, outcome: Outcome) -> str:
     if not reliable(experiment):
         return (
             f"Lost on the way: {outcome.missing}. A best-effort connection never sends anything "
-            "twice."
+            f"twice.{_too_old(_lifespans(experiment))}"
         )
-    return (
-        f"Missing, although the connection is reliable: {outcome.missing}. The writer's queue "
-        f"({_queue(experiment.offered)}) had dropped them before they could be sent again."
-    )
+    missing = f"Missing, although the connection is reliable: {outcome.missing}."
+    return f"{missing} {_not_repaired(experiment)}"
+
+
+def _not_repaired(experiment: Experiment) -> str:
+    """Return why a reliable connection did not bring what the link had lost."""
+    causes = _lifespans(experiment)
+    if _room(experiment.offered) < COUNT:
+        causes.insert(0, f"the writer's queue ({_queue(experiment.offered)})")
+    if not causes:
+        return "They had not been sent again when the experiment ended."
+    return f"They were dropped before they could be sent again, by {' or '.join(causes)}."
 
 
 def _late(experiment: Experiment, outcome: Outcome) -> str:
@@ -107,9 +118,13 @@ def _late(experiment: Experiment, outcome: Outcome) -> str:
             "The late reader got nothing of the past: that needs TRANSIENT_LOCAL and RELIABLE on "
             "both sides. A topic stores nothing by itself."
         )
+    kept, fit = len(outcome.received), _replayed(experiment)
+    if kept < fit and _lifespans(experiment):
+        came = f"Of the writer's last messages {fit} would fit into both queues, and {kept} came."
+        return came + _too_old(_lifespans(experiment))
     return (
         "The writer had kept its last messages for late readers, and sent as many as fit into both "
-        f"queues: {len(outcome.received)}."
+        f"queues: {kept}."
     )
 
 
@@ -117,10 +132,26 @@ def _slow(experiment: Experiment, outcome: Outcome) -> str:
     kept = len(outcome.received)
     if kept == outcome.sent:
         return "The reader's queue was long enough: it found every message."
-    return (
-        f"What was left in the reader's queue ({_queue(experiment.requested)}): {kept}. Newer "
-        "messages had pushed out older ones."
-    )
+    parts = [f"What was left in the reader's queue ({_queue(experiment.requested)}): {kept}."]
+    full = kept >= _room(experiment.requested)
+    newest = list(range(outcome.sent - kept, outcome.sent))
+    if full:
+        parts.append("Newer messages had pushed out older ones.")
+    if not full or outcome.received != newest:  # not all of them ever got there, or stayed
+        parts.append(_never_there(experiment, outcome))
+    return " ".join(filter(None, parts))
+
+
+def _never_there(experiment: Experiment, outcome: Outcome) -> str:
+    """Return why a slow reader's queue lacks messages that it had room for, if that is known."""
+    parts = []
+    if outcome.lossy and reliable(experiment):
+        parts.append(f"The link lost some. {_not_repaired(experiment)}")
+    elif outcome.lossy:
+        parts.append("The link lost some, and a best-effort connection never sends anything twice.")
+    if experiment.requested.lifespan:
+        parts.append(_too_old(_lifespans(experiment)[-1:]).strip())
+    return " ".join(parts)
 
 
 def _liveliness_lost(experiment: Experiment, outcome: Outcome) -> str:
@@ -139,14 +170,18 @@ def expected(experiment: Experiment) -> int | None:
     if not connects(experiment):
         return 0
     offered, requested = experiment.offered, experiment.requested
+    if experiment.scenario == "late joiner" and not _replays(experiment):
+        return 0
+    if 0 < min(offered.lifespan or OUTLIVES, requested.lifespan or OUTLIVES) < OUTLIVES:
+        return None  # it depends on how soon they come
     if experiment.scenario == "late joiner":
-        return min(COUNT, _room(offered), _room(requested)) if _replays(experiment) else 0
-    if offered.lifespan or (experiment.loss and not reliable(experiment)):
+        return _replayed(experiment)
+    if experiment.drops and not reliable(experiment):
         return None
     if experiment.scenario == "slow reader":
-        return None if experiment.loss else min(COUNT, _room(requested))
+        return None if experiment.drops else min(COUNT, _room(requested))
     # Lost messages are repaired only as long as the writer still has them.
-    return COUNT if not experiment.loss or _room(offered) >= COUNT else None
+    return COUNT if not experiment.drops or _room(offered) >= COUNT else None
 
 
 def _replays(experiment: Experiment) -> bool:
@@ -154,6 +189,22 @@ def _replays(experiment: Experiment) -> bool:
     offered, requested = experiment.offered, experiment.requested
     both = offered.durability == requested.durability == "TRANSIENT_LOCAL"
     return both and reliable(experiment)
+
+
+def _replayed(experiment: Experiment) -> int:
+    """Return how many messages of the past fit into both queues."""
+    return min(COUNT, _room(experiment.offered), _room(experiment.requested))
+
+
+def _lifespans(experiment: Experiment) -> list[str]:
+    """Return the lifespans that a side has set."""
+    sides = (("writer", experiment.offered.lifespan), ("reader", experiment.requested.lifespan))
+    return [f"the {side}'s lifespan ({_span(span)})" for side, span in sides if span]
+
+
+def _too_old(lifespans: list[str]) -> str:
+    """Return the sentence, after a space, that says what becomes of old messages, if anything."""
+    return f" What is older than {' or '.join(lifespans)} is dropped." if lifespans else ""
 
 
 def _room(profile: Profile) -> int:

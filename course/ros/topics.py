@@ -67,9 +67,9 @@ def hz(topic: str, timeout: float = 5.0) -> str:
     with ambient.record(topic, timeout=timeout) as recorder:
         try:
             recorder.wait(_ENOUGH, round(deadline.left, 2))
-        except WaitTimeout:
-            if recorder.count < 3:
-                raise
+        except WaitTimeout as error:
+            if recorder.count < 2:
+                raise _too_few(error, recorder.count, topic, timeout) from None
         stamps = [stamped.stamp_ns / 1e9 for stamped in recorder.messages]
         rate = recorder.rate()
     gaps = [later - earlier for earlier, later in itertools.pairwise(stamps)]
@@ -77,6 +77,18 @@ def hz(topic: str, timeout: float = 5.0) -> str:
         f"average rate: {rate:.3f} Hz over {len(stamps)} messages\n"
         f"  period: min {min(gaps):.4f} s, max {max(gaps):.4f} s, "
         f"standard deviation {statistics.pstdev(gaps):.4f} s"
+    )
+
+
+def _too_few(error: WaitTimeout, count: int, topic: str, timeout: float) -> WaitTimeout:
+    """Return what there is to say of a topic on which two messages did not come in time."""
+    if not ambient.session().observer.count_publishers(_full(topic)):
+        return error  # it says that nobody publishes: listening longer helps nobody
+    only = "Only one message" if count else "No message"
+    why = "" if count else f" {str(error).partition('. ')[2]}"
+    return WaitTimeout(
+        f"{only} arrived on {_full(topic)} in {timeout:g} s, and a rate takes two.{why} A slow "
+        f"topic takes longer: %ros topic hz {topic} --timeout {4 * timeout:g}."
     )
 
 

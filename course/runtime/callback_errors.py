@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
+import inspect
 import threading
 import time
 import traceback
 from dataclasses import dataclass, field
-from types import TracebackType
+from types import FunctionType, TracebackType
 from typing import Any
 
 from rclpy.service import Service
@@ -83,7 +84,10 @@ class ErrorLog:
 
 def callback_name(job: Job, frames: TracebackType | None = None) -> str:
     """Return the qualified name of the callback that `job` runs, or the outermost of `frames`."""
-    callback: Any = getattr(job.callback, "func", job.callback)  # functools.partial
+    callback: Any = job.callback
+    if isinstance(callback, FunctionType):  # a timeline's wrapper, say: what it wraps is meant
+        callback = inspect.unwrap(callback, stop=lambda f: not isinstance(f, FunctionType))
+    callback = getattr(callback, "func", callback)  # functools.partial
     name = getattr(callback, "__qualname__", None)
     if name is None and frames is not None:
         name = frames.tb_frame.f_code.co_qualname

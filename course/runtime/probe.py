@@ -58,15 +58,21 @@ class Probe:
         self.executor.add_node(self.node)
 
     def subscribe(
-        self, msg_type: Any, topic: str, callback: Callable[..., None], qos: QoSProfile | int
+        self,
+        msg_type: Any,
+        topic: str,
+        callback: Callable[..., None],
+        qos: QoSProfile | int,
+        *,
+        raw: bool = False,
     ) -> Subscription:
-        """Subscribe; the caller drops it with `drop`.
+        """Subscribe, ``raw`` to messages as CDR; the caller drops it with `drop`.
 
         Raises:
             WaitTimeout: the topic has another type.
         """
         require_type(topic, msg_type, self.node.get_topic_names_and_types())
-        return self.node.create_subscription(msg_type, topic, callback, qos)
+        return self.node.create_subscription(msg_type, topic, callback, qos, raw=raw)
 
     def drop(self, entity: Subscription | Client) -> None:
         """Destroy a subscription or client of the hidden node. Idempotent."""

@@ -39,16 +39,22 @@ class Showing(Asking):
         return self._probe.node
 
     def watch(
-        self, msg_type: Any, topic: str, callback: Callable[..., None], qos: QoSProfile | int
+        self,
+        msg_type: Any,
+        topic: str,
+        callback: Callable[..., None],
+        qos: QoSProfile | int,
+        *,
+        raw: bool = False,
     ) -> Subscription:
         """Call ``callback`` with each message on a topic, in a background thread.
 
         With a second argument, it gets what DDS says about the message, too: its time stamps and
-        number (see rclpy's ``create_subscription``).
+        number (see rclpy's ``create_subscription``). With ``raw`` a message comes as CDR.
 
         For live views: a node that blocks does not hold it up. `unwatch` ends it.
         """
-        return self._probe.subscribe(msg_type, topic, callback, qos)
+        return self._probe.subscribe(msg_type, topic, callback, qos, raw=raw)
 
     def unwatch(self, subscription: Subscription) -> None:
         """End a `watch`. Idempotent."""
@@ -139,7 +145,8 @@ class Showing(Asking):
 
         Args:
             topics: names, or (name, message class) where nobody uses the topic yet; 1 to 6.
-            window: how many seconds it shows, up to 60.
+            window: how many seconds it shows, up to 60; of a topic with more than 20000 messages
+                in that time, the latest.
 
         Raises:
             SessionError: no topic, too many, a window out of range, or a closed session.

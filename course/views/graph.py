@@ -12,12 +12,13 @@ from course.runtime.session import Session
 from course.views.live import Frame, LiveView
 
 MAX_BOXES = 150
-"""Boxes that are drawn; of a larger graph the rest is in the words only."""
+"""Boxes that are drawn; a larger graph is in the words only."""
 
 
 class GraphView(LiveView):
     """The graph as a session sees it; `graph` is the present snapshot as data.
 
+    A graph of more than `MAX_BOXES` boxes is not drawn: a note says so, and how to see less.
     As text it is a list of every topic, service and action with their endpoints and QoS.
     """
 
@@ -44,7 +45,7 @@ class GraphView(LiveView):
 
     def frame(self) -> Frame:
         """Return boxes and lines with their places."""
-        return _drawn(self.graph)
+        return self._drawing(self.graph)
 
     def words(self) -> str:
         """Return the graph as text."""
@@ -53,19 +54,32 @@ class GraphView(LiveView):
     def look(self) -> tuple[Frame, str]:
         """Return both from one look at the graph."""
         graph = self.graph
-        return _drawn(graph), words.describe(graph)
+        return self._drawing(graph), words.describe(graph)
 
+    def _drawing(self, graph: Graph) -> Frame:
+        title = (
+            f"{len(graph.nodes)} nodes, {len(graph.topics)} topics, "
+            f"{len(graph.mismatches)} pairs that do not connect"
+        )
+        # Counted first: the layout of a graph that nobody could follow takes long, too.
+        count = layout.count(graph)
+        if count > MAX_BOXES:
+            drawing, note = layout.Drawing((), (), 0, 0), self._too_large(graph, count)
+        else:
+            drawing, note = layout.draw(graph), ""
+        return {"title": title, "note": note, **asdict(drawing)}
 
-def _drawn(graph: Graph) -> Frame:
-    drawing = layout.draw(graph)
-    if len(drawing.boxes) > MAX_BOXES:
-        text = f"{len(drawing.boxes)} boxes are too many to draw: see the words."
-        return {"title": text, "boxes": [], "lines": [], "width": 0, "height": 0}
-    return {
-        "title": f"{len(graph.nodes)} nodes, {len(graph.topics)} topics, "
-        f"{len(graph.mismatches)} pairs that do not connect",
-        **asdict(drawing),
-    }
+    def _too_large(self, graph: Graph, count: int) -> str:
+        exchanges = len(graph.services) + len(graph.actions)
+        less = "stop the nodes that you do not need, as with course.stop('talker')"
+        if self._everything:
+            less = f"leave out everything=True, or {less}"
+        return (
+            f"This graph has {count} boxes (nodes: {len(set(graph.nodes))}, topics: "
+            f"{len(graph.topics)}, services and actions: {exchanges}), and nobody can follow a "
+            f"drawing of more than {MAX_BOXES}. To see it drawn, {less}. In a cell, print(…) of "
+            "this view tells all of it in words."
+        )
 
 
 class Mermaid:

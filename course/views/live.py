@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 import anywidget
 import traitlets
+from rclpy.exceptions import InvalidHandle
 
 from course.runtime.session import Session
 from course.views import brief
@@ -25,6 +26,9 @@ FASTEST = 0.1
 
 PATIENCE = 20
 """Frames that may be on their way before a browser that confirms none gets one a second only."""
+
+STUMBLES = 5
+"""Looks in a row that meet what has just been destroyed, before a view gives up."""
 
 MAX_FRAME = 256 * 1024
 """Bytes of JSON that a frame may have; a view cuts what it shows to stay below (see `brief`)."""
@@ -89,6 +93,7 @@ class LiveView(ABC):
         self._due = 0.0
         self._last = ""
         self._drawn = 0
+        self._stumbles = 0
         self._why = ""
         self._looking = threading.RLock()
         shelf_of(session).put(self, (type(self).__qualname__, repr(about)))
@@ -189,7 +194,11 @@ class LiveView(ABC):
                 frame, words = self.look()
                 words = brief.text(words, MAX_WORDS)
                 text = json.dumps([frame, words])
+                self._stumbles = 0
             except Exception as error:  # noqa: BLE001 - a view must never take its thread down
+                self._stumbles += 1
+                if isinstance(error, InvalidHandle) and self._stumbles < STUMBLES:
+                    return  # a node was destroyed under this look: the next one will not see it
                 failed = f"This view has stopped ({type(error).__name__}: {error})."
                 self.end(CLOSED if self.session.closed else failed)
                 return

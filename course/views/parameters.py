@@ -117,6 +117,8 @@ class ParameterPanel(LiveView):
             value = brief.data(entry.value, LONGEST)
             shown = "not set" if value is None else one_line(value)
             lines.append(f"  {entry.name}: {shown}{limits}{about}")
+        if not self._entries:
+            lines.append("  none: declare_parameter(…) makes one")
         with self._lock:
             problem = self._problem or self._silent
         return "\n".join([*lines, *([problem] if problem else [])])

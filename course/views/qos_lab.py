@@ -12,6 +12,7 @@ from rclpy.qos import QoSProfile
 from course.errors import CourseError
 from course.qoslab import lab, link, rules
 from course.qoslab.experiment import COUNT, SCENARIOS, Experiment, Outcome
+from course.qoslab.lab import LabError
 from course.qoslab.profile import CHOICES, NUMBERS, Profile
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
@@ -57,6 +58,8 @@ class QoSLab(LiveView):
         super().__init__(session, offered, requested)
         self._offered = Profile.of(offered) if offered else Profile()
         self._requested = Profile.of(requested) if requested else Profile()
+        self._processes = lab.Processes()
+        self.resources.callback(self._processes.end)
         self._trials: list[Trial] = []
         self._running = False
         self._problem = ""
@@ -89,13 +92,13 @@ class QoSLab(LiveView):
             requested: the reader's profile from now on.
 
         Raises:
-            LabError: no such scenario, or its processes failed.
+            LabError: no such scenario, its processes failed, or this view has ended.
             ProfileError: a profile that the lab does not know.
         """
         self._offered = Profile.of(offered) if offered else self._offered
         self._requested = Profile.of(requested) if requested else self._requested
         experiment = Experiment(self._offered, self._requested, scenario, loss)
-        trial = Trial(experiment, connects, arrive, lab.run(experiment))
+        trial = Trial(experiment, connects, arrive, lab.run(experiment, self._processes))
         self._keep(trial)
         return trial
 
@@ -143,14 +146,18 @@ class QoSLab(LiveView):
         try:
             self._offered = Profile.from_data(asked.get("offered"))
             self._requested = Profile.from_data(asked.get("requested"))
-            scenario, loss = str(asked.get("scenario")), _whole(asked.get("loss")) or 0
+            scenario, loss = str(asked.get("scenario")), asked.get("loss") or 0
             experiment = Experiment(self._offered, self._requested, scenario, loss)
-            connects, arrive = bool(asked.get("connects")), _whole(asked.get("arrive"))
-            self._keep(Trial(experiment, connects, arrive, lab.run(experiment)))
+            connects, arrive = bool(asked.get("connects")), _predicted(asked.get("arrive"))
+            outcome = lab.run(experiment, self._processes)
+            self._keep(Trial(experiment, connects, arrive, outcome))
         except CourseError as error:
             problem = str(error)
-        with self._lock:
-            self._running, self._problem = False, problem
+        except Exception as error:  # noqa: BLE001 - whatever it was, the buttons work again
+            problem = f"The experiment failed ({type(error).__name__}: {error})."
+        finally:
+            with self._lock:
+                self._running, self._problem = False, problem
 
     def _keep(self, trial: Trial) -> None:
         with self._lock:
@@ -167,7 +174,7 @@ def _shown(trial: Trial) -> dict[str, Any]:
     return {
         "title": f"{experiment.scenario}{loss}",
         "pair": f"{experiment.offered} -> {experiment.requested}",
-        "seen": _seen(outcome),
+        "seen": _seen(experiment, outcome),
         "why": " ".join(filter(None, [rules.explain(experiment, outcome), outcome.remark])),
         "right": trial.right,
         "verdict": f"You said: {said}. {truth}",
@@ -182,16 +189,20 @@ def _rule(rule: dict[str, Any]) -> str:
     return f"{rule['policy']}: {rule['offered']} -> {rule['requested']} {fits}. {rule['rule']}"
 
 
-def _seen(outcome: Outcome) -> str:
+def _seen(experiment: Experiment, outcome: Outcome) -> str:
     if not outcome.connected:
         return f"not connected ({outcome.broken.lower() or 'nothing was found'})"
     parts = [f"connected, {len(outcome.received)} of {outcome.sent} arrived"]
     if outcome.latency_ms:
-        parts.append(f"latency p50 {statistics.median(outcome.latency_ms):.2f} ms")
+        # What is replayed to a late reader waited in the writer's queue, and not on its way.
+        what = "age" if experiment.scenario == "late joiner" else "latency"
+        parts.append(f"{what} p50 {statistics.median(outcome.latency_ms):.2f} ms")
     if outcome.received and not outcome.in_order:
         parts.append("not in order")
     return ", ".join(parts)
 
 
-def _whole(value: Any) -> int | None:
-    return value if isinstance(value, int) else None
+def _predicted(arrive: Any) -> int | None:
+    if arrive is None or (isinstance(arrive, int) and 0 <= arrive <= COUNT):
+        return arrive
+    raise LabError(f"A prediction is a whole number of messages, 0 to {COUNT}, not {arrive!r}.")

@@ -26,8 +26,8 @@ def saved(label: str, words: str) -> dict[str, str]:
     Mime bundle with ``text/html`` and ``text/plain``.
     """
     note = (
-        f"{label} as it was at {time.strftime('%H:%M:%S')}. This is a saved copy and not live: run "
-        "this cell again to see what happens now."
+        f"{label} as it was at {time.strftime('%Y-%m-%d %H:%M:%S')}. This is a saved copy and not "
+        "live: run this cell again to see what happens now."
     )
     if len(words) > LONGEST:
         words = f"{words[:LONGEST]}\n[the rest was not saved]"

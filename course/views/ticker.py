@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 import weakref
@@ -74,13 +75,23 @@ class Ticker:
             due = time.monotonic() + LONGEST_REST
             views = list(self._views)
             for view in views:
-                due = min(due, view.tick(time.monotonic()))
+                due = min(due, self._tick(view, due))
             del views
             with self._changed:
                 if not self._views:
                     self._thread = None
                     return
                 self._changed.wait(max(0.0, due - time.monotonic()))
+
+    def _tick(self, view: Ticking, due: float) -> float:
+        """Return when the view is due next; ``due``, if it failed, and with it only this view."""
+        try:
+            return view.tick(time.monotonic())
+        except Exception as error:  # noqa: BLE001 - the others go on, and later ones begin
+            self.forget(view)
+            with contextlib.suppress(Exception):  # what failed may well fail at this, too
+                view.end(f"This view has stopped ({type(error).__name__}: {error}).")
+            return due
 
 
 ticker_of = PerSession(Ticker)

@@ -8,6 +8,7 @@ from typing import Any
 
 from course import mcap_file
 from course.errors import SessionError
+from course.mcap_file import RecordingError
 from course.runtime import arguments
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
@@ -74,11 +75,18 @@ class Timeline(LiveView):
         ]
 
     def save(self, path: str | Path) -> Path:
-        """Write the last messages of all topics (up to 1000 each) to an MCAP file; return its path.
+        """Write the last messages of all topics to an MCAP file; return its path.
+
+        These are up to 1000 of each topic, or as many as have 32 MiB.
 
         Raises:
-            RecordingError: the file cannot be written.
+            RecordingError: the file cannot be written, or this timeline has ended.
         """
+        if self.over:
+            raise RecordingError(
+                "This timeline has ended, and has let its messages go: run its cell again, and "
+                "save while it is live."
+            )
         recordings = {trace.topic: (trace.msg_type, trace.messages) for trace, _ in self._rows}
         return mcap_file.write(path, recordings)
 
@@ -99,9 +107,12 @@ class Timeline(LiveView):
     def words(self) -> str:
         """Return the figures of each topic."""
         lines = [f"The last {self._window / 1e9:g} s"]
-        for topic, found in self.figures().items():
-            lines.append(f"  {topic}: {describe(found)}")
-            for node, count in self._nodes(topic).items():
+        start = time.time_ns() - self._window
+        found = self.figures()
+        for trace, tap in self._rows:
+            text = describe(found[trace.topic]) + _shortened(trace, tap, start)
+            lines.append(f"  {trace.topic}: {text}")
+            for node, count in self._nodes(trace.topic).items():
                 lines.append(f"    callbacks of {node}: {count}")
         return "\n".join(lines)
 
@@ -139,7 +150,7 @@ class Timeline(LiveView):
             lanes.append((f"callback of {node}", [r.started for r in runs if r.node == node]))
         return {
             "name": trace.topic,
-            "text": describe(found),
+            "text": describe(found) + _shortened(trace, tap, start),
             "lanes": [
                 {"label": label, "counts": timeline.columns(moments, start, self._window)}
                 for label, moments in lanes
@@ -177,6 +188,18 @@ def describe(figures: Figures) -> str:
     if figures.lost:
         parts.append(f"{figures.lost} lost on the way")
     return ", ".join(parts)
+
+
+def _shortened(trace: Trace, tap: CallbackTap, start: int) -> str:
+    """Return, to be added to the figures, that what came since ``start`` (ns) is not all here."""
+    begins = max(trace.complete_since, tap.complete_since)
+    if begins <= start:
+        return ""
+    seconds = (time.time_ns() - begins) / 1e9
+    return (
+        f" (of the last {seconds:.1f} s only: a timeline keeps {timeline.KEPT} messages of a "
+        "topic, and as many runs of callbacks)"
+    )
 
 
 def _rounded(values: list[float | None], unit: float, digits: int) -> list[float | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import threading
 import time
@@ -9,6 +10,7 @@ import weakref
 from collections import deque
 from typing import Any, NamedTuple
 
+from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
@@ -25,30 +27,40 @@ class Run(NamedTuple):
 
 
 class CallbackTap:
-    """Listens to the callbacks of one topic's subscriptions, until `stop` gives them back.
+    """Listens to the callbacks of one topic's subscriptions, until `stop`.
 
     A callback runs as before, with the arguments that it takes; what it raises goes its way.
-    However many taps a subscription has, its callback is wrapped once.
+    However many taps a subscription has, its callback is wrapped once; without any, the wrapper
+    stays and only passes on. rclpy reads how many arguments a callback takes when it takes a
+    message, and calls it some time later, in another thread maybe: a callback given back in between
+    would get an argument too many.
     """
 
     def __init__(self, topic: str) -> None:
         """Listen to subscriptions of ``topic``, once `watch` has seen their nodes."""
         self.topic = topic
         self._runs: deque[Run] = deque(maxlen=KEPT)
+        self._heard: weakref.WeakSet[_Wrapped] = weakref.WeakSet()
 
     def watch(self, nodes: list[Node]) -> None:
         """Listen to the subscriptions that ``nodes`` have now, and to no others. Idempotent."""
-        present = {
-            subscription: node.get_fully_qualified_name()
-            for node in nodes
-            for subscription in node.subscriptions
-            if subscription.topic_name == self.topic
-        }
+        present = [found for node in nodes for found in self._subscriptions(node)]
         with _lock:
-            for subscription in [known for known in _wrapped if known not in present]:
-                _leave(subscription, self._runs)
-            for subscription, name in present.items():
-                _join(subscription, self._runs, name)
+            wrapped = [_wrap(subscription, name) for subscription, name in present]
+            for known in list(self._heard):
+                if known not in wrapped:
+                    known.leave(self._runs)
+                    self._heard.discard(known)
+            for found in wrapped:
+                found.join(self._runs)
+                self._heard.add(found)
+
+    def _subscriptions(self, node: Node) -> list[tuple[Subscription, str]]:
+        try:
+            name = node.get_fully_qualified_name()
+            return [(end, name) for end in node.subscriptions if end.topic_name == self.topic]
+        except InvalidHandle:  # it has been destroyed just now, or one of its subscriptions has
+            return []
 
     def since(self, moment_ns: int) -> list[Run]:
         """Return the runs that started since a moment (ns since the epoch)."""
@@ -56,8 +68,14 @@ class CallbackTap:
             runs = list(self._runs)
         return [run for run in runs if run.started >= moment_ns]
 
+    @property
+    def complete_since(self) -> int:
+        """The moment (ns) since when no run has been let go of; 0 if none ever was."""
+        with _lock:
+            return self._runs[0].started if len(self._runs) == self._runs.maxlen else 0
+
     def stop(self) -> None:
-        """Give the callbacks back, unless somebody has changed them since. Idempotent."""
+        """Listen no more. Idempotent."""
         self.watch([])
 
 
@@ -65,20 +83,21 @@ class _Wrapped:
     """A subscription's callback, wrapped for whoever listens to it."""
 
     def __init__(self, node: str, original: Any) -> None:
-        self.original = original
-        self.listeners: list[deque[Run]] = []
+        self._listeners: tuple[deque[Run], ...] = ()  # another one each time, so read at any time
         wants_info = _takes_two(original)
 
         def keep(info: dict[str, int] | None, started: int) -> None:
             run = Run(node, (info or {}).get("source_timestamp", 0), started, time.time_ns())
             with _lock:
-                for listener in self.listeners:
+                for listener in self._listeners:
                     listener.append(run)
 
         def call(message: Any, info: dict[str, int] | None) -> Any:
             return original(message, info or {}) if wants_info else original(message)
 
         def plain(message: Any, info: dict[str, int] | None = None) -> Any:
+            if not self._listeners:
+                return call(message, info)
             started = time.time_ns()
             try:
                 return call(message, info)
@@ -95,36 +114,36 @@ class _Wrapped:
         self.callback: Any = coroutine
         if not inspect.iscoroutinefunction(original):
             self.callback = plain
+        # What is said of it, and its errors above all, names the learner's own callback.
+        functools.update_wrapper(self.callback, original, updated=())
         # rclpy reads the signature to know what to pass, and a moment lies between its two notes of
         # it: a message in that moment comes without its information.
         self.callback.__signature__ = inspect.signature(_with_info)
+        # Known by the callback alone: a table of them would keep nodes that nobody has any more.
+        self.callback.__dict__[_MARK] = self
+
+    def join(self, listener: deque[Run]) -> None:
+        """Have a listener hear of the callback; called with the lock held. Idempotent."""
+        if not any(known is listener for known in self._listeners):
+            self._listeners = (*self._listeners, listener)
+
+    def leave(self, listener: deque[Run]) -> None:
+        """Have a listener hear no more; called with the lock held. Idempotent."""
+        self._listeners = tuple(known for known in self._listeners if known is not listener)
 
 
-_wrapped: weakref.WeakKeyDictionary[Subscription, _Wrapped] = weakref.WeakKeyDictionary()
+_MARK = "_course_wrapped"
 _lock = threading.Lock()
 
 
-def _join(subscription: Subscription, listener: deque[Run], node: str) -> None:
-    """Have a listener hear of a subscription's callback; called with the lock held."""
-    wrapped = _wrapped.get(subscription)
-    if wrapped is None or subscription.callback is not wrapped.callback:
+def _wrap(subscription: Subscription, node: str) -> _Wrapped:
+    """Return the wrapper of a subscription's callback, a new one if there is none around it."""
+    found = getattr(subscription.callback, "__dict__", {}).get(_MARK)
+    if not isinstance(found, _Wrapped) or found.callback is not subscription.callback:
         # New, or somebody has set another callback since: it is that one that runs now.
-        heard = wrapped.listeners if wrapped else []
-        wrapped = _wrapped[subscription] = _Wrapped(node, subscription.callback)
-        wrapped.listeners = heard
-        subscription.callback = wrapped.callback
-    if not any(known is listener for known in wrapped.listeners):
-        wrapped.listeners = [*wrapped.listeners, listener]
-
-
-def _leave(subscription: Subscription, listener: deque[Run]) -> None:
-    """Have a listener hear no more, and the last one leave all as it was; the lock is held."""
-    wrapped = _wrapped[subscription]
-    wrapped.listeners = [known for known in wrapped.listeners if known is not listener]
-    if not wrapped.listeners:
-        del _wrapped[subscription]
-        if subscription.callback is wrapped.callback:
-            subscription.callback = wrapped.original
+        found = _Wrapped(node, subscription.callback)
+        subscription.callback = found.callback
+    return found
 
 
 def _with_info(message: Any, info: dict[str, int]) -> None:

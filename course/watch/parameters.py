@@ -144,6 +144,8 @@ def _entry(name: str, value: Any, descriptor: Any) -> Entry:
     least, most, step = (
         (limits.from_value, limits.to_value, limits.step or None) if limits else (None, None, None)
     )
+    if descriptor.integer_range and not descriptor.floating_point_range:
+        step = step or 1  # a browser cannot tell 1.0 from 1, so the kind of range decides
     return Entry(name, value, kind, descriptor.description, least, most, step, descriptor.read_only)
 
 

@@ -13,13 +13,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from rclpy.qos import DurabilityPolicy
+
 from course.graph import reader
 from course.runtime.offers import fitting_qos, full_topic, type_on
-from course.runtime.recorder import Stamped
 from course.runtime.session import Session
 
 KEPT = 20_000
-"""Messages of one topic that a trace remembers: 20 s at 1 kHz."""
+"""Messages of one topic that a trace remembers: 20 s at 1 kHz. More take long to draw."""
 
 COLUMNS = 200
 """Into how many columns a window is divided: more than an eye can tell apart."""
@@ -29,6 +30,9 @@ BINS = 50
 
 MESSAGES = 1000
 """Messages of one topic that a trace keeps whole, to be saved."""
+
+BYTES = 32 * 1024 * 1024
+"""Bytes that these have at most: of large messages, such as pictures, the latest few are kept."""
 
 GAP = 3.0
 """A pause is a gap if it is so many times as long as the median period."""
@@ -92,12 +96,13 @@ class Trace:
         self.msg_type = msg_type or session.until(
             lambda: type_on(session.observer, self.topic), what=f"somebody to use {self.topic}"
         )
-        self._messages: deque[Stamped] = deque(maxlen=MESSAGES)
+        self._messages: deque[tuple[int, bytes]] = deque()
+        self._size = 0
         self._subscribe()
 
     @property
-    def messages(self) -> list[Stamped]:
-        """The latest messages, oldest first (a snapshot)."""
+    def messages(self) -> list[tuple[int, bytes]]:
+        """The latest messages, each with its time (ns) and as CDR, oldest first (a snapshot)."""
         with self._lock:
             return list(self._messages)
 
@@ -108,16 +113,23 @@ class Trace:
         """
         offers = self._session.observer.get_publishers_info_by_topic(self.topic)
         if any(reader.incompatibilities(offer.qos_profile, self._qos) for offer in offers):
-            self.stop()
+            self._session.unwatch(self._subscription)
             self._subscribe()
 
     def stop(self) -> None:
-        """Trace no more. Idempotent."""
+        """Trace no more, and let the messages go. Idempotent."""
         self._session.unwatch(self._subscription)
+        with self._lock:
+            self._messages.clear()
+            self._size = 0
 
     def _subscribe(self) -> None:
         self._qos = fitting_qos(self._session.observer, self.topic, _DEPTH)
-        self._subscription = self._session.watch(self.msg_type, self.topic, self._take, self._qos)
+        # Fits every offer, and brings nothing of the past: what is replayed is not what is late.
+        self._qos.durability = DurabilityPolicy.VOLATILE
+        self._subscription = self._session.watch(
+            self.msg_type, self.topic, self._take, self._qos, raw=True
+        )
 
     def since(self, moment_ns: int) -> list[Passage]:
         """Return the passages received since a moment (ns), oldest first."""
@@ -125,7 +137,14 @@ class Trace:
             passages = list(self._passages)
         return [passage for passage in passages if passage.received >= moment_ns]
 
-    def _take(self, message: Any, info: dict[str, int]) -> None:
+    @property
+    def complete_since(self) -> int:
+        """The moment (ns) since when no passage has been let go of; 0 if none ever was."""
+        with self._lock:
+            full = len(self._passages) == self._passages.maxlen
+            return self._passages[0].received if full else 0
+
+    def _take(self, message: bytes, info: dict[str, int]) -> None:
         passage = Passage(
             info["source_timestamp"], info["received_timestamp"] or time.time_ns(),
             info.get("publication_sequence_number") or 0,
@@ -134,7 +153,12 @@ class Trace:
         stamp = self._session.sim.now_ns if self._session.options["sim_time"] else passage.published
         with self._lock:
             self._passages.append(passage)
-            self._messages.append(Stamped(stamp, message))
+            self._messages.append((stamp, message))
+            self._size += len(message)
+            while len(self._messages) > MESSAGES or (
+                self._size > BYTES and len(self._messages) > 1
+            ):
+                self._size -= len(self._messages.popleft()[1])
 
 
 def figures(passages: Sequence[Passage]) -> Figures:

@@ -80,7 +80,7 @@ def test_every_view_renders_updates_and_speaks(open_cells: Open, tmp_path: Path)
     page = open_cells(*(source for source, _ in VIEWS.values()))
     graph = region(page, "ROS graph")
     expect(graph.locator("svg text", has_text="/chatter")).to_be_visible()
-    expect(graph.locator(".rosgraph-line.rosgraph-bad")).to_have_count(1)
+    expect(graph.locator(".rosgraph-line.rosgraph-bad")).to_have_count(2)
     expect(words(graph)).to_contain_text("do not connect on /scan: reliability")
     expect(region(page, "Log panel").get_by_role("log")).to_contain_text("heard hello")
     expect(region(page, "Timeline").locator("svg")).to_have_attribute("role", "img")
@@ -122,6 +122,30 @@ def test_nodes_come_and_go_in_the_graph(open_cells: Open) -> None:
     expect(graph.locator("svg text", has_text="/listener")).to_have_count(0)
     run_in_kernel(page, "course.run(Listener)")
     expect(graph.locator("svg text", has_text="/listener")).to_be_visible()
+
+
+def test_a_graph_that_cannot_be_drawn_says_why_in_its_place(open_cells: Open) -> None:
+    page = open_cells(
+        "session.graph()",
+        "broken = session.graph()\n"
+        "def look(): raise OSError('no graph today')\n"
+        "broken.look = look\n"
+        "broken",
+        "session.graph()",
+    )
+    graph, broken, second = region(page, "ROS graph").all()
+    expect(broken.get_by_role("status")).to_contain_text("This view has stopped (OSError: no graph")
+    expect(second.locator("svg text", has_text="/robot")).to_be_visible()
+    # Each view draws with arrows of its own: no id is on the page twice.
+    ids = page.page.locator("marker").evaluate_all("all => all.map(marker => marker.id)")
+    assert len(ids) == len(set(ids)) == 4
+    crowd = "crowd = [robot.create_publisher(String, f't{n}', 1) for n in range(160)]"
+    run_in_kernel(page, f"from std_msgs.msg import String\n{crowd}")
+    expect(graph.locator(".rosview-stage")).to_contain_text("nobody can follow a drawing of more")
+    expect(graph.locator("svg")).to_have_count(0)
+    run_in_kernel(page, "for publisher in crowd: robot.destroy_publisher(publisher)")
+    expect(graph.locator("svg text", has_text="/robot")).to_be_visible()
+    assert page.errors == []
 
 
 def test_a_cell_that_runs_again_has_one_live_view(open_cells: Open) -> None:
@@ -199,6 +223,75 @@ def test_every_view_is_honest_after_a_restart_and_in_a_notebook_that_is_opened_a
         expect(copy).to_be_hidden()
 
 
+@pytest.mark.parametrize("how", ["shut down", "killed"])
+def test_every_view_says_that_its_kernel_is_gone(open_cells: Open, lab: Lab, how: str) -> None:
+    page = open_cells(*(source for source, _ in VIEWS.values()))
+    for _, label in VIEWS.values():
+        expect(region(page, label).locator(".rosview-status")).to_have_text("")
+    if how == "shut down":
+        page.page.evaluate("() => window.jupyterapp.shell.currentWidget.sessionContext.shutdown()")
+    else:
+        for process in lab.kernel_processes():
+            process.kill()
+    for _, label in VIEWS.values():
+        view = region(page, label)
+        expect(view.get_by_role("status").last).to_contain_text("Run this cell again")
+        for control in view.locator("button, input, select").all():
+            expect(control).to_be_disabled()
+
+
+def test_what_is_being_read_or_used_is_left_alone(open_cells: Open) -> None:
+    page = open_cells(
+        "session.log_panel()",
+        'session.action("count")',
+        'session.parameters("robot")',
+        "from rclpy.node import Node\n"
+        "_ = course.run(lambda: Node('bare'))\n"
+        "session.parameters('bare')",
+        "from std_msgs.msg import String\n"
+        "robot.create_publisher(String, "
+        "'a_topic_with_a_name_that_is_far_too_long', 10)\n"
+        "session.timeline('a_topic_with_a_name_that_is_far_too_long')",
+    )
+    log = region(page, "Log panel")
+    # A line that stays is the same element, although others come: what is marked in it stays so.
+    line = log.locator("tbody tr").last.element_handle()
+    assert line is not None
+    said = words(log).text_content() or ""
+    expect(words(log)).not_to_have_text(said)
+    assert line.evaluate("element => element.isConnected")
+    expect(log.get_by_label("Search")).to_have_accessible_description(re.compile(r"lines \("))
+    # Marked words stand still, and catch up when they are let go of.
+    log.get_by_text("In words").click()
+    words(log).evaluate("element => document.getSelection().selectAllChildren(element)")
+    marked = words(log).text_content() or ""
+    before = log.locator("tbody tr").last.inner_text()
+    expect(log.locator("tbody tr").last).not_to_have_text(before)
+    assert words(log).text_content() == marked
+    page.page.evaluate("() => document.getSelection().removeAllRanges()")
+    expect(words(log)).not_to_have_text(marked)
+    # The focus of a Cancel button stays with its goal.
+    action = region(page, "Action view")
+    action.get_by_role("button", name="Send goal").click()
+    cancel = action.get_by_role("button", name="Cancel goal 1")
+    cancel.focus()
+    page.page.keyboard.press("Enter")
+    expect(action.locator("[aria-current]")).to_contain_text("CANCELED")
+    expect(action.get_by_role("listitem").first).to_be_focused()
+    # A key that is held moves the slider to where it is let go of.
+    slider = region(page, "Parameter panel").first.get_by_role("slider", name="speed")
+    slider.focus()
+    for key in ("ArrowRight", "ArrowRight", "ArrowLeft", "ArrowRight"):
+        page.page.keyboard.press(key)
+    expect(region(page, "Parameter panel").first.locator("output")).to_have_text("1.5")
+    run_in_kernel(page, "assert robot.get_parameter('speed').value == 1.5")
+    expect(region(page, "Parameter panel").last).to_contain_text("has declared no parameters")
+    for label in region(page, "Timeline").locator(".rostimeline-label").all():
+        left = "e => e.getBoundingClientRect().left - e.closest('svg').getBoundingClientRect().left"
+        assert label.evaluate(left) >= 0
+    assert page.errors == []
+
+
 def test_the_labs_scenarios_are_buttons_that_keys_press(open_cells: Open) -> None:
     page = open_cells("session.qos_lab()")
     view = region(page, "QoS lab")
@@ -220,6 +313,19 @@ def test_the_labs_scenarios_are_buttons_that_keys_press(open_cells: Open) -> Non
     expect(newest).to_contain_text("That was right.")
     expect(late).to_be_focused()
     expect(late).to_have_attribute("aria-disabled", "false")
+    loss = view.get_by_label("The link loses")
+    if loss.is_enabled():
+        loss.fill("")
+        loss.press_sequentially("e")  # a number may begin so, and this is none
+        group.get_by_role("button", name="Run stream").click()
+        expect(view.get_by_role("alert")).to_have_text(
+            "That is no number: type one, or leave it empty."
+        )
+        loss.fill("2.5")
+        group.get_by_role("button", name="Run stream").click()
+        expect(view.get_by_role("alert")).to_contain_text("a whole number, not 2.5.")
+        expect(view.locator(".roslab-state")).to_have_text("")
+        loss.fill("0")
     view.get_by_label("requested depth").fill("3")
     view.get_by_label("and that so many arrive").fill("3")
     group.get_by_role("button", name="Run slow reader").focus()
@@ -232,14 +338,22 @@ def test_the_labs_scenarios_are_buttons_that_keys_press(open_cells: Open) -> Non
 
 def test_what_is_read_only_stays_so_and_gaps_and_drops_are_marked(open_cells: Open) -> None:
     page = open_cells(
-        "from rcl_interfaces.msg import ParameterDescriptor\n"
-        "_ = robot.declare_parameter('serial', 'x1', ParameterDescriptor(read_only=True))",
+        "from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor\n"
+        "_ = robot.declare_parameter('serial', 'x1', ParameterDescriptor(read_only=True))\n"
+        "wide = [FloatingPointRange(from_value=0.0, to_value=2.0)]\n"
+        "wide = ParameterDescriptor(floating_point_range=wide)\n"
+        "_ = robot.declare_parameter('gain', 1.0, wide)",
         'session.parameters("robot")',
         'session.timeline("chatter", window=60.0)',
     )
     panel = region(page, "Parameter panel")
     expect(panel.get_by_label("speed")).to_be_enabled()
     expect(panel.get_by_label("serial")).to_be_disabled()
+    gain = panel.get_by_role("slider", name="gain")  # 1.0 is no whole number
+    expect(gain).to_have_attribute("step", "any")
+    gain.focus()
+    page.page.keyboard.press("ArrowRight")
+    expect(gain).to_have_value(re.compile(r"1\.\d+"))
     timeline = region(page, "Timeline")
     expect(timeline.locator(".rostimeline-rate")).to_have_attribute("points", re.compile(r"\S"))
     # The hidden reader keeps the last 1000: what is published while it is held is lost.

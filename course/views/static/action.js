@@ -39,7 +39,7 @@ function card(number, send) {
       onclick: () => send({ cancel: number }) }, "Cancel",
   );
   const element = make(
-    "li", { class: "rosgoal" }, make("strong", {}, `Goal ${number}`), states, text, state, cancel,
+    "li", { class: "rosgoal", tabindex: "-1" }, make("strong", {}, `Goal ${number}`), states, text, state, cancel,
   );
   return {
     element,
@@ -52,6 +52,8 @@ function card(number, send) {
       text.textContent = goal.text;
       if (state.textContent !== goal.outcome) state.textContent = goal.outcome;
       state.className = `rosgoal-state ${goal.bad ? "rosbad" : ""}`;
+      // The button goes with the goal's end: its focus stays in the view, where the result is.
+      if (goal.over && document.activeElement === cancel) element.focus();
       cancel.hidden = goal.over;
     },
   };

@@ -3,6 +3,7 @@
 const view = {
   label: "ROS graph",
   start(stage) {
+    const arrows = newId(); // its own: an arrow would be drawn by the marker of another view
     return {
       draw(frame) {
         const svg = shape("svg", {
@@ -10,32 +11,33 @@ const view = {
           viewBox: `0 0 ${frame.width} ${frame.height}`,
           width: frame.width, height: frame.height,
         });
-        svg.append(shape("defs", {}, marker("good"), marker("bad")));
-        for (const line of frame.lines) svg.append(arrow(line));
+        svg.append(shape("defs", {}, marker(arrows, "good"), marker(arrows, "bad")));
+        for (const line of frame.lines) svg.append(arrow(line, arrows));
         for (const box of frame.boxes) svg.append(drawnBox(box));
         stage.replaceChildren(
-          frame.boxes.length ? svg : make("p", {}, "No nodes yet: run one with course.run(…)."),
+          frame.boxes.length ? svg
+            : make("p", {}, frame.note || "No nodes yet: run one with course.run(…)."),
         );
       },
     };
   },
 };
 
-function marker(kind) {
+function marker(arrows, kind) {
   return shape(
     "marker",
-    { id: `arrow-${kind}`, viewBox: "0 0 8 8", refX: 8, refY: 4, markerWidth: 8, markerHeight: 8,
+    { id: `${arrows}-${kind}`, viewBox: "0 0 8 8", refX: 8, refY: 4, markerWidth: 8, markerHeight: 8,
       orient: "auto-start-reverse", class: `rosgraph-${kind}` },
     shape("path", { d: kind === "bad" ? "M1,1 L7,7 M7,1 L1,7" : "M0,0 L8,4 L0,8 Z" }),
   );
 }
 
-function arrow(line) {
+function arrow(line, arrows) {
   const kind = line.bad ? "bad" : "good";
   const group = shape(
     "g", { class: `rosgraph-line rosgraph-${kind} rosgraph-${line.kind}` },
     shape("title", {}, line.tip),
-    shape("path", { d: line.path, "marker-end": `url(#arrow-${kind})` }),
+    shape("path", { d: line.path, "marker-end": `url(#${arrows}-${kind})` }),
   );
   if (line.label) {
     group.append(shape("text", { x: line.x, y: line.y }, line.label));

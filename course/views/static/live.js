@@ -10,6 +10,7 @@ const SVG = "http://www.w3.org/2000/svg";
 const DEAD =
   "Not live any more: the kernel of this notebook was restarted or has ended. " +
   "Run this cell again.";
+const ENDINGS = ["terminating", "restarting", "autorestarting", "dead"]; // of a kernel
 const FOCUSABLE = "a, button, input, select, summary, textarea, [tabindex]";
 
 /** An id that nothing else on the page has: each view is a module of its own, with its own counters. */
@@ -53,6 +54,7 @@ function render({ model, el }) {
       model.send(message);
     } catch {
       dead = true; // the connection has been taken down
+      say();
     }
   };
   const stage = make("fieldset", { class: "rosview-stage", role: "presentation" });
@@ -73,10 +75,17 @@ function render({ model, el }) {
   let waiting = 0;
   const draw = () => {
     waiting = 0;
-    drawing.draw(model.get("frame"));
-    words.textContent = model.get("words");
+    // None yet, if the first look failed or was too large to send: the status line says why.
+    if (Object.keys(model.get("frame")).length) drawing.draw(model.get("frame"));
+    retell();
     guard(root);
     send({ drawn: model.get("number") });
+  };
+  // Text that somebody has marked, to copy it, stands still until it is let go of.
+  const retell = () => {
+    const marked = document.getSelection();
+    if (marked && !marked.isCollapsed && marked.containsNode(words, true)) return;
+    if (words.textContent !== model.get("words")) words.textContent = model.get("words");
   };
   // At most one drawing a screen refresh, always of the latest frame.
   const refresh = () => {
@@ -105,21 +114,30 @@ function render({ model, el }) {
     }
   };
   const heard = (message) => message?.here && alive();
+  // The widgets' manager passes restarts on, and neither "Shut Down Kernel" nor a crash.
+  const session = model.widget_manager?.context?.sessionContext;
+  const kernelStatus = (_, now) => { if (ENDINGS.includes(now)) connection(); };
 
+  document.addEventListener("selectionchange", retell);
   model.on("change:number", refresh);
   model.on("change:ended", say);
   model.on("change:notice", say);
   model.on("comm_live_update", connection);
   model.on("msg:custom", heard);
+  session?.kernelChanged?.connect(connection);
+  session?.statusChanged?.connect(kernelStatus);
   draw();
   say();
   return () => {
     cancelAnimationFrame(waiting);
+    document.removeEventListener("selectionchange", retell);
     model.off("change:number", refresh);
     model.off("change:ended", say);
     model.off("change:notice", say);
     model.off("comm_live_update", connection);
     model.off("msg:custom", heard);
+    session?.kernelChanged?.disconnect(connection);
+    session?.statusChanged?.disconnect(kernelStatus);
     drawing.stop?.();
     root.remove();
   };

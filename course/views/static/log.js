@@ -17,7 +17,10 @@ const view = {
     const search = make("input", {
       type: "search", "aria-label": "Search", placeholder: "Search", oninput: ask,
     });
-    const count = make("span", { class: "rosform-takes", role: "status" });
+    // No status: it changes with every line, and a screen reader would say nothing else. It belongs
+    // to the filters, and is read out with them.
+    const count = make("span", { class: "rosform-takes", id: newId() });
+    for (const filter of [level, search]) filter.setAttribute("aria-describedby", count.id);
     const rows = make("tbody");
     const box = make(
       "div", { class: "roslog", tabindex: "0", role: "log", "aria-live": "off" },
@@ -35,10 +38,7 @@ const view = {
       const wanted = search.value.toLowerCase();
       const found = frame.rows.filter((row) => (LEVELS[row[1]] ?? 20) >= least
         && (!wanted || row.join(" ").toLowerCase().includes(wanted)));
-      rows.replaceChildren(...found.map((row) => make(
-        "tr", { class: `roslog-${row[1].toLowerCase()}` },
-        ...row.map((cell) => make("td", {}, cell)),
-      )));
+      update(rows, found);
       if (following) requestAnimationFrame(() => { box.scrollTop = box.scrollHeight; });
       const said = `the last ${found.length} of ${frame.found} lines (${frame.total} in all)`;
       if (count.textContent !== said) count.textContent = said;
@@ -57,5 +57,28 @@ const view = {
     };
   },
 };
+
+/** Bring the table up to date; a line that stays is left alone, as somebody may read or copy it. */
+function update(rows, found) {
+  const known = new Map();
+  for (const element of rows.children) known.set(element.dataset.key, element);
+  const times = new Map(); // lines that are alike in all are told apart by their number
+  const wanted = found.map((row) => {
+    const line = JSON.stringify(row);
+    times.set(line, (times.get(line) ?? 0) + 1);
+    const key = `${line} ${times.get(line)}`;
+    return known.get(key) ?? make(
+      "tr", { class: `roslog-${row[1].toLowerCase()}`, "data-key": key },
+      ...row.map((cell) => make("td", {}, cell)),
+    );
+  });
+  const kept = new Set(wanted);
+  for (const element of known.values()) if (!kept.has(element)) element.remove();
+  let place = rows.firstElementChild;
+  for (const element of wanted) {
+    if (element === place) place = place.nextElementSibling;
+    else rows.insertBefore(element, place);
+  }
+}
 
 export default { render };

@@ -50,6 +50,13 @@ function build(stage, frame, id, send) {
   let running = false;
   const ask = (scenario) => {
     if (running) return;
+    // What is no number has no value, which would be taken for 0.
+    const unread = [...form.querySelectorAll("input")].find((input) => input.validity.badInput);
+    if (unread) {
+      problem.textContent = "That is no number: type one, or leave it empty.";
+      unread.focus();
+      return;
+    }
     if (!connects.value) {
       problem.textContent = "Predict first: will they connect?";
       connects.focus();

@@ -3,6 +3,7 @@
 
 const WIDTH = 760;
 const LABEL = 170;
+const LONGEST = 24; // characters of a label that LABEL has room for
 const LANE = 20;
 const PLOT = 40;
 const SPACE = 12;
@@ -36,7 +37,8 @@ function block(topic, frame) {
   topic.lanes.forEach((lane, row) => {
     const y = row * LANE;
     const most = Math.max(1, ...lane.counts);
-    svg.append(shape("text", { x: LABEL - 8, y: y + 14, class: "rostimeline-label" }, lane.label));
+    svg.append(shape("text", { x: LABEL - 8, y: y + 14, class: "rostimeline-label" },
+      shortened(lane.label), shape("title", {}, lane.label)));
     svg.append(shape("line", { x1: LABEL, x2: LABEL + WIDTH, y1: y + LANE - 2, y2: y + LANE - 2 }));
     let path = "";
     lane.counts.forEach((count, place) => {
@@ -64,6 +66,11 @@ function block(topic, frame) {
   );
   return make("div", {}, make("p", { class: "rostimeline-title" },
     make("strong", {}, topic.name), ` ${topic.text}`), svg);
+}
+
+/** A label that fits its place: the end of a name tells more than its beginning. */
+function shortened(label) {
+  return label.length <= LONGEST ? label : `…${label.slice(1 - LONGEST)}`;
 }
 
 /** Lines over one axis from 0 to the largest value; a part of the window without a value is skipped. */

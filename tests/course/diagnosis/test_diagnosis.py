@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import subprocess
 import threading
+import weakref
 from collections.abc import Callable
 
 import pytest
@@ -19,7 +21,7 @@ from test_msgs.action import Fibonacci
 from test_msgs.msg import Empty
 
 from course import Session
-from course.diagnosis import Diagnosis
+from course.diagnosis import Diagnosis, nodes
 from course.errors import WaitTimeout
 from course.graph import reader
 from tests.robot import Robot
@@ -55,6 +57,16 @@ def listener(topic: str = "scan") -> Node:
     node = Node("listener")
     node.create_subscription(String, topic, lambda _message: None, 10)
     return node
+
+
+def test_an_object_that_stands_for_one_that_is_gone_is_passed_over(session: Session) -> None:
+    class Gone:
+        """Something that a library of the learner's had a weak proxy of."""
+
+    proxy = weakref.proxy(Gone())
+    assert gc.is_tracked(proxy)
+    assert not list(nodes.unspun(session))
+    del proxy
 
 
 def test_where_nothing_is_wrong_nothing_is_found(session: Session) -> None:

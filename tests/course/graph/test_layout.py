@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from course.graph import layout
+from course.graph.mermaid import mermaid
 from course.graph.model import Endpoint, Graph, Mismatch, Topic
 
 TYPE = "std_msgs/msg/String"
@@ -47,3 +48,43 @@ def test_a_label_has_room_between_the_boxes() -> None:
     half = len(label.label) * 8 / 2
     for box in drawing.boxes:
         assert box.x + box.width < label.x - half or label.x + half < box.x
+
+
+def crowd(writers: str, readers: str, *broken: str) -> tuple[Graph, set[str], dict[str, str]]:
+    """Return the graph of one topic, its red arrows, and their labels; a pair is as in "ax"."""
+    graph = Graph(
+        tuple(f"/{name}" for name in writers + readers),
+        (
+            Topic(
+                "/t",
+                tuple(Endpoint(f"/{name}", "publisher", TYPE) for name in writers),
+                tuple(Endpoint(f"/{name}", "subscription", TYPE) for name in readers),
+                tuple(Mismatch(f"/{w}", f"/{r}", ("",), ("DURABILITY",)) for w, r in broken),
+            ),
+        ),
+    )
+    lines = layout.draw(graph).lines
+    red = {line.tip[1] for line in lines if line.bad}
+    return graph, red, {line.tip[1]: line.label for line in lines if line.label}
+
+
+def test_a_broken_pair_is_red_from_end_to_end_and_says_why_once() -> None:
+    _, red, labels = crowd("a", "x", "ax")
+    assert (red, labels) == ({"a", "x"}, {"x": "durability"})
+
+
+def test_of_two_publishers_only_the_one_that_nobody_hears_is_red() -> None:
+    graph, red, labels = crowd("ab", "x", "ax")
+    assert (red, labels) == ({"a"}, {"a": "durability"})
+    assert "linkStyle 0 stroke" in mermaid(graph)
+    assert mermaid(graph).count("does not fit") == 1
+
+
+def test_of_two_readers_only_the_deaf_one_is_red() -> None:
+    _, red, labels = crowd("a", "xy", "ax")
+    assert (red, labels) == ({"x"}, {"x": "durability"})
+
+
+def test_a_pair_between_two_that_connect_with_others_is_still_told() -> None:
+    _, red, labels = crowd("ab", "xy", "ax")
+    assert (red, labels) == ({"x"}, {"x": "durability"})

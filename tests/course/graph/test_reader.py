@@ -21,7 +21,7 @@ from test_msgs.msg import Empty
 from course import Session
 from course.graph import reader, words
 from course.graph.mermaid import mermaid
-from course.views.graph import GraphView
+from course.views.graph import MAX_BOXES, GraphView
 
 RELIABLE = QoSProfile(depth=10)
 BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -180,9 +180,37 @@ def test_the_mermaid_text_names_everything_once_and_marks_what_is_broken(session
     for name in ("/talker", "/listener", "/chatter<br/>String"):
         assert text.count(name) == 1
     assert '-. "reliability does not fit" .-x' in text
-    assert "linkStyle 1 stroke:#c00" in text
+    assert "linkStyle 0,1 stroke:#c00" in text, "the whole way is red"
     assert view.mermaid._repr_mimebundle_()["text/vnd.mermaid"] == text
 
 
 def test_an_empty_graph_is_said(session: Session) -> None:
     assert GraphView(session).words() == "No nodes."
+
+
+def crowd(count: int) -> Node:
+    node = Node("crowd")
+    for number in range(count):
+        node.create_publisher(String, f"topic_{number}", 10)
+    return node
+
+
+def test_a_graph_too_large_to_draw_is_said_and_its_words_keep_all(session: Session) -> None:
+    view = GraphView(session)
+    session.run(crowd, MAX_BOXES)
+    session.until(lambda: len(view.graph.topics) == MAX_BOXES)
+    frame, text = view.look()
+    assert frame["boxes"] == ()
+    assert (
+        f"This graph has {MAX_BOXES + 1} boxes (nodes: 1, topics: {MAX_BOXES}, serv"
+        in frame["note"]
+    )
+    assert "stop the nodes that you do not need" in frame["note"]
+    assert "everything" not in frame["note"]
+    for number in range(MAX_BOXES):
+        assert f"topic /topic_{number} (std_msgs/msg/String)" in text
+    assert "leave out everything=True" in GraphView(session, everything=True).frame()["note"]
+    session.stop("crowd")
+    session.run(crowd, 3)
+    session.until(lambda: len(view.graph.topics) == 3)
+    assert (view.frame()["note"], len(view.frame()["boxes"])) == ("", 4)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
+import psutil
 import pytest
 from rclpy.duration import Duration
-from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 
 from course import Session
 from course.qoslab import lab, link, rules
@@ -42,6 +44,9 @@ CASES = {
     ),
     "slow, newest": Experiment(Profile(), Profile(depth=1), "slow reader"),
     "slow, all": Experiment(Profile(), Profile(history="KEEP_ALL"), "slow reader"),
+    "late, long lifespan": Experiment(
+        durable(depth=30, lifespan=60.0), durable(depth=30), "late joiner"
+    ),
     "no deadline": Experiment(Profile(), Profile(deadline=0.1), "deadline"),
 }  # fmt: skip
 
@@ -78,6 +83,81 @@ def test_what_is_lost_is_lost_under_best_effort() -> None:
     assert "never sends anything twice" in rules.explain(
         Experiment(best_effort(), best_effort(), "stream", 60), outcome
     )
+
+
+@pytest.mark.parametrize("side", ["writer", "reader"])
+def test_what_is_older_than_a_lifespan_is_not_replayed_to_a_late_reader(side: str) -> None:
+    short, long = durable(depth=30, lifespan=0.05), durable(depth=30)
+    pair = (short, long) if side == "writer" else (long, short)
+    experiment = Experiment(*pair, "late joiner")
+    assert rules.expected(experiment) is None
+    outcome = lab.run(experiment)
+    assert (outcome.connected, outcome.received) == (True, [])
+    why = rules.explain(experiment, outcome)
+    assert "30 would fit into both queues, and 0 came." in why
+    assert f"What is older than the {side}'s lifespan (0.05 s) is dropped." in why
+
+
+def test_a_slow_readers_own_lifespan_empties_its_queue() -> None:
+    experiment = Experiment(Profile(), Profile(history="KEEP_ALL", lifespan=0.05), "slow reader")
+    assert rules.expected(experiment) is None
+    outcome = lab.run(experiment)
+    assert outcome.missing > 0
+    why = rules.explain(experiment, outcome)
+    assert "pushed out" not in why
+    assert "What is older than the reader's lifespan (0.05 s) is dropped." in why
+
+
+@needs_lossy_link
+def test_a_slow_reader_misses_what_the_link_has_lost() -> None:
+    deep = best_effort(depth=30)
+    experiment = Experiment(deep, deep, "slow reader", loss=60)
+    outcome = lab.run(experiment)
+    assert outcome.missing > 0
+    why = rules.explain(experiment, outcome)
+    assert "pushed out" not in why
+    assert "The link lost some, and a best-effort connection never sends anything twice." in why
+
+
+@needs_lossy_link
+def test_what_grew_old_before_it_was_sent_again_is_said() -> None:
+    brief = Profile(depth=30, lifespan=0.2)  # lost messages are sent again after seconds
+    experiment = Experiment(brief, Profile(depth=30), "stream", loss=60)
+    outcome = lab.run(experiment)
+    assert outcome.missing > 0
+    why = rules.explain(experiment, outcome)
+    assert "before they could be sent again, by the writer's lifespan (0.2 s)." in why
+
+
+@pytest.mark.parametrize(
+    ("experiment", "received", "sentence"),
+    [
+        (
+            Experiment(Profile(history="KEEP_ALL"), Profile(history="KEEP_ALL"), "stream", 60),
+            [0, 1], "They had not been sent again when the experiment ended.",
+        ),
+        (
+            Experiment(best_effort(), best_effort(depth=3), "slow reader", 60),
+            [20, 24, 29], "Newer messages had pushed out older ones. The link lost some, and",
+        ),
+    ],
+)  # fmt: skip
+def test_the_reason_is_one_that_can_be(
+    experiment: Experiment, received: list[int], sentence: str
+) -> None:
+    outcome = Outcome(connected=True, sent=COUNT, received=received, lossy=True)
+    assert sentence in rules.explain(experiment, outcome)
+
+
+@pytest.mark.parametrize("scenario", ["late joiner", "deadline", "liveliness"])
+def test_a_loss_is_not_claimed_where_nothing_is_lost(scenario: str) -> None:
+    experiment = Experiment(durable(), durable(), scenario, loss=50)
+    outcome = lab.run(experiment)
+    assert not outcome.lossy
+    assert (
+        outcome.remark == "The link lost nothing here: it does so in stream and slow reader only."
+    )
+    assert len(outcome.received) == rules.expected(experiment)
 
 
 @needs_lossy_link
@@ -163,6 +243,11 @@ def test_the_view_keeps_the_prediction_beside_what_was_seen(session: Session) ->
     assert trial.right is False
     words = view.words()
     assert "not connected (reliability)" in words
+    durable_ten = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    view.run("late joiner", connects=True, offered=durable_ten, requested=durable_ten, loss=20)
+    replay = view.words().partition("late joiner: ")[2]
+    assert re.match(r"connected, 10 of 30 arrived, age p50 \d", replay), replay
+    assert "The link lost nothing here" in replay
     assert "reliability: BEST_EFFORT -> RELIABLE does not fit. BEST_EFFORT never satis" in words
     assert "You said: connected, 30 messages. It came out otherwise." in words
     asked = {
@@ -170,8 +255,65 @@ def test_the_view_keeps_the_prediction_beside_what_was_seen(session: Session) ->
         "connects": True, "arrive": 30, "loss": 0,
     }  # fmt: skip
     view._heard(view.widget, {"run": asked}, [])
-    session.until(lambda: len(view.trials) == 2, timeout=60)
-    assert view.trials[1].right is True
+    session.until(lambda: len(view.trials) == 3, timeout=60)
+    assert view.trials[2].right is True
     session.until(lambda: not view.widget.frame["running"])
-    view._heard(view.widget, {"run": {**asked, "offered": {"depth": 0}}}, [])
-    session.until(lambda: "depth is 1 to 5000" in view.widget.frame["problem"])
+    for wrong, sentence in (
+        ({"offered": {"depth": 0}}, "depth is 1 to 5000"),
+        ({"loss": 2.5}, "0 to 90 % of its packets, a whole number, not 2.5."),
+        ({"arrive": 2.5}, "A prediction is a whole number of messages, 0 to 30, not 2.5."),
+    ):
+        view._heard(view.widget, {"run": {**asked, **wrong}}, [])
+        session.until(lambda said=sentence: said in view.widget.frame["problem"])  # type: ignore[misc]
+        assert not view.widget.frame["running"]
+    assert len(view.trials) == 3
+
+
+def test_an_experiment_that_fails_says_so_and_the_next_one_runs(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    view = session.qos_lab()
+    asked = {"offered": Profile().data(), "requested": Profile().data(), "scenario": "stream",
+             "connects": True, "arrive": None, "loss": 0}  # fmt: skip
+    with monkeypatch.context() as patch:
+        patch.setattr(lab.sys, "executable", "/nowhere/python")
+        view._heard(view.widget, {"run": asked}, [])
+        session.until(lambda: "The experiment failed (FileNotFoundErr" in view.frame()["problem"])
+    assert not view.frame()["running"]
+    view._heard(view.widget, {"run": asked}, [])
+    session.until(lambda: view.trials and not view.frame()["problem"], timeout=60)
+
+
+def children() -> list[psutil.Process]:
+    return [
+        process
+        for process in psutil.Process().children(recursive=True)
+        if any(part.startswith("course.qoslab.") for part in process.cmdline())
+    ]
+
+
+def test_an_experiment_ends_with_its_session() -> None:
+    with Session() as session:
+        view = session.qos_lab()
+        asked = {"offered": Profile(deadline=60).data(), "requested": Profile(deadline=60).data(),
+                 "scenario": "deadline", "connects": True, "loss": 0}  # fmt: skip
+        view._heard(view.widget, {"run": asked}, [])
+        session.until(lambda: len(children()) == 2, timeout=60)  # the bench and its writer
+        running = children()
+    _, alive = psutil.wait_procs(running, timeout=20)
+    assert alive == []
+    with pytest.raises(LabError, match="This QoS lab has ended"):
+        view.run("stream", connects=True)
+
+
+@needs_lossy_link
+def test_the_tools_of_a_lossy_link_are_found_by_an_ordinary_user(
+    monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
+    monkeypatch.setenv("PATH", "/usr/local/bin:/usr/bin:/bin")  # Debian has nft in /usr/sbin
+    link.problem.cache_clear()
+    request.addfinalizer(link.problem.cache_clear)
+    experiment = Experiment(best_effort(), best_effort(), "stream", loss=60)
+    outcome = lab.run(experiment)
+    assert (outcome.remark, outcome.lossy) == ("", True)
+    assert outcome.missing > 0

@@ -85,6 +85,38 @@ def test_the_rate_is_measured(robot: Robot, capsys: pytest.CaptureFixture[str]) 
     assert "period: min" in text
 
 
+@pytest.mark.parametrize("heard", [0, 1, 2])
+def test_a_slow_rate_takes_two_messages_and_else_says_how_to_listen_longer(
+    robot: Robot, capsys: pytest.CaptureFixture[str], heard: int
+) -> None:
+    publisher = robot.create_publisher(String, "slow", 10)
+    left = iter(range(heard))
+
+    def tick() -> None:
+        if publisher.get_subscription_count() and next(left, None) is not None:
+            publisher.publish(String(data="tick"))
+
+    robot.create_timer(0.5, tick)
+    line = "topic hz slow --timeout 3"
+    if heard == 2:
+        text = answer(capsys, line)
+        assert "Hz over 2 messages" in text
+        assert 0.3 < float(text.split()[2]) < 2.1
+        return
+    with pytest.raises(CourseError) as caught:
+        magic.ros(line)
+    said = str(caught.value)
+    assert said.startswith("Only one message" if heard else "No message")
+    assert "arrived on /slow in 3 s, and a rate takes two." in said
+    assert said.endswith("A slow topic takes longer: %ros topic hz slow --timeout 12.")
+
+
+def test_a_rate_of_nothing_is_not_listened_for_longer(robot: Robot) -> None:
+    with pytest.raises(CourseError, match="Nobody publishes on /orders") as caught:
+        magic.ros("topic hz /orders --timeout 0.2")
+    assert "--timeout" not in str(caught.value)
+
+
 def test_publishing_reaches_the_node(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
     assert "Published on /orders" in answer(capsys, "topic pub /orders '{data: go}'")
     course.until(lambda: robot.orders == ["go"])

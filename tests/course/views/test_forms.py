@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import array
 import json
+import tracemalloc
 from typing import Any
 
 import pytest
-from sensor_msgs.msg import CameraInfo
+from sensor_msgs.msg import CameraInfo, Image
 from test_msgs.msg import Arrays, BasicTypes, Strings
 
 from course import values
@@ -86,6 +88,18 @@ def test_what_does_not_fit_is_a_sentence(
         forms.message(msg_type, {path: typed})
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_picture_is_cut_before_it_becomes_numbers() -> None:
+    message = Image(data=array.array("B", bytes(20_000_000)))
+    tracemalloc.start()
+    try:
+        shown = values.to_data(message)["data"]
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert shown == [0] * values.LONGEST + [f"… {20_000_000 - values.LONGEST} more"]
+    assert peak < 1_000_000
 
 
 def test_long_texts_and_sequences_are_cut_for_display_alone() -> None:

@@ -13,10 +13,12 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from course import Session
+from course.graph import reader
 from course.views import live
 from course.views.graph import GraphView
 from course.views.live import LiveView
 from course.views.saved import saved
+from course.watch.callbacks import CallbackTap
 from tests.kernel import Kernel
 
 
@@ -117,6 +119,82 @@ def test_a_view_that_fails_says_so_and_the_others_go_on(session: Session) -> Non
     session.until(lambda: sound.widget.number > before)
 
 
+@pytest.mark.parametrize("also_at_its_end", [False, True])
+def test_a_view_whose_frame_cannot_be_sent_takes_no_other_down(
+    session: Session, also_at_its_end: bool
+) -> None:
+    unsent, sound = Counter(session), Counter(session)
+    assert unsent.widget
+    assert sound.widget
+    (thread,) = views_threads()
+
+    def refuse(*_args: object, **_options: object) -> None:
+        raise OSError("no such comm")
+
+    unsent.widget.observe(refuse, "number")
+    if also_at_its_end:
+        unsent.widget.observe(refuse, "ended")
+    session.until(lambda: unsent.over)
+    assert unsent.over == "This view has stopped (OSError: no such comm)."
+    before = sound.widget.number
+    session.until(lambda: sound.widget.number > before)
+    later = Counter(session)
+    session.until(lambda: later.widget.number > 2)
+    assert views_threads() == [thread]
+
+
+def test_a_node_that_is_destroyed_under_a_look_does_not_end_the_view(session: Session) -> None:
+    class Stumbling(Counter):
+        period = 60.0  # s: only this test looks
+        over_what: Node | None = None
+
+        def frame(self) -> dict[str, Any]:
+            if self.over_what is not None:
+                self.over_what.get_fully_qualified_name()
+            return super().frame()
+
+    gone = Node("gone", context=session.context)
+    gone.destroy_node()
+    view = Stumbling(session)
+    for _ in range(2):
+        before = view.widget.number
+        view.over_what = gone
+        for _ in range(live.STUMBLES - 1):
+            view._look()
+        assert (view.widget.ended, view.widget.number) == ("", before)
+        view.over_what = None
+        view._look()
+        assert view.widget.number > before
+    view.over_what = gone
+    for _ in range(live.STUMBLES):
+        view._look()
+    assert view.widget.ended.startswith("This view has stopped (InvalidHandle")
+
+
+def test_what_is_destroyed_in_between_is_passed_over(session: Session) -> None:
+    gone, sound = Node("gone", context=session.context), session.run(lambda: Node("sound"))
+    gone.destroy_node()
+    reader.read(session.observer, own=[gone, sound])
+    CallbackTap("/chatter").watch([gone, sound])
+
+
+def test_nodes_that_come_and_go_all_the_time_do_not_end_views(session: Session) -> None:
+    def talker() -> Node:
+        node = Node("talker")
+        node.create_publisher(String, "chatter", 10)
+        node.create_subscription(String, "chatter", lambda _message: None, 10)
+        return node
+
+    views = [session.graph(), session.timeline(("chatter", String))]
+    for view in views:
+        view.period = 0.0
+        view.widget  # noqa: B018 - shown from now on
+    for _ in range(20):
+        session.run(talker)
+        session.stop("talker")
+    assert [view.over for view in views] == ["", ""]
+
+
 def test_without_a_front_end_a_view_is_words_and_makes_no_widget(session: Session) -> None:
     view = GraphView(session)
     assert view._repr_mimebundle_() == ({"text/plain": "No nodes."}, {})
@@ -128,7 +206,9 @@ def test_in_a_kernel_a_view_leaves_its_words_for_a_reader_without_one(kernel: Ke
     assert status == "ok"
     (_, live_words), (_, note) = shown
     assert live_words == "No nodes."
-    assert re.match(r"ROS graph as it was at .* not live: run this cell again", note)
+    assert re.match(
+        r"ROS graph as it was at \d{4}-\d\d-\d\d \d\d:.* not live: run this cell again", note
+    )
 
 
 def test_saved_words_are_escaped_and_bounded() -> None:

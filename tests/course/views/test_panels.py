@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.action import ActionServer, CancelResponse
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.node import Node
@@ -211,6 +211,32 @@ def test_parameters_have_controls_from_their_descriptors(session: Session) -> No
     speed = next(entry for entry in panel.entries if entry.name == "speed")
     assert (speed.least, speed.most, speed.step, speed.description) == (0.0, 2.0, 0.5, "m/s")
     assert "speed: 0.5 (0 to 2)  # m/s" in panel.words()
+
+
+def test_a_slider_moves_in_whole_steps_for_whole_numbers_alone(session: Session) -> None:
+    def dial() -> Node:
+        node = Node("dial")
+        wide = ParameterDescriptor(
+            floating_point_range=[FloatingPointRange(from_value=0.0, to_value=2.0)]
+        )
+        node.declare_parameter("gain", 1.0, wide)
+        whole = ParameterDescriptor(integer_range=[IntegerRange(from_value=0, to_value=9)])
+        node.declare_parameter("gear", 1, whole)
+        return node
+
+    session.run(dial)
+    entries = {entry["name"]: entry for entry in shown(session.parameters("dial"))["entries"]}
+    assert {name: entry["kind"] for name, entry in entries.items()} == {
+        "gain": "slider", "gear": "slider",
+    }  # fmt: skip
+    assert (entries["gain"]["step"], entries["gear"]["step"]) == (None, 1)
+
+
+def test_a_node_without_parameters_says_so(session: Session) -> None:
+    session.run(lambda: Node("bare"))
+    panel = session.parameters("bare")
+    assert shown(panel)["entries"] == []
+    assert "  none: declare_parameter(…) makes one" in panel.words()
 
 
 def test_a_parameter_is_changed_and_a_refusal_has_its_reason(session: Session) -> None:

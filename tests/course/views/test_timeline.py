@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import functools
+import gc
+import re
+import sys
 import time
+import weakref
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mcap.reader import make_reader
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.serialization import deserialize_message
 from std_msgs.msg import String
 
 from course import Session
 from course.errors import SessionError, WaitTimeout
+from course.mcap_file import RecordingError
 from course.views.timeline import Timeline, describe
-from course.watch import timeline
+from course.watch import callbacks, timeline
 from course.watch.callbacks import CallbackTap
 from course.watch.timeline import Passage
+from tests.robot import Listener as TalkListener
+from tests.robot import Robot
 
 MS = 1_000_000
 
@@ -120,7 +129,45 @@ def test_callbacks_run_as_before_and_are_seen(session: Session) -> None:
     ]  # fmt: skip
     assert [sum(lane["counts"]) for lane in topic["lanes"]] == [3, 3, 9]
     view.stop()
-    assert [subscription.callback for subscription in listener.subscriptions] == originals
+    publisher.publish(String(data="unseen"))
+    session.until(lambda: len(listener.seen) == 12)
+    assert len(view.runs("/chatter")) == 9
+    again = Timeline(session, [("chatter", None)])
+    inner = [subscription.callback.__wrapped__ for subscription in listener.subscriptions]
+    assert inner == originals, "wrapped once, however many timelines there were"
+    publisher.publish(String(data="seen"))
+    session.until(lambda: len(again.runs("/chatter")) == 3)
+
+
+def test_a_callback_is_given_what_it_takes_while_timelines_come_and_go(
+    request: pytest.FixtureRequest,
+) -> None:
+    # rclpy takes a message and calls the callback a moment later: threads that change more often
+    # make more of such moments.
+    request.addfinalizer(functools.partial(sys.setswitchinterval, sys.getswitchinterval()))
+    sys.setswitchinterval(1e-6)
+    with Session(threads=3) as session:
+        robot, listener = session.run(Robot, 1000.0), session.run(TalkListener)
+        assert isinstance(robot, Robot)
+        assert isinstance(listener, TalkListener)
+        session.until(lambda: listener.heard)
+        begun = time.monotonic()
+        while listener.heard < 2000 and not session.errors:
+            tap = CallbackTap("/chatter")
+            tap.watch([robot, listener])
+            tap.stop()
+            assert time.monotonic() - begun < 60
+        assert session.errors == []
+
+
+def test_a_listener_is_let_go_of_with_its_wrapped_callback(session: Session) -> None:
+    listener = session.run(Listener)
+    view = Timeline(session, [("chatter", String)])
+    view.stop()
+    gone = weakref.ref(listener)
+    session.stop(listener)
+    del listener
+    session.until(lambda: gc.collect() >= 0 and gone() is None)
 
 
 def test_a_callback_that_raises_is_reported_as_ever(session: Session) -> None:
@@ -134,7 +181,42 @@ def test_a_callback_that_raises_is_reported_as_ever(session: Session) -> None:
     session.publish("chatter", String())
     session.until(lambda: session.errors)
     assert str(session.errors[0].exception) == "as ever"
+    assert session.errors[0].callback == "test_a_callback_that_raises_is_reported_as_ever.broken"
     assert len(tap.since(0)) == 1
+
+
+class Broken:
+    """Can be called as a callback, and has no name of its own."""
+
+    def __call__(self, _message: String) -> None:
+        raise ZeroDivisionError
+
+    def method(self, _extra: int, _message: String) -> None:
+        raise ZeroDivisionError
+
+
+@pytest.mark.parametrize(
+    ("callback", "name"),
+    [
+        (functools.partial(Broken().method, 1), "Broken.method"),
+        (Broken(), "Broken.__call__"),
+    ],
+    ids=["partial", "callable"],
+)
+def test_a_callback_keeps_its_name_under_a_timeline(
+    session: Session, callback: Any, name: str
+) -> None:
+    node = session.run(lambda: Node("n"))
+    node.create_subscription(String, "chatter", callback, 10)
+    tap = CallbackTap("/chatter")
+    for listens in (False, True):
+        if listens:
+            tap.watch([node])
+        known = sum(error.count for error in session.errors)
+        session.publish("chatter", String())
+        session.until(lambda known=known: sum(e.count for e in session.errors) > known)  # type: ignore[misc]
+    assert len(tap.since(0)) == 1
+    assert [error.callback for error in session.errors] == [name]
 
 
 def test_its_messages_can_be_saved(session: Session, tmp_path: Path) -> None:
@@ -145,9 +227,51 @@ def test_its_messages_can_be_saved(session: Session, tmp_path: Path) -> None:
     publisher.publish(String(data="x"))
     session.until(lambda: view.figures()["/chatter"].count == 1)
     with view.save(tmp_path / "t.mcap").open("rb") as file:
-        assert [channel.topic for _, channel, _ in make_reader(file).iter_messages()] == [
-            "/chatter"
-        ]
+        ((_, channel, saved),) = make_reader(file).iter_messages()
+    assert channel.topic == "/chatter"
+    assert deserialize_message(saved.data, String).data == "x"
+    view.stop()
+    with pytest.raises(RecordingError, match="has let its messages go"):
+        view.save(tmp_path / "late.mcap")
+
+
+@pytest.mark.parametrize("what", ["messages", "callbacks"])
+def test_a_window_with_more_than_is_kept_says_since_when_it_is_whole(
+    session: Session, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    monkeypatch.setattr(timeline if what == "messages" else callbacks, "KEPT", 50)
+    session.run(Robot, 40.0)
+    session.run(TalkListener)
+    view = session.timeline("chatter", window=60.0)
+    assert "s only: a timeline keeps" not in view.words()
+    (trace, tap) = view._rows[0]
+    session.until(lambda: len(trace.since(0)) >= 50 and len(tap.since(0)) >= 50)
+    (topic,) = view.frame()["topics"]
+    for text in (view.words(), topic["text"]):
+        found = re.search(r"\(of the last (\d+\.\d) s only: a timeline keeps \d+ messages", text)
+        assert found, text
+        assert 0.3 < float(found[1]) < 30
+
+
+def test_the_memory_that_its_messages_take_is_bounded_and_given_back(
+    session: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(timeline, "BYTES", 100_000)
+    monkeypatch.setattr(timeline, "MESSAGES", 20)
+    talker = session.run(lambda: Node("talker"))
+    publisher = talker.create_publisher(String, "chatter", 1000)
+    view = Timeline(session, [("chatter", String)])
+    (trace, _) = view._rows[0]
+    session.until(lambda: publisher.get_subscription_count() == 1)
+    for size, kept in ((10, 20), (30_000, 3), (200_000, 1), (10, 20)):
+        before = view.figures()["/chatter"].count
+        for _ in range(30):
+            publisher.publish(String(data="x" * size))
+        session.until(lambda n=before + 30: view.figures()["/chatter"].count == n, 20)  # type: ignore[misc]
+        assert len(trace.messages) == kept
+        assert trace._size == sum(len(cdr) for _, cdr in trace.messages)
+    view.stop()
+    assert (trace.messages, trace._size) == ([], 0)
 
 
 def test_a_talker_that_comes_back_as_best_effort_is_heard(session: Session) -> None:
@@ -167,6 +291,21 @@ def test_a_talker_that_comes_back_as_best_effort_is_heard(session: Session) -> N
     before = session.observer.count_subscribers("/chatter")
     view.figures()
     assert session.observer.count_subscribers("/chatter") == before == 1
+
+
+def test_what_was_published_before_is_no_late_message(session: Session) -> None:
+    latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node = session.run(lambda: Node("mapper"))
+    publisher = node.create_publisher(String, "map", latched)
+    publisher.publish(String(data="old"))
+    assert session.next_message(String, "map").data == "old"
+    view = Timeline(session, [("map", None)])
+    session.until(lambda: publisher.get_subscription_count() == 1)
+    for number in range(3):
+        publisher.publish(String(data=f"{number}"))
+    session.until(lambda: view.figures()["/map"].count >= 3)
+    kept = [deserialize_message(cdr, String) for _, cdr in view._rows[0][0].messages]
+    assert [message.data for message in kept] == ["0", "1", "2"]
 
 
 def test_what_a_timeline_cannot_show_is_said(session: Session) -> None:
