@@ -13,11 +13,12 @@ import socket
 import struct
 
 _LOAD, _EQUAL, _GREATER_EQUAL, _ANY_BIT, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
-_NUMBER, _ARCHITECTURE, _ARGUMENT_0 = 0, 4, 16  # offsets in struct seccomp_data
+_NUMBER, _ARCHITECTURE, _ARGUMENT_0, _ARGUMENT_3 = 0, 4, 16, 40  # offsets in struct seccomp_data
 _X86_64 = 0xC000003E
 _X32 = 0x40000000  # the first number of the x32 calls
 _ALLOW, _KILL, _ERRNO = 0x7FFF0000, 0x80000000, 0x00050000
 _NEW_USER_NAMESPACE = 0x10000000
+_SHARED, _ANONYMOUS = 0x01, 0x20  # flags of mmap
 
 REFUSED = {
     "shmget": 29, "shmat": 30, "msgget": 68, "ptrace": 101, "pivot_root": 155, "mount": 165,
@@ -28,7 +29,7 @@ REFUSED = {
     "userfaultfd": 323, "io_uring_setup": 425, "open_tree": 428, "move_mount": 429, "fsopen": 430,
     "fsconfig": 431, "fsmount": 432, "fspick": 433, "mount_setattr": 442, "memfd_secret": 447,
 }  # fmt: skip
-_CLONE, _CLONE3, _SOCKET = 56, 435, 41
+_MMAP, _CLONE, _CLONE3, _SOCKET = 9, 56, 435, 41
 FAMILIES = (socket.AF_UNIX, socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK)
 """Kinds of sockets that remain; DDS looks network interfaces up over netlink."""
 
@@ -52,6 +53,9 @@ def program() -> bytes:
     for number in REFUSED.values():
         steps += [_step(_EQUAL, number, 0, 1), _refuse(errno.EPERM)]
     steps += [
+        # Memory that processes share counts for none of them once who filled it has ended.
+        _step(_EQUAL, _MMAP, 0, 5), _step(_LOAD, _ARGUMENT_3), _step(_ANY_BIT, _ANONYMOUS, 0, 2),
+        _step(_ANY_BIT, _SHARED, 0, 1), _refuse(errno.EPERM), _step(_RETURN, _ALLOW),
         _step(_EQUAL, _CLONE, 0, 4), _step(_LOAD, _ARGUMENT_0),
         _step(_ANY_BIT, _NEW_USER_NAMESPACE, 0, 1), _refuse(errno.EPERM), _step(_RETURN, _ALLOW),
         _step(_EQUAL, _SOCKET, 0, 2 + len(FAMILIES)), _step(_LOAD, _ARGUMENT_0),

@@ -72,6 +72,8 @@ def _system() -> Iterator[str]:
     for name in _ETC:
         yield from ("--ro-bind-try", f"/etc/{name}", f"/etc/{name}")
     yield from ("--proc", "/proc", "--dev", "/dev")
+    # A shared map of it is memory that the filter of system calls would refuse.
+    yield from ("--ro-bind", "/dev/null", "/dev/zero")
 
 
 def python_folders() -> Iterator[Path]:
