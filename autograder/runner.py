@@ -156,7 +156,9 @@ def _follow(
             f"Something in the notebook wrote to the grader's own channel: {error}.",
         )
     except ChannelClosed:
-        _give_up(program, outcome, f"The notebook's process ended: {subject.fate()}.")
+        reason = f"The notebook's process ended: {subject.fate()}."
+        status: Status = "grader_error" if subject.unwatched else "not_checked"
+        _give_up(program, outcome, reason, status)
     except ExaminerError as error:
         _give_up(program, outcome, str(error), "grader_error")
 

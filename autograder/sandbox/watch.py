@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import os
+import select
 import signal
 import threading
 import time
 from contextlib import suppress
 from pathlib import Path
 
+from autograder.sandbox import usage
 from autograder.sandbox.limits import MIB, Limits
 
 PERIOD = 0.1
 """Seconds between two looks: memory can grow by some 100 MB in that time."""
-_PAGE = os.sysconf("SC_PAGE_SIZE")
-_TICK = os.sysconf("SC_CLK_TCK")
+BLIND_TIMEOUT = 5.0
+"""Seconds that the files of a sandbox may stay unreadable before it is ended for that."""
 
 
 class Watch:
-    """Adds up memory and processor time of a process namespace; kills its first process.
+    """Adds up what the processes of a namespace use; kills its first process if it is too much.
 
     A sandbox that is not complete yet has the machine's own files, its process list among them.
     """
@@ -30,7 +31,11 @@ class Watch:
         self._limits = limits
         self._started = time.monotonic()
         self._over = threading.Event()
+        self._looked = self._started
+        self._crowded = 0.0
+        self._blind_since: float | None = None
         self.reason = ""
+        self.failed = False  # what was wrong was the watch, not what it saw
         self._thread = threading.Thread(target=self._run, name="sandbox watch", daemon=True)
         self._thread.start()
 
@@ -40,13 +45,33 @@ class Watch:
         self._thread.join()
 
     def _run(self) -> None:
-        while not self._over.wait(PERIOD):
-            with suppress(OSError):
+        while not self._over.wait(PERIOD) and not self._ended():
+            try:
                 self.reason = self._excess()
+            except Exception as error:  # noqa: BLE001 - whatever it is, nothing runs unwatched
+                self._note(error)
+            else:
+                self._blind_since = None
             if self.reason:
                 with suppress(ProcessLookupError):
                     signal.pidfd_send_signal(self._handle, signal.SIGKILL)
                 return
+
+    def _ended(self) -> bool:
+        poll = select.poll()
+        poll.register(self._handle, select.POLLIN)
+        return bool(poll.poll(0))
+
+    def _note(self, error: Exception) -> None:
+        """End a sandbox that cannot be looked into: at once, or if files of it stay unreadable."""
+        now = time.monotonic()
+        self._blind_since = self._blind_since or now
+        # While a sandbox is made or ends, files are missing or another's for a moment.
+        if isinstance(error, OSError) and now - self._blind_since < BLIND_TIMEOUT:
+            return
+        if not self._ended():
+            self.failed = True
+            self.reason = f"the grader could not see what it used ({type(error).__name__}: {error})"
 
     def _excess(self) -> str:
         """Return what is used too much of, as a phrase, or an empty string."""
@@ -57,35 +82,30 @@ class Watch:
         processes = [entry for entry in self._proc.iterdir() if entry.name.isdecimal()]
         if len(processes) > self._limits.processes:
             return f"it started more than {self._limits.processes} processes"
-        if sum(map(_cpu_seconds, processes)) > self._limits.cpu:
+        if sum(map(usage.cpu_seconds, processes)) > self._limits.cpu:
             return f"it used more than {self._limits.cpu} s of processor time"
+        threads = [states for process in processes if (states := usage.threads(process))]
+        return self._crowd(threads) or self._held([next(iter(states)) for states in threads])
+
+    def _crowd(self, threads: list[dict[Path, bytes]]) -> str:
+        if (
+            sum(state == b"R" for states in threads for state in states.values())
+            > self._limits.busy
+        ):
+            self._crowded += PERIOD
+        if self._crowded > self._limits.crowd:
+            return (
+                f"it kept more than {self._limits.busy} processes and threads busy at a time for "
+                f"{self._limits.crowd} s"
+            )
+        return ""
+
+    def _held(self, processes: list[Path]) -> str:
+        if sum(map(usage.descriptors, processes)) > self._limits.all_files:
+            return f"its processes had more than {self._limits.all_files} files open"
         # Cheap first: this counts what forked processes share once for each of them.
-        if sum(map(_anonymous, processes)) > self._limits.memory and (
-            sum(map(_share, processes)) > self._limits.memory
+        if sum(map(usage.anonymous, processes)) > self._limits.memory and (
+            sum(map(usage.share, processes)) > self._limits.memory
         ):
             return f"it held more than {self._limits.memory // MIB} MB of memory"
         return ""
-
-
-def _cpu_seconds(process: Path) -> float:
-    """Return the processor time of a process and of its children that have ended."""
-    with suppress(OSError):
-        fields = (process / "stat").read_text().rpartition(")")[2].split()
-        return sum(map(int, fields[11:15])) / _TICK
-    return 0.0
-
-
-def _anonymous(process: Path) -> int:
-    with suppress(OSError):
-        _, resident, shared = (process / "statm").read_text().split()[:3]
-        return (int(resident) - int(shared)) * _PAGE
-    return 0
-
-
-def _share(process: Path) -> int:
-    """Return a process's fair share of the memory it uses: what is shared counts in parts."""
-    with suppress(OSError):
-        for line in (process / "smaps_rollup").read_text().splitlines():
-            if line.startswith("Pss_Anon:"):
-                return int(line.split()[1]) * 1024
-    return 0
