@@ -177,7 +177,8 @@ def _follow(
         )
     except ChannelClosed:
         fate = f"The notebook's process ended: {subject.fate()}."
-        _give_up(program, outcome, fate, reached=number)
+        status: Status = "grader_error" if subject.unwatched else "not_checked"
+        _give_up(program, outcome, fate, status, reached=number)
     except ExaminerError as error:
         _give_up(program, outcome, str(error), "grader_error", reached=number)
 

@@ -37,6 +37,11 @@ class BoxedSubject:
         self._watch = Watch(init, self._handle, limits)
         self.pid = 0
 
+    @property
+    def unwatched(self) -> bool:
+        """Whether it was ended because the watch over it failed."""
+        return self._watch.failed
+
     def ready(self) -> None:
         """Find the subject's process: the only one that process 1 has, as yet."""
         children = Path(f"/proc/{self._init}/task/{self._init}/children").read_text().split()

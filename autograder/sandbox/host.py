@@ -48,6 +48,8 @@ class Host:
 class HostSubject:
     """A running subject: started in a session of its own, and ended with that session."""
 
+    unwatched = False
+
     def __init__(
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
     ) -> None:

@@ -24,10 +24,12 @@ class Limits:
         data: writable memory that one process may reserve; beyond it Python raises MemoryError.
         tasks: processes and threads at a time.
         processes: processes at a time; a bomb is ended before it has slowed others down.
-        busy: processes and threads that want a processor at a time, for more than a moment.
+        busy: processes and threads that run, or wait for a processor, at a time.
+        crowd: seconds that they may be more; every second in which they are not takes one back.
         cpu: processor time of all its processes together.
         file: largest file.
         open_files: open file descriptors of one process.
+        all_files: those of all its processes; the kernel holds 200 KB of messages for a socket.
         scratch: room in its home folder, in /tmp and in /dev/shm, each.
         wall: time from start to end, exams included.
     """
@@ -35,11 +37,13 @@ class Limits:
     memory: int = 1536 * MIB
     data: int = 2048 * MIB
     tasks: int = 200
-    processes: int = 48
+    processes: int = 32
     busy: int = 12
+    crowd: int = 3
     cpu: int = 300
     file: int = 64 * MIB
-    open_files: int = 2048
+    open_files: int = 1024
+    all_files: int = 2048
     scratch: int = 64 * MIB
     wall: int = 900
 

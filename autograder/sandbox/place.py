@@ -49,6 +49,10 @@ class RunningSubject(Protocol):
     def pid(self) -> int:
         """Its process id as the examiner sees it; known once it has said that it is ready."""
 
+    @property
+    def unwatched(self) -> bool:
+        """Whether it was ended because the grader failed to watch over it."""
+
     def ready(self) -> None:
         """Note that the subject has started and has not run any of the student's code yet."""
 

@@ -71,8 +71,9 @@ def _system() -> Iterator[str]:
             yield from ("--ro-bind", str(folder), str(folder))
     for name in _ETC:
         yield from ("--ro-bind-try", f"/etc/{name}", f"/etc/{name}")
-    # A shared map of /dev/zero is memory that belongs to no process.
-    yield from ("--proc", "/proc", "--dev", "/dev", "--dev-bind", "/dev/null", "/dev/zero")
+    yield from ("--proc", "/proc", "--dev", "/dev")
+    # A shared map of it is memory that the filter of system calls would refuse.
+    yield from ("--ro-bind", "/dev/null", "/dev/zero")
 
 
 def python_folders() -> Iterator[Path]:

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import os
+import select
 import signal
 import threading
 import time
-from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
+from autograder.sandbox import usage
 from autograder.sandbox.limits import MIB, Limits
+from autograder.sandbox.usage import Process
 
 PERIOD = 0.1
 """Seconds between two looks: memory can grow by some 100 MB in that time."""
-CROWDED = 20
-"""Looks that may find too many busy, one after the other; one that does not takes one back."""
-_PAGE = os.sysconf("SC_PAGE_SIZE")
-_TICK = os.sysconf("SC_CLK_TCK")
+BLIND_TIMEOUT = 5.0
+"""Seconds that the files of a sandbox may stay unreadable before it is ended for that."""
 
 
 class Watch:
-    """Adds up memory and processor time of a process namespace; kills its first process.
+    """Adds up what the processes of a namespace use; kills its first process if it is too much.
 
     A sandbox that is not complete yet has the machine's own files, its process list among them.
     """
@@ -34,8 +32,10 @@ class Watch:
         self._limits = limits
         self._started = time.monotonic()
         self._over = threading.Event()
-        self._used, self._crowded = 0.0, 0
+        self._used = self._crowded = 0.0
+        self._blind_since: float | None = None
         self.reason = ""
+        self.failed = False  # what was wrong was the watch, not what it saw
         self._thread = threading.Thread(target=self._run, name="sandbox watch", daemon=True)
         self._thread.start()
 
@@ -45,17 +45,33 @@ class Watch:
         self._thread.join()
 
     def _run(self) -> None:
-        while not self._over.wait(PERIOD):
+        while not self._over.wait(PERIOD) and not self._ended():
             try:
                 self.reason = self._excess()
-            except OSError:  # it is ending, or not complete yet
-                continue
-            except Exception as error:  # noqa: BLE001 - nothing may run there unwatched
-                self.reason = f"it could not be watched any more ({type(error).__name__}: {error})"
+            except Exception as error:  # noqa: BLE001 - whatever it is, nothing runs unwatched
+                self._note(error)
+            else:
+                self._blind_since = None
             if self.reason:
                 with suppress(ProcessLookupError):
                     signal.pidfd_send_signal(self._handle, signal.SIGKILL)
                 return
+
+    def _ended(self) -> bool:
+        poll = select.poll()
+        poll.register(self._handle, select.POLLIN)
+        return bool(poll.poll(0))
+
+    def _note(self, error: Exception) -> None:
+        """End a sandbox that cannot be looked into: at once, or if files of it stay unreadable."""
+        now = time.monotonic()
+        self._blind_since = self._blind_since or now
+        # While a sandbox is made or ends, files are missing or another's for a moment.
+        if isinstance(error, OSError) and now - self._blind_since < BLIND_TIMEOUT:
+            return
+        if not self._ended():
+            self.failed = True
+            self.reason = f"the grader could not see what it used ({type(error).__name__}: {error})"
 
     def _excess(self) -> str:
         """Return what is used too much of, as a phrase, or an empty string."""
@@ -66,74 +82,27 @@ class Watch:
         processes = [entry for entry in self._proc.iterdir() if entry.name.isdecimal()]
         if len(processes) > self._limits.processes:
             return f"it started more than {self._limits.processes} processes"
-        states = [state for process in processes if (state := _state(process)) is not None]
-        used = sum(state.cpu for state in states)
+        found = [process for entry in processes if (process := usage.process(entry)) is not None]
+        return self._worked(found) or self._held(found)
+
+    def _worked(self, processes: list[Process]) -> str:
+        used = sum(process.cpu for process in processes)
+        grew, self._used = used - self._used, used
         if used > self._limits.cpu:
             return f"it used more than {self._limits.cpu} s of processor time"
-        if self._is_crowded(states, used):
-            return f"it kept more than {self._limits.busy} processes and threads busy"
+        # One that hardly works, as most do, has no crowd that would have to be counted.
+        crowd = grew > PERIOD / 2 and sum(p.busy() for p in processes) > self._limits.busy
+        self._crowded = max(0.0, self._crowded + (PERIOD if crowd else -PERIOD))
+        if self._crowded > self._limits.crowd:
+            return f"it kept more than {self._limits.busy} processes and threads busy at a time"
+        return ""
+
+    def _held(self, processes: list[Process]) -> str:
+        if sum(map(usage.descriptors, processes)) > self._limits.all_files:
+            return f"its processes had more than {self._limits.all_files} files open"
         # Cheap first: this counts what forked processes share once for each of them.
-        if sum(map(_anonymous, processes)) > self._limits.memory and (
-            sum(map(_share, processes)) > self._limits.memory
+        if sum(map(usage.anonymous, processes)) > self._limits.memory and (
+            sum(map(usage.share, processes)) > self._limits.memory
         ):
             return f"it held more than {self._limits.memory // MIB} MB of memory"
         return ""
-
-    def _is_crowded(self, states: list[_State], used: float) -> bool:
-        """Whether it has long wanted more processors than others can spare beside it."""
-        grew, self._used = used - self._used, used
-        idle = grew < PERIOD / 2  # the usual case, in which nothing need be counted
-        crowd = not idle and sum(state.busy() for state in states) > self._limits.busy
-        self._crowded = self._crowded + 1 if crowd else max(0, self._crowded - 1)
-        return self._crowded > CROWDED
-
-
-@dataclass(frozen=True)
-class _State:
-    """What the kernel says of a process: ``cpu`` is in s, that of its ended children included."""
-
-    process: Path
-    runs: bool
-    cpu: float
-    threads: int
-
-    def busy(self) -> int:
-        """Return how many of its threads want a processor now."""
-        if self.threads == 1:
-            return int(self.runs)
-        return sum(_fields(thread)[:1] == [b"R"] for thread in self._threads())
-
-    def _threads(self) -> Iterator[Path]:
-        with suppress(OSError):
-            yield from (self.process / "task").iterdir()
-
-
-def _state(process: Path) -> _State | None:
-    fields = _fields(process)
-    if not fields:
-        return None
-    cpu = sum(map(int, fields[11:15])) / _TICK
-    return _State(process, fields[0] == b"R", cpu, int(fields[17]))
-
-
-def _fields(process: Path) -> list[bytes]:
-    """Return what stands behind the name in a ``stat``: the name may be any bytes at all."""
-    with suppress(OSError):
-        return (process / "stat").read_bytes().rpartition(b")")[2].split()
-    return []
-
-
-def _anonymous(process: Path) -> int:
-    with suppress(OSError):
-        _, resident, shared = (process / "statm").read_bytes().split()[:3]
-        return (int(resident) - int(shared)) * _PAGE
-    return 0
-
-
-def _share(process: Path) -> int:
-    """Return a process's fair share of the memory it uses: what is shared counts in parts."""
-    with suppress(OSError):
-        for line in (process / "smaps_rollup").read_bytes().splitlines():
-            if line.startswith(b"Pss_Anon:"):
-                return int(line.split()[1]) * 1024
-    return 0

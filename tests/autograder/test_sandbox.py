@@ -178,6 +178,53 @@ def test_the_machine_s_own_processes_do_not_count() -> None:
     assert watch.reason == "it ran for more than 1 s"
 
 
+def test_nothing_runs_on_unwatched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever the watch stumbles over: that is the grader's mistake, and the sandbox's end."""
+
+    def stumble(*_: object) -> str:
+        raise ValueError("odd")
+
+    monkeypatch.setattr(Watch, "_excess", stumble)
+    with subprocess.Popen(["sleep", "infinity"]) as process:
+        handle = os.pidfd_open(process.pid)
+        watch = Watch(process.pid, handle, Limits())
+        assert process.wait(30) == -signal.SIGKILL
+        watch.stop()
+        os.close(handle)
+    assert watch.failed
+    assert watch.reason == "the grader could not see what it used (ValueError: odd)"
+
+
+def test_files_that_stay_unreadable_end_a_sandbox(monkeypatch: pytest.MonkeyPatch) -> None:
+    looks = []
+
+    def refuse(*_: object) -> str:
+        looks.append("")
+        raise PermissionError("refused")
+
+    monkeypatch.setattr(Watch, "_excess", refuse)
+    monkeypatch.setattr("autograder.sandbox.watch.BLIND_TIMEOUT", 0.2)
+    with subprocess.Popen(["sleep", "infinity"]) as process:
+        handle = os.pidfd_open(process.pid)
+        watch = Watch(process.pid, handle, Limits())
+        assert process.wait(30) == -signal.SIGKILL
+        watch.stop()
+        os.close(handle)
+    assert len(looks) > 1, "files may be missing for a moment"
+    assert watch.failed
+
+
+@needs_sandbox
+def test_a_failure_of_the_watch_is_left_to_a_person(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stumble(*_: object) -> str:
+        raise ValueError("odd")
+
+    monkeypatch.setattr(Watch, "_held", stumble)
+    outcome = runner.run((Cell("import threading; threading.Event().wait()"), EXAM))
+    assert {check.status for check in outcome.verdicts["qos-hidden"].checks} == {"grader_error"}
+    assert "the grader could not see what it used" in outcome.notes[0]
+
+
 def test_the_filter_is_a_whole_number_of_instructions() -> None:
     program = seccomp.program()
     assert len(program) % 8 == 0

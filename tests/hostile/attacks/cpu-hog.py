@@ -1,12 +1,12 @@
-# title: Forty processes that never rest, each in a session of its own
-# told: it kept more than 12 processes and threads busy
+# title: Busy processes, each in a session of its own, which is a share of the processor of its own
+# told: it kept more than 12 processes and threads busy at a time
 
 import os
 
-for _ in range(40):
+for _ in range(25):
     if os.fork() == 0:
         os.setsid()
         while True:
             pass
 while True:
-    os.sched_yield()
+    pass

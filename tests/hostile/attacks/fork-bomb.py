@@ -1,5 +1,5 @@
 # title: Processes that start processes, each in a session of its own
-# told: it started more than 48 processes
+# told: it started more than 32 processes
 
 import os
 

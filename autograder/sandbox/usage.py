@@ -1,0 +1,85 @@
+"""What one process uses, as its folder in /proc tells; nothing, once it has ended.
+
+Read as bytes, since a process gives itself whatever name it likes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+_PAGE = os.sysconf("SC_PAGE_SIZE")
+_TICK = os.sysconf("SC_CLK_TCK")
+_ENDED = (b"Z", b"X")
+
+
+@dataclass(frozen=True)
+class Process:
+    """A process that has not ended.
+
+    Attributes:
+        folder: its folder in /proc.
+        alive: that of a thread which has not ended: the first thread of a process can end before
+            others, and the process's own folder then shows nothing of what these hold.
+        cpu: processor time in s, with that of its children that have ended.
+    """
+
+    folder: Path
+    alive: Path
+    cpu: float
+
+    def busy(self) -> int:
+        """Return how many of its threads run or wait for a processor."""
+        return sum(state == b"R" for _, state in _threads(self.folder))
+
+
+def process(folder: Path) -> Process | None:
+    """Return the process whose folder in /proc this is; None if there is nothing left of it."""
+    with suppress(OSError):
+        state, *numbers = _stat(folder)
+        cpu = sum(map(int, numbers[10:14])) / _TICK
+        if state not in _ENDED:
+            return Process(folder, folder, cpu)
+        for thread, of_thread in _threads(folder):
+            if of_thread not in _ENDED:
+                return Process(folder, thread, cpu)
+    return None
+
+
+def _threads(folder: Path) -> Iterator[tuple[Path, bytes]]:
+    with suppress(OSError):
+        for thread in (folder / "task").iterdir():
+            with suppress(OSError):
+                yield thread, _stat(thread)[0]
+
+
+def descriptors(process: Process) -> int:
+    """Return the number of open file descriptors."""
+    with suppress(OSError):
+        return len(os.listdir(process.alive / "fd"))  # noqa: PTH208 - the names alone, of many
+    return 0
+
+
+def anonymous(process: Process) -> int:
+    """Return the bytes of memory that belong to no file."""
+    with suppress(OSError):
+        _, resident, shared = (process.alive / "statm").read_bytes().split()[:3]
+        return (int(resident) - int(shared)) * _PAGE
+    return 0
+
+
+def share(process: Process) -> int:
+    """Return the fair share of the memory that it uses: what is shared counts in parts."""
+    with suppress(OSError):
+        for line in (process.alive / "smaps_rollup").read_bytes().splitlines():
+            if line.startswith(b"Pss_Anon:"):
+                return int(line.split()[1]) * 1024
+    return 0
+
+
+def _stat(task: Path) -> list[bytes]:
+    """Return what follows the name, which can hold anything, in a task's ``stat``."""
+    return (task / "stat").read_bytes().rpartition(b")")[2].split()
