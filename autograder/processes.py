@@ -166,6 +166,8 @@ class ExaminerProcess:
         assert self._process.stderr is not None
         while self._process.stderr.fileno() in self._wait(0.0):
             pass
+        if b"bad_alloc" in self._said or b"MemoryError" in self._said:
+            return "it ran out of memory, as under a flood of messages"
         lines = self._said.decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else f"exit code {self._process.returncode}"
 

@@ -1,10 +1,10 @@
 """The system calls that a submission does without: a filter for `bwrap --seccomp`.
 
-Refused is what no limit reaches (memory that belongs to no process, or may go on when it has been
-let go of: a map that is shared and has no file), what opens large parts of the
-kernel to a stranger (new user namespaces, io_uring, bpf, keyrings, tracing), and sockets that lead
-out of a network namespace (VM sockets). Written for x86-64, the one machine that ROS 2 wheels are
-made for. The format is that of seccomp(2): an array of ``struct sock_filter``.
+Refused is what no limit reaches (memory that belongs to no process, or goes on when it has been let
+go of: a map that is shared and has no file), what opens large parts of the kernel to a stranger
+(new user namespaces, io_uring, bpf, keyrings, tracing), and sockets that lead out of a network
+namespace (VM sockets). Written for x86-64, the one machine that ROS 2 wheels are made for. The
+format is that of seccomp(2): an array of ``struct sock_filter``.
 """
 
 from __future__ import annotations
