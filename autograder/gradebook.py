@@ -9,7 +9,7 @@ import re
 import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -136,9 +136,10 @@ class CourseGradebook:
         """
         with self._open() as gradebook:
             for (notebook, cell), score in cells.items():
-                grade = gradebook.find_grade(cell, notebook, assignment, student)
-                if grade.manual_score is not None and grade.auto_score == score:
-                    grade.needs_manual_grade = False
+                with suppress(MissingEntry):  # the assignment has lost a cell since
+                    grade = gradebook.find_grade(cell, notebook, assignment, student)
+                    if grade.manual_score is not None and grade.auto_score == score:
+                        grade.needs_manual_grade = False
             gradebook.db.commit()
 
     def roster(self) -> Roster:

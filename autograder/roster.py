@@ -10,7 +10,7 @@ from pathlib import Path
 
 from nbgrader.utils import parse_utc
 
-from course.files import read_plain
+from quizzes.record import read_plain
 
 GLOB = "*?[]"
 LONGEST_ID = 128

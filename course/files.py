@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -37,21 +36,6 @@ def replacing(path: Path, mode: int = 0o644) -> Iterator[BinaryIO]:
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
-
-
-def read_plain(path: Path, most: int) -> bytes:
-    """Return what a file holds, at most its first ``most`` bytes.
-
-    A link is not followed, and what is no plain file (a pipe, a device) is not waited for.
-
-    Raises:
-        OSError: it cannot be read.
-    """
-    handle = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC)
-    with os.fdopen(handle, "rb") as file:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise OSError("it is not a plain file")
-        return file.read(most)
 
 
 def write_text(path: Path, text: str, mode: int = 0o644) -> None:
