@@ -19,8 +19,8 @@ from urllib.parse import urlsplit
 
 from autograder import jobs
 from autograder.jobs import Job, Result
-from autograder.sandbox import Abilities, BoxError
-from autograder.warm import ZygoteError
+from autograder.sandbox import Abilities
+from autograder.shortage import passes
 from autograder.workers import Done, Keep, Queue
 from course.errors import CourseError
 
@@ -63,9 +63,9 @@ def perform(text: str, hidden: list[str]) -> str:
 
     try:
         result = jobs.run(Job.from_json(text), [Path(folder) for folder in hidden])
-    except (BoxError, ZygoteError):
-        raise
     except CourseError as error:
+        if passes(error):
+            raise
         return json.dumps({"problem": str(error), "where": socket.gethostname()})
     if get_worker().status not in (Status.running, Status.paused):
         # A queue that takes its machine back ends a submission's processes, too: what is then

@@ -19,8 +19,8 @@ class HasDescriptor(Protocol):
         """Return its descriptor."""
 
 
-def readable(streams: Iterable[HasDescriptor], timeout: float | None) -> list[int]:
-    """Return the descriptors of those streams that can be read, or are at their end.
+def readable(streams: Iterable[HasDescriptor | int], timeout: float | None) -> list[int]:
+    """Return the descriptors, of those streams, that can be read or are at their end.
 
     Waits for the first at most ``timeout`` seconds; None: as long as it takes. Unlike `select`,
     which knows the first 1024 descriptors of a process only.

@@ -134,15 +134,14 @@ class Desk:
             for name in work.outcomes:
                 bridge.prepared.pop((self.assignment, work.student, name), None)
         shutil.rmtree(self._staged(work.student).parent, ignore_errors=True)
+        if settled:
+            self.gradebook.settle(self.assignment, work.student, settled)
         standings = self.gradebook.standings(self.assignment, work.student)
         if work.student not in standings:
             raise GradebookError(
                 f"nbgrader entered nothing for {work.student}, and did not say why: look whether "
                 "nbgrader_config.py leaves this student out."
             )
-        if settled:
-            self.gradebook.settle(self.assignment, work.student, settled)
-            standings = self.gradebook.standings(self.assignment, work.student)
         return standings[work.student]
 
     def _stage(self, student: str) -> Path:

@@ -118,11 +118,13 @@ class CourseGradebook:
     def settled(self, assignment: str, student: str) -> dict[tuple[str, str], float | None]:
         """Return {(notebook, cell): automatic score} of what a person has graded for good."""
         with self._open() as gradebook:
+            try:
+                notebooks = gradebook.find_submission(assignment, student).notebooks
+            except MissingEntry:
+                return {}
             return {
                 (notebook.name, grade.name): grade.auto_score
-                for submission in gradebook.assignment_submissions(assignment)
-                if submission.student_id == student
-                for notebook in submission.notebooks
+                for notebook in notebooks
                 for grade in notebook.grades
                 if grade.manual_score is not None and not grade.needs_manual_grade
             }

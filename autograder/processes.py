@@ -152,9 +152,10 @@ class ExaminerProcess:
 
         A student's nodes can have its libraries warn for ever; it must not wait for a reader.
         """
-        streams = [self._process.stdout, self._process.stderr][: 1 if self._mute else 2]
-        ready = readable([stream for stream in streams if stream is not None], timeout)
+        assert self._process.stdout is not None
         assert self._process.stderr is not None
+        errors_too = [] if self._mute else [self._process.stderr]
+        ready = readable([self._process.stdout, *errors_too], timeout)
         if (errors := self._process.stderr.fileno()) in ready:
             said = os.read(errors, 65536)
             self._mute = not said

@@ -11,8 +11,6 @@ that recovers always does, one that does not never does, and chance has no part 
 
 from __future__ import annotations
 
-import os
-import shutil
 import subprocess
 from collections import defaultdict
 from collections.abc import Iterator
@@ -26,7 +24,7 @@ from autograder.bench import Bench
 from autograder.exam import NotExaminable
 from autograder.rigs.readings import Heard, Sensor
 from autograder.rigs.sensor_node import ExaminerNode
-from course import Session
+from course import Session, tools
 
 TABLE = "inet ros2_course_radio"
 NOT_HERE = (
@@ -98,7 +96,7 @@ def radio(bench: Bench, near: ExaminerNode) -> Iterator[Radio]:
 
 
 def _nft(*commands: str) -> None:
-    tool = shutil.which("nft", path=f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin")
+    tool = tools.find("nft")
     if tool is None:
         raise NotExaminable(NOT_HERE.format(why=" (nftables is not installed)"))
     rules = "\n".join(commands).encode()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
 import socket
 import subprocess
@@ -20,6 +21,7 @@ from autograder.sandbox.host import Host
 from autograder.sandbox.network import TOOL_TIMEOUT, BoxError
 from autograder.sandbox.place import Place, subject_command
 from autograder.warm import ZygoteError
+from course import tools
 from course.errors import CourseError
 
 TOOLS = {
@@ -122,7 +124,8 @@ def require() -> None:
 def _try() -> bool:
     """Run this Python in a sandbox; return whether its network can lose packets."""
     with Box() as box:
-        nft = "nft add table inet probe" if shutil.which("nft") else "false"
+        tool = tools.find("nft")
+        nft = f"{shlex.quote(tool)} add table inet probe" if tool else "false"
         with (
             _in_the_network(box, f"{nft} && echo yes; read -r _") as said,
             box.start([sys.executable, "-c", "import rclpy"], {}, ()) as subject,

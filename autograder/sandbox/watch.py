@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import select
 import signal
 import threading
 import time
 from contextlib import suppress
 from pathlib import Path
 
+from autograder.descriptors import readable
 from autograder.sandbox import usage
 from autograder.sandbox.limits import MIB, Limits
 from autograder.sandbox.usage import Process
@@ -58,9 +58,7 @@ class Watch:
                 return
 
     def _ended(self) -> bool:
-        poll = select.poll()
-        poll.register(self._handle, select.POLLIN)
-        return bool(poll.poll(0))
+        return bool(readable([self._handle], 0))
 
     def _note(self, error: Exception) -> None:
         """End a sandbox that cannot be looked into: at once, or if files of it stay unreadable."""

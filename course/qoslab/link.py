@@ -6,10 +6,10 @@ which no rule could drop), and nftables drops a share of the packets.
 
 from __future__ import annotations
 
-import os
-import shutil
 import subprocess
 from functools import cache
+
+from course import tools
 
 ENTER = ("unshare", "--map-root-user", "--net", "--")
 """Begins a command line that runs in a network namespace of its own."""
@@ -27,13 +27,13 @@ _TIMEOUT = 10.0
 @cache
 def problem() -> str:
     """Return why there can be no loss here, as a sentence; empty if there can."""
-    missing = [tool for tool in _TOOLS if _path(tool) is None]
+    missing = [tool for tool in _TOOLS if tools.find(tool) is None]
     if missing:
         return (
             f"A lossy link needs {', '.join(missing)}: install util-linux, iproute2 and nftables."
         )
     tried = subprocess.run(
-        [*ENTER, _path("nft") or "nft", "list", "tables"],
+        [*ENTER, tools.find("nft") or "nft", "list", "tables"],
         capture_output=True,
         timeout=_TIMEOUT,
         check=False,
@@ -59,10 +59,5 @@ def lose(percent: int) -> None:
 
 
 def _run(tool: str, *arguments: str) -> None:
-    command = [_path(tool) or tool, *arguments]
+    command = [tools.find(tool) or tool, *arguments]
     subprocess.run(command, check=True, capture_output=True, timeout=_TIMEOUT)
-
-
-def _path(tool: str) -> str | None:
-    """Return where a tool is: Debian has some where an ordinary user's PATH does not lead."""
-    return shutil.which(tool, path=f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin")

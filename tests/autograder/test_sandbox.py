@@ -178,6 +178,17 @@ def test_the_machine_s_own_processes_do_not_count() -> None:
     assert watch.reason == "it ran for more than 1 s"
 
 
+def watch_that_kills() -> Watch:
+    """Watch a process that does nothing until the watch has killed it; return the watch."""
+    with subprocess.Popen(["sleep", "infinity"]) as process:
+        handle = os.pidfd_open(process.pid)
+        watch = Watch(process.pid, handle, Limits())
+        assert process.wait(30) == -signal.SIGKILL
+        watch.stop()
+        os.close(handle)
+    return watch
+
+
 def test_nothing_runs_on_unwatched(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the watch stumbles over: that is the grader's mistake, and the sandbox's end."""
 
@@ -185,12 +196,7 @@ def test_nothing_runs_on_unwatched(monkeypatch: pytest.MonkeyPatch) -> None:
         raise ValueError("odd")
 
     monkeypatch.setattr(Watch, "_excess", stumble)
-    with subprocess.Popen(["sleep", "infinity"]) as process:
-        handle = os.pidfd_open(process.pid)
-        watch = Watch(process.pid, handle, Limits())
-        assert process.wait(30) == -signal.SIGKILL
-        watch.stop()
-        os.close(handle)
+    watch = watch_that_kills()
     assert watch.failed
     assert watch.reason == "the grader could not see what it used (ValueError: odd)"
 
@@ -204,12 +210,7 @@ def test_files_that_stay_unreadable_end_a_sandbox(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setattr(Watch, "_excess", refuse)
     monkeypatch.setattr("autograder.sandbox.watch.BLIND_TIMEOUT", 0.2)
-    with subprocess.Popen(["sleep", "infinity"]) as process:
-        handle = os.pidfd_open(process.pid)
-        watch = Watch(process.pid, handle, Limits())
-        assert process.wait(30) == -signal.SIGKILL
-        watch.stop()
-        os.close(handle)
+    watch = watch_that_kills()
     assert len(looks) > 1, "files may be missing for a moment"
     assert watch.failed
 
