@@ -25,7 +25,7 @@ from rclpy.executors import (
 from rclpy.node import Node
 from rclpy.task import Future, Task
 
-from course.runtime import qos_events, streams
+from course.runtime import qos_events, streams, taking
 from course.runtime.families import Families
 from course.runtime.gate import Gate
 from course.runtime.idleness import Idleness
@@ -334,6 +334,8 @@ class BackgroundExecutor(Executor):
         if job.unfinished is not None:
             streams.finish_lines(job)
         if failure is not None:
+            if taking.give_back(job, failure):
+                self.wake()
             self.report(job, failure)
         if job.entity is None and (job.task.done() or job.task.cancelled()):
             self._created.forget(job.task)

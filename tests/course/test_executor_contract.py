@@ -27,6 +27,7 @@ from rclpy.executors import (
 )
 from rclpy.node import Node
 from rclpy.task import Future
+from rclpy.timer import Timer
 from rclpy.waitable import NumberOfEntities, Waitable
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -662,6 +663,61 @@ def test_a_node_removed_by_hand_is_taken_back(opened):
     node.create_timer(0.005, lambda: ticks.append(1))
     opened.until(lambda: ticks)
     assert "/program was taken out" in opened.notices[0]
+
+
+class CancelledAsItFires(Timer):
+    """A timer that another thread cancels between rclpy's look whether it is due, and its call."""
+
+    @property
+    def handle(self):
+        handle = super().handle
+        if sys._getframe(1).f_code.co_name == "_take_timer" and "cancelled" not in vars(self):
+            self.cancelled = True
+            handle.cancel_timer()
+        return handle
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_timer_that_is_cancelled_as_it_fires_leaves_its_node_alive(opened, threads):
+    node = opened.run(Node, "program", threads=threads)
+    fired, ticks = [], []
+    timer = node.create_timer(0.005, lambda: fired.append(1))
+    timer.__class__ = CancelledAsItFires
+    wait(lambda: hasattr(timer, "cancelled"))
+    count = len(fired)
+    node.create_timer(0.005, lambda: ticks.append(1))  # in the same callback group
+    wait(lambda: ticks)
+    assert len(fired) == count
+    timer.reset()
+    wait(lambda: len(fired) > count)
+    assert opened.errors == []
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_what_cannot_be_taken_is_said_and_its_node_lives(opened, threads):
+    class Wrong(Letterbox):
+        def __init__(self, node):
+            super().__init__(node)
+            self.callback_group = node.default_callback_group
+            self.callback_group.add_entity(self)
+
+        def take_data(self):
+            letters = super().take_data()
+            if letters == ["torn"]:
+                raise ValueError("torn")
+            return letters
+
+    node = opened.run(Node, "program", threads=threads)
+    ticks = []
+    with executor_of(node).held():
+        box = Wrong(node)
+    for letter in ("torn", "a"):
+        box.post(letter)
+        wait(lambda: not box.letters)
+    wait(lambda: box.read == ["a"])
+    assert "raised ValueError: torn" in str(opened.errors[0])
+    node.create_timer(0.005, lambda: ticks.append(1))
+    wait(lambda: ticks)
 
 
 def test_a_waitable_with_a_mistake_is_said_and_the_session_goes_on(opened):

@@ -1,0 +1,62 @@
+"""Domains that differ: what is missed here may be next door, where DDS never looks."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+from course import neighbours
+from course.diagnosis.graph import lonely
+from course.doctor.finding import Finding, problem, warning
+from course.graph import reader
+from course.runtime import closing
+from course.runtime.actions import SEND_GOAL
+from course.runtime.session import Session
+
+
+def on_another_domain(session: Session) -> Iterator[Finding]:
+    """Find sessions of this process that cannot hear each other, and a domain set in vain."""
+    others = [
+        other
+        for other in closing.known()
+        if isinstance(other, Session) and not other.closed and other.nodes
+    ]
+    for other in others:
+        if other.domain_id != session.domain_id:
+            yield warning(
+                "domain", f"This session is on domain {session.domain_id}; another one of this "
+                f"kernel, with {', '.join(other.nodes)}, is on {other.domain_id}, and DDS domains "
+                "never hear each other.",
+                f"Open one of them with course.Session(domain_id={session.domain_id}).",
+            )  # fmt: skip
+    asked = os.environ.get("ROS_DOMAIN_ID", "")
+    if asked and asked != str(session.domain_id):
+        yield warning(
+            "domain", f"ROS_DOMAIN_ID is {asked}, but a session leases a domain of its own: this "
+            f"one is on {session.domain_id}, so it does not hear nodes on {asked}.",
+            f"Join that domain with course.session(domain_id={asked}).",
+        )  # fmt: skip
+
+
+def next_door(session: Session, sought: str = "") -> Iterator[Finding]:
+    """Find what nobody offers here in a session of another notebook on this machine.
+
+    Args:
+        session: whose nodes miss something.
+        sought: a topic or service that the session itself has waited for, or "".
+    """
+    own = session.nodes
+    graph = reader.read(session.observer, own=list(own.values()))
+    missed = [*lonely(graph, set(own)), *([sought] if sought else [])]
+    here = session.offered(missed)
+    missed = [name for name in missed if name not in here]
+    for neighbour in neighbours.ask(missed) if missed else []:
+        for name, nodes in neighbour.offers.items():
+            action = name.removesuffix(SEND_GOAL)
+            yield problem(
+                "domain", f"{action} is offered by {', '.join(nodes)} on domain "
+                f"{neighbour.domain_id}, in {neighbour.program}; this session is on domain "
+                f"{session.domain_id}, and DDS domains never hear each other.",
+                f"Join that domain: course.close(), then course.session(domain_id="
+                f"{neighbour.domain_id}).",
+            )  # fmt: skip
