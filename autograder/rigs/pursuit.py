@@ -1,9 +1,10 @@
 """Whether a consumer keeps up with what comes in, or falls further and further behind.
 
 A list that fills faster than it is emptied is a queue without end, whatever DDS keeps. It shows
-after a pause, while readings go on coming in: a sound consumer soon hands on one that is fresh,
-with the other each is older than the one before. Both times, of publication and of handing on, are
-the student's own: how fast the examiner hears of them plays no part.
+after a pause, while readings go on coming in: though they come at their rate, a sound consumer soon
+hands on one that is fresh; with the other each is older than the one before. Both times, of
+publication and of handing on, are the student's own: how fast the examiner hears of them plays no
+part.
 """
 
 from __future__ import annotations
@@ -16,11 +17,12 @@ from dataclasses import dataclass
 from autograder.rigs.readings import SENSORS, STOP, Sensor
 from autograder.rigs.sensors import SensorRig
 
-WATCHED = 0.8  # s after a pause; from then on one fresh reading shows that a consumer keeps up
+WATCHED = 0.8  # s after a pause; from then on a fresh reading shows that a consumer keeps up
 FRESH = 0.2  # s: a control loop at 5 Hz that acts on the newest hands it on within this time
 GENEROUS = 2  # times what a consumer may find waiting: beyond it is not just a busy moment
 LASTING = 0.5  # s for which it has to stay beyond
 QUIET = 2.0  # s without a reading after which there is nothing more to see
+RATED, ENOUGH = 1.0, 0.7  # s before, and the share of what is to come in then, for that to count
 PATIENCE = 8.0  # s for those that are neither fresh nor far behind
 
 
@@ -63,7 +65,7 @@ class Pursuit:
         handings = self._handings()
         if not handings or time.time_ns() > handings[-1].when + QUIET * 1e9:
             return True
-        if any(self._fresh(handing) for handing in handings):
+        if self._fresh(handings[-1]) and self._at_rate():
             return True
         late = list(self._late_at_last(handings))
         if late and late[0].when - late[-1].when > LASTING * 1e9:
@@ -72,6 +74,13 @@ class Pursuit:
 
     def _fresh(self, handing: Handing) -> bool:
         return handing.when > self._resumed + WATCHED * 1e9 and handing.age <= FRESH
+
+    def _at_rate(self) -> bool:
+        """Whether readings came in at the sensor's rate: a slow consumer keeps up with fewer."""
+        now = time.time_ns()
+        moments = self._rig.publications(self.sensor, self._phase).values()
+        came = sum(now - RATED * 1e9 < moment <= now for moment in moments)
+        return came >= ENOUGH * RATED * self.sensor.rate
 
     def _late_at_last(self, handings: list[Handing]) -> Iterable[Handing]:
         """Go back through those that are late until one is not."""

@@ -23,6 +23,9 @@ from autograder.rigs.readings import SENSORS, STOP, Heard, Sensor, Tag
 AHEAD, LAG = 4, 1.0
 """Readings that may be on their way into a driver, and for how many seconds the next one waits."""
 
+INSISTENT = 0.25
+"""Seconds whose readings may be on their way in when they are to come in at their rate."""
+
 
 def lossless(durability: DurabilityPolicy = DurabilityPolicy.VOLATILE) -> QoSProfile:
     """Return the profile of a cable: every reading, in order."""
@@ -129,16 +132,45 @@ class Stream:
         self._node, self._phase, self._limit = node, phase, limit
         self._ahead = 1 if sensor is STOP else AHEAD
         self._drops = False
+        self._on_time: tuple[float, int] | None = None
         self._since = time.monotonic()
         self._turn = threading.Lock()
         self._timer = node.create_timer(1 / sensor.rate, self._tick)
 
+    def spare(self) -> None:
+        """Send the next only when the driver has published the one before, from now on.
+
+        On a busy machine readings would keep the thread that it shares with the consumer from what
+        waits there.
+        """
+        with self._turn:
+            self._ahead = 1
+
+    def insist(self) -> None:
+        """Keep to the sensor's rate on average from now on, though the driver may lose some.
+
+        A busy machine skips turns of a timer, so that readings come in more slowly than on a robot,
+        and a consumer that is too slow would keep up. What was skipped is caught up with.
+        """
+        with self._turn:
+            self._ahead = max(AHEAD, int(INSISTENT * self.sensor.rate))
+            self._on_time = time.monotonic(), self.sent
+
     def _tick(self) -> None:
         with self._turn:
-            if self.sent < self._limit and not self._waits():
+            for _ in range(self._due()):
+                if self.sent >= self._limit or self._waits():
+                    break
                 self._node.publish(self.sensor, self._phase, self.sent)
                 self.sent += 1
                 self._since = time.monotonic()
+
+    def _due(self) -> int:
+        """Return how many readings are to be sent in this turn."""
+        if self._on_time is None:
+            return 1
+        since, sent = self._on_time
+        return int((time.monotonic() - since) * self.sensor.rate) + sent - self.sent
 
     def _waits(self) -> bool:
         """Whether the driver has not yet come to what was sent; one that drops it is not it."""

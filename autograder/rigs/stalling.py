@@ -74,6 +74,7 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     with ExitStack() as held:
         for stream in streams.values():
             held.enter_context(stream.held())
+            stream.spare()
         counts = {name: stream.sent for name, stream in streams.items()}
         published = {s.name: _published(rig, s, phase, counts[s.name]) for s in SENSORS}
         # So that a reading is clearly on this side of a bound or on that one, whatever the jitter.
@@ -84,6 +85,9 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     # All but the events go on, as on a robot.
     for sensor in SENSORS:
         _drain(rig, sensor, phase, counts[sensor.name])
+    for sensor in SENSORS:
+        if sensor is not STOP:
+            streams[sensor.name].insist()
     behind = left_behind(rig, phase, resumed)
     for stream in streams.values():
         stream.stop()

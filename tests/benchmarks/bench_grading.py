@@ -6,7 +6,8 @@ same released assignment and the same submissions are then graded by both, turn 
 so that a busy machine is busy for both. Stock nbgrader executes each notebook, whose check cells
 grade in its kernel; `autograder grade` also sandboxes every submission and writes feedback. Their
 scores must be equal. ``--sizes 100,1000`` shows instead what one submission costs in classes of
-these sizes. Nothing here is a test: timing is shown, never asserted.
+these sizes, where all submissions of one case must have the same score. ``--keep FOLDER`` keeps the
+courses whose scores differ. Nothing here is a test: timing is shown, never asserted.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import sys
 import tempfile
 import threading
 import time
+from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
@@ -206,10 +208,27 @@ def scores(root: Path, name: str) -> dict[str, float]:
     return {grade.student: grade.score for grade in CourseGradebook(root).grades(name)}
 
 
-def compare(given: Assignment, number: int, rounds: int, jobs: int) -> dict[str, object]:
+def case_of(given: Assignment, student: str) -> str:
+    """Return which case of the corpus a student has handed in."""
+    return given.cases[int(student.removeprefix("student")) % len(given.cases)].name
+
+
+def put_away(root: Path, keep: Path | None) -> None:
+    """Remove a graded course, or keep it."""
+    if keep is None:
+        shutil.rmtree(root.parent)
+    else:
+        keep.mkdir(parents=True, exist_ok=True)
+        shutil.move(root.parent, keep)
+
+
+def compare(
+    given: Assignment, number: int, rounds: int, jobs: int, keep: Path | None
+) -> dict[str, object]:
     """Grade a class by both, turn by turn; return the runs and the ratio of their throughputs."""
     pairs, differing = [], {}
     for turn in range(rounds):
+        before = len(differing)
         roots = {name: given.hand_in(number) for name in ("ours", "stock")}
         runs = {}
         for name in roots if turn % 2 else reversed(roots):
@@ -221,10 +240,11 @@ def compare(given: Assignment, number: int, rounds: int, jobs: int) -> dict[str,
         expected, actual = (scores(roots[name], given.name) for name in ("stock", "ours"))
         for student, score in expected.items():
             if actual.get(student) != score:
-                case = given.cases[int(student.removeprefix("student")) % len(given.cases)].name
-                differing[case] = {"stock": score, "ours": actual.get(student)}
+                differing[f"{student}, {case_of(given, student)}"] = {
+                    "stock": score, "ours": actual.get(student),
+                }  # fmt: skip
         for root in roots.values():
-            shutil.rmtree(root.parent)
+            put_away(root, keep if len(differing) > before else None)
     return {
         "runs": [{name: asdict(run) for name, run in pair.items()} for pair in pairs],
         "throughput ratio": statistics.median(p["ours"].rate / p["stock"].rate for p in pairs),
@@ -233,13 +253,16 @@ def compare(given: Assignment, number: int, rounds: int, jobs: int) -> dict[str,
     }
 
 
-def growth(given: Assignment, sizes: list[int], jobs: int) -> dict[str, object]:
+def growth(given: Assignment, sizes: list[int], jobs: int, keep: Path | None) -> dict[str, object]:
     """Grade classes of growing size; return what one submission takes in each."""
     rows = {}
+    by_case: dict[str, dict[float, list[str]]] = defaultdict(lambda: defaultdict(list))
     for number in sizes:
         root = given.hand_in(number)
         run = ours(root, given.name, number, jobs)
-        shutil.rmtree(root.parent)
+        for student, score in scores(root, given.name).items():
+            by_case[case_of(given, student)][score].append(f"{student} of {number}")
+        put_away(root, keep if any(len(found) > 1 for found in by_case.values()) else None)
         rows[str(number)] = {
             "s a submission": run.wall / number,
             "cpu s a submission": run.cpu / number,
@@ -248,7 +271,12 @@ def growth(given: Assignment, sizes: list[int], jobs: int) -> dict[str, object]:
             "peak MiB, the engine": run.own_peak_mib,
             "load": run.load,
         }
-    return {"sizes": rows}
+    differing = {
+        case: {str(score): students[:5] for score, students in found.items()}
+        for case, found in by_case.items()
+        if len(found) > 1
+    }
+    return {"sizes": rows, "scores that differ": differing}
 
 
 def shown(results: dict[str, object]) -> str:
@@ -279,13 +307,14 @@ def main() -> int:
     parser.add_argument("--rounds", type=int, default=2, help="turns of each side")
     parser.add_argument("--jobs", type=int, default=0, help="as for autograder grade")
     parser.add_argument("--sizes", help="sizes of classes, as in 100,1000: only ours, growing")
+    parser.add_argument("--keep", type=Path, help="where courses go whose scores differ")
     options = parser.parse_args()
     with assignment(options.exercise) as given:
         if options.sizes:
             sizes = [int(size) for size in options.sizes.split(",")]
-            results = growth(given, sizes, options.jobs)
+            results = growth(given, sizes, options.jobs, options.keep)
         else:
-            results = compare(given, options.students, options.rounds, options.jobs)
+            results = compare(given, options.students, options.rounds, options.jobs, options.keep)
     results["cores"] = os.cpu_count()
     results["load at the end"] = os.getloadavg()[0]
     text = json.dumps(results, indent=2) if options.json else shown(results)
