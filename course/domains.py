@@ -46,14 +46,19 @@ class DomainLease:
     """One domain id that no other session on this machine can lease; released by `release()`."""
 
     def __init__(self, domain_id: int, sock: socket.socket) -> None:
-        """Hold `domain_id` for as long as `sock` is open."""
+        """Hold `domain_id` for as long as `sock` is open; others may send to it meanwhile."""
         self.domain_id = domain_id
-        self._socket = sock
+        self.socket = sock
         _leases.add(self)
 
     def release(self) -> None:
         """Give the domain id back. Idempotent."""
-        self._socket.close()
+        self.socket.close()
+
+
+def address(domain_id: int) -> str:
+    """Return the address of the socket that is this domain's lease, while it is leased."""
+    return f"\0ros2-course/domain/{domain_id}"
 
 
 def lease_domain() -> DomainLease:
@@ -103,7 +108,7 @@ def domains_in_use() -> set[int]:
 def _claim(domain_id: int) -> socket.socket | None:
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
     try:
-        sock.bind(f"\0ros2-course/domain/{domain_id}")
+        sock.bind(address(domain_id))
     except OSError:
         sock.close()
         return None

@@ -26,4 +26,13 @@ class SessionError(CourseError):
 
 
 class WaitTimeout(CourseError):  # noqa: N818 - a wait that ended, named as ROS users say it
-    """A wait reached its deadline; the message names what was waited for."""
+    """A wait reached its deadline; the message names what was waited for.
+
+    Attributes:
+        sought: the topic or service that it was about, as the graph spells it, or "".
+    """
+
+    def __init__(self, message: str = "", sought: str = "") -> None:
+        """Say ``message``, of a wait for ``sought``."""
+        super().__init__(message)
+        self.sought = sought

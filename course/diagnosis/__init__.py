@@ -6,7 +6,7 @@ import html
 from collections.abc import Iterator, Sequence
 from typing import overload
 
-from course.diagnosis import graph, nodes
+from course.diagnosis import domains, graph, nodes
 from course.doctor.finding import Finding
 from course.runtime.session import Session
 
@@ -56,9 +56,10 @@ class Diagnosis(Sequence[Finding]):
 def diagnose(session: Session) -> Diagnosis:
     """Return what is wrong, or may be, with a session's nodes and what they talk to.
 
-    Nodes of other processes are asked whether they answer, which takes up to a second each.
+    Nodes of other processes are asked whether they answer, and other notebooks' sessions whether
+    they have what is missed here; it takes up to two seconds.
     """
-    return Diagnosis([*quick(session), *nodes.silent(session)])
+    return Diagnosis([*quick(session), *domains.next_door(session), *nodes.silent(session)])
 
 
 def quick(session: Session) -> list[Finding]:
@@ -66,7 +67,7 @@ def quick(session: Session) -> list[Finding]:
     return [*nodes.stuck(session), *nodes.moved(session), *_calm(session)]
 
 
-def likely(session: Session, *, vague: bool) -> list[Finding]:
+def likely(session: Session, *, vague: bool, sought: str = "") -> list[Finding]:
     """Return what may be why a wait of the session was in vain, the likeliest first.
 
     Stuck callbacks and nodes in other executors are left out: a wait tells of them by itself. Nodes
@@ -76,8 +77,11 @@ def likely(session: Session, *, vague: bool) -> list[Finding]:
         session: whose wait it was.
         vague: nobody knows what was waited for; so an endpoint without anybody on the other side
             may be the reason.
+        sought: the topic or service that was waited for, as the graph spells it, or "".
     """
     found = [f for f in _calm(session) if vague or f.name not in _LONELY]
+    if vague or sought:
+        found += domains.next_door(session, sought)
     if not any(finding.status == "problem" for finding in found):
         found += nodes.silent(session)
     return sorted(found, key=_rank)
@@ -87,7 +91,7 @@ _LONELY = ("topic", "service", "action")
 
 
 def _calm(session: Session) -> list[Finding]:
-    checks = (nodes.stolen, nodes.paused, nodes.unspun, nodes.on_another_domain, graph.check)
+    checks = (nodes.stolen, nodes.paused, nodes.unspun, domains.on_another_domain, graph.check)
     return [finding for check in checks for finding in check(session)]
 
 

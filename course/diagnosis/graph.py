@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from course.doctor.finding import Finding, problem, warning
 from course.graph import reader, words
 from course.graph.model import Graph
+from course.runtime.actions import SEND_GOAL
 from course.runtime.session import Session
 
 NEARLY = " (is it "
@@ -71,17 +72,44 @@ def lonely_topics(graph: Graph, own: set[str]) -> Iterator[Finding]:
 
 
 def lonely_clients(graph: Graph, own: set[str]) -> Iterator[Finding]:
-    """Find clients of the session's nodes that have no server."""
+    """Find clients of the session's nodes that have no server, or one of another type."""
     for kind, exchanges in (("service", graph.services), ("action", graph.actions)):
-        offered = [exchange.name for exchange in exchanges if exchange.servers]
+        offered = {exchange.name: exchange for exchange in exchanges if exchange.servers}
         for exchange in exchanges:
-            clients = sorted(set(exchange.clients) & own)
-            if clients and not exchange.servers:
+            clients = ", ".join(sorted(set(exchange.clients) & own))
+            if not clients or exchange.servers:
+                continue
+            if (other := offered.get(exchange.name)) is not None:
+                yield problem(
+                    "type", f"{clients} uses the {kind} {exchange.name} as {exchange.type}, and "
+                    f"{', '.join(other.servers)} offers it as {other.type}: DDS never connects "
+                    "them.", f"One {kind} has one type: correct the type or the name on one side.",
+                )  # fmt: skip
+            else:
                 yield warning(
-                    kind, f"{', '.join(clients)} uses the {kind} {exchange.name}, and nobody "
-                    f"offers it{_alike(exchange.name, offered)}.",
+                    kind, f"{clients} uses the {kind} {exchange.name}, and nobody offers it"
+                    f"{_alike(exchange.name, list(offered))}.",
                     "Start its server, or correct the name.",
                 )  # fmt: skip
+
+
+def lonely(graph: Graph, own: set[str]) -> list[str]:
+    """Return the topics and services that nodes of the session use, and that nobody offers.
+
+    An action is named by the service that takes its goals.
+    """
+    topics = [
+        topic.name
+        for topic in graph.topics
+        if not topic.publishers and own & {end.node for end in topic.subscriptions}
+    ]
+    exchanges = [
+        exchange.name + ending
+        for ending, kind in (("", graph.services), (SEND_GOAL, graph.actions))
+        for exchange in kind
+        if not exchange.servers and own & set(exchange.clients)
+    ]
+    return topics + exchanges
 
 
 def _alike(name: str, names: list[str]) -> str:

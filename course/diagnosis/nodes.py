@@ -1,11 +1,10 @@
-"""What can be seen of nodes themselves: stuck, stolen, paused, never spun, silent, elsewhere."""
+"""What can be seen of nodes themselves: stuck, stolen, paused, never spun, or silent."""
 
 # mypy: allow-untyped-calls
 
 from __future__ import annotations
 
 import gc
-import os
 from collections.abc import Iterator
 
 from rcl_interfaces.srv import ListParameters
@@ -13,7 +12,6 @@ from rclpy.node import Node
 
 from course.doctor.finding import Finding, problem, warning
 from course.graph import reader
-from course.runtime import closing
 from course.runtime.names import node_name
 from course.runtime.session import Session
 
@@ -69,30 +67,6 @@ def unspun(session: Session) -> Iterator[Finding]:
                 "executor", f"{name} was made, and nobody spins it: none of its callbacks will "
                 "ever run.", "Run it with course.run(YourNode) in place of making it yourself.",
             )  # fmt: skip
-
-
-def on_another_domain(session: Session) -> Iterator[Finding]:
-    """Find sessions of this process that cannot hear each other, and a domain set in vain."""
-    others = [
-        other
-        for other in closing.known()
-        if isinstance(other, Session) and not other.closed and other.nodes
-    ]
-    for other in others:
-        if other.domain_id != session.domain_id:
-            yield warning(
-                "domain", f"This session is on domain {session.domain_id}; another one of this "
-                f"kernel, with {', '.join(other.nodes)}, is on {other.domain_id}, and DDS domains "
-                "never hear each other.",
-                f"Open one of them with course.Session(domain_id={session.domain_id}).",
-            )  # fmt: skip
-    asked = os.environ.get("ROS_DOMAIN_ID", "")
-    if asked and asked != str(session.domain_id):
-        yield warning(
-            "domain", f"ROS_DOMAIN_ID is {asked}, but a session leases a domain of its own: this "
-            f"one is on {session.domain_id}, so it does not hear nodes on {asked}.",
-            f"Join that domain with course.session(domain_id={asked}).",
-        )  # fmt: skip
 
 
 def silent(session: Session) -> Iterator[Finding]:

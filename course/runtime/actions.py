@@ -22,7 +22,8 @@ from course.runtime.settle import settle
 from course.runtime.waiting import Deadline, poll
 
 _FEEDBACK_DEPTH = 1000
-_SEND = "/_action/send_goal"
+SEND_GOAL = "/_action/send_goal"
+"""Follows an action's name in that of the service that takes its goals (ROS 2 design: Actions)."""
 
 
 class GoalState(IntEnum):
@@ -195,14 +196,16 @@ class Goals:
             WaitTimeout: no server, or no answer, within `timeout` seconds.
         """
         probe, deadline = self._probe, Deadline(timeout)
-        service = f"{full_action(probe.node, name)}{_SEND}"
+        service = f"{full_action(probe.node, name)}{SEND_GOAL}"
         action = self._actions.get((action_type, name))
         if action is None:
             action = self._actions[action_type, name] = _Action(probe, action_type, name)
         if not poll(action.is_ready, deadline.left, probe.pulse):
             reason = why_no_service(probe.node, service, action_type.Impl.SendGoalService)
-            reason = reason.replace(_SEND, "")
-            raise WaitTimeout(f"The action {name} was not ready in {timeout:g} s. {reason}")
+            reason = reason.replace(SEND_GOAL, "")
+            raise WaitTimeout(
+                f"The action {name} was not ready in {timeout:g} s. {reason}", service
+            )
         run = GoalRun(probe, name, on_feedback)
         # rclpy registers the request after it has sent it: no answer may come in between.
         with probe.executor.held():

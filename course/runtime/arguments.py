@@ -165,8 +165,14 @@ def shown(value: Any) -> str:
 
 
 def _kind_of(value: Any) -> str | None:
-    """Return what ROS class `value` is, told by its package, or None."""
+    """Return what ROS class `value` is, told by its package, or None.
+
+    The services and messages that an action is made of stand in its package, too.
+    """
     parts = str(getattr(value, "__module__", "")).split(".")
     if not isinstance(value, type) or len(parts) < 2:
         return None
-    return next((kind for kind, (part, _) in _KINDS.items() if part == parts[1]), None)
+    found = next((kind for kind, (part, _) in _KINDS.items() if part == parts[1]), None)
+    if found == "action" and not hasattr(value, "Goal"):
+        return "service" if hasattr(value, "Request") else "message"
+    return found

@@ -18,6 +18,7 @@ from course.runtime.blocked import BlockedCallback
 from course.runtime.hosting import Hosting
 from course.runtime.interruptible import SessionContext
 from course.runtime.jobs import current_job
+from course.runtime.offers import who_offers
 from course.runtime.probe import Probe
 from course.runtime.recorder import Recorder
 from course.runtime.waiting import Deadline, poll
@@ -204,6 +205,20 @@ class Asking(Hosting):
             profile = arguments.qos(qos)
             return Recorder(self._probe, topic, msg_type, profile, limit, self._now_ns, timeout)
 
+    def offered(self, names: Sequence[str]) -> dict[str, list[str]]:
+        """Return which nodes of this domain publish these topics, or serve these services.
+
+        Args:
+            names: as the graph spells them; an action is served as ``/dock/_action/send_goal``.
+
+        Returns:
+            The fully qualified names of the nodes, by topic or service; those that nobody offers
+            are left out.
+        """
+        made = self._probe_made
+        node = made.node if made is not None else next(iter(self.nodes.values()), None)
+        return {} if node is None or self.closed else who_offers(node, names)
+
     # Inside.
 
     @property
@@ -248,13 +263,13 @@ class Asking(Hosting):
                 )
             hints += [str(blocked) for blocked in self._held_up_by()[:2]]
             if self.explains and not self.closed:
-                found = self._further_hints(vague=vague)
+                found = self._further_hints(vague=vague, sought=error.sought)
                 hints += found[:_MOST_HINTS]
                 if (more := len(found) - _MOST_HINTS) > 0:
                     hints.append(f"session.diagnose() names {more} more.")
-            raise WaitTimeout(" ".join(hints)) from None
+            raise WaitTimeout(" ".join(hints), error.sought) from None
 
-    def _further_hints(self, *, vague: bool) -> list[str]:
+    def _further_hints(self, *, vague: bool, sought: str) -> list[str]:
         """Return what else may be the reason that a wait was in vain, the likeliest first."""
         return []
 

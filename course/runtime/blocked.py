@@ -25,6 +25,7 @@ from course.runtime.jobs import Job
 from course.runtime.names import node_name
 
 _CLIENTS = ("rclpy.client", "rclpy.action.client")
+_MOST_LINES = 5  # of a stack, in a sentence
 _WAITS_FOR_SERVER = ("wait_for_service", "wait_for_server")
 
 
@@ -36,7 +37,8 @@ class BlockedCallback:
         node: fully qualified name of its node, or "" if it belongs to none.
         callback: its qualified name, such as ``Asker.ask``.
         seconds: how long it has been running.
-        line: the line of the learner's code where it is, or "" if that is unknown.
+        stack: the lines of the learner's code that it is in, the callback's own first and the one
+            where it is last; empty if that is unknown.
         reason: why it cannot go on, if it waits for what cannot come; else "".
         holds_up: whether callbacks of other nodes have to wait for it.
         advice: what to do about it.
@@ -48,7 +50,7 @@ class BlockedCallback:
     node: str
     callback: str
     seconds: float
-    line: str
+    stack: tuple[str, ...]
     reason: str
     holds_up: bool
     advice: str
@@ -59,7 +61,13 @@ class BlockedCallback:
     def what(self) -> str:
         """The callback and where it is: ``Asker.ask of /asker (at line 7: client.call(x))``."""
         of = f" of {self.node}" if self.node else ""
-        return f"{self.callback}{of}" + (f" (at {self.line})" if self.line else "")
+        where = ", called from ".join(self.stack[: -_MOST_LINES - 1 : -1])
+        return f"{self.callback}{of}" + (f" (at {where})" if where else "")
+
+    @property
+    def line(self) -> str:
+        """The line of the learner's code where it is, or "" if that is unknown."""
+        return self.stack[-1] if self.stack else ""
 
     def __str__(self) -> str:
         """Return what is known of it and what to do, in a few sentences."""
@@ -99,7 +107,7 @@ def describe(job: Job) -> BlockedCallback:
         node="" if "/_" in name else name,
         callback=callback_name(job),
         seconds=time.monotonic() - job.since,
-        line=next((line for frame in frames if (line := _learners_line(frame))), ""),
+        stack=tuple(line for frame in reversed(frames) if (line := _learners_line(frame))),
         reason=reason,
         holds_up=len({other.thread_id for other in home.running.copy()} - {0}) >= home.threads,
         advice=advice,

@@ -72,7 +72,7 @@ class LogStore:
             message: the text.
             home: whose thread said it, or None if that is unknown.
         """
-        name = level if isinstance(level, str) else _NAMES.get(level, str(level))
+        name = level if isinstance(level, str) else level_name(level)
         severity = SEVERITIES.get(name, level if isinstance(level, int) else 0)
         entry = _Entry(stamp, severity, name, logger, message, home)
         key = (logger, severity >= SEVERITIES["WARN"])
@@ -97,6 +97,15 @@ class LogStore:
         with self._lock:
             for owners in self._owners.values():
                 owners.discard(id(home))
+
+    def knows(self, logger: str) -> bool:
+        """Whether a logger of this name has said something in this process, or is a node's here."""
+        with self._lock:
+            return (
+                logger in self._owners
+                or (logger, False) in self._rings
+                or (logger, True) in self._rings
+            )
 
     def rows(self, home: object, since: float) -> list[tuple[int, LogRow]]:
         """Return severity and row of what `home`'s nodes and threads said, oldest first.
@@ -144,6 +153,11 @@ store = LogStore()
 def note(level: str, node: str, message: str, home: object) -> None:
     """Add a line said just now by a callback of `node`."""
     store.add(time.time(), level, logger_of(node), message, home)
+
+
+def level_name(severity: int) -> str:
+    """Return the name of one of rcutils' severities; the number itself if it has none."""
+    return _NAMES.get(severity, str(severity))
 
 
 def logger_of(node: str) -> str:

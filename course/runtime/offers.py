@@ -8,11 +8,12 @@ import difflib
 import importlib
 import importlib.util
 import re
-from collections.abc import Callable
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rclpy.exceptions import NameValidationException
-from rclpy.node import Node
+from rclpy.node import Node, NodeNameNonExistentError
 from rclpy.qos import (
     DurabilityPolicy,
     QoSCompatibility,
@@ -160,6 +161,22 @@ def why_no_service(node: Node, name: str, srv_type: Any) -> str:
     require_type(name, srv_type, list(services.items()))
     others = [service for service in services if node.count_services(service)]
     return f"Nobody offers {name}{_alike(name, others)}."
+
+
+def who_offers(node: Node, names: Sequence[str]) -> dict[str, list[str]]:
+    """Return the nodes that publish these topics or serve these services; see `Session.offered`."""
+    found: dict[str, set[str]] = defaultdict(set)
+    for name in names:
+        for info in node.get_publishers_info_by_topic(name):
+            found[name].add(f"{info.node_namespace.rstrip('/')}/{info.node_name}")
+    for name, namespace in node.get_node_names_and_namespaces():
+        try:
+            served = dict(node.get_service_names_and_types_by_node(name, namespace))
+        except NodeNameNonExistentError:  # it has gone since
+            continue
+        for service in served.keys() & set(names):
+            found[service].add(f"{namespace.rstrip('/')}/{name}")
+    return {name: sorted(nodes) for name, nodes in found.items()}
 
 
 def _published(node: Node) -> list[str]:

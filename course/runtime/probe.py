@@ -100,7 +100,7 @@ class Probe:
                 if poll(lambda: inbox, deadline.left, self.pulse):
                     return inbox[0]
         reason = why_no_message(self.node, topic, msg_type, better)
-        raise WaitTimeout(f"No message on {topic} in {timeout:g} s. {reason}")
+        raise WaitTimeout(f"No message on {topic} in {timeout:g} s. {reason}", topic)
 
     def publish(self, topic: str, message: Any, qos: QoSProfile, timeout: float) -> None:
         """Publish one message as soon as a subscription matches; see `Session.publish`."""
@@ -133,7 +133,7 @@ class Probe:
             if not poll(client.service_is_ready, deadline.left, self.pulse):
                 reason = why_no_service(self.node, name, srv_type)
                 raise WaitTimeout(
-                    f"The service {name} was not ready in {deadline.total:g} s. {reason}"
+                    f"The service {name} was not ready in {deadline.total:g} s. {reason}", name
                 )
             yield client
         finally:

@@ -89,7 +89,7 @@ class Recorder:
             if not self._count:
                 node = self._probe.node
                 message += f" {why_no_message(node, self.topic, self.msg_type, self.qos)}"
-            raise WaitTimeout(message)
+            raise WaitTimeout(message, self.topic)
 
     def rate(self) -> float:
         """Return the mean rate of the kept messages in Hz; 0.0 with fewer than two of them."""
@@ -143,6 +143,6 @@ class Recorder:
             nobody = nobody_publishes(self._probe.node, self.topic)
             raise WaitTimeout(
                 f"{nobody}, so after {timeout:g} s its type is still unknown: name it, as in "
-                "record(topic, String)."
-            )
+                "record(topic, String).", self.topic,
+            )  # fmt: skip
         return found

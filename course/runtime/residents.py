@@ -8,6 +8,7 @@ import functools
 import threading
 import weakref
 from collections.abc import Callable, Hashable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +17,7 @@ from rclpy.executors import Executor
 from rclpy.node import Node
 
 from course.errors import SessionError
-from course.runtime import arguments
+from course.runtime import arguments, clashes
 from course.runtime.blocked import describe
 from course.runtime.context import as_default_context
 from course.runtime.crew import Crew
@@ -235,6 +236,8 @@ class Residents:
             with as_default_context(self._context), hearing_constructors():
                 node = factory(*args, **kwargs)
         except BaseException as error:
+            with suppress(Exception):  # rclpy's own error, of a name that cannot be, say, is enough
+                clashes.explain(error)
             destroy_half_made(error.__traceback__)
             raise
         if not isinstance(node, Node):

@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Self
 
+from course import neighbours
 from course.domains import check_domain_id, lease_domain
 from course.errors import SessionError
 from course.runtime import arguments, closing, signals
@@ -78,6 +79,7 @@ class Session(Showing):
         if sim_time:
             self._sim = SimulatedTime(self._probe, self._crew, self._residents)
             self._residents.on_made.append(self._sim.welcome)
+        self._answering = neighbours.Answering(self._lease, self.offered) if self._lease else None
         closing.register(self)
 
     @property
@@ -168,6 +170,8 @@ class Session(Showing):
         Repeatable: Ctrl-C may have cut the first attempt short.
         """
         self._ended.set()
+        if self._answering is not None:
+            self._answering.stop()
         leaked = self._crew.stop(deadline)
         leaked += self._residents.forget_all()
         for callback in self._on_close:

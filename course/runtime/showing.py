@@ -200,11 +200,11 @@ class Showing(Asking):
         """Return the names of paused nodes."""
         return [resident.name for resident in self._residents.all() if resident.paused]
 
-    def _further_hints(self, *, vague: bool) -> list[str]:
+    def _further_hints(self, *, vague: bool, sought: str) -> list[str]:
         from course.diagnosis import likely
 
         try:
-            found = likely(self._me, vague=vague)
+            found = likely(self._me, vague=vague, sought=sought)
         except Exception:  # noqa: BLE001 - the session may end meanwhile; the wait has its own error
             return []
         return [f"{finding.message} {finding.mend}" for finding in found]

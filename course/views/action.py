@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import Any
 
@@ -78,7 +79,7 @@ class ActionView(LiveView):
         for goal in self.goals:
             shown = _shown(goal)
             states = " -> ".join(f"{name} ({when})" for name, when in shown["states"])
-            parts = (f"goal {goal.number}: {states}", shown["text"], shown["outcome"])
+            parts = (f"goal {goal.number}: {states}", shown["text"], _way(goal), shown["outcome"])
             lines.append("  " + "; ".join(part for part in parts if part))
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
 
@@ -91,10 +92,26 @@ def _shown(goal: Goal) -> dict[str, Any]:
         "number": goal.number,
         "states": [[state.name, f"{when:.1f} s"] for state, when in goal.states],
         "text": asked + feedback,
+        "way": {"text": _way(goal), "points": _points(goal)} if goal.way else None,
         "outcome": goal.problem or result or goal.note,
-        "bad": bool(goal.problem or goal.note),
+        "bad": bool(goal.problem or (goal.note and not goal.over)),
         "over": goal.over,
     }
+
+
+def _way(goal: Goal) -> str:
+    """Return how far a goal has come, in words."""
+    if goal.way is None:
+        return ""
+    name, points = goal.way
+    first, last = points[0][1], points[-1][1]
+    return f"{name}: {first:g} to {last:g}" if len(points) > 1 else f"{name}: {last:g}"
+
+
+def _points(goal: Goal) -> list[list[float]]:
+    """Return the same to be drawn: (s since the goal was first seen, number); all finite."""
+    points = goal.way[1].copy() if goal.way else ()
+    return [[round(when, 2), value] for when, value in points if math.isfinite(value)]
 
 
 def _line(data: Any) -> str:

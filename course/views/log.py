@@ -1,4 +1,4 @@
-"""What all nodes of a session log and print, live."""
+"""What all nodes of a domain log, and those of the session print, live."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from course.runtime.logs import LogTable
 from course.runtime.session import Session
 from course.views import brief
 from course.views.live import Frame, LiveView
+from course.watch.rosout import Rosout
 
 SHOWN = 200
 """Lines that a frame has."""
@@ -25,7 +26,9 @@ MOST_BYTES = 100_000
 class LogPanel(LiveView):
     """The latest lines of all nodes that the filters for level and text let through.
 
-    It begins with what is INFO or more. As text it is the table of `Session.logs`.
+    Nodes of other programs on the session's domain are among them, with what they log; what they
+    print is not to be seen from here. It begins with what is INFO or more. As text it is a table
+    like that of `Session.logs`.
     """
 
     label = "Log panel"
@@ -37,6 +40,8 @@ class LogPanel(LiveView):
         """Show lines of at least ``level``."""
         session.logs(level=level, last=1)  # an unknown level is an error at once
         super().__init__(session, level)
+        self._elsewhere = Rosout(session)
+        self.resources.callback(self._elsewhere.stop)
         self._least = level
         self._level = _named(level) if SEVERITIES[_named(level)] > SEVERITIES["INFO"] else "INFO"
         self._search = ""
@@ -86,6 +91,9 @@ class LogPanel(LiveView):
     def _found(self) -> tuple[list[LogRow], int]:
         """Return the rows that pass, and how many there are in all."""
         rows = self.session.logs(level=self._least, last=None).rows
+        least = SEVERITIES[_named(self._least)]
+        rows += [r for r in self._elsewhere.rows if SEVERITIES.get(r.level, 0) >= least]
+        rows.sort(key=lambda row: row.stamp)
         lowest = SEVERITIES[self._level]
         return [
             row

@@ -12,7 +12,8 @@ from course.runtime.session import Session
 from course.views.per_session import PerSession
 
 MOST = 30
-"""Views of one session that live at a time: the oldest ends when there are more."""
+"""Views of one session that live at a time: the oldest ends when there are more. As many of closed
+sessions stay on the page."""
 
 REPLACED = "This view has been replaced: the cell that made it was run again."
 TOO_MANY = f"This view has ended, as its session shows {MOST} at most: run its cell again."
@@ -27,13 +28,17 @@ class Shown(Protocol):
         """Stop whatever it does, and say ``why``; ``close`` takes it off the page. Idempotent."""
 
 
+_lock = threading.Lock()
+_left: dict[Shown, tuple[Hashable, Hashable]] = {}
+"""Views that sessions have left on the page when they closed."""
+
+
 class Shelf:
     """The living views of one session, each with the place in the code that it came from."""
 
     def __init__(self, session: Session) -> None:
         """Keep views until ``session`` closes."""
         self._views: dict[Shown, tuple[Hashable, Hashable]] = {}
-        self._lock = threading.Lock()
         session.on_close(lambda: self.clear("The session has been closed."))
 
     def put(self, view: Shown, about: Hashable) -> None:
@@ -45,10 +50,11 @@ class Shelf:
                 things, in a loop, makes as many views.
         """
         place, run = _whereabouts(about)
-        with self._lock:
+        with _lock:
             before = [
                 other
-                for other, (where, when) in self._views.items()
+                for views in (self._views, _left)
+                for other, (where, when) in views.items()
                 if where == place and when != run
             ]
             self._views[view] = (place, run)
@@ -60,16 +66,21 @@ class Shelf:
 
     def forget(self, view: Shown) -> None:
         """Let go of a view that has ended and has no widget any more. Idempotent."""
-        with self._lock:
+        with _lock:
             self._views.pop(view, None)
+            _left.pop(view, None)
 
     def clear(self, why: str) -> None:
-        """End all views."""
-        with self._lock:
+        """End all views: they stay on the page, and say why, until their cells are run again."""
+        with _lock:
             views = list(self._views)
+            _left.update(self._views)
             self._views.clear()
+            oldest = list(_left)[:-MOST]
         for view in views:
             view.end(why)
+        for view in oldest:
+            view.end(why, close=True)
 
 
 shelf_of = PerSession(Shelf)

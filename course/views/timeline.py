@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from course.watch.callbacks import CallbackTap, Run
 from course.watch.timeline import Figures, Trace
 
 MOST_DROPS = 200
-"""Marks for drops that a frame has."""
+"""Marks for drops that a lane has."""
 
 MOST_TOPICS = 6
 """Topics that one timeline shows: more lanes than that nobody can follow."""
@@ -27,7 +28,8 @@ class Timeline(LiveView):
     """Lanes of a few topics over the last seconds.
 
     Each topic has a lane of publications and receptions, one of callbacks for each node that reads
-    it, marks for gaps and drops, plots of rate and latency, and figures: rate, median and 95th
+    it, marks for gaps and drops (lost on the way, or passed by a callback that was too slow for its
+    queue), plots of rate and latency, and figures: rate, median and 95th
     percentile of the latency from publication to reception (on one machine: both stamps are of its
     clock), gaps, and messages that never arrived.
     """
@@ -112,8 +114,10 @@ class Timeline(LiveView):
         for trace, tap in self._rows:
             text = describe(found[trace.topic]) + _shortened(trace, tap, start)
             lines.append(f"  {trace.topic}: {text}")
-            for node, count in self._nodes(trace.topic).items():
-                lines.append(f"    callbacks of {node}: {count}")
+            for node, runs in self._nodes(trace.topic).items():
+                missed = sum(count for _, count in timeline.drops(runs))
+                passed = f", {missed} messages passed it by" if missed else ""
+                lines.append(f"    callbacks of {node}: {len(runs)}{passed}")
         return "\n".join(lines)
 
     def _add(self, name: str, msg_type: Any | None) -> None:
@@ -132,38 +136,39 @@ class Timeline(LiveView):
             trace.adapt()
             tap.watch(nodes)
 
-    def _nodes(self, topic: str) -> dict[str, int]:
-        counts: dict[str, int] = {}
-        for run in self.runs(topic):
-            counts[run.node] = counts.get(run.node, 0) + 1
-        return counts
+    def _nodes(self, topic: str) -> dict[str, list[Run]]:
+        return _by_node(self.runs(topic))
 
     def _topic(self, trace: Trace, tap: CallbackTap, start: int) -> dict[str, Any]:
-        passages, runs = trace.since(start), tap.since(start)
+        passages = trace.since(start)
         found = timeline.figures(passages)
         plots = timeline.plots(passages, start, self._window)
         lanes = [
-            ("published", [passage.published for passage in passages]),
-            ("received", [passage.received for passage in passages]),
+            self._lane("published", [passage.published for passage in passages], start),
+            self._lane("received", [passage.received for passage in passages], start, found.drops),
         ]
-        for node in sorted({run.node for run in runs}):
-            lanes.append((f"callback of {node}", [r.started for r in runs if r.node == node]))
+        for node, runs in _by_node(tap.since(start)).items():
+            moments = [run.started for run in runs]
+            lanes.append(self._lane(f"callback of {node}", moments, start, timeline.drops(runs)))
         return {
             "name": trace.topic,
             "text": describe(found) + _shortened(trace, tap, start),
-            "lanes": [
-                {"label": label, "counts": timeline.columns(moments, start, self._window)}
-                for label, moments in lanes
-            ],
+            "lanes": lanes,
             "rate": _rounded(plots.rate, 1.0, 2),
             "p50": _rounded(plots.p50, 1e3, 3),
             "p95": _rounded(plots.p95, 1e3, 3),
             "gaps": [
                 [self._share(begin, start), self._share(end, start)] for begin, end in found.gaps
             ],
-            "drops": [
-                [self._share(when, start), count] for when, count in found.drops[-MOST_DROPS:]
-            ],
+        }
+
+    def _lane(
+        self, label: str, moments: list[int], start: int, drops: Sequence[tuple[float, int]] = ()
+    ) -> dict[str, Any]:
+        return {
+            "label": label,
+            "counts": timeline.columns(moments, start, self._window),
+            "drops": [[self._share(when, start), count] for when, count in drops[-MOST_DROPS:]],
         }
 
     def _share(self, moment: float, start: int) -> float:
@@ -188,6 +193,14 @@ def describe(figures: Figures) -> str:
     if figures.lost:
         parts.append(f"{figures.lost} lost on the way")
     return ", ".join(parts)
+
+
+def _by_node(runs: list[Run]) -> dict[str, list[Run]]:
+    """Return the runs of each node's callbacks, in the order in which messages were published."""
+    found: dict[str, list[Run]] = {}
+    for run in sorted(runs, key=lambda run: (run.node, run.published)):
+        found.setdefault(run.node, []).append(run)
+    return found
 
 
 def _shortened(trace: Trace, tap: CallbackTap, start: int) -> str:

@@ -18,12 +18,16 @@ KEPT = 20_000
 
 
 class Run(NamedTuple):
-    """One run of a callback: its node, the message's time of publication, start and end (ns)."""
+    """One run of a callback: its node, the message's time of publication, start and end (ns).
+
+    ``sequence`` is the message's number, as in `timeline.Passage`.
+    """
 
     node: str
     published: int
     started: int
     ended: int
+    sequence: int = 0
 
 
 class CallbackTap:
@@ -87,7 +91,11 @@ class _Wrapped:
         wants_info = _takes_two(original)
 
         def keep(info: dict[str, int] | None, started: int) -> None:
-            run = Run(node, (info or {}).get("source_timestamp", 0), started, time.time_ns())
+            said = info or {}
+            run = Run(
+                node, said.get("source_timestamp", 0), started, time.time_ns(),
+                said.get("publication_sequence_number") or 0,
+            )  # fmt: skip
             with _lock:
                 for listener in self._listeners:
                     listener.append(run)

@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import deque
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,12 +19,21 @@ from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
 from course import values
 from course.errors import CourseError
-from course.runtime.actions import GoalRun, GoalState
+from course.runtime.actions import GoalState
 from course.runtime.session import Session
-from course.watch import forms
+from course.watch import forms, progress
 
 KEPT = 40
 """Goals that are kept with all that is known of them: those that run before those that are over."""
+
+POINTS = 100
+"""Of how many of its latest feedback messages a goal keeps how far it had come."""
+
+ANSWER = 10.0
+"""Seconds within which a server gives the result of a goal that is over, unless it is busy."""
+
+TRIES = 3
+"""How often it is asked: its only thread may be working on the next goal."""
 
 OVER = (GoalState.SUCCEEDED, GoalState.CANCELED, GoalState.ABORTED)
 
@@ -31,13 +42,16 @@ OVER = (GoalState.SUCCEEDED, GoalState.CANCELED, GoalState.ABORTED)
 class Goal:
     """One goal: the states that it went through with their times (s since it was first seen).
 
-    ``problem`` says why it never began; ``note`` what else there is to say about it.
+    ``way`` is how far it had come, as `progress.measure` tells: the number's name, and (s since the
+    goal was first seen, number) of the latest feedback messages. ``problem`` says why it never
+    began; ``note`` what else there is to say about it.
     """
 
     number: int
     states: list[tuple[GoalState, float]] = field(default_factory=list)
     feedback: int = 0
     latest: dict[str, Any] = field(default_factory=dict)
+    way: tuple[str, deque[tuple[float, float]]] | None = None
     result: dict[str, Any] | None = None
     asked: dict[str, Any] | None = None
     problem: str = ""
@@ -69,6 +83,7 @@ class GoalBoard:
         self._rejected: list[Goal] = []
         self._count = 0
         self._lock = threading.Lock()
+        self._asker = ThreadPoolExecutor(1, "ROS goal results")
         self._subscriptions = [
             session.watch(
                 GoalStatusArray, f"{name}/_action/status", self._on_status,
@@ -82,7 +97,9 @@ class GoalBoard:
 
     def stop(self) -> None:
         """Watch no more. Idempotent."""
-        self._stopped = True
+        with self._lock:
+            self._stopped = True
+            self._asker.shutdown(wait=False, cancel_futures=True)
         for subscription in self._subscriptions:
             self._session.unwatch(subscription)
 
@@ -94,7 +111,7 @@ class GoalBoard:
             return sorted(both, key=lambda goal: goal.number)[-KEPT:]
 
     def send(self, typed: Mapping[str, Any], timeout: float = 5.0) -> None:
-        """Send a goal made of what was typed into the form; its result is awaited in a thread.
+        """Send a goal made of what was typed into the form; its answer is awaited in a thread.
 
         Raises:
             MisfitError: something does not fit its field.
@@ -136,21 +153,32 @@ class GoalBoard:
             return
         with self._lock:
             kept = self._goal(run.goal_id)
-            if kept is None:
-                return
-            kept.asked = asked
-        self._await(run, kept)
+            if kept is not None:
+                kept.asked = asked
 
-    def _await(self, run: GoalRun, kept: Goal) -> None:
-        while not (self._stopped or self._session.closed):
-            try:
-                if not run.done_within(1.0):
-                    continue
-                result = run.wait()
-            except Exception:  # noqa: BLE001 - the session has ended
-                return
-            kept.result = values.to_data(result) if result is not None else None
+    def _ask(self, key: bytes, goal: Goal, tries: int = TRIES) -> None:
+        """Have the result of a goal that is over fetched; called with the lock held."""
+        if not self._stopped:
+            self._asker.submit(self._fetch, key, goal, tries)
+
+    def _fetch(self, key: bytes, goal: Goal, tries: int) -> None:
+        service = self.action_type.Impl.GetResultService
+        request = service.Request(goal_id=UUID(uuid=list(key)))
+        try:
+            response = self._session.call(
+                service, f"{self.name}/_action/get_result", request, ANSWER
+            )
+        except Exception:  # noqa: BLE001 - whatever it is, there is no result yet
+            goal.note = "Its server has not given its result yet."
+            with self._lock:
+                if tries > 1 and key in self._goals:
+                    self._ask(key, goal, tries - 1)
             return
+        goal.note = ""
+        if response.status in OVER:
+            goal.result = values.to_data(response.result)
+        else:
+            goal.note = "Its server has not kept the result."
 
     def _reject(self, asked: dict[str, Any], problem: str) -> None:
         with self._lock:
@@ -178,8 +206,9 @@ class GoalBoard:
                 state = GoalState(status.status)
                 if goal.state != state:
                     goal.states.append((state, max(0.0, now - goal.seen)))
-                if goal.over:
-                    goal.note = ""
+                    if goal.over:
+                        goal.note = ""
+                        self._ask(key, goal)
             # A server lists goals for minutes after their end: these are not new ones.
             self._let_go &= listed.keys()
             oldest = sorted(self._goals, key=lambda key: not self._goals[key].over)
@@ -193,3 +222,7 @@ class GoalBoard:
             if goal is not None:
                 goal.feedback += 1
                 goal.latest = values.to_data(message.feedback)
+                if (found := progress.measure(message.feedback)) is not None:
+                    if goal.way is None or goal.way[0] != found.name:
+                        goal.way = found.name, deque(maxlen=POINTS)
+                    goal.way[1].append((time.monotonic() - goal.seen, found.value))

@@ -11,7 +11,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from rclpy.qos import DurabilityPolicy
 
@@ -168,15 +168,15 @@ def figures(passages: Sequence[Passage]) -> Figures:
     latencies = sorted((p.received - p.published) / _NS for p in passages)
     stamps = [p.published / _NS for p in passages]
     span = stamps[-1] - stamps[0]
-    drops = _drops(passages)
+    missing = drops(passages)
     return Figures(
         len(passages),
         rate=(len(stamps) - 1) / span if span > 0 else None,
         latency_p50=_share(latencies, 0.5),
         latency_p95=_share(latencies, 0.95),
-        lost=sum(count for _, count in drops),
+        lost=sum(count for _, count in missing),
         gaps=_gaps(stamps),
-        drops=drops,
+        drops=missing,
     )
 
 
@@ -224,9 +224,25 @@ def _share(ordered: Sequence[float], share: float) -> float:
     return ordered[min(len(ordered) - 1, int(len(ordered) * share))]
 
 
-def _drops(passages: Sequence[Passage]) -> tuple[tuple[float, int], ...]:
-    """Return where numbers are missing, if all come from one publisher that counts."""
-    pairs = list(itertools.pairwise(passages))
+class Counted(Protocol):
+    """A message that came somewhere: when it was published (ns), and its number."""
+
+    @property
+    def published(self) -> int:
+        """See `Passage`."""
+
+    @property
+    def sequence(self) -> int:
+        """See `Passage`."""
+
+
+def drops(messages: Sequence[Counted]) -> tuple[tuple[float, int], ...]:
+    """Return where numbers are missing, if all come from one publisher that counts.
+
+    Returns:
+        How many are, and when the message after them was published (s since the epoch).
+    """
+    pairs = list(itertools.pairwise(messages))
     if any(a.sequence == 0 or b.sequence <= a.sequence for a, b in pairs):
         return ()
     return tuple(

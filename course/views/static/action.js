@@ -33,13 +33,14 @@ const view = {
 function card(number, send) {
   const states = make("ol", { class: "rosstates" });
   const text = make("p", { class: "rosgoal-text" });
+  const way = make("p", { class: "rosgoal-way" });
   const state = make("p", { class: "rosgoal-state", role: "status" });
   const cancel = make(
     "button", { type: "button", "aria-label": `Cancel goal ${number}`,
       onclick: () => send({ cancel: number }) }, "Cancel",
   );
   const element = make(
-    "li", { class: "rosgoal", tabindex: "-1" }, make("strong", {}, `Goal ${number}`), states, text, state, cancel,
+    "li", { class: "rosgoal", tabindex: "-1" }, make("strong", {}, `Goal ${number}`), states, text, way, state, cancel,
   );
   return {
     element,
@@ -50,6 +51,7 @@ function card(number, send) {
         `${name} ${when}`,
       )));
       text.textContent = goal.text;
+      way.replaceChildren(...(goal.way ? [line(goal.way), goal.way.text] : []));
       if (state.textContent !== goal.outcome) state.textContent = goal.outcome;
       state.className = `rosgoal-state ${goal.bad ? "rosbad" : ""}`;
       // The button goes with the goal's end: its focus stays in the view, where the result is.
@@ -57,6 +59,24 @@ function card(number, send) {
       cancel.hidden = goal.over;
     },
   };
+}
+
+const WAY = { width: 120, height: 24 };
+
+/** How far a goal has come, from feedback to feedback, as a small line. */
+function line({ points }) {
+  const svg = shape("svg", { ...WAY, viewBox: `0 0 ${WAY.width} ${WAY.height}`, "aria-hidden": "true" });
+  const [times, values] = [0, 1].map((part) => points.map((point) => point[part]));
+  const scaled = (all, room) => {
+    const least = Math.min(...all);
+    const span = Math.max(...all) - least || 1;
+    return all.map((value) => 2 + (value - least) / span * (room - 4));
+  };
+  const [x, y] = [scaled(times, WAY.width), scaled(values, WAY.height)];
+  svg.append(shape("polyline", {
+    points: points.map((_, place) => `${x[place].toFixed(1)},${(WAY.height - y[place]).toFixed(1)}`).join(" "),
+  }));
+  return svg;
 }
 
 export default { render };

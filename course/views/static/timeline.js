@@ -48,12 +48,13 @@ function block(topic, frame) {
       }
     });
     svg.append(shape("path", { class: `rostimeline-lane${Math.min(row, 2)}`, d: path }));
+    const what = row < 2 ? "lost on the way" : "passed this callback by";
+    for (const [place, count] of lane.drops) {
+      const x = (LABEL + Math.max(0, Math.min(1, place)) * WIDTH).toFixed(1);
+      svg.append(shape("path", { class: "rostimeline-drop", d: `M${x},${y} m-4,0 h8 l-4,7 Z` },
+        shape("title", {}, `${count} ${what}`)));
+    }
   });
-  for (const [place, count] of topic.drops) {
-    const x = (LABEL + Math.max(0, Math.min(1, place)) * WIDTH).toFixed(1);
-    svg.append(shape("path", { class: "rostimeline-drop", d: `M${x},${LANE} m-4,0 h8 l-4,7 Z` },
-      shape("title", {}, `${count} lost on the way`)));
-  }
   svg.append(
     ...plot("rate", "Hz", 1, [["rostimeline-rate", topic.rate]], lanes * LANE + SPACE),
     ...plot("latency p50, p95", "ms", 2, [["rostimeline-p50", topic.p50], ["rostimeline-p95", topic.p95]],

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
+import re
 import signal
+import socket
 import subprocess
 import threading
 import weakref
@@ -12,15 +15,16 @@ from collections.abc import Callable
 
 import pytest
 import rclpy
+from rclpy.action import ActionClient
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import String
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 from test_msgs.action import Fibonacci
 from test_msgs.msg import Empty
 
-from course import Session
+from course import Session, domains
 from course.diagnosis import Diagnosis, nodes
 from course.errors import WaitTimeout
 from course.graph import reader
@@ -108,19 +112,56 @@ def test_a_type_that_differs(session: Session) -> None:
         assert "One topic carries one type" in in_vain(session)
 
 
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (
+            lambda node: node.create_subscription(Empty, "scan", print, 10),
+            "/scan is of type std_msgs/msg/String, not test_msgs/msg/Empty: one topic has one type",
+        ),
+        (
+            lambda node: node.create_publisher(Empty, "scan", 10),
+            "/scan is of type std_msgs/msg/String, not test_msgs/msg/Empty: one topic has one type",
+        ),
+        (
+            lambda node: node.create_client(Trigger, "lamp"),
+            "/lamp is of type std_srvs/srv/SetBool, not std_srvs/srv/Trigger: one service has one",
+        ),
+    ],
+)
+def test_a_type_that_differs_within_one_kernel(
+    session: Session, make: Callable[[Node], object], said: str
+) -> None:
+    node = session.run(talker)
+    node.create_service(SetBool, "lamp", lambda _request, response: response)
+
+    class Other(Node):
+        def __init__(self) -> None:
+            super().__init__("other")
+            make(self)
+
+    session.until(lambda: session.offered(["/scan", "/lamp"]).keys() == {"/scan", "/lamp"})
+    with pytest.raises(RuntimeError, match=said):
+        session.run(Other)
+
+
 def test_a_deadlock_is_named_with_its_line(session: Session) -> None:
     def asker() -> Node:
         node = Node("asker")
         node.create_service(SetBool, "lamp", lambda _request, response: response)
         client = node.create_client(SetBool, "lamp")
-        node.create_timer(0.01, lambda: client.call(SetBool.Request(), timeout_sec=8))
+
+        def switch() -> None:
+            client.call(SetBool.Request(), timeout_sec=8)
+
+        node.create_timer(0.01, lambda: switch())
         return node
 
     session.run(asker)
     session.until(lambda: about(session.diagnose(), "callback"))
     text = about(session.diagnose(), "callback")
     assert "Deadlock: it waits for the answer of lamp" in text
-    assert "client.call(SetBool.Request(), timeout_sec=8)" in text
+    assert re.search(r"at line \d+: client.call.*, called from line \d+: .*lambda: switch", text)
     assert "call_async()" in text
     said = in_vain(session)
     assert said.count("Deadlock: it waits for the answer of lamp") == 1
@@ -251,6 +292,85 @@ def test_a_recorder_and_a_goal_say_it_too(session: Session) -> None:
             session.record("chatter", String).wait(timeout=0)
     finally:
         robot.go.set()
+
+
+def test_a_service_of_another_type(session: Session) -> None:
+    node = session.run(Node, "asker")
+    node.create_client(SetBool, "lamp")
+    with Session(domain_id=session.domain_id) as other:
+        other.run(Node, "keeper").create_service(Trigger, "lamp", lambda _request, answer: answer)
+        session.until(lambda: about(session.diagnose(), "type"))
+        text = about(session.diagnose(), "type")
+        assert "/asker uses the service /lamp as std_srvs/srv/SetBool, and /keeper offers" in text
+        assert "it as std_srvs/srv/Trigger" in text
+        assert "/keeper offers it as std_srvs/srv/Trigger" in in_vain(session)
+        assert about(session.diagnose(), "service") == ""
+
+
+NEXT_DOOR = """
+import os
+os.environ["JPY_SESSION_NAME"] = "work/ch05.ipynb"
+import course
+from rclpy.action import ActionServer
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import SetBool, Trigger
+from test_msgs.action import Fibonacci
+with course.Session() as session:
+    node = session.run(lambda: Node("next_door"))
+    node.create_publisher(String, "weather", 10)
+    node.create_service(SetBool, "gate", lambda request, answer: answer)
+    server = ActionServer(node, Fibonacci, "tour", lambda goal: Fibonacci.Result())
+    print(session.domain_id, flush=True)
+    session.spin()
+"""
+
+
+def test_what_is_missed_here_is_in_another_notebook(
+    session: Session, start_script: Callable[[str], subprocess.Popen[str]]
+) -> None:
+    process = start_script(NEXT_DOOR)
+    assert process.stdout is not None
+    domain = int(process.stdout.readline())
+    session.run(listener, "weather")
+    asker = session.run(Node, "asker")
+    asker.create_client(SetBool, "gate")
+    client = ActionClient(asker, Fibonacci, "tour")
+    session.until(lambda: len(about(session.diagnose(), "domain").splitlines()) >= 3, 30)
+    text = about(session.diagnose(), "domain")
+    for name in ("/weather", "/gate", "/tour"):
+        assert f"{name} is offered by /next_door on domain {domain}, in ch05.ipynb" in text
+    assert f"this session is on domain {session.domain_id}" in text
+    assert f"course.session(domain_id={domain})" in text
+    with pytest.raises(WaitTimeout, match=f"/weather is offered by /next_door on domain {domain}"):
+        session.next_message(String, "weather", timeout=0)
+    with pytest.raises(WaitTimeout, match=f"/gate is offered by /next_door on domain {domain}"):
+        session.call(SetBool, "gate", SetBool.Request(), timeout=0)
+    with pytest.raises(WaitTimeout, match=f"/tour is offered by /next_door on domain {domain}"):
+        session.send_goal(Fibonacci, "tour", Fibonacci.Goal(), timeout=0)
+    asker.create_publisher(String, "weather", 10)  # then it is not missed
+    session.until(lambda: "/weather" not in about(session.diagnose(), "domain"))
+    os.kill(process.pid, signal.SIGSTOP)
+    try:  # nobody waits for who does not answer
+        assert "/next_door" not in about(session.diagnose(), "domain")
+    finally:
+        os.kill(process.pid, signal.SIGCONT)
+    client.destroy()
+
+
+def test_whoever_asks_nonsense_gets_no_answer_and_does_no_harm(session: Session) -> None:
+    session.run(talker)
+    session.until(lambda: session.offered(["/scan"]))
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
+        sock.bind("")
+        sock.settimeout(10)
+        for nonsense in (b"", b"{", b"5", b"[1, null, {}]", b'["not a name", "~"]', b"[" * 9000):
+            sock.sendto(nonsense, domains.address(session.domain_id))
+        sock.sendto(b'["/scan"]', domains.address(session.domain_id))
+        while not (answer := json.loads(sock.recv(65536)))["offers"]:
+            pass
+    assert answer["offers"] == {"/scan": ["/talker"]}
+    assert answer["domain_id"] == session.domain_id
 
 
 REMOTE = """

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
@@ -126,6 +127,55 @@ def test_a_goal_of_somebody_else_is_seen_and_can_be_cancelled(busy: Session) -> 
     assert run.status == GoalState.CANCELED
     busy.until(lambda: view.goals[0].over)
     assert view.goals[0].state == GoalState.CANCELED
+
+
+def test_a_goal_sent_from_a_cell_shows_its_progress_and_its_result(busy: Session) -> None:
+    robot = busy.run(Robot)
+    assert isinstance(robot, Robot)
+    view = busy.action("count")
+    busy.send_goal(Fibonacci, "count", Fibonacci.Goal(order=3))
+    busy.until(lambda: view.goals and view.goals[0].feedback)
+    (goal,) = view.frame()["goals"]
+    assert goal["way"]["text"] == "sequence (number of values): 2"
+    assert [value for _, value in goal["way"]["points"]] == [2.0]
+    robot.go.set()
+    busy.until(lambda: view.goals[0].result is not None)
+    (goal,) = view.frame()["goals"]
+    assert goal["outcome"] == "result: {sequence: [0, 1, 1]}"
+    assert "sequence (number of values): 2; result: {sequence: [0, 1, 1]}" in view.words()
+
+
+def test_a_goal_that_was_over_before_anybody_looked_has_a_result_too(busy: Session) -> None:
+    robot = busy.run(Robot)
+    assert isinstance(robot, Robot)
+    robot.go.set()
+    busy.send_goal(Fibonacci, "count", Fibonacci.Goal(order=3)).wait()
+    view = busy.action("count")  # the server still lists it
+    busy.until(lambda: view.goals and view.goals[0].result is not None)
+    assert view.goals[0].state == GoalState.SUCCEEDED
+
+
+def test_a_result_that_comes_late_is_asked_for_again(
+    busy: Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(goals, "ANSWER", 0.2)
+    release = threading.Event()
+
+    class Dawdler(Server):
+        def _execute(self, goal: Any) -> Fibonacci.Result:
+            goal.succeed()
+            release.wait()
+            return Fibonacci.Result(sequence=[7])
+
+    busy.run(Dawdler)
+    view = busy.action("fib")
+    view.send(order=1)
+    busy.until(lambda: view.goals and view.goals[0].note)
+    (goal,) = view.frame()["goals"]
+    assert (goal["outcome"], goal["bad"]) == ("Its server has not given its result yet.", False)
+    release.set()
+    busy.until(lambda: view.goals[0].result == {"sequence": [7]})
+    assert view.goals[0].note == ""
 
 
 def test_a_rejected_goal_is_said(busy: Session) -> None:
@@ -357,6 +407,34 @@ def test_the_log_panel_has_the_latest_lines(session: Session) -> None:
     assert len(shown(panel)["rows"]) == 200
     assert shown(panel)["rows"][-1][1:3] == ["INFO", "/robot"]
     assert "line 299" in panel.words()
+
+
+REMOTE = """
+import course
+from rclpy.node import Node
+with course.Session(domain_id={domain}) as session:
+    node = session.run(lambda: Node("remote", namespace="far"))
+    session.run(lambda: Node("robot")).get_logger().info("of the same name")
+    node.get_logger().debug("not on the topic")
+    node.get_logger().warning("battery low")
+    session.spin()
+"""
+
+
+def test_the_log_panel_has_what_nodes_of_other_programs_log(
+    session: Session, start_script: Callable[[str], subprocess.Popen[str]]
+) -> None:
+    robot = session.run(Robot)
+    panel = session.log_panel()
+    start_script(REMOTE.format(domain=session.domain_id))
+    robot.get_logger().info("here")
+    session.until(lambda: "battery low" in panel.words(), 30)
+    rows = [row[1:] for row in panel.frame()["rows"]]
+    assert ["WARN", "/far/remote", "battery low"] in rows
+    # What this process runs comes on the topic, too, and is there once.
+    assert [row for row in rows if row[2] == "here"] == [["INFO", "/robot", "here"]]
+    panel.filter("ERROR")
+    assert panel.frame()["found"] == 0
 
 
 def test_the_log_panel_filters_before_it_cuts(session: Session) -> None:

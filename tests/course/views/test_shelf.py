@@ -124,6 +124,32 @@ def test_two_places_have_two_views_and_nobody_has_more_than_so_many(session: Ses
     assert sum(not view.over for view in views) == shelf.MOST == len(shelf_of(session)._views)
 
 
+def test_what_a_closed_session_left_on_the_page_goes_when_its_cell_is_run_again(
+    kernel: Kernel,
+) -> None:
+    cell = "from tests.robot import Robot\ncourse.run(Robot)\ncourse.session().graph()"
+    count = "print(sum(hasattr(w, 'ended') for w in ipywidgets.widgets.widget._instances.values()))"
+    kernel.run("import ipywidgets.widgets.widget\nimport course\ncourse.close()")
+    counts = []
+    for _ in range(4):
+        assert kernel.run(cell)[0] == "ok"
+        status, shown = kernel.run(f"course.close()\n{count}")
+        assert status == "ok", shown
+        counts.append(next(text for kind, text in shown if kind == "stdout"))
+    assert counts == counts[:1] * 4
+
+
+def test_closed_sessions_leave_so_many_views_on_the_page_at_most() -> None:
+    views = []
+    for turn in range(shelf.MOST // 10 + 1):
+        with Session() as session:
+            views += [Plain(session, turn, number) for number in range(10)]
+            widgets = [view.widget for view in views[-10:]]
+        assert {widget.ended for widget in widgets} == {"The session has been closed."}
+    left = [view for view in views if view.widget.comm is not None]
+    assert left == views[-shelf.MOST :]
+
+
 def test_a_closed_widget_ends_its_view(session: Session) -> None:
     view = Plain(session)
     view.widget.close()

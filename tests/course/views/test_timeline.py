@@ -6,6 +6,7 @@ import functools
 import gc
 import re
 import sys
+import threading
 import time
 import weakref
 from pathlib import Path
@@ -84,6 +85,39 @@ def test_nothing_is_said_of_nothing() -> None:
 def test_columns_cover_the_window() -> None:
     counts = timeline.columns([0, 1, 999, 1000, -1], 0, 1000)
     assert (counts[0], counts[-1], sum(counts)) == (2, 1, 3)
+
+
+class Slow(Node):
+    """Has a queue of one, and a callback that waits for `go`."""
+
+    def __init__(self) -> None:
+        super().__init__("slow")
+        self.go = threading.Semaphore(0)
+        self.seen: list[str] = []
+        self.create_subscription(String, "chatter", self.hear, 1)
+
+    def hear(self, message: String) -> None:
+        self.go.acquire()
+        self.seen.append(message.data)
+
+
+def test_what_passed_a_slow_callback_by_is_marked_in_its_lane(session: Session) -> None:
+    publisher = session.run(lambda: Node("talker")).create_publisher(String, "chatter", 10)
+    slow = session.run(Slow)
+    assert isinstance(slow, Slow)
+    view = Timeline(session, [("chatter", None)])
+    session.until(lambda: publisher.get_subscription_count() == 2)
+    for number in range(8):
+        publisher.publish(String(data=f"{number}"))
+        session.until(lambda count=number + 1: view.figures()["/chatter"].count == count)
+    slow.go.release(8)
+    session.until(lambda: slow.seen == ["0", "7"])
+    session.until(lambda: len(view.runs("/chatter")) == 2)
+    lanes = {lane["label"]: lane["drops"] for lane in view.frame()["topics"][0]["lanes"]}
+    assert lanes["received"] == []
+    ((_, missed),) = lanes["callback of /slow"]
+    assert missed == 6
+    assert "callbacks of /slow: 2, 6 messages passed it by" in view.words()
 
 
 class Listener(Node):
