@@ -45,25 +45,25 @@ class Answering:
         """Answer until `stop`, which comes before the lease is released."""
         self._lease = lease
         self._offers = offers
+        self._stopping = False
         name = f"ROS neighbours of domain {lease.domain_id}"
         self._thread = threading.Thread(target=self._answer, name=name, daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
         """Answer no more. Idempotent."""
+        self._stopping = True
         with suppress(OSError):  # it is closed
             self._lease.socket.shutdown(socket.SHUT_RD)
         self._thread.join(1.0)
 
     def _answer(self) -> None:
         sock = self._lease.socket
-        while True:
+        while not self._stopping:
             try:
                 question, sender = sock.recvfrom(_MOST_BYTES)
             except OSError:
                 return
-            if not question and not sender:
-                return  # shut down
             with suppress(Exception):  # no question, an asker that has gone, nodes that go
                 sock.sendto(self._reply(question), socket.MSG_DONTWAIT, sender)
 

@@ -92,11 +92,13 @@ class Slow(Node):
 
     def __init__(self) -> None:
         super().__init__("slow")
+        self.begun = threading.Event()
         self.go = threading.Semaphore(0)
         self.seen: list[str] = []
         self.create_subscription(String, "chatter", self.hear, 1)
 
     def hear(self, message: String) -> None:
+        self.begun.set()
         self.go.acquire()
         self.seen.append(message.data)
 
@@ -110,6 +112,7 @@ def test_what_passed_a_slow_callback_by_is_marked_in_its_lane(session: Session) 
     for number in range(8):
         publisher.publish(String(data=f"{number}"))
         session.until(lambda count=number + 1: view.figures()["/chatter"].count == count)
+        session.until(slow.begun.is_set)  # from now on each message pushes out the one before
     slow.go.release(8)
     session.until(lambda: slow.seen == ["0", "7"])
     session.until(lambda: len(view.runs("/chatter")) == 2)
