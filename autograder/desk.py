@@ -13,6 +13,7 @@ from nbformat import NotebookNode
 
 from autograder import ledger, quiz_marks, roster, runner, submission
 from autograder import nbgrader_bridge as bridge
+from autograder.beside import files_beside
 from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.jobs import Job
 from autograder.ledger import Standing
@@ -159,7 +160,7 @@ class Desk:
         try:
             notebook, notes = submission.restore(submission.read(path), source, released)
             program = submission.program(notebook)
-            files = submission.extras(path.parent)
+            beside = files_beside(path.parent)
         except SubmissionError as error:
             notebook, outcome = self._unreadable(path.stem, str(error), "not_checked")
             # Whoever hands in some of the notebooks has left the others out: nothing to look into.
@@ -171,8 +172,8 @@ class Desk:
             reason = f"{type(error).__name__}: {error}"
             notebook, outcome = self._unreadable(path.stem, reason, "grader_error")
         else:
-            notebook.metadata[bridge.NOTES_KEY] = notes
-            return notebook, Piece(work, path.stem, Job(program, files, self._trust))
+            notebook.metadata[bridge.NOTES_KEY] = notes + beside.notes
+            return notebook, Piece(work, path.stem, Job(program, beside.files, self._trust))
         return notebook, Piece(work, path.stem, outcome=outcome)
 
     def _unreadable(self, name: str, reason: str, status: Status) -> tuple[NotebookNode, Outcome]:

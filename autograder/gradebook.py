@@ -24,7 +24,7 @@ from traitlets.config.loader import PyFileConfigLoader
 from autograder import database, roster
 from autograder.database import GradebookUnusable
 from autograder.ledger import Standing
-from autograder.nbgrader_bridge import RestoreCells
+from autograder.nbgrader_bridge import RestoreCells, SubmissionExporter
 from autograder.nbgrader_once import Engines, FeedbackExporter
 from autograder.roster import Roster
 from course.errors import CourseError
@@ -68,6 +68,8 @@ class CourseGradebook:
             config.CourseDirectory.submitted_directory = staged
             steps = config.Autograde.sanitize_preprocessors
             config.Autograde.sanitize_preprocessors = [s for s in steps if s is not RestoreCells]
+            if config.Autograde.get("exporter_class") is SubmissionExporter:
+                del config.Autograde.exporter_class  # what is staged can be read
         if "exporter_class" not in config.GenerateFeedback:
             config.GenerateFeedback.exporter_class = FeedbackExporter
         self._engines = Engines()

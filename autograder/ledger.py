@@ -15,12 +15,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from autograder import digests
+from autograder.beside import MAX_BYTES
 from autograder.files import walk, write_whole
-from autograder.submission import MAX_EXTRAS, MAX_NOTEBOOK
+from autograder.submission import MAX_NOTEBOOK
 
 VERSION = 1
 FOLDER = "entered"
-MAX_FILE = MAX_NOTEBOOK + MAX_EXTRAS
+MAX_FILE = MAX_NOTEBOOK + MAX_BYTES
 """Bytes of one file beyond which only its size and date are looked at: it is not read anyway."""
 
 

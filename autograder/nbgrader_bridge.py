@@ -1,16 +1,18 @@
-"""What nbgrader runs in place of its own execution step: preprocessors for ``nbgrader autograde``.
+"""What nbgrader runs in place of its own steps: an exporter and preprocessors for its autograding.
 
 `GradeByBehaviour` stands where nbgrader would execute the notebook in a kernel. It writes the
 outputs of the subject's run into the cells and each exam's points into its grade cell, so that
-nbgrader's own steps save, flag and report the scores as everyone knows them.
+nbgrader's own steps save, flag and report the scores as everyone knows them. `SubmissionExporter`
+reads the notebooks: one that cannot be read is entered with the reason, too.
 """
 
 from __future__ import annotations
 
-import json
+import copy
 from pathlib import Path
 from typing import Any
 
+from nbconvert.exporters import NotebookExporter
 from nbformat import NotebookNode
 from nbformat.v4 import new_output
 from nbgrader.api import Gradebook
@@ -19,11 +21,16 @@ from nbgrader.preprocessors import NbGraderPreprocessor
 from traitlets import Bool
 
 from autograder import cells, submission
+from autograder.beside import files_beside
 from autograder.insight import records
 from autograder.report import Report
+from autograder.submission import SubmissionError
 from autograder.verdict import Verdict
 
 NOTES_KEY = "ros2_course_notes"
+UNREADABLE_KEY = "ros2_course_unreadable"
+"""Metadata that the first steps leave for the later ones: remarks, and why there is no more."""
+
 WORK_FOLDER = ".autograder"
 """Folder under the course root where the engine keeps outcomes and staged submissions."""
 
@@ -34,16 +41,35 @@ prepared: dict[Key, Any] = {}
 """Outcomes that the engine already has, by (assignment, student, notebook)."""
 
 
+class SubmissionExporter(NotebookExporter):
+    """Reads a submitted notebook as the engine does, whatever a stranger has put in its place."""
+
+    def from_filename(
+        self, filename: str, resources: Resources | None = None, **more: Any
+    ) -> tuple[NotebookNode, Resources]:
+        """Return the notebook at ``filename``; the released one, with why, if it is unreadable."""
+        resources = resources or {}
+        try:
+            notebook = submission.read(Path(filename))
+        except SubmissionError as error:
+            converter: Any = self.parent
+            _, released = originals(converter.coursedir, *_names(resources)[::2])
+            notebook = copy.deepcopy(released)
+            resources[UNREADABLE_KEY] = str(error)
+        return self.from_notebook_node(notebook, resources, **more)  # type: ignore[no-untyped-call,no-any-return]
+
+
 class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ships no types
     """Put the instructor's cells right before anything else looks at a submission."""
 
     def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:
         """Mend ``nb`` against the source and the released notebook; remember what was mended."""
         source, released = originals(_coursedir(self), *_names(resources)[::2])
-        # nbgrader has read it by itself: it must be what the engine would read.
-        nb = submission.parse(json.dumps(nb), f"{_names(resources)[2]}.ipynb")
         nb, notes = submission.restore(nb, source, released)
+        # The grading steps read what is written here: nothing of a submission's own metadata is.
         nb.metadata[NOTES_KEY] = notes
+        if UNREADABLE_KEY in resources:
+            nb.metadata[UNREADABLE_KEY] = resources[UNREADABLE_KEY]
         return nb, resources
 
 
@@ -59,7 +85,8 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         from autograder import runner
 
         notes = list(nb.metadata.pop(NOTES_KEY, []))
-        outcome = prepared.get(_names(resources)) or self._run(nb, resources)
+        unreadable = str(nb.metadata.pop(UNREADABLE_KEY, ""))
+        outcome = prepared.get(_names(resources)) or self._outcome(nb, resources, unreadable)
         outcome = runner.with_notes(outcome, notes)
         code_cells = [cell for cell in nb.cells if cell.cell_type == "code"]
         for cell, outputs in zip(code_cells, outcome.outputs, strict=True):
@@ -78,20 +105,30 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         ]
         return nb, resources
 
-    def _run(self, nb: NotebookNode, resources: Resources) -> Any:
-        from autograder import quiz_marks
-        from autograder.store import OutcomeStore
+    def _outcome(self, nb: NotebookNode, resources: Resources, unreadable: str) -> Any:
+        """Return what comes of a notebook that the engine has not run before."""
+        from autograder import quiz_marks, runner
 
         coursedir = _coursedir(self)
         assignment, student, _ = _names(resources)
-        folder = coursedir.format_path(coursedir.submitted_directory, student, assignment)
-        program, files = submission.program(nb), submission.extras(Path(folder))
+        folder = Path(coursedir.format_path(coursedir.submitted_directory, student, assignment))
         root = Path(coursedir.root)
+        if unreadable:
+            outcome = runner.refuse(submission.program(nb), unreadable)
+        else:
+            outcome = self._run(nb, folder, root)
+        return quiz_marks.with_quizzes(outcome, nb, folder, student, root)
+
+    def _run(self, nb: NotebookNode, folder: Path, root: Path) -> Any:
+        from autograder import runner
+        from autograder.store import OutcomeStore
+
+        beside = files_beside(folder)
         store = OutcomeStore(
             root / WORK_FOLDER / "outcomes", trust=self.trust_submissions, hidden=[root]
         )
-        outcome = store.outcome(program, files)
-        return quiz_marks.with_quizzes(outcome, nb, Path(folder), student, root)
+        outcome = store.outcome(submission.program(nb), beside.files)
+        return runner.with_notes(outcome, beside.notes)
 
 
 class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]

@@ -22,15 +22,10 @@ import nbformat.validator
 from nbformat import NotebookNode
 
 from autograder import bounds, keys, points
-from autograder.files import walk
 from course.errors import CourseError
 
 MAX_NOTEBOOK = 20 * 1024 * 1024
 """Largest notebook file in bytes that is read; a course notebook with its outputs has 0.1 MB."""
-
-
-MAX_EXTRAS = 10 * 1024 * 1024
-"""Bytes of other files that are given to a submission's code."""
 
 
 class SubmissionError(CourseError):
@@ -126,26 +121,6 @@ def _text(path: Path) -> str:
         raise SubmissionError(
             f"{path.name} cannot be read ({error.strerror}): hand in the notebook itself."
         ) from None
-
-
-def extras(folder: Path) -> dict[str, bytes]:
-    """Return {relative path: content} of a submission's other files, a helper module perhaps.
-
-    Links, hidden files, notebooks, what is over `MAX_EXTRAS` bytes in all, and what `walk` does
-    not find are left out.
-    """
-    found: dict[str, bytes] = {}
-    room = MAX_EXTRAS
-    for path in sorted(walk(folder)):
-        name = path.relative_to(folder)
-        hidden = any(part.startswith((".", "__")) for part in name.parts)
-        if hidden or path.suffix == ".ipynb" or name == Path("timestamp.txt"):
-            continue
-        status = path.lstat()
-        if stat.S_ISREG(status.st_mode) and status.st_size <= room:
-            found[str(name)] = path.read_bytes()
-            room -= status.st_size
-    return found
 
 
 def _sound(notebook: NotebookNode) -> NotebookNode:

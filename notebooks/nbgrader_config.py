@@ -15,7 +15,12 @@ from nbgrader.preprocessors import (
     SaveAutoGrades,
 )
 
-from autograder.nbgrader_bridge import FlagForHumans, GradeByBehaviour, RestoreCells
+from autograder.nbgrader_bridge import (
+    FlagForHumans,
+    GradeByBehaviour,
+    RestoreCells,
+    SubmissionExporter,
+)
 
 c = get_config()  # noqa: F821 - given by nbgrader
 root = Path(__file__).resolve().parent
@@ -39,8 +44,10 @@ c.Execute.timeout = 300
 # if you trust every one of them: they then run with your own rights.
 c.GradeByBehaviour.trust_submissions = False
 
-# Our own steps among nbgrader's: first mend what a student did to the instructor's cells, then
-# watch the nodes instead of trusting what the notebook prints, and flag what a person must see.
+# Our own steps among nbgrader's: first read what may be no notebook at all and mend what a student
+# did to the instructor's cells, then watch the nodes instead of trusting what the notebook prints,
+# and flag what a person must see.
+c.Autograde.exporter_class = SubmissionExporter
 c.Autograde.sanitize_preprocessors = [
     RestoreCells,
     ClearOutput,

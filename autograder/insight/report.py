@@ -11,6 +11,7 @@ from typing import Any
 from nbformat import NotebookNode
 
 from autograder import submission
+from autograder.beside import files_beside
 from autograder.gradebook import CourseGradebook
 from autograder.insight import InsightError, exports, feedback, figures, needs, similarity
 from autograder.insight.collect import ClassData, collect
@@ -157,7 +158,7 @@ def _texts(data: ClassData, given: GivenText) -> tuple[dict[str, OwnText], list[
             except SubmissionError:
                 continue  # "what needs a person" names it, and why it cannot be read
         if notebooks:
-            texts[grade.student] = given.own(notebooks, submission.extras(folder))
+            texts[grade.student] = given.own(notebooks, files_beside(folder).files)
         else:
             unread.append(grade.student)
     if not unread:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import os
 import subprocess
 import sys
@@ -224,15 +225,35 @@ def test_nbgraders_own_command_gives_the_same_grades(course: Course, cases: Case
         cases["wrong-lidar-deep"].submission(course.source, course.released), "qos-visible"
     )
     course.submit("wrong", wrong)
+    reasons = {"cut-off": "was cut off or damaged", "pipe": "is not a file", "deep": "is nested"}
+    course.submit("cut-off", '{"cells": [')
+    course.submit(
+        "deep", '{"nbformat": 4, "nbformat_minor": 5, "cells": ' + "[" * 500 + "]" * 500 + "}"
+    )
+    os.mkfifo(course.folder("pipe") / f"{NOTEBOOK}.ipynb")
+    (course.folder("wrong") / "data.bin").write_bytes(bytes(11 * 2**20))
     result = nbgrader(course, "autograde", ASSIGNMENT)
     assert result.returncode == 0, result.stderr
     by_nbgrader = grades(course)
+    for student in reasons:
+        assert by_nbgrader[student].score == 0
+        assert by_nbgrader[student].needs_manual_grade, "a person decides about what is unreadable"
     assert cells(by_nbgrader["right"])["qos-visible"] == 10.0
     assert cells(by_nbgrader["wrong"])["qos-visible"] == 8.0
     assert nbgrader(course, "generate_feedback", ASSIGNMENT).returncode == 0
     feedback = (course.root / f"feedback/wrong/{ASSIGNMENT}/{NOTEBOOK}.html").read_text()
     assert "After a pause obstacle avoidance acts on fresh scans only." in feedback
-    assert grade(course, fresh=True) == by_nbgrader
+
+    def said(student: str) -> str:
+        file = course.root / f"feedback/{student}/{ASSIGNMENT}/{NOTEBOOK}.html"
+        return html.unescape(file.read_text())
+
+    reasons["wrong"] = "Your code was run without 'data.bin'"
+    for student, reason in reasons.items():
+        assert reason in said(student)
+    assert grade(course, fresh=True, feedback=True) == by_nbgrader
+    for student, reason in reasons.items():
+        assert reason in said(student)
 
 
 def test_nbgrader_validate_passes_the_exemplar_and_fails_the_stub(course: Course) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 from pathlib import Path
 
 import nbformat
@@ -12,7 +11,7 @@ import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from autograder import bounds, files, ledger, submission
+from autograder import bounds, submission
 from autograder.submission import SubmissionError
 from autograder.wire import MAX_LINE
 
@@ -251,63 +250,6 @@ def test_what_is_no_plain_file_is_refused_at_once(tmp_path: Path) -> None:
     for path in (folder, fifo, loop):
         with pytest.raises(SubmissionError, match="hand in the notebook itself"):
             submission.read(path)
-
-
-def test_other_files_of_a_submission_are_found_and_links_are_not(tmp_path: Path) -> None:
-    (tmp_path / "profiles.py").write_text("depth = 5")
-    (tmp_path / "pack").mkdir()
-    (tmp_path / "pack" / "more.py").write_text("x = 1")
-    (tmp_path / "timestamp.txt").write_text("2026-01-01")
-    (tmp_path / ".hidden").write_text("x")
-    (tmp_path / "link.py").symlink_to("/etc/hostname")
-    (tmp_path / "away").symlink_to("/etc")
-    assert submission.extras(tmp_path) == {"pack/more.py": b"x = 1", "profiles.py": b"depth = 5"}
-
-
-@pytest.mark.parametrize("linked", ["submitted", "submitted/bob"])
-def test_other_files_are_found_where_a_folder_above_is_a_link(tmp_path: Path, linked: str) -> None:
-    disk = tmp_path / "another-disk"
-    place = tmp_path / linked
-    place.parent.mkdir(exist_ok=True)
-    place.symlink_to(disk)
-    folder = tmp_path / "submitted" / "bob" / "ch05"
-    disk.mkdir()
-    folder.mkdir(parents=True)
-    (folder / "profiles.py").write_text("depth = 5")
-    assert submission.extras(folder) == {"profiles.py": b"depth = 5"}
-
-
-def test_of_very_many_files_the_upper_ones_are_taken(tmp_path: Path) -> None:
-    (tmp_path / "profiles.py").write_text("depth = 5")
-    deep = tmp_path / "many"
-    deep.mkdir()
-    for number in range(files.MAX_FILES):
-        (deep / f"{number:05}.py").touch()
-    found = submission.extras(tmp_path)
-    assert len(found) == files.MAX_FILES
-    assert "profiles.py" in found
-
-
-def nested(folder: Path, depth: int, name: str) -> None:
-    """Make a file under so many folders: more than a path can name."""
-    handle = os.open(folder, os.O_RDONLY)
-    for _ in range(depth):
-        os.mkdir("d", dir_fd=handle)
-        below = os.open("d", os.O_RDONLY, dir_fd=handle)
-        os.close(handle)
-        handle = below
-    os.close(os.open(name, os.O_CREAT | os.O_WRONLY, dir_fd=handle))
-    os.close(handle)
-
-
-@pytest.mark.parametrize("depth", [3, 1000, 3000])
-def test_folders_within_folders_are_looked_through_up_to_a_depth(
-    tmp_path: Path, depth: int
-) -> None:
-    nested(tmp_path, depth, "deep.py")
-    assert len(submission.extras(tmp_path)) == (1 if depth == 3 else 0)
-    assert ledger.of_folder(tmp_path)
-    subprocess.run(["rm", "-rf", tmp_path / "d"], check=True)  # pytest's own way is recursive
 
 
 def test_cells_that_were_moved_are_noted() -> None:
