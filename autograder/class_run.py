@@ -67,7 +67,7 @@ class ClassRun:
         progress: Progress,
         *,
         feedback: bool,
-        fresh: bool,
+        since: int,
     ) -> None:
         """Prepare a run.
 
@@ -78,14 +78,14 @@ class ClassRun:
             interruption: says when to stop.
             progress: is told how it goes.
             feedback: write HTML feedback, too.
-            fresh: take nothing from earlier runs.
+            since: take nothing from earlier runs that is older (see `Anew.since`).
         """
         self._desk = desk
         self._store = store
         self._workers = workers
         self._interruption = interruption
         self._progress = progress
-        self._feedback, self._fresh = feedback, fresh
+        self._feedback, self._since = feedback, since
         self._ledger = Ledger(desk.work_folder, desk.assignment)
         self._course = ledger.of_course(
             desk.root, desk.folders, workers.modes[0], _exams(desk.assignment)
@@ -124,7 +124,7 @@ class ClassRun:
 
     def _unchanged(self, work: Work, standing: Standing | None) -> Graded | None:
         """Return what is known of a submission that needs nothing, bar new feedback, or None."""
-        entry = None if self._fresh else self._ledger.get(work.student)
+        entry = self._ledger.get(work.student, self._since)
         if entry is None or standing is None or entry.made_of != work.made_of:
             return None
         if entry.standing.automatic != standing.automatic or not self._desk.is_graded(work.student):
@@ -182,7 +182,7 @@ class ClassRun:
         if keys[0] in self._running:
             self._running[keys[0]].append(piece)
             return
-        found = (None if self._fresh else self._store.named(key) for key in keys)
+        found = (self._store.named(key, self._since) for key in keys)
         kept = next((outcome for outcome in found if outcome is not None), None)
         if kept is not None:
             self._take(piece, kept, waited=False)

@@ -87,7 +87,7 @@ def grade(
     ] = "",
     as_json: AsJson = False,
 ) -> None:
-    """Grade what is in ``submitted/`` into the gradebook, with feedback and grades.csv.
+    """Grade what is in ``submitted/`` into the gradebook, write feedback and all its grades as CSV.
 
     What has not changed since it was graded is left as it is. A run that was ended, however, goes
     on where it was when it is started again.
@@ -100,8 +100,10 @@ def grade(
         where, assignment, jobs=jobs, fresh=fresh, trust=trust, scheduler=scheduler,
         progress=progress.for_console(out, err, machine=as_json),
     )  # fmt: skip
-    grades = CourseGradebook(where).grades(assignment)
-    grades_csv.write(grades, assignment, where / "grades.csv")
+    gradebook = CourseGradebook(where)
+    every = {name: gradebook.grades(name) for name in gradebook.assignments()}
+    grades = every[assignment]
+    grades_csv.write(every, where / "grades.csv")
     problems = {
         graded.student: graded.problem if graded.entered else f"NOT ENTERED: {graded.problem}"
         for graded in done

@@ -99,7 +99,7 @@ def run(
     )
     grades = CourseGradebook(root).grades(ASSIGNMENT)
     csv = root / "grades.csv"
-    grades_csv.write(grades, ASSIGNMENT, csv)
+    grades_csv.write({ASSIGNMENT: grades}, csv)
     by_student = {grade.student: grade for grade in grades}
     rows = [_row(class_[s], graded[s], by_student[s], cases) for s in sorted(graded)]
     return Demo(root, csv, tuple(rows))

@@ -15,6 +15,7 @@ from filelock import FileLock, Timeout
 
 from autograder import files, roster, sandbox
 from autograder import nbgrader_bridge as bridge
+from autograder.anew import Anew
 from autograder.class_run import ClassRun, Graded
 from autograder.desk import Desk
 from autograder.gradebook import CourseGradebook
@@ -66,7 +67,8 @@ def grade(
         root: the nbgrader course root.
         assignment: its name.
         jobs: how many notebooks are run at a time.
-        fresh: run also what was run before and has not changed.
+        fresh: run also what was run before and has not changed. Until such a run is through,
+            whichever comes after it goes on with it.
         trust: run submissions outside of a sandbox, with the rights of this process.
         feedback: write HTML feedback, too.
         scheduler: address of a Dask scheduler whose workers run the notebooks, in place of this
@@ -101,8 +103,16 @@ def grade(
         workers = stack.enter_context(_workers(jobs, store, trust, scheduler, root, progress))
         interruption = stack.enter_context(Interruption(workers.wake))
         desk = Desk(gradebook, assignment, names, trust=trust)
-        run = ClassRun(desk, store, workers, interruption, progress, feedback=feedback, fresh=fresh)
+        anew = Anew(desk.work_folder, assignment)
+        if anew.since:
+            progress.say("Going on with the run with --fresh that was ended before it was through.")
+        if fresh:
+            anew.begin()
+        run = ClassRun(
+            desk, store, workers, interruption, progress, feedback=feedback, since=anew.since
+        )
         graded = [*refused, *run.grade(students, refused)]
+        anew.end()
     return sorted(graded, key=lambda item: item.student)
 
 

@@ -1,7 +1,8 @@
-"""``grades.csv``: one line a student, for spreadsheets and other programs."""
+"""``grades.csv``: a line for each grade in the gradebook, for spreadsheets and other programs."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from autograder.files import write_whole
@@ -11,17 +12,19 @@ from autograder.insight.exports import as_csv, guarded
 HEAD = ("assignment", "student_id", "score", "max_score", "needs_manual_grade")
 
 
-def write(grades: list[Grade], assignment: str, path: Path) -> None:
-    """Write one line a student; a cell that waits for a manual grade is empty.
+def write(grades: Mapping[str, list[Grade]], path: Path) -> None:
+    """Write one line a student and assignment; a cell that waits for a manual grade is empty.
 
-    A text that a spreadsheet would run as a formula has an apostrophe in front.
+    ``grades`` has the grades of each assignment. A text that a spreadsheet would run as a formula
+    has an apostrophe in front.
 
     Raises:
         OSError: it cannot be written; what stood there before still does.
     """
-    columns = sorted({(n, c) for g in grades for n, cells in g.cells.items() for c in cells})
+    lines = [(assignment, grade) for assignment, found in grades.items() for grade in found]
+    columns = sorted({(n, c) for _, g in lines for n, cells in g.cells.items() for c in cells})
     rows = [[*HEAD, *(guarded(f"{notebook}:{cell}") for notebook, cell in columns)]]
-    for grade in grades:
+    for assignment, grade in lines:
         points = [grade.cells.get(notebook, {}).get(cell) for notebook, cell in columns]
         found = (grade.score, grade.max_score, grade.needs_manual_grade)
         texts = [guarded(assignment), guarded(grade.student), *map(str, found)]

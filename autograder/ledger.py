@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from autograder import digests
+from autograder.anew import is_since
 from autograder.beside import MAX_BYTES
 from autograder.files import walk, write_whole
 from autograder.submission import MAX_NOTEBOOK
@@ -68,10 +69,13 @@ class Ledger:
         # file name can be, so a record goes by its digest.
         self._folder = work / FOLDER / assignment
 
-    def get(self, student: str) -> Entry | None:
-        """Return a student's record, or None if there is no sound one."""
+    def get(self, student: str, since: int = 0) -> Entry | None:
+        """Return a student's record, or None if there is no sound one from after ``since``."""
+        path = self._path(student)
         try:
-            data = json.loads(self._path(student).read_text(encoding="utf-8"))
+            if not is_since(path, since):
+                return None
+            data = json.loads(path.read_text(encoding="utf-8"))
             if data.pop("version") != VERSION or data.pop("student") != student:
                 return None
             return Entry(**{**data, "standing": Standing(**data["standing"])})

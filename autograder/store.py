@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from autograder import jobs, sandbox
+from autograder.anew import is_since
 from autograder.files import write_whole
 from autograder.jobs import Job
 from autograder.runner import Outcome
@@ -28,16 +29,14 @@ class OutcomeStore:
         self._folder = folder
         self._trust, self._hidden = trust, tuple(hidden)
 
-    def outcome(
-        self, program: Program, files: Mapping[str, bytes], *, fresh: bool = False
-    ) -> Outcome:
-        """Return a program's outcome: the one that is kept, or else (or if ``fresh``) a new one.
+    def outcome(self, program: Program, files: Mapping[str, bytes]) -> Outcome:
+        """Return a program's outcome: the one that is kept, or else a new one.
 
         Raises:
             SandboxError: a new one is needed, and there is no sandbox to run an untrusted program.
             StoreError: the new one could not be kept.
         """
-        kept = None if fresh else self.get(program, files)
+        kept = self.get(program, files)
         if kept is not None:
             return kept
         result = jobs.run(Job(program, files, self._trust), self._hidden)
@@ -51,10 +50,13 @@ class OutcomeStore:
         """
         return self.named(self.key(program, files, mode))
 
-    def named(self, key: str) -> Outcome | None:
-        """Return the outcome whose key is ``key``, if there is a sound one."""
+    def named(self, key: str, since: int = 0) -> Outcome | None:
+        """Return the outcome whose key is ``key``, if there is a sound one from after ``since``."""
+        path = self._path(key)
         try:
-            return Outcome.from_json(self._path(key).read_text(encoding="utf-8"))
+            if not is_since(path, since):
+                return None
+            return Outcome.from_json(path.read_text(encoding="utf-8"))
         except (OSError, ValueError, KeyError, TypeError, AttributeError, CourseError):
             return None
 

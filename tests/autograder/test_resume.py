@@ -6,6 +6,10 @@ import os
 import random
 import shutil
 import signal
+import subprocess
+import time
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -54,6 +58,35 @@ def test_an_engine_that_is_killed_goes_on_where_it_was(
     assert whole.grades() == class_.grades, f"seed {seed}, {kills} kills"
     assert len(whole.outcomes()) == 2, "two students handed in the same"
     assert "4 submissions have not changed" in whole.finish()
+
+
+@pytest.mark.parametrize("arguments", [(), ("--fresh",)])
+def test_grading_anew_goes_on_where_it_was_killed(
+    class_: Undisturbed, tmp_path: Path, arguments: tuple[str, ...]
+) -> None:
+    course = course_of(class_, tmp_path)
+    anew = Engine(course.root, ASSIGNMENT, tmp_path / "scratch", ("--fresh",), jobs=1)
+    first = anew.outcomes()
+
+    def made_again() -> dict[str, tuple[int, int]]:
+        return {name: mark for name, mark in anew.outcomes().items() if mark != first[name]}
+
+    deadline = time.monotonic() + 120
+    with anew.start() as process:
+        while not made_again():
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(0.02)
+            assert process.poll() is None, process.communicate()
+            assert time.monotonic() < deadline, "nothing is run again"
+        os.killpg(process.pid, KILL)
+    kept = made_again()
+    said = replace(anew, arguments=arguments).finish()
+    assert "Going on with the run with --fresh" in said
+    after = made_again()
+    assert len(after) == 2, "what was not run again by then is not taken from before"
+    assert kept.items() <= after.items(), "what was run again by then is not run once more"
+    assert anew.grades() == class_.grades
+    assert "4 submissions have not changed" in replace(anew, arguments=()).finish()
 
 
 class Seen(Progress):

@@ -7,6 +7,7 @@ import select
 import subprocess
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,6 +16,7 @@ import pytest
 from autograder import descriptors, runner
 from autograder.submission import Cell
 from autograder.warm import ForkedProcess, Nursery, Zygote, ZygoteError
+from autograder.warm import nursery as nursery_module
 from autograder.warm.task import Task
 from course.runtime.waiting import Pulse, poll
 from tests.machine import needs_warm_starts
@@ -147,6 +149,34 @@ def test_a_nursery_has_one_zygote_for_a_module_and_environment(tmp_path: Path) -
     assert not first.alive
     nursery.close()
     assert not second.alive
+
+
+MEETING = """
+def preload():
+    open({fifo!r}, {mode!r}).close()  # waits until the other end is opened, too
+
+def main(arguments):
+    return 0
+"""
+
+
+def test_the_zygotes_of_two_modules_start_side_by_side(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(nursery_module, "START_TIMEOUT", 30.0)
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    for name, mode in (("meets_reading", "r"), ("meets_writing", "w")):
+        (tmp_path / f"{name}.py").write_text(MEETING.format(fifo=str(fifo), mode=mode))
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    nursery = Nursery()
+    with ThreadPoolExecutor(2) as pool:
+        starts = [
+            pool.submit(nursery.zygote, f"meets_{what}", environment)
+            for what in ("reading", "writing")
+        ]
+    assert all(start.result().alive for start in starts)
+    nursery.close()
 
 
 @needs_warm_starts
