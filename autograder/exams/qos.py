@@ -267,8 +267,9 @@ def stop_reaches_all(rig: SensorRig) -> None:
     stop. Only a RELIABLE offer serves both.
     """
     offers_all = all(map(_reliable, rig.offered(STOP.topic)))
-    listeners = require_all_heard(rig, give_up=not offers_all)
-    require_no_repeats(rig, listeners)
+    with rig.node.guests():
+        listeners = require_all_heard(rig, give_up=not offers_all)
+        require_no_repeats(rig, listeners)
     if not any(map(_reliable, rig.requested(STOP.topic))):
         raise Failed(
             expected="Your own consumer cannot lose a stop on a bad network either.",
@@ -329,9 +330,10 @@ def late_joiner(rig: SensorRig) -> None:
         late: Heard = defaultdict(list)
         refused: list[object] = []
         profile = lossless(DurabilityPolicy.TRANSIENT_LOCAL)
-        rig.node.listen(sensor, sensor.topic, profile, late, refused.append)
-        # Either DDS refuses to hand out the past, or the writer replays it at once.
-        rig.wait(lambda heard=late, no=refused, s=sensor: no or heard[s.name])  # type: ignore[misc]
+        with rig.node.guests():
+            rig.node.listen(sensor, sensor.topic, profile, late, refused.append)
+            # Either DDS refuses to hand out the past, or the writer replays it at once.
+            rig.wait(lambda heard=late, no=refused, s=sensor: no or heard[s.name])  # type: ignore[misc]
         # Nothing was sent since it began: all that it hears is old, from whichever check.
         if late[sensor.name]:
             raise Failed(

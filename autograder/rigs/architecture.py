@@ -11,12 +11,11 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
-from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from autograder.bench import Bench, StudentError
 from autograder.rigs.pouring import SETTLE, Poured, Pours
+from autograder.rigs.quiet import QuietNode
 from autograder.rigs.robot_graph import RobotGraph, Topic, read_graph
 from autograder.rigs.robot_jobs import ACTION, SENSORS, Jobs
 from autograder.rigs.robot_types import UnknownTypeError, load_type
@@ -35,12 +34,7 @@ class ArchitectureRig:
         """Bring up the examiner's node; the design is started by its first check."""
         self.subject = bench.subject
         self._session = bench.session
-        self.node = bench.session.run(
-            Node,
-            f"examiner_{secrets.token_hex(4)}",
-            start_parameter_services=False,
-            enable_rosout=False,
-        )
+        self.node = bench.session.run(QuietNode, f"examiner_{secrets.token_hex(4)}")
         self.graph = RobotGraph()
         self.jobs = Jobs(self.graph)
         self.seen: dict[str, set[int]] = defaultdict(set)
@@ -83,7 +77,6 @@ class ArchitectureRig:
                     QoSProfile(
                         history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT
                     ),
-                    event_callbacks=SubscriptionEventCallbacks(use_default_callbacks=False),
                 )
 
     def _note(self, topic: str, message: Any) -> None:

@@ -18,8 +18,6 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from rclpy.duration import Duration
-from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32
@@ -27,6 +25,7 @@ from std_msgs.msg import Int32
 from autograder.bench import REPLY_TIMEOUT, Bench, StudentError, SubjectGone
 from autograder.exam import Failed
 from autograder.rigs.process import Process
+from autograder.rigs.quiet import QuietNode
 from course import WaitTimeout
 from course.runtime.waiting import Deadline
 
@@ -65,24 +64,18 @@ def _picture(message: Any) -> Picture | None:
     return Picture(found[1], int(found[2]), int(found[3])) if found else None
 
 
-class ExaminerNode(Node):
+class ExaminerNode(QuietNode):
     """The examiner's endpoints, and what each of two readers got, in the order of its arrival."""
 
     def __init__(self) -> None:
         """Listen on the image topic, whichever reliability is offered."""
-        super().__init__(
-            f"examiner_{secrets.token_hex(4)}", start_parameter_services=False, enable_rosout=False
-        )
+        super().__init__(f"examiner_{secrets.token_hex(4)}")
         self.heard: dict[ReliabilityPolicy, list[Picture]] = {}
-        # Without a handler of ours rclpy would log an incompatible profile as a warning.
-        events = SubscriptionEventCallbacks(
-            incompatible_qos=lambda _: None, use_default_callbacks=False
-        )
         for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
             qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=reliability)
             heard = self.heard[reliability] = []
             note = partial(self._note, heard)
-            self.create_subscription(Image, IMAGE, note, qos, event_callbacks=events)
+            self.create_subscription(Image, IMAGE, note, qos)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.zoom = self.create_publisher(Int32, ZOOM, latched)
 

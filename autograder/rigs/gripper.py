@@ -14,11 +14,11 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.executors import Executor
-from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import SetBool
 
+from autograder.rigs.quiet import QuietNode
 from autograder.rigs.safety import Player
 
 
@@ -31,12 +31,12 @@ class Try:
     reply: Callable[[bool], None]
 
 
-class Gripper(Node):
+class Gripper(QuietNode):
     """The server of `gripper/set`: notes each request, and answers when it is told to."""
 
     def __init__(self, arrived: Callable[[bool, Callable[[bool], None]], None]) -> None:
         """Tell ``arrived`` of each request: what it asks for, and how to answer it."""
-        super().__init__("gripper", start_parameter_services=False, enable_rosout=False)
+        super().__init__("gripper")
         self._arrived = arrived
         group = ReentrantCallbackGroup()
         self.create_service(SetBool, "gripper/set", self._serve, callback_group=group)

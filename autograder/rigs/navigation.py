@@ -20,6 +20,7 @@ from rclpy.task import Future
 from std_msgs.msg import Bool, Int32, String
 from test_msgs.action import Fibonacci as Drive
 
+from autograder.rigs.quiet import QuietNode
 from autograder.rigs.safety import Player
 from course.runtime.executor import BackgroundExecutor
 
@@ -47,12 +48,12 @@ class _PlainServer(ActionServer):
         self._handle.send_cancel_response(header, answer)
 
 
-class Navigator(Node):
+class Navigator(QuietNode):
     """The server of `navigate`: takes goals and does with them what it is told to."""
 
     def __init__(self, user: NavigatorUser) -> None:
         """Serve; what arrives is noted with ``user``, who also decides what is accepted."""
-        super().__init__("navigator", start_parameter_services=False, enable_rosout=False)
+        super().__init__("navigator")
         self._user = user
         self._server = _PlainServer(
             self, self._refuses,

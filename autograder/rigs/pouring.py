@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from rclpy.duration import Duration
-from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
@@ -297,7 +296,6 @@ class Pours:
                 load_type(topic.types[0]),
                 topic.name,
                 _serving(topic),
-                event_callbacks=PublisherEventCallbacks(use_default_callbacks=False),
             )
         return self._inlets[topic.name]
 

@@ -17,11 +17,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from autograder.bench import Bench
 from autograder.exam import NotExaminable
+from autograder.rigs.quiet import QuietNode
 from autograder.rigs.readings import Heard, Sensor
 from autograder.rigs.sensor_node import ExaminerNode
 from course import Session, tools
@@ -33,14 +33,6 @@ NOT_HERE = (
 )
 
 
-class FarNode(Node):
-    """The endpoints at the far end of the link."""
-
-    def __init__(self, name: str) -> None:
-        """Create a node without endpoints."""
-        super().__init__(name, start_parameter_services=False, enable_rosout=False)
-
-
 class Radio:
     """The far end of a radio link."""
 
@@ -49,7 +41,7 @@ class Radio:
         self._near = near
         before = _own_ports()
         self.session = Session(domain_id=domain_id)
-        self._node = self.session.run(lambda: FarNode(f"{near.get_name()}_far"))
+        self._node = self.session.run(QuietNode, f"{near.get_name()}_far")
         # What it shares with the near end is the multicast port, which only announces.
         self._ports = sorted(_own_ports() - before)
         if not self._ports:

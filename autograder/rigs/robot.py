@@ -21,14 +21,13 @@ from operator import itemgetter
 from typing import Any, NamedTuple, TypeVar, overload
 
 from rclpy.duration import Duration
-from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import BatteryState, Image
 from std_msgs.msg import Float64
 
 from autograder.bench import Bench, StudentError
 from autograder.exam import Failed
+from autograder.rigs.quiet import QuietNode
 from course import WaitTimeout
 
 T = TypeVar("T")
@@ -106,16 +105,12 @@ class Ears(Sequence[T]):
             self._heard = []
 
 
-class ExaminerNode(Node):
+class ExaminerNode(QuietNode):
     """The examiner's endpoints: the hardware, and listeners on what the robot tells everybody."""
 
     def __init__(self) -> None:
         """Create what does not depend on the student."""
-        super().__init__(
-            f"examiner_{secrets.randbelow(2**24)}",
-            start_parameter_services=False,
-            enable_rosout=False,
-        )
+        super().__init__(f"examiner_{secrets.randbelow(2**24)}")
         # It serves every subscription, and one that asks for the last value gets it.
         qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.hardware = {
@@ -154,11 +149,7 @@ class ExaminerNode(Node):
             reliability=ReliabilityPolicy.RELIABLE if lossless else ReliabilityPolicy.BEST_EFFORT,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if durable else DurabilityPolicy.VOLATILE,
         )
-        # Without a handler of ours rclpy would log an incompatible profile as a warning.
-        events = SubscriptionEventCallbacks(
-            incompatible_qos=lambda _: None, use_default_callbacks=False
-        )
-        return self.create_subscription(msg_type, topic, heard, qos, event_callbacks=events)
+        return self.create_subscription(msg_type, topic, heard, qos)
 
 
 def _picture(image: Image, info: dict[str, Any]) -> Picture:

@@ -28,6 +28,7 @@ from rclpy.task import Future
 
 from autograder.bench import Bench, Endpoints, StudentError
 from autograder.exam import Failed
+from autograder.rigs.quiet import QuietNode
 from autograder.rigs.stillness import Stillness
 from course import WaitTimeout
 
@@ -46,12 +47,12 @@ LOSSLESS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPol
 UNDEMANDING = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-class Player(Node):
+class Player(QuietNode):
     """The examiner's end of one part of the task: plays the world around the student's node."""
 
     def __init__(self, name: str) -> None:
         """Create no endpoints yet; ``now`` is simulated time in s, which the rig keeps."""
-        super().__init__(name, start_parameter_services=False, enable_rosout=False)
+        super().__init__(name)
         self.now = 0.0
         self._ears: dict[str, tuple[Any, Callable[[Any], None]]] = {}
         self.spoken: list[str] = []

@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 
+from autograder.rigs.quiet import QuietNode
 from autograder.rigs.readings import SENSORS, STOP, Heard, Sensor, Tag
 
 AHEAD, LAG = 4, 1.0
@@ -41,15 +42,13 @@ def undemanding() -> QoSProfile:
     return QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-class ExaminerNode(Node):
+class ExaminerNode(QuietNode):
     """The examiner's endpoints: hardware outputs, a witness a topic, and the consumers' ends."""
 
     def __init__(self) -> None:
         """Create what does not depend on the student; a nonce of this run tags readings."""
         self.nonce = secrets.randbelow(2**24)  # that a float32 still holds exactly
-        super().__init__(
-            f"examiner_{self.nonce}", start_parameter_services=False, enable_rosout=False
-        )
+        super().__init__(f"examiner_{self.nonce}")
         self._phases: dict[str, int] = {}
         self.hardware = {
             s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless()) for s in SENSORS
@@ -93,12 +92,21 @@ class ExaminerNode(Node):
                     self.handed[sensor.name].append((tag, info["source_timestamp"]))
 
         note: Callable[..., None] = keep  # rclpy's stubs know nothing of the second argument
-        # Without a handler of ours rclpy would log an incompatible profile as a warning.
         events = SubscriptionEventCallbacks(
-            incompatible_qos=on_incompatible or (lambda _: None), use_default_callbacks=False
+            incompatible_qos=on_incompatible, use_default_callbacks=False
         )
         node = on or self
         return node.create_subscription(sensor.type, topic, note, qos, event_callbacks=events)
+
+    @contextmanager
+    def guests(self) -> Iterator[None]:
+        """Let whoever begins to listen in the block stop at its end, and cost nobody time then."""
+        before = set(self.subscriptions)
+        try:
+            yield
+        finally:
+            for guest in set(self.subscriptions) - before:
+                self.destroy_subscription(guest)
 
     def phase(self, name: str) -> int:
         """Return the number of a phase of the exam."""
