@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import igraph
 
 from course.graph import words
-from course.graph.model import Exchange, Graph, Mismatch, Topic
+from course.graph.model import Endpoint, Exchange, Graph, Mismatch, Topic
 
 BOX_HEIGHT = 40  # px, with room for a name and a type below it
 _CHARACTER, _LEAST_WIDTH, _LONGEST_LABEL = 7.5, 80, 34
@@ -143,20 +143,26 @@ def _links(graph: Graph) -> Iterator[_Link]:
 def _topic_links(topic: Topic) -> Iterator[_Link]:
     here = ("topic", topic.name)
     sent, heard = topic.broken
-    for end in {end.node: end for end in topic.publishers}.values():
-        pairs = sent.get(end.node, [])
-        tip = "\n".join([f"{end.node} offers {words.qos(end)}", *_told(topic, pairs)])
+    for node, tip in _tips(topic, topic.publishers, "offers", sent).items():
+        pairs = sent.get(node, [])
         # What both arrows of a pair would say is said once, where it arrives.
         untold = [pair for pair in pairs if pair not in heard.get(pair.subscription, [])]
-        yield _Link(("node", end.node), here, "topic", tip, bool(pairs), words.policies(untold))
-    for end in {end.node: end for end in topic.subscriptions}.values():
-        pairs = heard.get(end.node, [])
-        tip = "\n".join([f"{end.node} requests {words.qos(end)}", *_told(topic, pairs)])
-        yield _Link(here, ("node", end.node), "topic", tip, bool(pairs), words.policies(pairs))
+        yield _Link(("node", node), here, "topic", tip, bool(pairs), words.policies(untold))
+    for node, tip in _tips(topic, topic.subscriptions, "requests", heard).items():
+        pairs = heard.get(node, [])
+        yield _Link(here, ("node", node), "topic", tip, bool(pairs), words.policies(pairs))
 
 
-def _told(topic: Topic, pairs: list[Mismatch]) -> list[str]:
-    return [words.mismatch(topic.name, pair) for pair in pairs]
+def _tips(
+    topic: Topic, ends: Iterable[Endpoint], does: str, broken: Mapping[str, list[Mismatch]]
+) -> dict[str, str]:
+    """Return {node: what its endpoints on a topic offer or request, and what breaks them}."""
+    lines: dict[str, list[str]] = {}
+    for end in ends:
+        lines.setdefault(end.node, []).append(f"{end.node} {does} {words.qos(end)}")
+    for node, said in lines.items():
+        said += [words.mismatch(topic.name, pair) for pair in broken.get(node, [])]
+    return {node: "\n".join(dict.fromkeys(said)) for node, said in lines.items()}
 
 
 def _exchange_links(kind: str, exchange: Exchange) -> Iterator[_Link]:

@@ -124,6 +124,54 @@ def test_nodes_come_and_go_in_the_graph(open_cells: Open) -> None:
     expect(graph.locator("svg text", has_text="/listener")).to_be_visible()
 
 
+POINTED_AT = """([link, aside]) => {
+    const path = link.querySelector('path');
+    const { x, y } = path.getPointAtLength(path.getTotalLength() / 2);
+    const at = new DOMPoint(x, y).matrixTransform(path.getScreenCTM());
+    return document.elementFromPoint(at.x, at.y + aside)?.closest('.rosgraph-line') === link;
+}"""
+
+
+def test_the_qos_of_an_endpoint_is_under_the_pointer(open_cells: Open) -> None:
+    page = open_cells("session.graph()")
+    graph = region(page, "ROS graph")
+    expect(graph.locator(".rosgraph-line.rosgraph-bad")).to_have_count(2)
+    tips = {}
+    for link in graph.locator(".rosgraph-line").all():
+        link.scroll_into_view_if_needed()
+        tips[link.locator("title").text_content()] = [
+            link.evaluate("(link, aside) => (" + POINTED_AT + ")([link, aside])", aside)
+            for aside in (0, 5)
+        ]
+    said = "\n".join(map(str, tips))
+    assert "/robot offers RELIABLE" in said
+    assert "/listener requests RELIABLE" in said
+    assert re.search(r"/robot offers BEST_EFFORT[^/]*\n.*reliability", said)
+    assert all(reached == [True, True] for reached in tips.values()), tips
+
+
+def test_several_goals_run_at_once_and_each_has_its_own_end(open_cells: Open) -> None:
+    page = open_cells('session.action("count")')
+    action = region(page, "Action view")
+    goals = action.locator(".rosgoals > li")
+    for number in (1, 2, 3):
+        action.get_by_label("order").fill("3")
+        action.get_by_role("button", name="Send goal").click()
+        expect(goals).to_have_count(number)
+    expect(action.locator("[aria-current]")).to_have_text([re.compile("EXECUTING")] * 3)
+    expect(goals.first).to_contain_text("Goal 3")
+    action.get_by_role("button", name="Cancel goal 2").click()
+    ended = [re.compile(state) for state in ("EXECUTING", "CANCELED", "EXECUTING")]
+    expect(action.locator("[aria-current]")).to_have_text(ended)
+    run_in_kernel(page, "robot.go.set()")
+    ended = [re.compile(state) for state in ("SUCCEEDED", "CANCELED", "SUCCEEDED")]
+    expect(action.locator("[aria-current]")).to_have_text(ended)
+    for number in (0, 2):
+        expect(goals.nth(number).locator(".rosgoal-state")).to_contain_text("[0, 1, 1]")
+    expect(action.get_by_role("button", name="Cancel goal")).to_have_count(0)
+    assert page.errors == []
+
+
 def test_a_graph_that_cannot_be_drawn_says_why_in_its_place(open_cells: Open) -> None:
     page = open_cells(
         "session.graph()",
@@ -466,6 +514,30 @@ def test_keys_stay_in_their_control(open_cells: Open) -> None:
             page.page.keyboard.press(key)
         assert page.cells() == before, control.evaluate("element => element.outerHTML")
     assert {"BUTTON", "INPUT", "SELECT", "SUMMARY"} <= names
+
+
+CONTROLS = """root => [...root.querySelectorAll(
+    'button, input, select, summary, [tabindex="0"]'
+)].filter(control => control.checkVisibility() && !control.disabled)"""
+
+
+def test_tab_goes_through_each_view_in_reading_order_and_out_of_it(open_cells: Open) -> None:
+    page = open_cells(*(source for source, _ in VIEWS.values()))
+    action = region(page, "Action view")
+    action.get_by_role("button", name="Send goal").click()
+    expect(action.get_by_role("button", name="Cancel goal 1")).to_be_visible()
+    for _, label in VIEWS.values():
+        view = region(page, label)
+        expect(view).to_be_visible()
+        count = view.evaluate(f"root => ({CONTROLS})(root).length")
+        assert count, label
+        view.evaluate(f"root => ({CONTROLS})(root)[0].focus()")
+        place = f"root => ({CONTROLS})(root).indexOf(document.activeElement)"
+        visited = [view.evaluate(place)]
+        for _ in range(count):
+            page.page.keyboard.press("Tab")
+            visited.append(view.evaluate(place))
+        assert visited == [*range(count), -1], f"{label}: the last Tab leaves it"
 
 
 def test_what_a_streaming_cell_prints_never_lands_in_another(open_cells: Open) -> None:

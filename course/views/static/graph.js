@@ -38,6 +38,7 @@ function arrow(line, arrows) {
     "g", { class: `rosgraph-line rosgraph-${kind} rosgraph-${line.kind}` },
     shape("title", {}, line.tip),
     shape("path", { d: line.path, "marker-end": `url(#${arrows}-${kind})` }),
+    shape("path", { d: line.path, class: "rosgraph-reach" }), // a line is too thin to point at
   );
   if (line.label) {
     group.append(shape("text", { x: line.x, y: line.y }, line.label));

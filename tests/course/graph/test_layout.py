@@ -88,3 +88,13 @@ def test_of_two_readers_only_the_deaf_one_is_red() -> None:
 def test_a_pair_between_two_that_connect_with_others_is_still_told() -> None:
     _, red, labels = crowd("ab", "xy", "ax")
     assert (red, labels) == ({"x"}, {"x": "durability"})
+
+
+def test_the_qos_of_every_endpoint_of_a_node_is_told_at_its_arrow() -> None:
+    reliable, lossy = ({"reliability": name} for name in ("RELIABLE", "BEST_EFFORT"))
+    writers = tuple(Endpoint("/a", "publisher", TYPE, qos) for qos in (reliable, lossy, lossy))
+    readers = (Endpoint("/x", "subscription", TYPE, reliable),)
+    broken = (Mismatch("/a", "/x", ("offers BEST_EFFORT",), ("RELIABILITY",)),)
+    lines = layout.draw(Graph(("/a", "/x"), (Topic("/t", writers, readers, broken),))).lines
+    (tip,) = (line.tip for line in lines if "offers" in line.tip.splitlines()[0])
+    assert tip.splitlines()[:2] == ["/a offers RELIABLE", "/a offers BEST_EFFORT"]
