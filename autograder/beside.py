@@ -13,7 +13,6 @@ MAX_BYTES = 10 * 1024 * 1024
 """Bytes of other files that are given to a submission's code."""
 
 _MOST_NAMED = 5
-_MB = 2**20
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ def files_beside(folder: Path) -> Beside:
     if too_large:
         beside.notes.append(
             f"Your code was run without {_named(too_large)}: the files beside the notebooks may "
-            f"have {MAX_BYTES // _MB} MB together. Hand in smaller ones."
+            f"have {MAX_BYTES // 2**20} MB together. Hand in smaller ones."
         )
     if links:
         beside.notes.append(

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import copy
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 
 import nbformat
@@ -13,7 +14,7 @@ from nbformat import NotebookNode
 
 from autograder import ledger, quiz_marks, roster, runner, submission
 from autograder import nbgrader_bridge as bridge
-from autograder.beside import files_beside
+from autograder.beside import Beside, files_beside
 from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.jobs import Job
 from autograder.ledger import Standing
@@ -94,8 +95,9 @@ class Desk:
         """Stage a submission's notebooks one by one."""
         submitted, staged = self._submitted(work.student), self._stage(work.student)
         work.problems += roster.remarks(submitted)
+        beside = cache(partial(files_beside, submitted))  # every notebook finds the same
         for name in self.notebooks:
-            notebook, piece = self._piece(work, submitted / f"{name}.ipynb")
+            notebook, piece = self._piece(work, submitted / f"{name}.ipynb", beside)
             marked = quiz_marks.with_quizzes(
                 Outcome(), notebook, submitted, work.student, self.root
             )
@@ -155,12 +157,14 @@ class Desk:
             (staged / "timestamp.txt").write_text(time, encoding="utf-8")
         return staged
 
-    def _piece(self, work: Work, path: Path) -> tuple[NotebookNode, Piece]:
+    def _piece(
+        self, work: Work, path: Path, beside: Callable[[], Beside]
+    ) -> tuple[NotebookNode, Piece]:
         source, released = self._originals[path.stem]
         try:
             notebook, notes = submission.restore(submission.read(path), source, released)
             program = submission.program(notebook)
-            beside = files_beside(path.parent)
+            found = beside()
         except SubmissionError as error:
             notebook, outcome = self._unreadable(path.stem, str(error), "not_checked")
             # Whoever hands in some of the notebooks has left the others out: nothing to look into.
@@ -172,8 +176,8 @@ class Desk:
             reason = f"{type(error).__name__}: {error}"
             notebook, outcome = self._unreadable(path.stem, reason, "grader_error")
         else:
-            notebook.metadata[bridge.NOTES_KEY] = notes + beside.notes
-            return notebook, Piece(work, path.stem, Job(program, beside.files, self._trust))
+            notebook.metadata[bridge.NOTES_KEY] = notes + found.notes
+            return notebook, Piece(work, path.stem, Job(program, found.files, self._trust))
         return notebook, Piece(work, path.stem, outcome=outcome)
 
     def _unreadable(self, name: str, reason: str, status: Status) -> tuple[NotebookNode, Outcome]:

@@ -8,7 +8,6 @@ reads the notebooks: one that cannot be read is entered with the reason, too.
 
 from __future__ import annotations
 
-import copy
 from pathlib import Path
 from typing import Any
 
@@ -53,8 +52,7 @@ class SubmissionExporter(NotebookExporter):
             notebook = submission.read(Path(filename))
         except SubmissionError as error:
             converter: Any = self.parent
-            _, released = originals(converter.coursedir, *_names(resources)[::2])
-            notebook = copy.deepcopy(released)
+            _, notebook = originals(converter.coursedir, *_names(resources)[::2])
             resources[UNREADABLE_KEY] = str(error)
         return self.from_notebook_node(notebook, resources, **more)  # type: ignore[no-untyped-call,no-any-return]
 
@@ -108,27 +106,22 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
     def _outcome(self, nb: NotebookNode, resources: Resources, unreadable: str) -> Any:
         """Return what comes of a notebook that the engine has not run before."""
         from autograder import quiz_marks, runner
+        from autograder.store import OutcomeStore
 
         coursedir = _coursedir(self)
         assignment, student, _ = _names(resources)
         folder = Path(coursedir.format_path(coursedir.submitted_directory, student, assignment))
         root = Path(coursedir.root)
+        program = submission.program(nb)
         if unreadable:
-            outcome = runner.refuse(submission.program(nb), unreadable)
+            outcome = runner.refuse(program, unreadable)
         else:
-            outcome = self._run(nb, folder, root)
+            beside = files_beside(folder)
+            store = OutcomeStore(
+                root / WORK_FOLDER / "outcomes", trust=self.trust_submissions, hidden=[root]
+            )
+            outcome = runner.with_notes(store.outcome(program, beside.files), beside.notes)
         return quiz_marks.with_quizzes(outcome, nb, folder, student, root)
-
-    def _run(self, nb: NotebookNode, folder: Path, root: Path) -> Any:
-        from autograder import runner
-        from autograder.store import OutcomeStore
-
-        beside = files_beside(folder)
-        store = OutcomeStore(
-            root / WORK_FOLDER / "outcomes", trust=self.trust_submissions, hidden=[root]
-        )
-        outcome = store.outcome(submission.program(nb), beside.files)
-        return runner.with_notes(outcome, beside.notes)
 
 
 class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]

@@ -27,6 +27,7 @@ from autograder.exam import Failed
 from autograder.rigs.process import Process
 from autograder.rigs.quiet import QuietNode
 from course import WaitTimeout
+from course.runtime.names import full_name
 from course.runtime.waiting import Deadline
 
 IMAGE, ZOOM, SNAPSHOT = "camera/image", "camera/zoom", "camera/snapshot"
@@ -340,7 +341,7 @@ class CameraRig:
         }
         # Every node announces changes of its parameters: a node itself has no endpoint.
         for end in self.node.get_publishers_info_by_topic("/parameter_events"):
-            name = f"{end.node_namespace.rstrip('/')}/{end.node_name}"
+            name = full_name(end.node_name, end.node_namespace)
             found.setdefault(f"the node {name}", []).append(end)
         return [(what, bytes(end.endpoint_gid)) for what, ends in found.items() for end in ends]
 

@@ -20,6 +20,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from course.runtime.names import full_name
+
 KINDS = ("topic", "request", "response", "goal", "feedback")
 """The ways in which information goes from one node to another."""
 
@@ -137,7 +139,7 @@ def read_graph(node: Node) -> RobotGraph:
         for name, namespace in node.get_node_names_and_namespaces()
         if not name.startswith("_") and name != node.get_name()
     ]
-    graph = RobotGraph(nodes=frozenset(_full(name, space) for name, space in names))
+    graph = RobotGraph(nodes=frozenset(full_name(name, space) for name, space in names))
     for topic, _ in node.get_topic_names_and_types():
         if topic not in INFRASTRUCTURE and "/_" not in topic:
             found = Topic(
@@ -153,7 +155,7 @@ def read_graph(node: Node) -> RobotGraph:
 
 
 def _add_offers(graph: RobotGraph, node: Node, name: str, space: str) -> None:
-    full = _full(name, space)
+    full = full_name(name, space)
     for offers, serves, found in (
         (graph.services, True, node.get_service_names_and_types_by_node(name, space)),
         (graph.services, False, node.get_client_names_and_types_by_node(name, space)),
@@ -167,9 +169,7 @@ def _add_offers(graph: RobotGraph, node: Node, name: str, space: str) -> None:
 
 
 def _ends(infos: Iterable[TopicEndpointInfo], nodes: frozenset[str]) -> tuple[End, ...]:
-    ends = (End(_full(i.node_name, i.node_namespace), i.topic_type, i.qos_profile) for i in infos)
+    ends = (
+        End(full_name(i.node_name, i.node_namespace), i.topic_type, i.qos_profile) for i in infos
+    )
     return tuple(end for end in ends if end.node in nodes)
-
-
-def _full(name: str, namespace: str) -> str:
-    return f"{namespace.rstrip('/')}/{name}"

@@ -21,6 +21,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from course.graph.model import QOS_POLICIES, Endpoint, Exchange, Graph, Mismatch, Topic
 from course.runtime import qos_events
+from course.runtime.names import full_name
 
 _PLUMBING = ("/rosout", "/parameter_events", "/clock")
 _PLUMBING_TYPES = ("rcl_interfaces/", "type_description_interfaces/")
@@ -65,7 +66,7 @@ def read(
     ]
     services, actions = _exchanges(node, names, everything)
     return Graph(
-        nodes=tuple(sorted(_full(name, namespace) for name, namespace in names)),
+        nodes=tuple(sorted(full_name(name, namespace) for name, namespace in names)),
         topics=tuple(_topics(node, everything, known)),
         services=services,
         actions=actions,
@@ -169,7 +170,7 @@ def _only(profile: QoSProfile, policies: tuple[str, ...]) -> QoSProfile:
 def _endpoint(
     info: TopicEndpointInfo, role: Any, topic: str, queues: dict[End, QoSProfile]
 ) -> Endpoint:
-    node = _full(info.node_name, info.node_namespace)
+    node = full_name(info.node_name, info.node_namespace)
     words = _words(info.qos_profile) | _queue(queues.get((node, topic, role), info.qos_profile))
     qos = {policy: words[policy] for policy in QOS_POLICIES if policy in words}
     return Endpoint(node, role, info.topic_type, qos, bytes(info.endpoint_gid).hex())
@@ -217,7 +218,7 @@ def _exchanges(
                 continue
             for exchange, types in answers:
                 if everything or not _plumbing(exchange, types[0]):
-                    found[kind][exchange, types[0]][side].add(_full(name, namespace))
+                    found[kind][exchange, types[0]][side].add(full_name(name, namespace))
     return tuple(
         tuple(
             Exchange(name, type_, tuple(sorted(servers)), tuple(sorted(clients)))
@@ -233,7 +234,3 @@ def _plumbing(exchange: str, type_: str) -> bool:
 
 def _hidden(name: str) -> bool:
     return any(part.startswith("_") for part in name.split("/"))
-
-
-def _full(name: str, namespace: str) -> str:
-    return f"{namespace.rstrip('/')}/{name}"

@@ -22,6 +22,11 @@ def node_name(node: Node | None) -> str:
         return node_of(str(node.get_logger().name))
 
 
+def full_name(name: str, namespace: str) -> str:
+    """Return a node's fully qualified name, of the two parts in which the graph gives it."""
+    return f"{namespace.rstrip('/')}/{name}"
+
+
 def type_name(ros_type: Any) -> str:
     """Return a message, service or action type's name as on the graph: ``std_msgs/msg/String``."""
     package, kind = ros_type.__module__.split(".")[:2]

@@ -27,7 +27,7 @@ from rclpy.validate_node_name import validate_node_name
 from course import plain
 from course.errors import CourseError, SessionError, WaitTimeout
 from course.runtime import arguments
-from course.runtime.names import node_name, type_name
+from course.runtime.names import full_name, node_name, type_name
 
 
 def full_topic(node: Node, topic: str) -> str:
@@ -168,14 +168,14 @@ def who_offers(node: Node, names: Sequence[str]) -> dict[str, list[str]]:
     found: dict[str, set[str]] = defaultdict(set)
     for name in names:
         for info in node.get_publishers_info_by_topic(name):
-            found[name].add(f"{info.node_namespace.rstrip('/')}/{info.node_name}")
+            found[name].add(full_name(info.node_name, info.node_namespace))
     for name, namespace in node.get_node_names_and_namespaces():
         try:
             served = dict(node.get_service_names_and_types_by_node(name, namespace))
         except NodeNameNonExistentError:  # it has gone since
             continue
         for service in served.keys() & set(names):
-            found[service].add(f"{namespace.rstrip('/')}/{name}")
+            found[service].add(full_name(name, namespace))
     return {name: sorted(nodes) for name, nodes in found.items()}
 
 
