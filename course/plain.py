@@ -112,3 +112,8 @@ def shown(value: Any, longest: int = 60) -> str:
     except Exception:  # noqa: BLE001 - a number of thousands of digits, an object that is broken
         return f"a {type(value).__name__}"
     return text if len(text) <= longest else f"{text[:longest]}…"
+
+
+def counted(number: int, what: str) -> str:
+    """Return a number of things in words: "1 node", "2 nodes"."""
+    return f"{number} {what}{'' if number == 1 else 's'}"

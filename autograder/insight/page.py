@@ -14,6 +14,7 @@ from autograder.insight import plots
 from autograder.insight.figures import FEW, CheckFigures
 from autograder.insight.report import ClassReport
 from autograder.insight.similarity import MOST_PAIRS, Pair, side_by_side
+from course.plain import counted
 
 CHECK_COLUMNS = (
     "check", "points", "passed", "failed", "not checked", "grader error", "failure rate",
@@ -75,12 +76,12 @@ def _scores(report: ClassReport) -> list[str]:
     grades, most = report.data.grades, report.data.max_score
     waiting = sum(grade.needs_manual_grade for grade in grades)
     said = (
-        f"{_count(len(grades), 'student')} with a grade, of {most:g} points; "
+        f"{counted(len(grades), 'student')} with a grade, of {most:g} points; "
         f"median {report.median:g}, mean {report.mean:.1f}."
     )
     if waiting:
         said += (
-            f" {_count(waiting, 'grade')} still {'waits' if waiting == 1 else 'wait'} for a "
+            f" {counted(waiting, 'grade')} still {'waits' if waiting == 1 else 'wait'} for a "
             "person: points that are not given yet count as 0 here."
         )
     drawn = plots.scores([grade.score for grade in grades], most)
@@ -176,13 +177,13 @@ def _times(report: ClassReport) -> list[str]:
 def _alike(report: ClassReport) -> list[str]:
     found = report.likeness
     said = (
-        f"{_count(found.compared, 'submission')} compared; "
-        f"{_count(found.found, 'pair')} at least {100 * report.threshold:.0f} % alike in what the "
+        f"{counted(found.compared, 'submission')} compared; "
+        f"{counted(found.found, 'pair')} at least {100 * report.threshold:.0f} % alike in what the "
         "students wrote themselves. The assignment's own lines, lines that a good part of the "
         "class has, comments and chosen names do not count."
     )
     if found.too_short:
-        said += f" Too little to compare: {_count(len(found.too_short), 'submission')}."
+        said += f" Too little to compare: {counted(len(found.too_short), 'submission')}."
     hint = (
         "This is a hint where to look, never a verdict: people who learn together, or from the "
         "same example, write alike."
@@ -245,7 +246,3 @@ def _names(students: Sequence[str]) -> str:
 
 def _listed(students: Iterable[str]) -> str:
     return escape(", ".join(students))
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from course.graph.model import Endpoint, Exchange, Graph, Mismatch, Topic
+from course.plain import counted
 
 
 def describe(graph: Graph) -> str:
     """Return the whole graph as text, a paragraph a topic, service and action."""
     if not graph.nodes:
         return "No nodes."
-    lines = [f"{_count(graph.nodes, 'node')}: {', '.join(graph.nodes)}"]
+    lines = [f"{counted(len(graph.nodes), 'node')}: {', '.join(graph.nodes)}"]
     lines += [f"  Two nodes are called {name}: rename one." for name in graph.twins]
     for topic in graph.topics:
         lines += _topic(topic)
@@ -65,7 +66,3 @@ def _exchange(kind: str, exchange: Exchange) -> Iterable[str]:
     yield f"  served by {', '.join(exchange.servers) or 'nobody'}"
     if exchange.clients:
         yield f"  used by {', '.join(exchange.clients)}"
-
-
-def _count(things: tuple[str, ...], what: str) -> str:
-    return f"{len(things)} {what}{'' if len(things) == 1 else 's'}"

@@ -145,7 +145,7 @@ def why_no_message(node: Node, topic: str, msg_type: Any, qos: QoSProfile) -> st
             return f"The QoS that {info.node_name} offers on {topic} does not fit: {reasons}."
     count = len(publishers)
     return (
-        f"{count} publisher{'s' if count > 1 else ''} on {topic} with a QoS that fits, "
+        f"{plain.counted(count, 'publisher')} on {topic} with a QoS that fits, "
         "but nothing was published while we listened."
     )
 

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from course.errors import CourseError
-from course.plain import one_line
+from course.plain import counted, one_line
 from course.runtime.session import Session
 from course.views import brief
 from course.views.live import Frame, LiveView
@@ -75,23 +75,24 @@ class ActionView(LiveView):
 
     def words(self) -> str:
         """Return the goals as text."""
-        lines = [f"Action {self._board.name}, {len(self.goals)} goals"]
+        lines = [f"Action {self._board.name}, {counted(len(self.goals), 'goal')}"]
         for goal in self.goals:
             shown = _shown(goal)
             states = " -> ".join(f"{name} ({when})" for name, when in shown["states"])
-            parts = (f"goal {goal.number}: {states}", shown["text"], _way(goal), shown["outcome"])
+            told = (*shown["text"], _way(goal), shown["outcome"])
+            parts = (f"goal {goal.number}: {states}", *told)
             lines.append("  " + "; ".join(part for part in parts if part))
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
 
 
 def _shown(goal: Goal) -> dict[str, Any]:
-    asked = f"asked: {_line(goal.asked)} " if goal.asked is not None else ""
-    feedback = f"feedback {goal.feedback}: {_line(goal.latest)}" if goal.feedback else ""
+    text = [f"asked: {_line(goal.asked)}"] if goal.asked is not None else []
+    text += [f"feedback {goal.feedback}: {_line(goal.latest)}"] if goal.feedback else []
     result = f"result: {_line(goal.result)}" if goal.result is not None else ""
     return {
         "number": goal.number,
         "states": [[state.name, f"{when:.1f} s"] for state, when in goal.states],
-        "text": asked + feedback,
+        "text": text,
         "way": {"text": _way(goal), "points": _points(goal)} if goal.way else None,
         "outcome": goal.problem or result or goal.note,
         "bad": bool(goal.problem or (goal.note and not goal.over)),

@@ -8,6 +8,7 @@ from typing import Any
 from course.graph import layout, reader, words
 from course.graph.mermaid import mermaid
 from course.graph.model import Graph
+from course.plain import counted
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
 
@@ -57,9 +58,10 @@ class GraphView(LiveView):
         return self._drawing(graph), words.describe(graph)
 
     def _drawing(self, graph: Graph) -> Frame:
+        apart = graph.mismatches
         title = (
-            f"{len(graph.nodes)} nodes, {len(graph.topics)} topics, "
-            f"{len(graph.mismatches)} pairs that do not connect"
+            f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.topics), 'topic')}, "
+            f"{counted(len(apart), 'pair')} that {'does' if len(apart) == 1 else 'do'} not connect"
         )
         # Counted first: the layout of a graph that nobody could follow takes long, too.
         count = layout.count(graph)

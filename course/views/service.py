@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from course.errors import CourseError
-from course.plain import for_json, one_line
+from course.plain import counted, for_json, one_line
 from course.runtime.session import Session
 from course.views import brief
 from course.views.live import Frame, LiveView
@@ -65,7 +65,7 @@ class ServiceConsole(LiveView):
 
     def words(self) -> str:
         """Return the calls as text."""
-        lines = [f"Service {self._model.name}, {len(self.calls)} calls"]
+        lines = [f"Service {self._model.name}, {counted(len(self.calls), 'call')}"]
         for call in self.calls:
             shown = _shown(call)
             outcome = "waiting" if call.waiting else shown["problem"] or one_line(shown["answer"])

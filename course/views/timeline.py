@@ -10,6 +10,7 @@ from typing import Any
 from course import mcap_file
 from course.errors import SessionError
 from course.mcap_file import RecordingError
+from course.plain import counted
 from course.runtime import arguments
 from course.runtime.session import Session
 from course.views.live import Frame, LiveView
@@ -189,7 +190,7 @@ def describe(figures: Figures) -> str:
     longest = max((end - begin for begin, end in figures.gaps), default=0.0)
     if figures.gaps:
         count = len(figures.gaps)
-        parts.append(f"{count} gap{'s' if count > 1 else ''}, the longest {longest:.2f} s")
+        parts.append(f"{counted(count, 'gap')}, the longest {longest:.2f} s")
     if figures.lost:
         parts.append(f"{figures.lost} lost on the way")
     return ", ".join(parts)

@@ -72,7 +72,8 @@ class Run:
 class Memory:
     """Looks now and then at how much memory a process and all its descendants hold."""
 
-    PERIOD = 1.0
+    PERIOD = 5.0
+    """Seconds. A look walks the page tables of dozens of processes: work on what it measures."""
 
     def __init__(self, pid: int) -> None:
         """Begin to look."""

@@ -50,8 +50,8 @@ function card(number, send) {
           "aria-current": place === goal.states.length - 1 ? "step" : null },
         `${name} ${when}`,
       )));
-      text.textContent = goal.text;
-      way.replaceChildren(...(goal.way ? [line(goal.way), goal.way.text] : []));
+      text.textContent = goal.text.join("\n");
+      way.replaceChildren(...(goal.way ? [...line(goal.way), goal.way.text] : []));
       if (state.textContent !== goal.outcome) state.textContent = goal.outcome;
       state.className = `rosgoal-state ${goal.bad ? "rosbad" : ""}`;
       // The button goes with the goal's end: its focus stays in the view, where the result is.
@@ -63,8 +63,9 @@ function card(number, send) {
 
 const WAY = { width: 120, height: 24 };
 
-/** How far a goal has come, from feedback to feedback, as a small line. */
+/** How far a goal has come, from feedback to feedback, as a small line; one point makes none. */
 function line({ points }) {
+  if (points.length < 2) return [];
   const svg = shape("svg", { ...WAY, viewBox: `0 0 ${WAY.width} ${WAY.height}`, "aria-hidden": "true" });
   const [times, values] = [0, 1].map((part) => points.map((point) => point[part]));
   const scaled = (all, room) => {
@@ -76,7 +77,7 @@ function line({ points }) {
   svg.append(shape("polyline", {
     points: points.map((_, place) => `${x[place].toFixed(1)},${(WAY.height - y[place]).toFixed(1)}`).join(" "),
   }));
-  return svg;
+  return [svg];
 }
 
 export default { render };

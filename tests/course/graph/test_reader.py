@@ -174,6 +174,7 @@ def test_the_mermaid_text_names_everything_once_and_marks_what_is_broken(session
     session.run(listener, RELIABLE)
     session.run(talker, BEST_EFFORT)
     session.until(lambda: view.graph.mismatches)
+    assert view.frame()["title"] == "2 nodes, 1 topic, 1 pair that does not connect"
     text = str(view.mermaid)
     assert text == mermaid(view.graph)
     assert text.splitlines()[0] == "flowchart LR"

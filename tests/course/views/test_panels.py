@@ -107,6 +107,8 @@ def test_goals_pass_through_their_states(busy: Session) -> None:
     say(view, goal={"order": "2"})
     busy.until(lambda: view.goals and view.goals[0].state == GoalState.EXECUTING)
     busy.until(lambda: view.goals[0].feedback == 1)
+    (shown,) = view.frame()["goals"]
+    assert shown["text"] == ["asked: {order: 2}", "feedback 1: {sequence: [0, 1]}"]
     robot.go.set()
     busy.until(lambda: view.goals[0].result is not None and view.goals[0].over)
     (goal,) = view.goals
@@ -136,6 +138,7 @@ def test_a_goal_sent_from_a_cell_shows_its_progress_and_its_result(busy: Session
     busy.send_goal(Fibonacci, "count", Fibonacci.Goal(order=3))
     busy.until(lambda: view.goals and view.goals[0].feedback)
     (goal,) = view.frame()["goals"]
+    assert goal["text"] == ["feedback 1: {sequence: [0, 1]}"]
     assert goal["way"]["text"] == "sequence (number of values): 2"
     assert [value for _, value in goal["way"]["points"]] == [2.0]
     robot.go.set()
