@@ -10,7 +10,7 @@ import gc
 import json
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from functools import partial
 from typing import Any
 
@@ -27,6 +27,7 @@ from autograder.raised import (
 )
 from autograder.wire import Channel, ChannelClosed
 from course import Session
+from course.runtime.context import default_context_beside
 from course.runtime.teardown import sweep
 
 MAX_VALUE = 64 * 1024
@@ -52,6 +53,7 @@ class Harness:
         """Serve what ``namespace`` (a notebook's globals) has, in sessions of ``open_session``."""
         self._open_session = open_session
         self._session: Session | None = None
+        self._beside = ExitStack()
         self._namespace = namespace
         self._nodes: dict[str, Any] = {}
         self._declared: dict[str, Callable[[], Any]] = {}
@@ -94,9 +96,13 @@ class Harness:
 
     @property
     def _hosting(self) -> Session:
-        if self._session is None:
-            self._session = self._open_session(1, False)
-        return self._session
+        return self._session or self._begin(1, False)
+
+    def _begin(self, threads: int, sim_time: bool) -> Session:
+        session = self._open_session(threads, sim_time)
+        self._session = session
+        self._beside.enter_context(default_context_beside(session.domain_id, sim_time=sim_time))
+        return session
 
     def _close(self) -> None:
         self._nodes.clear()
@@ -105,11 +111,12 @@ class Harness:
         session, self._session = self._session, None
         if session is not None:
             _close(session)
+            self._beside.close()
             gc.collect()
 
     def _open(self, request: dict[str, Any]) -> dict[str, Any]:
         self._close()
-        self._session = self._open_session(int(request["threads"]), bool(request["sim_time"]))
+        self._begin(int(request["threads"]), bool(request["sim_time"]))
         return {}
 
     def _find(self, name: str) -> Any:

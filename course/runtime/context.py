@@ -145,3 +145,28 @@ def as_default_context(context: Context) -> Iterator[None]:
             yield
         finally:
             set_default_context(before)
+
+
+@contextlib.contextmanager
+def default_context_beside(domain_id: int, *, sim_time: bool) -> Iterator[None]:
+    """Give the process a default context of its own, on `domain_id`, and put back what was there.
+
+    For nodes of a session that is not the process's: `while rclpy.ok():` in a thread of theirs goes
+    on, a node that they make in a callback is on their domain, and `rclpy.shutdown()` ends neither
+    their session nor the notebook's.
+
+    Raises:
+        SessionError: as from `open_context`.
+    """
+    beside = open_context(domain_id, "LOCALHOST", (), sim_time=sim_time)
+    with rclpy.utilities.g_context_lock:
+        before = rclpy.utilities.g_default_context
+    set_default_context(beside)
+    try:
+        yield
+    finally:
+        with rclpy.utilities.g_context_lock:
+            replaced = rclpy.utilities.g_default_context is not beside
+        if not replaced:
+            set_default_context(before)
+        beside.try_shutdown()

@@ -29,6 +29,7 @@ from autograder.harness import Harness
 from autograder.raised import MUST_NOT_SPIN
 from autograder.wire import Channel, ChannelTimeout
 from course import Session
+from course.runtime.context import default_context_beside
 
 
 class Named(Node):
@@ -138,11 +139,36 @@ class Waiting(Node):
         self.asked.wait_for_service(timeout_sec=60.0)
 
 
+class OfAScript(Node):
+    """Written for a process of its own, which rclpy.init() and rclpy.shutdown() frame."""
+
+    def __init__(self) -> None:
+        super().__init__("of_a_script")
+        self.beats = self.create_publisher(String, "beats", 1)
+        self.create_subscription(String, "helper", self.help, 1)
+        self.over = threading.Event()
+        self.thread = threading.Thread(target=self.beat)
+        self.thread.start()
+
+    def beat(self) -> None:
+        while rclpy.ok() and not self.over.wait(0.02):
+            self.beats.publish(String())
+
+    def help(self, _: String) -> None:
+        self.helper = rclpy.create_node("helper")
+
+    def destroy_node(self) -> None:
+        self.over.set()
+        self.thread.join()
+        rclpy.shutdown()
+        super().destroy_node()
+
+
 CLASSES = {
     cls.__name__: cls
     for cls in (
         Named, OneCleanupOnly, NoCleanup, Exits, Managed, Deaf, Speechless, Spinner, Raiser,
-        Careless, Waiting,
+        Careless, Waiting, OfAScript,
     )
 }  # fmt: skip
 
@@ -265,6 +291,36 @@ def test_a_node_that_does_not_come_up_is_named() -> None:
     subject = Subject(Silent())  # type: ignore[arg-type]
     with pytest.raises(SubjectGone, match="bring up the nodes of `robot`, and bob did not come up"):
         subject.start_all("robot")
+
+
+@pytest.mark.parametrize("sim_time", [False, True])
+def test_rclpy_is_ok_for_a_node_and_its_threads_whatever_the_notebook_has_opened(
+    subject: Subject, outside: Session, sim_time: bool
+) -> None:
+    subject.open(sim_time=sim_time)
+    subject.start("OfAScript")
+    beats = outside.record("beats", String)
+    beats.wait(5)
+    talker = outside.run(Node, "talker")
+    asking = talker.create_publisher(String, "helper", 1)
+    outside.until(asking.get_subscription_count)
+    asking.publish(String())
+    outside.until(lambda: "helper" in talker.get_node_names())
+    subject.stop("OfAScript")
+    subject.start("Named")  # in the same session, which rclpy.shutdown() did not end
+    outside.until(lambda: "nobody" in talker.get_node_names())
+    subject.open()
+    subject.start("OfAScript")  # in another one, where rclpy is ok again
+    beats.wait(len(beats.messages) + 5)
+    subject.stop("OfAScript")
+
+
+def test_the_notebooks_default_context_is_back_after_an_exam(outside: Session) -> None:
+    before = rclpy.utilities.g_default_context
+    with default_context_beside(outside.domain_id, sim_time=False):
+        assert rclpy.ok()
+        assert rclpy.utilities.g_default_context is not before
+    assert rclpy.utilities.g_default_context is before
 
 
 def test_who_spins_in_a_callback_is_told_so_and_nobody_else(
