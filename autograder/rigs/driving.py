@@ -28,6 +28,9 @@ PART_OF_THE_WAY = 0.7
 """Of the metre between two stations: who rounds a position is at the next one too early."""
 BLOCKED, BLOCKED_WALL = 1.2, 0.3
 """Seconds of the node's clock, and then on the wall, for which the robot cannot get on."""
+WAITS = 5.0
+"""Seconds of the node's clock for which it cannot get on in all: longer than a metre takes who
+reckons by the time, and than the patience of who gives up."""
 FILMED = (8.0, 12.0)
 """Pictures a second, as far as such a short time tells."""
 LOOKING, STOPPING, UNDER_WAY = 0.6, 4.0, 2.0
@@ -202,12 +205,20 @@ class Drive:
         if self._rig.films:
             stretch.run(BLOCKED, sum(FILMED) / 2)
         else:
-            for _ in range(round(BLOCKED / STEP)):
-                self._rig.step()
+            self._go_by(BLOCKED)
         if self._rig.wait(lambda: self._latest > self.station, BLOCKED_WALL):
             self._complain()
         self._require_going_on()
         self._require_the_rest(stretch)
+        self._go_by(WAITS - stretch.seconds)
+        hear_out(self._rig)
+        if self._latest > self.station:
+            self._complain()
+        self._require_going_on()
+
+    def _go_by(self, seconds: float) -> None:
+        for _ in range(round(seconds / STEP)):
+            self._rig.step()
 
     def _require_the_rest(self, stretch: filming.Stretch) -> None:
         """Fail if the drive holds up what worked without one: the camera, or the position.
