@@ -136,7 +136,7 @@ class SensorRig:
         for index in range(count):
             self.node.publish(sensor, phase, index)
             if takes:
-                takes = self.wait(partial(self.taken, sensor, phase, index - AHEAD), LAG)
+                takes = self.wait(partial(self.taken, sensor, phase, index + 1 - AHEAD), LAG)
         return self.wait(partial(self.taken, sensor, phase, count - 1))
 
     def taken(self, sensor: Sensor, phase: str, index: int) -> bool:
