@@ -15,6 +15,10 @@ from autograder.sandbox.usage import Process
 
 PERIOD = 0.1
 """Seconds between two looks: memory can grow by some 100 MB in that time."""
+LONGEST = 0.5
+"""Seconds that one look may stand for: on a busy machine the next one can come late."""
+COUNTED = 5
+"""Each so manyeth look counts who is busy, however little they get of a busy machine."""
 BLIND_TIMEOUT = 5.0
 """Seconds that the files of a sandbox may stay unreadable before it is ended for that."""
 
@@ -33,6 +37,7 @@ class Watch:
         self._started = time.monotonic()
         self._over = threading.Event()
         self._used = self._crowded = 0.0
+        self._looked, self._looks = self._started, 0
         self._blind_since: float | None = None
         self.reason = ""
         self.failed = False  # what was wrong was the watch, not what it saw
@@ -86,11 +91,15 @@ class Watch:
     def _worked(self, processes: list[Process]) -> str:
         used = sum(process.cpu for process in processes)
         grew, self._used = used - self._used, used
+        now = time.monotonic()
+        passed, self._looked = min(now - self._looked, LONGEST), now
+        self._looks += 1
         if used > self._limits.cpu:
             return f"it used more than {self._limits.cpu} s of processor time"
-        # One that hardly works, as most do, has no crowd that would have to be counted.
-        crowd = grew > PERIOD / 2 and sum(p.busy() for p in processes) > self._limits.busy
-        self._crowded = max(0.0, self._crowded + (PERIOD if crowd else -PERIOD))
+        # Counting costs a little: one that hardly works, as most do, has seldom a crowd.
+        worth = grew > passed / 2 or self._crowded > 0 or self._looks % COUNTED == 0
+        crowd = worth and sum(process.busy() for process in processes) > self._limits.busy
+        self._crowded = max(0.0, self._crowded + (passed if crowd else -passed))
         if self._crowded > self._limits.crowd:
             return f"it kept more than {self._limits.busy} processes and threads busy at a time"
         return ""
