@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -59,6 +59,10 @@ class Clock:
         return f"{in_words((self.now() - self.started) / self.run * self.left)} left"
 
 
+MOST_REASONS = 5
+"""Reasons for checks that were not examined that a run tells; `autograder report` has them all."""
+
+
 class Lines(Progress):
     """One line a submission: for log files, and whatever is no terminal."""
 
@@ -67,6 +71,7 @@ class Lines(Progress):
         self._out = out
         self._clock = Clock()
         self._done = self._all = 0
+        self._unexamined: dict[str, None] = {}
 
     def begin(self, submissions: int, notebooks: int, unchanged: int) -> None:
         """Say what needs nothing."""
@@ -83,8 +88,21 @@ class Lines(Progress):
         """Say what a submission got."""
         self._done += 1
         left = self._clock.remaining()
+        self._tell(graded, f"; {left}" if left else "")
+
+    def end(self) -> None:
+        """Say which checks were not examined, and why."""
+        for reason in list(self._unexamined)[:MOST_REASONS]:
+            self.say(f"Left to a person: {reason}")
+        if len(self._unexamined) > MOST_REASONS:
+            self.say("Left to a person, too: what `autograder report` lists.")
+
+    def _tell(self, graded: Graded, more: str = "") -> None:
+        """Say what a submission got, and remember what was not examined in it."""
         number = f"{self._done:>{len(str(self._all))}} of {self._all}"
-        self.say(f"  {number}  {_line(graded)}" + (f"; {left}" if left else ""))
+        self.say(f"  {number}  {_line(graded)}{more}")
+        if len(self._unexamined) <= MOST_REASONS:
+            self._unexamined.update(dict.fromkeys(_unexamined(graded)))
 
     def say(self, line: str) -> None:
         """Print a line."""
@@ -118,11 +136,12 @@ class Live(Lines):
     def done(self, graded: Graded) -> None:
         """Say what a submission got, above the bar."""
         self._done += 1
-        self.say(f"  {self._done:>{len(str(self._all))}} of {self._all}  {_line(graded)}")
+        self._tell(graded)
 
     def end(self) -> None:
-        """Take the bar away."""
+        """Take the bar away, and say which checks were not examined."""
         self._bar.stop()
+        super().end()
 
 
 def for_console(out: Console, err: Console, *, machine: bool) -> Progress:
@@ -154,10 +173,22 @@ def _unchanged(count: int) -> str:
 
 def _line(graded: Graded) -> str:
     problem = f"  {graded.problem}" if graded.problem else ""
+    verdicts = [v for outcome in graded.outcomes.values() for v in outcome.verdicts.values()]
+    unexamined = sum(verdict.unexamined for verdict in verdicts)
+    open_points = f" ({unexamined:g} not examined)" if unexamined else ""
     return (
-        f"{graded.student}: {graded.points:g} of {graded.max_points:g} automatic points, "
-        f"{graded.seconds:.1f} s{problem}"
+        f"{graded.student}: {graded.points:g} of {graded.max_points:g} automatic points"
+        f"{open_points}, {graded.seconds:.1f} s{problem}"
     )
+
+
+def _unexamined(graded: Graded) -> Iterator[str]:
+    """Yield which checks could not be examined, and why; students whose reasons agree share one."""
+    for notebook, outcome in graded.outcomes.items():
+        for verdict in outcome.verdicts.values():
+            for check in verdict.checks:
+                if check.status == "not_examined":
+                    yield f"{notebook}, “{check.title}”: {check.actual}"
 
 
 class Collecting(Progress):

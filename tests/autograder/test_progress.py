@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
@@ -10,6 +11,8 @@ from rich.console import Console
 from autograder import progress
 from autograder.engine import Graded
 from autograder.progress import Clock, Lines, Live, Progress
+from autograder.runner import Outcome
+from autograder.verdict import CheckResult, Verdict
 
 ADA = Graded("ada [bold]", {}, 12.5, 15.0, 4.04)
 BOB = Graded("bob", {}, 0.0, 15.0, 0.0, "It was cut off.")
@@ -37,6 +40,35 @@ def test_lines_say_what_each_submission_got() -> None:
         "   1 of 10  ada [bold]: 12.5 of 15 automatic points, 4.0 s",
         "   2 of 10  bob: 0 of 15 automatic points, 0.0 s  It was cut off.",
     ]
+
+
+def test_what_was_not_examined_is_said_once_with_its_reason() -> None:
+    check = CheckResult("repaired", "Lost stops are sent again", "not_examined", 0.0, 2.0)
+    checks = (replace(check, actual="This network loses nothing."),)
+    outcome = Outcome(verdicts={"hidden": Verdict("qos", "hidden", checks)})
+    out = console(terminal=False)
+    lines = Lines(out)
+    lines.begin(submissions=2, notebooks=2, unchanged=0)
+    for student in ("ada", "bob"):
+        lines.done(Graded(student, {"qos-design": outcome}, 13.0, 15.0, 4.0))
+    lines.end()
+    assert said(out).splitlines() == [
+        "  1 of 2  ada: 13 of 15 automatic points (2 not examined), 4.0 s",
+        "  2 of 2  bob: 13 of 15 automatic points (2 not examined), 4.0 s",
+        "Left to a person: qos-design, “Lost stops are sent again”: This network loses nothing.",
+    ]
+
+
+def test_many_reasons_are_told_by_the_report() -> None:
+    lines = Lines(out := console(terminal=False))
+    for number in range(20):
+        check = CheckResult("c", f"Check {number}", "not_examined", 0.0, 1.0, actual="Why.")
+        outcome = Outcome(verdicts={"hidden": Verdict("qos", "hidden", (check,))})
+        lines.done(Graded("ada", {"qos-design": outcome}))
+    lines.end()
+    told = [line for line in said(out).splitlines() if line.startswith("Left to a person")]
+    assert len(told) == progress.MOST_REASONS + 1
+    assert "autograder report" in told[-1]
 
 
 def test_a_terminal_has_a_bar_that_goes_away() -> None:
