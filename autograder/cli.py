@@ -92,6 +92,10 @@ def grade(
     What has not changed since it was graded is left as it is. A run that was ended, however, goes
     on where it was when it is started again.
     """
+    from autograder import sandbox
+
+    if not trust and not scheduler:
+        sandbox.warm_up()  # while nbgrader is imported, which takes seconds
     from autograder import engine, grades_csv, progress
     from autograder.gradebook import CourseGradebook
 

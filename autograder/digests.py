@@ -97,13 +97,28 @@ class _Code:
 def _imports(name: str, source: bytes) -> frozenset[str]:
     """Return what a module may import, its own packages included; too many names do no harm."""
     found = set(_parents(name))
-    for node in ast.walk(ast.parse(source)):
+    for node in _statements(ast.parse(source)):
         if isinstance(node, ast.Import):
             found |= {name for alias in node.names for name in (alias.name, *_parents(alias.name))}
         elif isinstance(node, ast.ImportFrom) and node.module:
             found |= {node.module, *_parents(node.module)}
             found |= {f"{node.module}.{alias.name}" for alias in node.names}
     return frozenset(found)
+
+
+def _statements(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield the statements of a module, those in other statements included.
+
+    No expression has an import in it, and most of a module's nodes are expressions.
+    """
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting += (n for n in ast.iter_child_nodes(node) if isinstance(n, _MAY_HOLD_STATEMENTS))
+
+
+_MAY_HOLD_STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)
 
 
 def _parents(name: str) -> Iterator[str]:

@@ -89,8 +89,8 @@ def grade(
     names = _notebooks(gradebook, assignment)
     students, wrong = _students(gradebook, assignment)
     if not trust and not scheduler:
-        with sandbox.warming_up():
-            sandbox.require()
+        sandbox.warm_up()
+        sandbox.require()
     refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
     refused += [Graded(s, {}, problem=EXCLUDED) for s in students if s in gradebook.excluded]
     students = [s for s in students if s not in gradebook.excluded]

@@ -15,7 +15,7 @@ from autograder.bench import SubjectGone
 from autograder.exam import Failed
 from autograder.rigs import filming, odometry
 from autograder.rigs.listening import acquaint, hear_out
-from autograder.rigs.robot import SETTLE, STEP, RobotRig
+from autograder.rigs.robot import GRAIN, SETTLE, STEP, RobotRig
 from autograder.rigs.scenarios import NAMES
 from course import GoalRun, GoalState, WaitTimeout
 
@@ -31,6 +31,9 @@ BLOCKED, BLOCKED_WALL = 1.2, 0.3
 WAITS = 5.0
 """Seconds of the node's clock for which it cannot get on in all: longer than a metre takes who
 reckons by the time, and than the patience of who gives up."""
+COARSE = 0.05
+"""Seconds of the node's clock between two looks of those who wait all that time: a fifth as many
+take a fifth of the time."""
 FILMED = (8.0, 12.0)
 """Pictures a second, as far as such a short time tells."""
 LOOKING, STOPPING, UNDER_WAY = 0.6, 4.0, 2.0
@@ -210,15 +213,15 @@ class Drive:
             self._complain()
         self._require_going_on()
         self._require_the_rest(stretch)
-        self._go_by(WAITS - stretch.seconds)
+        self._go_by(WAITS - stretch.seconds, COARSE)
         hear_out(self._rig)
         if self._latest > self.station:
             self._complain()
         self._require_going_on()
 
-    def _go_by(self, seconds: float) -> None:
+    def _go_by(self, seconds: float, grain: float = GRAIN) -> None:
         for _ in range(round(seconds / STEP)):
-            self._rig.step()
+            self._rig.step(STEP, grain)
 
     def _require_the_rest(self, stretch: filming.Stretch) -> None:
         """Fail if the drive holds up what worked without one: the camera, or the position.

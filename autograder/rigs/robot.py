@@ -42,8 +42,8 @@ SETTLE = 8.0
 ANSWERED, AGAIN = 1.0, 0.1
 """Seconds of wall time for an answer before the clock moves on, which it may wait for: the first
 time, and where one has been found to wait."""
-STEP = 0.1
-"""Seconds of simulated time in one step."""
+STEP, GRAIN = 0.1, 0.01
+"""Seconds of simulated time in one step, and between two moments of it that nodes get to see."""
 
 
 class Picture(NamedTuple):
@@ -206,10 +206,13 @@ class RobotRig:
         """Note since when (ns, as messages are stamped) the student's clock stands still."""
         self.still = time.time_ns()
 
-    def step(self, seconds: float = STEP) -> None:
-        """Move the student's clock on; everything that this sets off has then run."""
+    def step(self, seconds: float = STEP, grain: float = GRAIN) -> None:
+        """Move the student's clock on; everything that this sets off has then run.
+
+        ``grain`` is the time (s) between two moments that the student's nodes get to see.
+        """
         try:
-            self.subject.advance(seconds)
+            self.subject.advance(seconds, grain)
         except StudentError as error:
             told = str(error).partition(": ")[2] or str(error)  # without the exception's name
             raise Failed(

@@ -12,10 +12,10 @@ from autograder.sandbox.probe import (
     abilities,
     place,
     require,
-    warming_up,
+    warm_up,
 )
 
 __all__ = [
     "Abilities", "BoxError", "Place", "RunningSubject", "SandboxError", "abilities", "place",
-    "require", "subject_command", "warming_up",
+    "require", "subject_command", "warm_up",
 ]  # fmt: skip

@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -83,20 +83,18 @@ def _abilities() -> Abilities:
             return Abilities(_advice(str(error)))
 
 
-@contextmanager
-def warming_up() -> Iterator[None]:
-    """Start what examiners are forked from while something else is done in the block."""
+def warm_up() -> None:
+    """Begin to try the sandbox, and to start what its processes are forked from; return at once.
 
-    def start() -> None:
-        with suppress(ZygoteError):  # whoever needs it hears of it
-            warmth.examiners()
+    Whoever needs one of them waits for it, and hears what is wrong with it.
+    """
 
-    starting = threading.Thread(target=start)
-    starting.start()
-    try:
-        yield
-    finally:
-        starting.join()
+    def begin(step: Callable[[], object]) -> None:
+        with suppress(Exception):
+            step()
+
+    for step in (abilities, warmth.examiners):
+        threading.Thread(target=begin, args=(step,)).start()
 
 
 def place(*, trust: bool = False, hidden: Iterable[Path] = ()) -> Place:
