@@ -111,11 +111,16 @@ def test_what_a_fork_raises_is_read_from_its_errors(zygote: Zygote) -> None:
 
 @pytest.mark.parametrize(("said", "code"), [([], 0), (["no submission"], 1)])
 def test_a_fork_ends_as_a_program_does(zygote: Zygote, said: list[str], code: int) -> None:
-    process, into, out_of = forked(zygote, "leave", *said)
+    (says, output), (complains, errors) = os.pipe(), os.pipe()
+    task = Task("forked_program", ["leave", *said], [1, 2])
+    process = zygote.fork(task, [output, errors])
+    os.close(output)
+    os.close(errors)
     assert process.wait(30) == code
-    with os.fdopen(out_of) as stream:
-        assert {*stream.read().splitlines()} == {*said, "a thread ended", "last words"}
-    os.close(into)
+    with os.fdopen(says) as stream:
+        assert stream.read().splitlines() == ["a thread ended", "last words"]
+    with os.fdopen(complains) as stream:
+        assert stream.read().splitlines() == said
 
 
 def test_a_fork_that_cannot_join_is_refused_and_the_next_one_is_not(zygote: Zygote) -> None:
