@@ -18,6 +18,7 @@ from autograder.rigs.camera_duties import (
     require_closed,
     require_endpoints,
     require_gone,
+    require_no_queue,
     require_open,
     require_own_clock,
     require_picture,
@@ -39,6 +40,7 @@ from autograder.rigs.managed import (
     require_off_graph,
     require_one_publisher,
     require_refused,
+    require_silent_at_once,
     require_still,
     require_still_held,
 )
@@ -266,8 +268,8 @@ def managed_runs(rig: CameraRig) -> None:
         "What still runs in your node between deactivate and activate?",
         "A lifecycle publisher drops what is published while it is inactive: you do not see a "
         "timer that goes on, the camera does.",
-        "Make the timer in on_activate; in on_deactivate destroy_timer() it and stop() the camera, "
-        "then return super().on_deactivate(state).",
+        "Make the timer in on_activate; in on_deactivate destroy_timer() it, wait for a thread "
+        "that takes a picture, stop() the camera, then return super().on_deactivate(state).",
     ),
     read=READ_MANAGED,
 )
@@ -294,6 +296,11 @@ def silent_when_inactive(rig: CameraRig) -> None:
         node.go("activate")
         require_fresh(rig, device, sent, asked)
         require_rate(rig, device, 10, " after a second “activate”")
+        node.go("deactivate", "cleanup")
+        slow = rig.device("slow")
+        node.require(device=slow)
+        node.go("configure")
+        require_silent_at_once(rig, node, slow)
 
 
 @EXAM.check(
@@ -457,7 +464,7 @@ def callback_raises(rig: CameraRig) -> None:
     needs=("endpoints_gone", "camera_given_back"),
     hints=(
         "A callback waits for a picture, and destroy_node() runs in another thread. Who waits for "
-        "whom?",
+        "whom, and for how many pictures?",
         "camera.close() ends every read() that waits with an OSError; an answer that your worker "
         "will never give does not end.",
         "Do not wait without end in a callback: let the read() itself be what it waits for, or "
@@ -488,3 +495,8 @@ def cleanup_when_busy(rig: CameraRig) -> None:
         again = rig.device()
         rig.start(DRIVER, again)
         require_zoom(rig, again, 4, "After a restart")
+    device = rig.device("slow")
+    with rig.life(DRIVER, device):
+        require_picture(rig, device)
+        require_no_queue(rig, device, lambda: rig.destroy(DRIVER))
+        require_closed(rig, device, "After destroy_node() with a slow camera")

@@ -12,7 +12,9 @@ from __future__ import annotations
 
 import re
 import secrets
+import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any, NamedTuple
@@ -52,17 +54,21 @@ PERIOD = 0.1
 
 
 class Picture(NamedTuple):
-    """What a picture's pixels say: its device, its number since the device was opened, its zoom."""
+    """What a picture's pixels say: its device, its number since the device was opened, its zoom.
+
+    And when it was published, by DDS: in ns of this machine's time of day.
+    """
 
     device: str
     number: int
     zoom: int
+    published: int
 
 
-def _picture(message: Any) -> Picture | None:
+def _picture(message: Any, published: int) -> Picture | None:
     label = bytes(message.data[:200]).split(b"\n")[0].decode(errors="replace")
     found = re.fullmatch(r"([\w-]{1,100}) (\d{1,9}) (\d{1,3})", label)
-    return Picture(found[1], int(found[2]), int(found[3])) if found else None
+    return Picture(found[1], int(found[2]), int(found[3]), published) if found else None
 
 
 class ExaminerNode(QuietNode):
@@ -80,8 +86,8 @@ class ExaminerNode(QuietNode):
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.zoom = self.create_publisher(Int32, ZOOM, latched)
 
-    def _note(self, heard: list[Picture], message: Any) -> None:
-        if (picture := _picture(message)) is not None:
+    def _note(self, heard: list[Picture], message: Any, info: dict[str, int]) -> None:
+        if (picture := _picture(message, info["source_timestamp"])) is not None:
             heard.append(picture)
 
     def of(self, device: str) -> list[Picture]:
@@ -273,6 +279,25 @@ class CameraRig:
     def cameras(self, device: str) -> list[int]:
         """Return how often each open camera of ``device`` was asked for a picture."""
         return self.process.positions(f"camera:{device}")
+
+    def asked_during(self, device: str, act: Callable[[], object]) -> int:
+        """Return for how many pictures the camera of ``device`` was asked while ``act`` ran."""
+        before = highest = sum(self.cameras(device))
+        over = threading.Event()
+
+        def look() -> None:
+            nonlocal highest
+            while not over.wait(PERIOD):
+                highest = max(highest, sum(self.cameras(device)))
+
+        with ThreadPoolExecutor(max_workers=1) as beside:
+            looking = beside.submit(look)
+            try:
+                act()
+            finally:
+                over.set()
+        looking.result()
+        return highest - before
 
     def streams(self, device: str) -> bool:
         """Whether the stream of ``device`` runs."""

@@ -5,6 +5,8 @@ Each ``require_…`` returns if it was seen, and raises `Failed` with what was s
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
@@ -18,6 +20,8 @@ FURTHER = 3  # pictures: one may have been under way with another zoom
 STANDSTILL = 0.5  # s of wall time without two pictures: they stand still
 BURST = 4  # snapshots that are asked for at once
 BACKLOG = 3.0  # s of wall time in which pictures may come that had been ordered before
+A_FEW, MANY = 5, 20  # ticks
+LAST_ONES = 5  # pictures: 4 that take 0.3 s each are about as many as a second allows
 
 
 def require_endpoints(rig: CameraRig, node: str) -> None:
@@ -82,11 +86,11 @@ def let_arrive(rig: CameraRig, device: str) -> None:
     Not for long: a thread may read all the time, and publish just some of what it reads.
     """
 
-    def all_here() -> bool:
+    def newest_is_here() -> bool:
         newest = [picture.number for picture in rig.pictures(device)[-1:]]
         return newest >= [max(rig.cameras(device), default=0) - 1]
 
-    rig.wait(all_here, 1.0)
+    rig.wait(newest_is_here, 1.0)
 
 
 def require_own_clock(rig: CameraRig, device: str) -> None:
@@ -187,6 +191,21 @@ def require_snapshots_under_way(rig: CameraRig, device: str) -> None:
         raise Failed(
             expected=f"The service {SNAPSHOT} answers when the picture is there.",
             actual=f"No answer came within {SETTLE:.0f} s{rig.raised()}.",
+        )
+
+
+def require_no_queue(rig: CameraRig, device: str, destroy: Callable[[], object]) -> None:
+    """Fail if pictures that a slow camera is behind with are all taken before ``destroy`` ends."""
+    before = sum(rig.cameras(device))
+    rig.advance(A_FEW * PERIOD)
+    if sum(rig.cameras(device)) - before < A_FEW - 1:  # it does not take them one by one at once
+        rig.advance(MANY * PERIOD)
+    if (asked := rig.asked_during(device, destroy)) > LAST_ONES:
+        raise Failed(
+            expected="destroy_node() ends every thread within a second, also while the camera is "
+            "slower than the timer.",
+            actual=f"While it ran the camera was asked for {asked} more pictures, each of which "
+            "takes 0.3 s: they had been ordered before, and waited in a queue.",
         )
 
 

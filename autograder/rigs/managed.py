@@ -5,6 +5,7 @@ Sources: the ROS 2 design article "Managed nodes", and the interfaces of ``lifec
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 from lifecycle_msgs.msg import Transition
@@ -15,12 +16,14 @@ from rcl_interfaces.srv import SetParameters
 from autograder.exam import Failed
 from autograder.rigs.camera import IMAGE, RESEND, SETTLE, CameraRig, phrase
 from autograder.rigs.camera_duties import (
+    let_arrive,
     require_closed,
     require_open,
     require_picture,
     require_rate,
 )
 from autograder.rigs.lives import require_flat
+from course.runtime.waiting import Deadline
 
 TRANSITIONS = {
     "configure": (Transition.TRANSITION_CONFIGURE, "inactive"),
@@ -29,6 +32,8 @@ TRANSITIONS = {
     "cleanup": (Transition.TRANSITION_CLEANUP, "unconfigured"),
 }
 ROUNDS = 10
+EXPOSURE = 0.3  # s of a slow camera
+EXPOSURES = 3  # at most, that are waited for on a busy machine, where one may be over too soon
 STATES = ("unconfigured", "inactive", "active", "finalized")
 SHUTDOWNS = {
     "unconfigured": Transition.TRANSITION_UNCONFIGURED_SHUTDOWN,
@@ -145,6 +150,29 @@ def require_still(rig: CameraRig, device: str, transition: str) -> None:
             expected="An inactive node asks its camera for no picture: it has no timer.",
             actual=f"In one second after “{transition}” it asked {asked} times.",
         )
+
+
+def require_silent_at_once(rig: CameraRig, node: Managed, device: str) -> None:
+    """Fail if a picture that was being exposed at “deactivate” is published after it.
+
+    By the times that DDS gives: what was published before, and arrives after, is in order.
+    """
+    for _ in range(EXPOSURES):
+        node.go("activate")
+        asked = sum(rig.cameras(device))
+        rig.see(device, lambda n=asked: sum(rig.cameras(device)) > n)  # type: ignore[misc]
+        under_way = Deadline(EXPOSURE)
+        node.go("deactivate")
+        in_time, inactive = under_way.left, time.time_ns()
+        let_arrive(rig, device)
+        if any(picture.published > inactive for picture in rig.pictures(device)[-1:]):
+            raise Failed(
+                expected="When “deactivate” has succeeded the node sends no picture, also not the "
+                "one that its camera was just taking.",
+                actual="It sent one that a slow camera had ready when the node was inactive.",
+            )
+        if in_time:
+            return
 
 
 def require_still_held(rig: CameraRig, device: str) -> None:
