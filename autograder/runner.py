@@ -160,14 +160,7 @@ def _follow(
                     outcome.outputs[number] = shortened(outputs)
                     outcome.notes += [TOO_MUCH] if before >= 0 else []
     except ChannelTimeout:
-        _give_up(
-            program,
-            outcome,
-            f"Code cell {number + 1} was still running after {cell_timeout:.0f} s, so nothing "
-            "after it was examined: a cell that never ends (rclpy.spin, an endless loop) blocks "
-            "a notebook.",
-            reached=number,
-        )
+        _give_up(program, outcome, _stuck(program, number, cell_timeout), reached=number)
     except ChannelBroken as error:
         _give_up(
             program,
@@ -181,6 +174,19 @@ def _follow(
         _give_up(program, outcome, fate, status, reached=number)
     except ExaminerError as error:
         _give_up(program, outcome, str(error), "grader_error", reached=number)
+
+
+def _stuck(program: Program, number: int, seconds: float) -> str:
+    """Return what a program is stuck in that has not answered for ``number``, as a sentence."""
+    if program[number].exam:  # no cell of the student's: what it waits for is the end of the last
+        return (
+            f"Your nodes were still being taken down {seconds:.0f} s after an examination, so "
+            "nothing after it was examined: does a destroy_node() of yours wait for ever?"
+        )
+    return (
+        f"Code cell {number + 1} was still running after {seconds:.0f} s, so nothing after it was "
+        "examined: a cell that never ends (rclpy.spin, an endless loop) blocks a notebook."
+    )
 
 
 def _await(channel: Channel, subject: RunningSubject) -> None:

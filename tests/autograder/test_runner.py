@@ -67,6 +67,23 @@ def test_a_cell_that_never_ends_is_ended() -> None:
     assert "Code cell 1 was still running after 3 s" in reason
 
 
+def test_a_cleanup_that_never_ends_is_told_from_a_cell() -> None:
+    source = """
+import threading
+from rclpy.node import Node
+class SensorDrivers(Node):
+    def __init__(self):
+        super().__init__('drivers')
+    def destroy_node(self):
+        threading.Event().wait()
+"""
+    hidden = Cell("", "qos-hidden", "qos", "hidden")
+    outcome = runner.run((*program(source), hidden), cell_timeout=5)
+    (reason,) = {check.actual for check in outcome.verdicts["qos-hidden"].checks}
+    assert "Your nodes were still being taken down 5 s after an examination" in reason
+    assert outcome.notes == [reason]
+
+
 def test_a_constructor_that_never_returns_fails_its_check(monkeypatch: pytest.MonkeyPatch) -> None:
     source = """
 from rclpy.node import Node
