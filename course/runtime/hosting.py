@@ -178,8 +178,8 @@ class Hosting:
         store.claim(node_name(node), self._crew)
 
     def _record(self, job: Job, failure: BaseException) -> None:
-        # A callback that outlives its stopped node finds everything destroyed, and a timer may be
-        # cancelled while rclpy calls it: neither is news.
-        outlived = isinstance(failure, InvalidHandle) and job.node in self._residents.stopped
+        # A callback that outlives its node finds everything destroyed, and a timer may be cancelled
+        # while rclpy calls it: neither is news.
+        outlived = isinstance(failure, InvalidHandle) and self._residents.is_leaving(job.node)
         if not outlived and _TIMER_CANCELLED not in str(failure):
             self._errors.record(job, failure)

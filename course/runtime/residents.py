@@ -25,7 +25,12 @@ from course.runtime.executor import BackgroundExecutor
 from course.runtime.jobs import Job, current_job
 from course.runtime.names import is_name, node_name
 from course.runtime.rcutils_tap import hearing_constructors
-from course.runtime.teardown import destroy_half_made, destroy_node, is_alive
+from course.runtime.teardown import (
+    destroy_half_made,
+    destroy_node,
+    is_alive,
+    is_being_destroyed,
+)
 from course.runtime.waiting import Pulse, poll
 
 _CALLBACK_GRACE = 2.0  # s that stop() and pause() give a callback that is running
@@ -111,6 +116,10 @@ class Residents:
             self._made_by[name] = factory
             executor.add_node(node)  # under the lock: a node without executor looks stolen
         return node
+
+    def is_leaving(self, node: Node | None) -> bool:
+        """Return whether `node` is being destroyed, by the session or by hand, or has been."""
+        return node is not None and (node in self.stopped or is_being_destroyed(node))
 
     def stop(self, node: Node) -> None:
         """Stop spinning `node`, let its running callback end, and destroy it. Idempotent."""

@@ -7,6 +7,7 @@ from __future__ import annotations
 import contextlib
 from types import TracebackType
 
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer
 from rclpy.exceptions import InvalidHandle
@@ -74,3 +75,11 @@ def is_alive(node: Node) -> bool:
             return True
     except (InvalidHandle, AttributeError, TypeError):  # super().__init__() not reached
         return False
+
+
+def is_being_destroyed(node: Node) -> bool:
+    """Return whether `destroy_node()` of `node` has begun, or ended: its entities are going.
+
+    The publisher that rclpy gives every node first is also the first that it destroys.
+    """
+    return not any(publisher.msg_type is ParameterEvent for publisher in node.publishers)

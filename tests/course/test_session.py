@@ -258,6 +258,37 @@ def test_a_node_destroyed_by_hand_is_let_go_of(any_session):
     assert any_session.errors == []
 
 
+def test_a_callback_that_outlives_a_node_destroyed_by_hand_is_no_news(any_session):
+    begun, destroyed, over = threading.Event(), threading.Event(), threading.Event()
+
+    class Slow(Talker):
+        def say(self):
+            begun.set()
+            destroyed.wait(10)
+            try:
+                super().say()
+            finally:
+                over.set()
+
+    slow = any_session.run(Slow)
+    assert begun.wait(10)
+    for publisher in list(slow.publishers)[:2]:  # as far as destroy_node() gets in between
+        slow.destroy_publisher(publisher)
+    destroyed.set()
+    assert over.wait(10)
+    slow.destroy_node()
+    talker = any_session.run(Talker, "other")
+    any_session.until(lambda: talker.count > 3)
+    assert any_session.errors == []
+
+
+def test_publishing_with_what_was_destroyed_is_told_of_a_node_that_lives(any_session):
+    talker = any_session.run(Talker)
+    talker.destroy_publisher(talker.publisher)
+    any_session.until(lambda: any_session.errors)
+    assert "InvalidHandle" in any_session.errors[0].problem
+
+
 def test_entities_can_come_and_go_while_their_node_spins(any_session):
     talker = any_session.run(Talker)
     for _ in range(50):
