@@ -56,7 +56,7 @@ def own_line(error: BaseException) -> str:
     frames = traceback.extract_tb(error.__traceback__)
     while frames and _of_python(frames[-1].filename):
         frames.pop()
-    return _line([frame for frame in frames[-1:] if _theirs(frame)])
+    return _line([frame for frame in frames[-1:] if is_students(frame.filename)])
 
 
 def _line(frames: list[traceback.FrameSummary]) -> str:
@@ -64,11 +64,13 @@ def _line(frames: list[traceback.FrameSummary]) -> str:
 
 
 def _frames(error: BaseException) -> list[traceback.FrameSummary]:
-    return [frame for frame in traceback.extract_tb(error.__traceback__) if _theirs(frame)]
+    frames = traceback.extract_tb(error.__traceback__)
+    return [frame for frame in frames if is_students(frame.filename)]
 
 
-def _theirs(frame: traceback.FrameSummary) -> bool:
-    return not (_of_python(frame.filename) or frame.filename.startswith((*_INSTALLED, *_OURS)))
+def is_students(filename: str) -> bool:
+    """Return whether a frame's file is the student's: not Python's, a package's or ours."""
+    return not (_of_python(filename) or filename.startswith((*_INSTALLED, *_OURS)))
 
 
 def _of_python(filename: str) -> bool:

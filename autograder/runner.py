@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from autograder import exams, sandbox
+from autograder import exams, sandbox, stuck
 from autograder.exam import unexamined
 from autograder.processes import ExaminerError, ExaminerProcess
 from autograder.sandbox import Place, RunningSubject
@@ -135,6 +135,7 @@ def _follow(
     cell_timeout: float,
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
+    status: Status
     moved_on, number, room = True, 0, MAX_OUTPUTS
     try:
         _await(channel, subject)
@@ -160,7 +161,9 @@ def _follow(
                     outcome.outputs[number] = shortened(outputs)
                     outcome.notes += [TOO_MUCH] if before >= 0 else []
     except ChannelTimeout:
-        _give_up(program, outcome, _stuck(program, number, cell_timeout), reached=number)
+        frames = stuck.ask(subject.pid, channel)
+        reason, status = _stuck(program, number, cell_timeout, frames)
+        _give_up(program, outcome, reason, status, reached=number)
     except ChannelBroken as error:
         _give_up(
             program,
@@ -170,23 +173,38 @@ def _follow(
         )
     except ChannelClosed:
         fate = f"The notebook's process ended: {subject.fate()}."
-        status: Status = "grader_error" if subject.unwatched else "not_checked"
+        status = "grader_error" if subject.unwatched else "not_checked"
         _give_up(program, outcome, fate, status, reached=number)
     except ExaminerError as error:
         _give_up(program, outcome, str(error), "grader_error", reached=number)
 
 
-def _stuck(program: Program, number: int, seconds: float) -> str:
-    """Return what a program is stuck in that has not answered for ``number``, as a sentence."""
-    if program[number].exam:  # no cell of the student's: what it waits for is the end of the last
+def _stuck(
+    program: Program, number: int, seconds: float, frames: list[stuck.Frame]
+) -> tuple[str, Status]:
+    """Return what a program is stuck in that has not answered for ``number``, and who is to blame.
+
+    ``frames`` are where it is, if it has said so.
+    """
+    theirs = stuck.students(frames)
+    where = f" ({stuck.line_of(theirs, program)})" if theirs else ""
+    if not program[number].exam:
         return (
-            f"Your nodes were still being taken down {seconds:.0f} s after an examination, so "
-            "nothing after it was examined: does a destroy_node() of yours wait for ever?"
-        )
+            f"Code cell {number + 1} was still running after {seconds:.0f} s{where}, so nothing "
+            "after it was examined: a cell that never ends (rclpy.spin, an endless loop) blocks a "
+            "notebook."
+        ), "not_checked"
+    # No cell of the student's: what it waits for is the end of the last examination.
+    if frames and not theirs:
+        inner = " < ".join(f"{Path(f.file).name}:{f.line} {f.function}" for f in frames[:6])
+        return (
+            f"The nodes were still being taken down {seconds:.0f} s after an examination, and it "
+            f"was not in the student's code ({inner})."
+        ), "grader_error"
     return (
-        f"Code cell {number + 1} was still running after {seconds:.0f} s, so nothing after it was "
-        "examined: a cell that never ends (rclpy.spin, an endless loop) blocks a notebook."
-    )
+        f"Your nodes were still being taken down {seconds:.0f} s after an examination{where}, so "
+        "nothing after it was examined: does a destroy_node() of yours wait for ever?"
+    ), "not_checked"
 
 
 def _await(channel: Channel, subject: RunningSubject) -> None:

@@ -80,9 +80,16 @@ def make_shell() -> CellShell:
     return shell
 
 
-def run_cell(shell: CellShell, source: str) -> list[Output]:
-    """Run one cell and return its outputs in notebook format; an error is one of them."""
+def run_cell(shell: CellShell, source: str, number: int) -> list[Output]:
+    """Run one cell and return its outputs in notebook format; an error is one of them.
+
+    Args:
+        shell: what runs it.
+        source: the cell's text.
+        number: which of the notebook's code cells it is, from 1: tracebacks say so.
+    """
     shell.last_error = None
+    shell.execution_count = number
     shell.shown.clear()
     with capture_output(display=False) as captured:
         shell.run_cell(source, store_history=True)

@@ -16,6 +16,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from autograder import stuck
 from autograder.harness import SUBJECT_ENV, Harness
 from autograder.sandbox.limits import Limits
 from autograder.shell import make_shell, run_cell
@@ -37,6 +38,7 @@ def run(engine: Channel, control: Channel, domain_id: int) -> None:
     # Up to here standard error told the grader why a subject does not start.
     with Path(os.devnull).open("w") as nowhere:
         os.dup2(nowhere.fileno(), sys.stderr.fileno())
+    stuck.tell_when_asked(engine.fileno())
     engine.send({"ready": True})
 
     def open_session(threads: int, sim_time: bool) -> Session:
@@ -47,7 +49,7 @@ def run(engine: Channel, control: Channel, domain_id: int) -> None:
             engine.send({"exam": number})
             Harness(open_session, shell.user_ns).serve(control)
         else:
-            engine.send({"ran": number, "outputs": run_cell(shell, cell["source"])})
+            engine.send({"ran": number, "outputs": run_cell(shell, cell["source"], number + 1)})
 
 
 def preload() -> None:

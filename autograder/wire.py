@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import socket
 import time
+from contextlib import suppress
 from typing import Any
 
 MAX_LINE = 2 * 1024 * 1024
@@ -52,6 +53,10 @@ class Channel:
         self._sock = sock
         self._most = most
         self._buffer = b""
+
+    def fileno(self) -> int:
+        """Return the socket's descriptor."""
+        return self._sock.fileno()
 
     def send(self, message: dict[str, Any]) -> None:
         """Send one message.
@@ -108,6 +113,19 @@ class Channel:
         if not chunk:
             raise ChannelClosed("end of stream")
         self._buffer += chunk
+
+    def leftovers(self, patience: float, silence: float) -> bytes:
+        """Return what comes that need be no message, up to the largest size of one.
+
+        For at most ``patience`` seconds until it begins, and until ``silence`` seconds bring
+        nothing more.
+        """
+        wait = patience
+        with suppress(ChannelTimeout, ChannelClosed):
+            while len(self._buffer) < self._most:
+                self._fill(time.monotonic() + wait)
+                wait = silence
+        return self._buffer
 
     def close(self) -> None:
         """Close the socket; closing twice is fine."""

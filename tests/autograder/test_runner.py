@@ -64,7 +64,26 @@ def test_a_cell_that_never_ends_is_ended() -> None:
     outcome = runner.run(program("while True: pass"), cell_timeout=3)
     ((status, reason),) = verdict_reasons(outcome)
     assert status == "not_checked"
-    assert "Code cell 1 was still running after 3 s" in reason
+    assert "Code cell 1 was still running after 3 s (line 1 of code cell 1: while True" in reason
+
+
+def test_the_line_of_a_cell_that_never_ends_is_found_in_another_cell() -> None:
+    wait = "import threading\ndef wait():\n    threading.Event().wait()  # for ever"
+    outcome = runner.run(program("x = 1", wait, "wait()"), cell_timeout=3)
+    ((_, reason),) = verdict_reasons(outcome)
+    assert "Code cell 3 was still running after 3 s (line 3 of code cell 2: threading" in reason
+
+
+def test_a_program_that_does_not_say_where_it_is_is_ended_as_well() -> None:
+    source = """
+import signal
+signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+while True:
+    pass
+"""
+    outcome = runner.run(program(source), cell_timeout=3)
+    ((_, reason),) = verdict_reasons(outcome)
+    assert "Code cell 1 was still running after 3 s, so" in reason
 
 
 def test_a_cleanup_that_never_ends_is_told_from_a_cell() -> None:
@@ -80,8 +99,25 @@ class SensorDrivers(Node):
     hidden = Cell("", "qos-hidden", "qos", "hidden")
     outcome = runner.run((*program(source), hidden), cell_timeout=5)
     (reason,) = {check.actual for check in outcome.verdicts["qos-hidden"].checks}
-    assert "Your nodes were still being taken down 5 s after an examination" in reason
+    assert "Your nodes were still being taken down 5 s after an examination (line 8 of " in reason
     assert outcome.notes == [reason]
+
+
+def test_a_cleanup_of_ours_that_never_ends_is_no_fault_of_the_student() -> None:
+    source = """
+import queue
+import course.runtime.residents
+from rclpy.node import Node
+class SensorDrivers(Node):
+    def __init__(self):
+        super().__init__('drivers')
+course.runtime.residents.destroy_node = queue.SimpleQueue().get  # waits, and is no line of theirs
+"""
+    hidden = Cell("", "qos-hidden", "qos", "hidden")
+    outcome = runner.run((*program(source), hidden), cell_timeout=5)
+    assert outcome.spoilt
+    (reason,) = {check.actual for check in outcome.verdicts["qos-hidden"].checks}
+    assert "not in the student's code (residents.py:" in reason
 
 
 def test_a_constructor_that_never_returns_fails_its_check(monkeypatch: pytest.MonkeyPatch) -> None:
