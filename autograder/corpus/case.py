@@ -131,10 +131,12 @@ class Case:
             for what, names in (
                 ("did not fail but must:", self.must_fail - failed - unknown),
                 ("must pass:", set() if self.fails else set(checks) - passed - failed),
-                ("grader error in:", spoilt),
             )
             if names
         ]
+        if spoilt:
+            reasons = {checks[name].actual for name in spoilt}
+            differences.append(f"grader error in {', '.join(sorted(spoilt))}: {min(reasons)!r}")
         for name in sorted(failed - self.must_fail):
             differences.append(f"{name} failed but must not: {_words(checks[name])!r}")
         for name, fragment in self.says.items():

@@ -11,7 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from autograder import corpus, exams, submission
+from autograder import corpus, exams, runner, submission
 from autograder.cells import without_markers
 from autograder.corpus import Case, CorpusError, Trial, tables, trials
 from autograder.corpus.trials import Notebooks
@@ -105,6 +105,15 @@ def test_a_message_without_its_fragment_is_reported() -> None:
     case = Case("qos", "claimed", "t", wrong.fails, says=says, stub=wrong.stub)
     (trial,) = run([case])
     assert trial.difference.startswith("imu_burst does not say 'the moon': ")
+
+
+def test_what_the_grader_failed_at_is_reported_with_the_reason() -> None:
+    case = CASES["qos"][0]
+    program = submission.program(case.submission(*notebooks("qos")))
+    outcome = runner.refuse(program, "the examiner was ended", "grader_error")
+    difference = case.verdict_of(outcome)
+    assert "grader error in " in difference
+    assert "the examiner was ended" in difference
 
 
 def test_a_flip_between_repeats_is_found() -> None:
