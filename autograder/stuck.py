@@ -23,8 +23,8 @@ ASK = signal.SIGUSR1
 PATIENCE, SILENCE = 2.0, 0.5
 """Seconds until an answer must begin, and without anything more after which it is over."""
 
-_FRAME = re.compile(r'  File "([^"\n]*)", line (\d+) in (.*)')
-_CELL = re.compile(r"<ipython-input-(\d+)-")
+_FRAME = re.compile(r'  File "([^"\n]{1,500})", line (\d{1,9}) in (.{1,100})')
+_CELL = re.compile(r"<ipython-input-(\d{1,9})-")
 _OURS = ("autograder/subject.py", "run")  # what a subject's first thread runs
 
 
@@ -53,7 +53,8 @@ def ask(pid: int, channel: Channel) -> list[Frame]:
         return []
     with suppress(ProcessLookupError, PermissionError):
         os.kill(pid, ASK)
-    return _of_first_thread(channel.leftovers(PATIENCE, SILENCE).decode(errors="replace"))
+    said = channel.leftovers(PATIENCE, SILENCE).decode(errors="replace")
+    return _of_first_thread("".join(c if c.isprintable() or c == "\n" else "?" for c in said))
 
 
 def _of_first_thread(dump: str) -> list[Frame]:

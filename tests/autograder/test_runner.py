@@ -86,6 +86,32 @@ while True:
     assert "Code cell 1 was still running after 3 s, so" in reason
 
 
+def test_what_is_forged_as_the_place_of_a_program_is_cut_to_measure() -> None:
+    source = """
+import os, signal
+from autograder import stuck
+frame = f'  File "{"x" * 300}\\0\\x1b[2J", line {"9" * 5000} in {"y" * 10**6}\\n'
+first = f'  File "{"z" * 300}", line {"9" * 9} in f\\n'
+ours = '  File "/autograder/subject.py", line 1 in run\\n'
+dump = ("Thread 0x1 (most recent call first):\\n" + first + frame + ours).encode()
+def forge(*_):
+    for fd in range(3, 50):
+        try:
+            os.write(fd, dump)
+        except OSError:
+            pass
+import faulthandler
+faulthandler.unregister(stuck.ASK)
+signal.signal(stuck.ASK, forge)
+while True:
+    pass
+"""
+    outcome = runner.run(program(source), cell_timeout=3)
+    ((_, reason),) = verdict_reasons(outcome)
+    assert f"(line 999999999 of {'z' * 100})" in reason
+    assert len(reason) < 500
+
+
 def test_a_cleanup_that_never_ends_is_told_from_a_cell() -> None:
     source = """
 import threading
