@@ -13,7 +13,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -22,6 +22,9 @@ from course.domains import MAX_DOMAIN, MIN_DOMAIN, DomainLease, address
 
 ANSWER = 0.5
 """Seconds within which a session answers, unless its process is stopped."""
+
+DOMAINS: Sequence[int] = range(MIN_DOMAIN, MAX_DOMAIN + 1)
+"""Whose sessions are asked: all that lease one."""
 
 MOST_NAMES = 100
 _MOST_BYTES = 64 * 1024
@@ -79,7 +82,7 @@ def ask(names: Iterable[str], timeout: float = ANSWER) -> list[Neighbour]:
     found = []
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sock:
         sock.bind("")  # the kernel chooses an address, for the answers
-        waiting = sum(_sent(sock, json.dumps(wanted).encode(), domain) for domain in _DOMAINS)
+        waiting = sum(_sent(sock, json.dumps(wanted).encode(), domain) for domain in DOMAINS)
         deadline = time.monotonic() + timeout
         while waiting and (left := deadline - time.monotonic()) > 0:
             sock.settimeout(left)
@@ -91,9 +94,6 @@ def ask(names: Iterable[str], timeout: float = ANSWER) -> list[Neighbour]:
             with suppress(ValueError, TypeError, KeyError, AttributeError):  # somebody else's bytes
                 found += _neighbours(json.loads(answer), wanted)
     return sorted(found)
-
-
-_DOMAINS = range(MIN_DOMAIN, MAX_DOMAIN + 1)
 
 
 def _sent(sock: socket.socket, question: bytes, domain_id: int) -> bool:
