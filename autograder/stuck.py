@@ -20,8 +20,8 @@ from autograder.submission import Program
 from autograder.wire import Channel
 
 ASK = signal.SIGUSR1
-PATIENCE, SILENCE = 2.0, 0.5
-"""Seconds until an answer must begin, and without anything more after which it is over."""
+PATIENCE, SILENCE = 3.0, 0.5
+"""Seconds that an answer may take, and without anything more after which it is over."""
 
 _FRAME = re.compile(r'  File "([^"\n]{1,500})", line (\d{1,9}) in (.{1,100})')
 _CELL = re.compile(r"<ipython-input-(\d{1,9})-")

@@ -117,14 +117,14 @@ class Channel:
     def leftovers(self, patience: float, silence: float) -> bytes:
         """Return what comes that need be no message, up to the largest size of one.
 
-        For at most ``patience`` seconds until it begins, and until ``silence`` seconds bring
-        nothing more.
+        It waits for ``patience`` seconds at most, and no longer than ``silence`` seconds once
+        something has come and nothing more does.
         """
-        wait = patience
+        end = until = time.monotonic() + patience
         with suppress(ChannelTimeout, ChannelClosed):
             while len(self._buffer) < self._most:
-                self._fill(time.monotonic() + wait)
-                wait = silence
+                self._fill(until)
+                until = min(end, time.monotonic() + silence)
         return self._buffer
 
     def close(self) -> None:

@@ -72,3 +72,24 @@ def test_an_endless_line_is_refused(ends: tuple[Channel, socket.socket]) -> None
     flood.start()
     with pytest.raises(ChannelClosed, match="more than"):
         channel.receive(30)
+
+
+def test_leftovers_that_come_in_drops_do_not_come_for_ever(
+    ends: tuple[Channel, socket.socket],
+) -> None:
+    channel, theirs = ends
+    enough = threading.Event()
+
+    def drip() -> None:
+        for _ in range(200):
+            theirs.sendall(b"x")
+            if enough.wait(0.1):
+                return
+
+    dripping = threading.Thread(target=drip, daemon=True)
+    dripping.start()
+    try:
+        assert 0 < len(channel.leftovers(1, 0.5)) < 100
+    finally:
+        enough.set()
+        dripping.join()
