@@ -5,19 +5,69 @@
 
 from __future__ import annotations
 
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import Any
 
 from IPython.core.displayhook import DisplayHook
 from IPython.core.displaypub import DisplayPublisher
 from IPython.core.interactiveshell import InteractiveShell
-from IPython.utils.capture import capture_output
 from traitlets import Type
 from traitlets.config import Config
 
 MAX_OUTPUT = 64 * 1024
-"""Characters kept of one stream of one cell; a flood is cut, and says so."""
+"""Characters kept of one stream of one cell, and of what it displays; a flood is cut, and says so.
+
+The rest is dropped as it comes: a cell that prints for ever is not one that needs too much memory.
+"""
+_DISPLAY = 100  # characters that a display counts as, beside what is in it
 
 Output = dict[str, Any]
+
+
+class _Stream(io.TextIOBase):
+    """Keeps the beginning of what is written to it."""
+
+    def __init__(self) -> None:
+        self._kept: list[str] = []
+        self._room = MAX_OUTPUT
+        self._dropped = 0
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, text: str) -> int:
+        if not isinstance(text, str):
+            raise TypeError(f"write() argument must be str, not {type(text).__name__}")
+        kept = text[: max(self._room, 0)]  # less than nothing if threads write at once
+        self._room -= len(kept)
+        self._dropped += len(text) - len(kept)
+        if kept:
+            self._kept.append(kept)
+        return len(text)
+
+    def text(self) -> str:
+        return _shortened("".join(self._kept), self._dropped)
+
+
+class _Shown:
+    """Keeps the first displays of a cell."""
+
+    def __init__(self) -> None:
+        self.outputs: list[Output] = []
+        self._room = MAX_OUTPUT
+
+    def add(self, formats: dict[str, Any]) -> None:
+        """Keep one display: its text by MIME type."""
+        if self._room < 0:
+            return
+        data = {mime: value for mime, value in formats.items() if isinstance(value, str)}
+        self._room -= _DISPLAY + sum(len(value) for value in data.values())
+        if self._room < 0:
+            self.outputs.append(_stream("[further outputs were cut off here]\n"))
+        else:
+            self.outputs.append({"output_type": "display_data", "data": data, "metadata": {}})
 
 
 class _Hook(DisplayHook):
@@ -27,14 +77,14 @@ class _Hook(DisplayHook):
         """Print no prompt."""
 
     def write_format_data(self, format_dict: dict[str, Any], md_dict: Any = None) -> None:
-        _shell_of(self).shown.append(format_dict)
+        _shell_of(self).shown.add(format_dict)
 
 
 class _Publisher(DisplayPublisher):
     """Keeps what a cell displays."""
 
     def publish(self, data: Any, *_: Any, **__: Any) -> None:
-        _shell_of(self).shown.append(data)
+        _shell_of(self).shown.add(data)
 
     def clear_output(self, wait: bool = False) -> None:
         """Keep it all: the record of a run is not an animation."""
@@ -48,7 +98,7 @@ class CellShell(InteractiveShell):
 
     def __init__(self, **kwargs: Any) -> None:
         """Start with nothing shown."""
-        self.shown: list[dict[str, Any]] = []
+        self.shown = _Shown()
         self.last_error: Output | None = None
         super().__init__(**kwargs)
 
@@ -61,6 +111,11 @@ class CellShell(InteractiveShell):
             "evalue": _cut(str(evalue)),
             "traceback": [_cut(line) for line in stb],
         }
+
+    @contextmanager
+    def _tee(self, channel: str) -> Iterator[None]:
+        # IPython 9 would keep a second copy for its history: all that is written, without bounds.
+        yield
 
     def ask_exit(self) -> None:
         """Ignore ``exit``: the rest of the notebook is still run."""
@@ -90,21 +145,13 @@ def run_cell(shell: CellShell, source: str, number: int) -> list[Output]:
     """
     shell.last_error = None
     shell.execution_count = number
-    shell.shown.clear()
-    with capture_output(display=False) as captured:
+    shell.shown = _Shown()
+    out, err = _Stream(), _Stream()
+    with redirect_stdout(out), redirect_stderr(err):
         shell.run_cell(source, store_history=True)
-    outputs: list[Output] = []
-    for name in ("stdout", "stderr"):
-        if text := getattr(captured, name):
-            outputs.append(_stream(_cut(text), name))
-    room = MAX_OUTPUT
-    for shown in shell.shown:
-        data = {mime: value for mime, value in shown.items() if isinstance(value, str)}
-        room -= sum(len(value) for value in data.values())
-        if room < 0:
-            outputs.append(_stream("[further outputs were cut off here]\n"))
-            break
-        outputs.append({"output_type": "display_data", "data": data, "metadata": {}})
+    streams = [(out.text(), "stdout"), (err.text(), "stderr")]
+    outputs = [_stream(text, name) for text, name in streams if text]
+    outputs += shell.shown.outputs
     if shell.last_error is not None:
         outputs.append(shell.last_error)
     return outputs
@@ -115,6 +162,10 @@ def _stream(text: str, name: str = "stdout") -> Output:
 
 
 def _cut(text: str) -> str:
-    if len(text) <= MAX_OUTPUT:
+    return _shortened(text[:MAX_OUTPUT], max(len(text) - MAX_OUTPUT, 0))
+
+
+def _shortened(text: str, dropped: int) -> str:
+    if not dropped:
         return text
-    return f"{text[:MAX_OUTPUT]}\n[{len(text) - MAX_OUTPUT} more characters were cut off here]\n"
+    return f"{text}\n[{dropped} more characters were cut off here]\n"

@@ -178,6 +178,23 @@ class SensorDrivers(Node):
     assert {(check.status, check.actual) for check in hidden} == {("not_checked", note)}
 
 
+def test_displays_without_end_are_cut_and_say_so() -> None:
+    many = "for number in range(100_000): display({'text/plain': str(number)}, raw=True)"
+    ((*kept, last),) = runner.run((Cell(many),)).outputs
+    assert kept[1]["data"] == {"text/plain": "1"}
+    assert len(kept) < 1000
+    assert last["text"] == "[further outputs were cut off here]\n"
+
+
+def test_only_text_is_written_to_a_stream() -> None:
+    outcome = runner.run((Cell("import sys\nsys.stdout.write(b'bytes')"),))
+    ((error,),) = outcome.outputs
+    assert (error["ename"], error["evalue"]) == (
+        "TypeError",
+        "write() argument must be str, not bytes",
+    )
+
+
 def test_a_flood_of_output_is_cut() -> None:
     outcome = runner.run((Cell("print('x' * 5_000_000)"),))
     text = text_of(outcome.outputs[0])

@@ -22,7 +22,7 @@ import subprocess
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
@@ -57,6 +57,7 @@ pytestmark = [
 @dataclass(frozen=True)
 class Attack:
     name: str
+    title: str
     text: str
     told: list[str] = field(default_factory=list)
     prints: list[str] = field(default_factory=list)
@@ -75,7 +76,7 @@ def attack_of(file: Path) -> Attack:
     for key, value in re.findall(r"^# (\w+): (.*)$", text, re.MULTILINE):
         fields.setdefault(key, []).append(value)
     return Attack(
-        file.stem, text, fields.get("told", []), fields.get("prints", []),
+        file.stem, fields["title"][0], text, fields.get("told", []), fields.get("prints", []),
         fields.get("base", [EMPTY])[0], fields.get("score", ["0"])[0],
         float(fields.get("seconds", [CELL_TIMEOUT])[0]),
     )  # fmt: skip
@@ -178,6 +179,13 @@ def score(outcome: Outcome) -> float:
     return sum(verdict.score for verdict in outcome.verdicts.values())
 
 
+def gist(outcome: Outcome) -> str:
+    """Return what the grade says first: why it ended, or the first check that did not pass."""
+    checks = [check for verdict in outcome.verdicts.values() for check in verdict.checks]
+    complaints = [*outcome.notes, *(check.actual for check in checks if check.status != "passed")]
+    return complaints[0].splitlines()[0] if complaints else "every check passed"
+
+
 def grade_text(outcome: Outcome) -> str:
     checks = [check for verdict in outcome.verdicts.values() for check in verdict.checks]
     return "\n".join([*outcome.notes, *(f"{check.expected} {check.actual}" for check in checks)])
@@ -190,6 +198,7 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
     scratch: Path,
     host: tuple[int, list[socket.socket]],
     namespaces: set[int],
+    record_property: Callable[[str, object], None],
 ) -> None:
     port, listeners = host
     text = attack.text.replace("PORT", str(port)).replace("ROOT", repr(str(class_.root)))
@@ -199,8 +208,15 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
             runner.run, class_.program(attack.base, text), hidden=[class_.root],
             cell_timeout=attack.seconds,
         )  # fmt: skip
-        outcome = hostile.result()
-        assert score(neighbour.result()) == FULL, grade_text(neighbour.result())
+        outcome, beside = hostile.result(), neighbour.result()
+    for name, value in {
+        "attack": f"{attack.name}: {attack.title}",
+        "what the grade says": gist(outcome),
+        "points": f"{score(outcome):g} of {FULL:g}",
+        "neighbour's points": f"{score(beside):g} of {FULL:g}",
+    }.items():
+        record_property(name, value)
+    assert score(beside) == FULL, grade_text(beside)
 
     said, shown = grade_text(outcome), json.dumps(outcome.outputs, ensure_ascii=False)
     if attack.score != "any":
