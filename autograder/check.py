@@ -12,8 +12,9 @@ from dataclasses import replace
 from typing import Any
 
 from autograder import exams
-from autograder.harness import SUBJECT_ENV, Harness
+from autograder.harness import Harness
 from autograder.processes import ExaminerProcess
+from autograder.raised import SUBJECT_ENV
 from autograder.report import Report
 from autograder.verdict import Verdict
 from autograder.wire import Channel

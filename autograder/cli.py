@@ -131,7 +131,7 @@ def corpus(
     case: Annotated[list[str] | None, typer.Option("--case", help="Only this case.")] = None,
     repeat: Annotated[int, typer.Option("--repeat", min=1, help="Runs of each case.")] = 1,
     load: Annotated[int, typer.Option("--load", min=0, help="Busy loops beside it.")] = 0,
-    jobs: Jobs = 2,
+    jobs: Jobs = IN_FLIGHT,
     as_json: AsJson = False,
     as_table: Annotated[
         bool, typer.Option("--table", help="Run nothing; print which mutant each check catches.")

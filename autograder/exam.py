@@ -130,9 +130,24 @@ class Exam(Generic[RigT]):
             except (StudentError, SubjectGone) as error:
                 done.update((name, _blamed(self.checks[name], error)) for name in self._roots())
                 rig = None
-            results = [_worth(self._result(name, rig, done, gone), table[name]) for name in table]
+            results = [self._result(name, rig, done, gone) for name in table]
+        seen = {*table, *failed}
+        results = [self._with_reason(result, done, seen) for result in results]
         failed.update((name, result) for name, result in done.items() if result.status == "failed")
-        return Verdict(self.name, part, tuple(results))
+        return Verdict(self.name, part, tuple(_worth(r, table[r.name]) for r in results))
+
+    def _with_reason(
+        self, result: CheckResult, done: dict[str, CheckResult], seen: set[str]
+    ) -> CheckResult:
+        """Say why what a check needs failed, where no report of this notebook says so.
+
+        It may have passed in an earlier part, and not now.
+        """
+        needs = [done[need] for need in self.checks[result.name].needs if need in done]
+        hidden = [need for need in needs if need.status == "failed" and need.name not in seen]
+        if result.status != "not_checked" or not hidden:
+            return result
+        return replace(result, actual=f"{result.actual} This time it failed: {hidden[0].actual}")
 
     def _roots(self) -> list[str]:
         return [name for name, check in self.checks.items() if not check.needs]

@@ -14,6 +14,7 @@ from contextlib import ExitStack, suppress
 from functools import partial
 from typing import Any
 
+from IPython import get_ipython
 from rclpy.node import Node
 from std_msgs.msg import String
 
@@ -38,9 +39,6 @@ MAX_TOLD = 500
 
 MOST_CLEANUPS = 100
 """Nodes whose cleanup may raise while a session is closed."""
-
-SUBJECT_ENV = "AUTOGRADER_SUBJECT"
-"""Set in a subject: `autograder.check` in a student's own cell then has nothing to do."""
 
 OpenSession = Callable[[int, bool], Session]
 """Makes a session of so many threads, with simulated time or not."""
@@ -124,7 +122,7 @@ class Harness:
             return self._namespace[name]
         except KeyError:
             raise _Missing(
-                f"No {name} was defined: did its cell end with an error?{_last_error()}"
+                f"No {name} was defined: did its cell end with an error?{_cell_error(name)}"
             ) from None
 
     def _start(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -226,7 +224,8 @@ class Harness:
         }  # fmt: skip
         return {
             "counts": {
-                kind: {name: counts[kind](name) for name in names}
+                # The examiner's names: a student's node may live in a namespace of its own.
+                kind: {name: counts[kind]("/" + name.lstrip("/")) for name in names}
                 for kind, names in request["endpoints"].items()
             }
         }
@@ -268,12 +267,18 @@ class _Missing(Exception):  # noqa: N818 - nothing of the student's raised it
     """The notebook has not defined what the examiner asks for; the message says so."""
 
 
-def _last_error() -> str:
-    """Return, as a sentence, what a cell last ended with, if IPython knows of an error."""
-    error = getattr(sys, "last_value", None)
-    if error is None:
+def _cell_error(missing: str) -> str:
+    """Return, as a sentence, what a cell ended with, if IPython knows of an error.
+
+    Where a notebook is run from top to bottom that is its first: later ones may come of it. A
+    kernel knows the last alone, and that ``missing`` is missing is no news.
+    """
+    last = getattr(sys, "last_value", None)
+    error = getattr(get_ipython(), "first_error", None) or last
+    if error is None or (isinstance(error, NameError) and error.name == missing):
         return ""
-    return f" The last error of a cell was {described(error)[:MAX_TOLD].rstrip('.')}."
+    which = "last" if error is last else "first"
+    return f" The {which} error of a cell was {described(error)[:MAX_TOLD].rstrip('.')}."
 
 
 class _RaisedUnaided(Exception):  # noqa: N818 - it wraps an error, and is none itself

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 import sysconfig
 import threading
 import time
@@ -15,17 +17,25 @@ import rclpy
 MUST_NOT_SPIN = " (a callback must not spin: it runs because somebody spins already; await instead)"
 """What rclpy does not say where a callback calls ``rclpy.spin_until_future_complete``."""
 
+SUBJECT_ENV = "AUTOGRADER_SUBJECT"
+"""Set in a subject: `autograder.check` in a student's own cell then has nothing to do."""
+
 TRACE_LINES = 6
 _KEPT = 50  # errors of threads: one that is started again and again must not fill the memory
 
 _STDLIB = str(sysconfig.get_path("stdlib"))
 _INSTALLED = tuple({sysconfig.get_path(name) for name in ("purelib", "platlib")})
 _OURS = tuple(str(Path(__file__).parent.parent / part) for part in ("autograder", "course"))
+_BUILT_AT = re.compile(r",? at /\S+\.(?:c|cpp|h|hpp):\d+")
+"""Where rcl and rmw were compiled, which they add to their messages."""
 
 
 def described(error: BaseException) -> str:
     """Return what was raised, and its message if it has one."""
-    name, message = type(error).__name__, str(error)
+    name, message = type(error).__name__, _BUILT_AT.sub("", str(error))
+    if isinstance(error, SyntaxError) and error.lineno:
+        # Its message has the name that IPython gives to the cell.
+        message = f"{error.msg}, in line {error.lineno}"
     return f"{name}: {message}" if message else name
 
 
@@ -39,7 +49,9 @@ def spins(error: BaseException) -> bool:
 
 def student_trace(error: BaseException) -> str:
     """Return the last frames of ``error`` that are the student's: not Python's, rclpy's or ours."""
-    return "".join(traceback.format_list(_frames(error)[-TRACE_LINES:]))[:4000]
+    frames = _frames(error)[-TRACE_LINES:]
+    told = (f"  {_place(f)}, in {f.name}\n" + (f"    {f.line}\n" if f.line else "") for f in frames)
+    return "".join(told)[:4000]
 
 
 def student_line(error: BaseException) -> str:
@@ -60,7 +72,25 @@ def own_line(error: BaseException) -> str:
 
 
 def _line(frames: list[traceback.FrameSummary]) -> str:
-    return "".join(f"line {frame.lineno}: {frame.line}".removesuffix(": ") for frame in frames)
+    return "".join(f"{_place(frame)}: {frame.line}".removesuffix(": ") for frame in frames)
+
+
+def _place(frame: traceback.FrameSummary) -> str:
+    """Return which line of which cell or file a frame is in, without the way to a file.
+
+    A cell has the number that stands beside it. Where a notebook is run to be graded, from top to
+    bottom, it is how many code cells there are up to it; what it was at the student's is not known.
+    """
+    from IPython.core.getipython import get_ipython  # it takes long, and an engine needs it not
+
+    shell = get_ipython()
+    cell = shell.compile.format_code_name(frame.filename) if shell is not None else None
+    if cell is None:
+        return f"line {frame.lineno} of {Path(frame.filename).name}"
+    name = " ".join(cell)  # Cell In[3]
+    if SUBJECT_ENV in os.environ:
+        name = f"code cell {re.sub('[^0-9]', '', name)}"
+    return f"line {frame.lineno} of {name}"
 
 
 def _frames(error: BaseException) -> list[traceback.FrameSummary]:

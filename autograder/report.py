@@ -78,7 +78,8 @@ class Report:
             shown = check.hints[: self._hints]
             details += [(f"hint {n}", hint) for n, hint in enumerate(shown, start=1)]
             if len(shown) < len(check.hints):
-                more = f'check("{self._verdict.exam}", hint={len(shown) + 1})'
+                part = "" if self._verdict.part == "visible" else f', part="{self._verdict.part}"'
+                more = f'check("{self._verdict.exam}"{part}, hint={len(shown) + 1})'
                 details.append(("more help", more))
             details.append(("read", check.read))
         return [(label, text) for label, text in details if text]

@@ -100,11 +100,13 @@ class CellShell(InteractiveShell):
         """Start with nothing shown."""
         self.shown = _Shown()
         self.last_error: Output | None = None
+        self.first_error: BaseException | None = None
         super().__init__(**kwargs)
 
     def _showtraceback(
         self, etype: type[BaseException], evalue: BaseException, stb: list[str]
     ) -> None:
+        self.first_error = self.first_error or evalue
         self.last_error = {
             "output_type": "error",
             "ename": getattr(etype, "__name__", str(etype)),

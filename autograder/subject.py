@@ -17,7 +17,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from autograder import stuck
-from autograder.harness import SUBJECT_ENV, Harness
+from autograder.harness import Harness
+from autograder.raised import SUBJECT_ENV
 from autograder.sandbox.limits import Limits
 from autograder.shell import make_shell, run_cell
 from autograder.wire import Channel, ChannelClosed

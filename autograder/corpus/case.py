@@ -21,6 +21,9 @@ STUB_MARK = "# Your work goes here."
 EVERYTHING = "everything"
 ROOTS = "the first"
 
+OURS = ("autograder", "site-packages", "/tmp/", "/project/src", "Traceback", "ipython-input")
+"""What no feedback may hold: the grader's own insides, paths, and tracebacks."""
+
 Splice = tuple[str, str]
 
 
@@ -142,8 +145,11 @@ class Case:
         for name, fragment in self.says.items():
             if name in checks and name not in unknown and fragment not in _words(checks[name]):
                 differences.append(f"{name} does not say {fragment!r}: {_words(checks[name])!r}")
+        texts = [_words(check) for check in checks.values() if check.name not in spoilt]
+        for text in (*texts, *(note for v in outcome.verdicts.values() for note in v.notes)):
+            differences += [f"feedback holds {ours!r}: {text!r}" for ours in OURS if ours in text]
         return "; ".join(differences)
 
 
 def _words(result: CheckResult) -> str:
-    return f"{result.expected} {result.actual}"
+    return f"{result.expected} {result.actual} {result.note}"

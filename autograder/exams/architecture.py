@@ -7,25 +7,24 @@ the task allows; only the robot's boundary has fixed names.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from autograder.bench import StudentError
 from autograder.exam import Exam, Failed
 from autograder.rigs.architecture import ArchitectureRig, architecture_rig
-from autograder.rigs.pouring import POURS, GoalRejectedError, Poured
-from autograder.rigs.robot_jobs import ACTION, MOTORS, MOTORS_TYPE, SENSORS, STREAMS
+from autograder.rigs.pouring import POURS, GoalRejectedError
+from autograder.rigs.robot_jobs import ACTION, MOTORS, MOTORS_TYPE, SENSORS, STREAMS, WHEELS
 from autograder.rigs.robot_reasons import (
     alike,
+    every,
     instead,
     is_carried,
+    link_faults,
     listed,
     nodes,
-    offer_faults,
-    topic_faults,
     why_no_obstacles,
     why_no_planner,
     why_no_pose,
 )
+from autograder.rigs.robot_traces import raised, see_scan_arrive, stranded
 from autograder.rigs.robot_types import UnknownTypeError, load_type
 from course import WaitTimeout
 from course.design import dye
@@ -33,7 +32,6 @@ from course.design import dye
 EXAM: Exam[ArchitectureRig] = Exam("architecture", architecture_rig)
 
 MOST_JOBS = 2
-READINGS = {"/scan": "a scan", "/camera/image": "an image"}
 
 READ_NODES = "Chapter 5, “Nodes: the processing units”"
 READ_TOPICS = "Chapter 5, “Topics: continuous data sharing”"
@@ -121,12 +119,11 @@ def navigation_action(rig: ArchitectureRig) -> None:
         raise Failed(expected=expected, actual=f"No node is its server{instead(rig.graph)}.")
     if len(servers) > 1:
         raise Failed(expected=expected, actual=f"It has {len(servers)} servers: {nodes(servers)}.")
-    fed = rig.graph.reached(rig.jobs.reading(SENSORS, ()) | rig.jobs.drivers - servers, ("topic",))
-    if not servers & fed:
+    if not rig.jobs.informed:
         raise Failed(
             expected=expected,
-            actual=f"{nodes(servers)} is the server, but no topic leads to it from "
-            f"{listed(SENSORS, 'or')}: it would drive blind.",
+            actual=f"{nodes(servers)} is the server, but no topic brings it readings, "
+            "obstacle information or the pose: it would drive blind.",
         )
 
 
@@ -178,6 +175,13 @@ def pose_published(rig: ArchitectureRig) -> None:
             expected="A node that reads sensors publishes the pose, as Odometry or one of the Pose "
             "types, on a topic other than /wheel/odometry.",
             actual=why_no_pose(rig.jobs),
+        )
+    poses = [topic.name for topic in rig.jobs.pose_topics]
+    if rig.jobs.pose_of_wheels and not rig.estimates(poses):
+        raise Failed(
+            expected="While the wheel encoders report, the pose is published.",
+            actual=f"Odometry came in on {WHEELS}, and nothing was ever published on "
+            f"{listed(poses, 'or')}{raised(rig)}.",
         )
 
 
@@ -231,7 +235,9 @@ def motors_driven(rig: ArchitectureRig) -> None:
     if types != {MOTORS_TYPE}:
         raise Failed(expected=expected, actual=f"It is published as {listed(sorted(types))}.")
     if len(drivers) > 1:
-        raise Failed(expected=expected, actual=f"{nodes(drivers)} all command the motors.")
+        raise Failed(expected=expected, actual=f"{every(drivers)} command the motors.")
+    if twins := drivers & rig.graph.namesakes:
+        raise Failed(expected=expected, actual=f"Two nodes called {nodes(twins)} command them.")
     if not drivers & rig.jobs.goal_reaches:
         raise Failed(
             expected=expected,
@@ -248,7 +254,7 @@ def motors_driven(rig: ArchitectureRig) -> None:
         "Add who is missing, or take the endpoint out; where QoS does not fit, offer more or ask "
         "for less.",
     ),
-    read="ROS 2 documentation, “Quality of Service settings: QoS compatibilities”",
+    read="Chapter 5, “Experiment 2: two ends that do not fit”",
 )
 def links_connect(rig: ArchitectureRig) -> None:
     """Every topic has a writer and a reader, every call a server, and DDS connects them.
@@ -256,7 +262,7 @@ def links_connect(rig: ArchitectureRig) -> None:
     A wrong name or profile raises no error in ROS 2: the link simply stays silent, and you look for
     the mistake everywhere else.
     """
-    faults = [*topic_faults(rig.graph), *offer_faults(rig.graph)]
+    faults = link_faults(rig.graph)
     if not rig.graph.topics:
         faults.append("No topic connects anything.")
     if faults:
@@ -358,24 +364,13 @@ def goal_reaches_motors(rig: ArchitectureRig) -> None:
             "coming in between.",
         ) from None
     if not poured.enough:
-        raise Failed(expected=expected, actual=_stranded(rig, poured, [MOTORS]))
-
-
-def _stranded(rig: ArchitectureRig, poured: Poured, wanted: Iterable[str]) -> str:
-    """Return how far the dye got instead, and what the student's callbacks raised."""
-    there = listed(wanted, "or")
-    way = f"{listed(poured.lost_on)}, but" if poured.lost_on else "no topic, and so"
-    where = f"It was seen on {way} never on {there}"
-    if poured.arrived:
-        others = (
-            f"; the others were seen on {way} never there" if poured.marks > poured.arrived else ""
+        raise Failed(expected=expected, actual=stranded(rig, poured, [MOTORS]))
+    if poured.turned_away:
+        raise Failed(
+            expected=f"The server of {ACTION} takes a goal whenever the one before is over.",
+            actual=f"It took a goal, and after that was over it rejected "
+            f"{'the next' if poured.turned_away == 1 else f'{poured.turned_away} others'}.",
         )
-        where = f"Of {poured.marks} marks {poured.arrived} was seen on {there}{others}"
-    if poured.aside:
-        where += f"; {poured.aside}"
-    raised = rig.subject.errors()
-    why = f"; a callback raised {raised[-1]}" if raised else ""
-    return f"{where}{why}."
 
 
 @EXAM.check(
@@ -383,7 +378,8 @@ def _stranded(rig: ArchitectureRig, poured: Poured, wanted: Iterable[str]) -> st
     hints=(
         "Follow a scan from /scan to the obstacle information, and from there to the motors.",
         "Somewhere a node reads and does not write, or a message has no room for what it says.",
-        "If you wrote nodes yourself, let them call `course.design.carry(received, sent)`.",
+        "If you wrote nodes yourself, let them call `course.design.carry(received, sent)`; make "
+        "all of their endpoints in the constructor.",
     ),
     read=READ_PATTERNS,
 )
@@ -399,16 +395,10 @@ def scan_reaches_motors(rig: ArchitectureRig) -> None:
             expected="Obstacle information has a message type that is installed.",
             actual=f"{topic.name} is of type {listed(topic.types)}, unknown to the examiner.",
         )
-    eye = rig.jobs.eye(topics.values())
-    poured = rig.colour_topics([rig.graph.topic(eye)], topics)
-    if not poured.enough:
+    see_scan_arrive(rig, topics)
+    if faults := rig.new_faults():
         raise Failed(
-            expected=f"The mark of {READINGS[eye]} on {eye} is seen on {listed(topics, 'or')}.",
-            actual=_stranded(rig, poured, topics),
-        )
-    poured = rig.colour_topics(topics.values(), [MOTORS])
-    if not poured.enough:
-        raise Failed(
-            expected=f"The mark of a message on {listed(topics, 'or')} is seen on {MOTORS}.",
-            actual=_stranded(rig, poured, [MOTORS]),
+            expected="Every endpoint is there as soon as its node is, and those that come later "
+            "keep to the same rules.",
+            actual=f"While marks were poured in, this was new on the graph: {' '.join(faults[:4])}",
         )

@@ -11,38 +11,62 @@ from collections.abc import Callable
 from functools import wraps
 
 from autograder.exam import Exam, Failed
-from autograder.rigs.camera import PERIOD, CameraRig, camera_rig, phrase
+from autograder.rigs.camera import PERIOD, CameraRig, camera_rig
 from autograder.rigs.camera_duties import (
-    let_arrive,
+    DRIVER,
     require_callbacks_ended,
     require_closed,
+    require_default_device,
     require_endpoints,
     require_gone,
-    require_no_queue,
     require_open,
-    require_own_clock,
     require_picture,
-    require_rate,
+    require_threads_ended,
+)
+from autograder.rigs.camera_orders import (
+    require_no_queue,
+    require_one_picture_each,
     require_snapshot,
     require_snapshots_under_way,
-    require_threads_ended,
     require_zoom,
+    require_zoom_at_once,
     require_zoom_kept,
 )
-from autograder.rigs.lives import DRIVER, LIVES, MEMORY, attempt, failing_starts, growth
-from autograder.rigs.managed import (
-    Managed,
-    require_configuration,
-    require_flat_rounds,
-    require_fresh,
+from autograder.rigs.camera_rate import (
+    let_arrive,
+    require_own_clock,
+    require_rate,
+    require_tick_zoom,
+)
+from autograder.rigs.lives import LIVES, MEMORY, growth
+from autograder.rigs.managed import Managed
+from autograder.rigs.managed_holdings import (
     require_no_publisher_yet,
     require_nothing_held,
     require_off_graph,
     require_one_publisher,
-    require_refused,
+    require_only_pictures,
+)
+from autograder.rigs.managed_inactive import (
+    require_fresh,
     require_silent_at_once,
     require_still,
     require_still_held,
+    require_stopped,
+)
+from autograder.rigs.managed_rounds import (
+    require_configuration,
+    require_flat_rounds,
+    require_refusals,
+)
+from autograder.rigs.phrases import phrase
+from autograder.rigs.residue import (
+    attempt,
+    failing_starts,
+    failing_starts_memory,
+    refuse_zooms,
+    require_flat_refusals,
+    require_flat_snapshots,
 )
 
 EXAM: Exam[CameraRig] = Exam("resources", camera_rig)
@@ -51,7 +75,7 @@ MANAGED = "ManagedCamera"
 FAILING_STARTS = 10
 FASTEST = 30.0  # Hz, the highest rate that is allowed
 
-READ_NODES = "Chapter 5, “Lifecycle management” and “Resource management” of nodes"
+READ_NODES = "Chapter 5, “Nodes: lifecycle management” and “Nodes: resource management”"
 READ_MANAGED = "ROS 2 design, “Managed nodes”"
 
 
@@ -91,6 +115,10 @@ def driver_runs(rig: CameraRig) -> None:
         require_rate(rig, device, 1 / PERIOD)
         require_zoom(rig, device, 3, "While the driver runs")
         require_zoom_kept(rig, device, 3, "After a zoom of 3")
+        require_one_picture_each(rig, device, "While the driver runs")
+        require_zoom_at_once(rig, device, 8, "While the driver runs")
+        require_tick_zoom(rig, device, 8, "After a zoom of 8")
+    require_default_device(rig, DRIVER)
 
 
 @EXAM.check(
@@ -112,7 +140,7 @@ def endpoints_gone(rig: CameraRig) -> None:
     device = rig.device()
     with rig.life(DRIVER, device) as node:
         require_endpoints(rig, node)
-        rig.stop(DRIVER, bare=True)
+        rig.program.stop(DRIVER, bare=True)
         require_gone(rig, device, "After destroy_node()", node)
 
 
@@ -136,7 +164,7 @@ def camera_given_back(rig: CameraRig) -> None:
     for _ in range(2):  # it has been started before: for the check that this one needs
         with rig.life(DRIVER, device):
             require_picture(rig, device, "When the driver is started again,")
-            rig.stop(DRIVER)
+            rig.program.stop(DRIVER)
             require_closed(rig, device, "After destroy_node()")
 
 
@@ -165,6 +193,8 @@ def lives_are_flat(rig: CameraRig) -> str:
             f"{MEMORY} KiB a life.",
             actual=f"Each life of the driver left {phrase(leaked)} behind.",
         )
+    with rig.trying():
+        require_flat_snapshots(rig)
     if grown.made < LIVES:
         return f"A life of your driver takes {grown.pace:.1f} s, so it was given {grown.made}."
     return ""
@@ -192,8 +222,8 @@ def cleanup_twice(rig: CameraRig) -> None:
     threads = rig.process.thread_ids()
     with rig.life(DRIVER, device):
         require_picture(rig, device)
-        rig.destroy(DRIVER)
-        rig.destroy_again(DRIVER)
+        rig.program.destroy(DRIVER)
+        rig.program.destroy_again(DRIVER)
         require_closed(rig, device, "After destroy_node()")
         # The program still refers to the node: no thread ends because Python collects it.
         require_threads_ended(rig, threads, "After destroy_node()")
@@ -225,11 +255,13 @@ def failed_start(rig: CameraRig) -> None:
         # A participant's endpoints are told in order: when those of a driver that works are known,
         # those of the failed starts before it are known, too.
         device = rig.device()
-        node = rig.start(DRIVER, device)
+        node = rig.program.start(DRIVER, device)
         require_picture(rig, device)
         require_endpoints(rig, node)
-        rig.stop(DRIVER)
+        attempt(rig, device)  # it can be open once
+        rig.program.stop(DRIVER)
         require_gone(rig, device, "After failed starts, one that worked, and its end,", node)
+        failing_starts_memory(rig, "stuck", FAILING_STARTS)
 
 
 @EXAM.check(
@@ -257,6 +289,7 @@ def managed_runs(rig: CameraRig) -> None:
         require_open(rig, device)
         node.go("activate")
         require_picture(rig, device)
+        require_only_pictures(rig)
         require_own_clock(rig, device)
         require_rate(rig, device, 10)
         node.go("deactivate", "cleanup")
@@ -283,6 +316,7 @@ def silent_when_inactive(rig: CameraRig) -> None:
     with rig.life(MANAGED) as name:
         node = Managed(rig, name)
         node.require(device=device)
+        strange = rig.node.strange()
         node.go("configure")
         require_still(rig, device, "configure")
         node.go("activate")
@@ -294,9 +328,11 @@ def silent_when_inactive(rig: CameraRig) -> None:
         require_still_held(rig, device)
         asked = max(rig.cameras(device), default=0)
         node.go("activate")
-        require_fresh(rig, device, sent, asked)
+        require_fresh(rig, device, sent, asked, strange)
         require_rate(rig, device, 10, " after a second “activate”")
-        node.go("deactivate", "cleanup")
+        node.go("deactivate")
+        require_stopped(rig, device, "deactivate")
+        node.go("cleanup")
         slow = rig.device("slow")
         node.require(device=slow)
         node.go("configure")
@@ -323,6 +359,7 @@ def managed_gives_back(rig: CameraRig) -> None:
     with rig.life(MANAGED) as name:
         node = Managed(rig, name)
         require_no_publisher_yet(rig)
+        node.require_defaults()
         require_configuration(rig, node, 10.0, later=20.0)
         require_configuration(rig, node, FASTEST)
         require_configuration(rig, node, 1.5, seconds=4)  # neither 1 nor 2 Hz
@@ -347,10 +384,9 @@ def configure_refused(rig: CameraRig) -> None:
     """
     with rig.life(MANAGED) as name:
         node = Managed(rig, name)
-        refused = (0.0, -5.0, FASTEST + 1.0, 1000.0)
-        for rate in refused:
-            require_refused(rig, node, f"a rate of {rate:g} Hz", rate, "front")
-        require_refused(rig, node, "a camera 'unplugged'", 10.0, "unplugged")
+        require_refusals(rig, node, (0.0, -5.0, FASTEST + 0.5, 1000.0))
+        node.require(device=rig.device(), rate=0.5)  # slow, and allowed
+        node.go("configure", "cleanup")
         device = rig.device()
         node.require(device=device, rate=10.0)
         node.go("configure", "activate")
@@ -377,24 +413,29 @@ def activation_error(rig: CameraRig) -> None:
     """
     with rig.life(MANAGED) as name:
         node = Managed(rig, name)
-        device = rig.device("stuck")
-        node.require(device=device)
-        # Whoever tries the stream when the node is configured finds out even earlier.
-        if (state := node.attempt("configure")) == "inactive":
-            require_one_publisher(rig)
-            state = node.attempt("activate")
-        if state not in ("unconfigured", "finalized"):
-            raise Failed(
-                expected="If the stream does not start, your node ends unconfigured or finalized.",
-                actual=f"It is {state}.",
-            )
-        require_nothing_held(rig, device, "After the error")
-        if state == "unconfigured":
-            device = rig.device()
+        for time in ("", " a second time"):
+            device, threads = rig.device("stuck"), rig.process.thread_ids()
             node.require(device=device)
-            node.go("configure", "activate")
-            require_picture(rig, device)
-            require_rate(rig, device, 10, " after an error and a restart")
+            # Whoever tries the stream when the node is configured finds out even earlier.
+            if (state := node.attempt("configure")) == "inactive":
+                require_one_publisher(rig)
+                state = node.attempt("activate")
+            if state not in ("unconfigured", "finalized"):
+                raise Failed(
+                    expected=f"If the stream does not start{time}, your node ends unconfigured or "
+                    "finalized.",
+                    actual=f"It is {state}.",
+                )
+            require_nothing_held(rig, device, f"After the error{time}")
+            if state == "finalized":
+                return
+        # The middleware may have started a thread the first time.
+        require_threads_ended(rig, threads, "After the error")
+        device = rig.device()
+        node.require(device=device)
+        node.go("configure", "activate")
+        require_picture(rig, device)
+        require_rate(rig, device, 10, " after an error and a restart")
 
 
 @EXAM.check(
@@ -418,7 +459,7 @@ def managed_shutdown(rig: CameraRig) -> None:
         for state, path in paths.items():
             device = rig.device()
             with rig.life(MANAGED) as name:
-                node = Managed(rig, name)
+                node, threads = Managed(rig, name), rig.process.thread_ids()
                 node.require(device=device)
                 node.go(*path)
                 if path:
@@ -426,11 +467,15 @@ def managed_shutdown(rig: CameraRig) -> None:
                 if end == "shutdown":
                     node.go("shutdown")
                 else:
-                    rig.stop(MANAGED, bare=True)
-                require_nothing_held(rig, device, f"After {end} in the state {state}")
+                    rig.program.stop(MANAGED, bare=True)
+                when = f"After {end} in the state {state}"
+                require_nothing_held(rig, device, when)
+                if state == "active":  # by now the middleware has the threads that it keeps
+                    require_threads_ended(rig, threads, when)
                 if end == "shutdown":
-                    rig.stop(MANAGED, bare=True)  # finalized is a state, too
+                    rig.program.stop(MANAGED, bare=True)  # finalized is a state, too
                 require_off_graph(rig, name, "After destroy_node()")
+                rig.program.destroy_again(MANAGED)
 
 
 @EXAM.check(
@@ -452,12 +497,17 @@ def callback_raises(rig: CameraRig) -> None:
     with rig.life(DRIVER, device) as node:
         require_endpoints(rig, node)
         require_zoom(rig, device, 2, "While the driver runs")
-        rig.refused_zoom(99)
-        require_zoom_kept(rig, device, 2, "After a zoom of 99")
-        require_zoom(rig, device, 5, "After a zoom of 99")
-        rig.stop(DRIVER)
+        for factor in (99, 0, -1):
+            rig.refused_zoom(factor)
+            require_zoom_kept(rig, device, 2, f"After a zoom of {factor}")
+        require_zoom_at_once(rig, device, 1, "After a zoom of -1")
+        require_rate(rig, device, 1 / PERIOD, " after a zoom that was refused")
+        before = rig.process.usage()
+        refuse_zooms(rig)
+        rig.program.stop(DRIVER)
         require_closed(rig, device, "After destroy_node()")
         require_gone(rig, device, "After destroy_node()", node)
+        require_flat_refusals(rig, before)
 
 
 @EXAM.check(
@@ -484,19 +534,19 @@ def cleanup_when_busy(rig: CameraRig) -> None:
     device = rig.device("slow")
     with rig.life(DRIVER, device) as node:
         require_endpoints(rig, node)
-        require_snapshot(rig, device, "While the driver runs")
+        require_snapshot(rig, device, "While the driver runs", slow=True)
         require_snapshots_under_way(rig, device)
         when, threads = "After destroy_node() during a snapshot", rig.process.thread_ids()
-        rig.destroy(DRIVER)
+        rig.program.destroy(DRIVER)
         require_closed(rig, device, when)
         require_gone(rig, device, when, node)
-        rig.drop(DRIVER)
+        rig.program.drop(DRIVER)
         require_callbacks_ended(rig, threads, usual, when)
         again = rig.device()
-        rig.start(DRIVER, again)
+        rig.program.start(DRIVER, again)
         require_zoom(rig, again, 4, "After a restart")
     device = rig.device("slow")
     with rig.life(DRIVER, device):
         require_picture(rig, device)
-        require_no_queue(rig, device, lambda: rig.destroy(DRIVER))
+        require_no_queue(rig, device, lambda: rig.program.destroy(DRIVER))
         require_closed(rig, device, "After destroy_node() with a slow camera")

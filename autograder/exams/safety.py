@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from autograder.exam import Exam
 from autograder.rigs.safety import RobotRig, robot_rig
-from autograder.rigs.trials import drives, goals, grips, speeds
+from autograder.rigs.trials import drives, goals, grips, late_answers, shutdowns, speeds
 
 EXAM: Exam[RobotRig] = Exam("safety", robot_rig)
 
 READ_SERVICES = "Chapter 5, “Services: error handling”"
-READ_ACTIONS = "Chapter 5, “Actions: cancelation support”"
-READ_ERRORS = "Chapter 5, “Exercise solutions: error handling”"
+READ_GOALS = "Chapter 5, “Actions: goal, feedback, result”"
+READ_CANCELS = "Chapter 5, “Actions: cancellation”"
+READ_STATUS = "Chapter 5, “Actions: goal status”"
 READ_ASYNC = "ROS 2 documentation, “Synchronous vs. asynchronous service clients”"
 READ_GROUPS = "ROS 2 documentation, “Using callback groups”"
 
@@ -60,7 +61,7 @@ def gripper_refuses(rig: RobotRig) -> None:
         "Loop over the pauses, such as 0.5 s and 1.0 s, on the node's clock; then give up.",
         "After the third try without an answer: publish on arm/hold, then `failed`.",
     ),
-    read=READ_ERRORS,
+    read=READ_SERVICES,
 )
 def gripper_retries(rig: RobotRig) -> None:
     """Without answers there are three tries with growing pauses, then a safe end.
@@ -111,7 +112,7 @@ def speed_refuses(rig: RobotRig) -> None:
         "`goal_handle.accepted` answers the first, `response.status` of the result the second.",
         "Only STATUS_SUCCEEDED is `arrived`. With any other word publish `Twist()` on cmd_vel.",
     ),
-    read=READ_ACTIONS,
+    read=READ_STATUS,
 )
 def goals_end(rig: RobotRig) -> None:
     """Arrived, rejected, aborted: each end of a goal is told apart, and failures stop the robot.
@@ -129,7 +130,7 @@ def goals_end(rig: RobotRig) -> None:
         "Feedback is the sign of life: start a timer of 2 s at acceptance, and again with each.",
         "When it fires: `cancel_goal_async()`, a zero Twist, then `stalled`. Cancel it at the end.",
     ),
-    read=READ_ACTIONS,
+    read=READ_CANCELS,
 )
 def goals_stall(rig: RobotRig) -> None:
     """A drive without feedback for 2 s is canceled, a long one with feedback is not.
@@ -145,7 +146,7 @@ def goals_stall(rig: RobotRig) -> None:
         "Reject bad orders in the goal callback: in `execute` it is too late, it was accepted.",
         "A second a metre: command the wheels, `await sleep`, feedback; then succeed, and stop.",
     ),
-    read=READ_ACTIONS,
+    read=READ_GOALS,
 )
 def drive_arrives(rig: RobotRig) -> None:
     """A valid goal is driven with feedback and ends in a stop, an invalid one is rejected.
@@ -162,7 +163,7 @@ def drive_arrives(rig: RobotRig) -> None:
         "Accept it in the cancel callback, and look at `goal_handle.is_cancel_requested` often.",
         "In the loop: if requested, `goal_handle.canceled()` and return; `finally` stop wheels.",
     ),
-    read=READ_ACTIONS,
+    read=READ_CANCELS,
 )
 def drive_cancels(rig: RobotRig) -> None:
     """A canceled drive ends within 0.5 s, and the robot stands.
@@ -179,7 +180,7 @@ def drive_cancels(rig: RobotRig) -> None:
         "Catch WheelError around the whole loop: say why on drive/fault, then abort the goal.",
         "`except WheelError as error:` publish it, `goal_handle.abort()`; `finally:` stop.",
     ),
-    read=READ_ERRORS,
+    read=READ_STATUS,
 )
 def drive_aborts(rig: RobotRig) -> None:
     """Jammed wheels abort the drive with a reason, the robot stands, and later goals are served.
@@ -204,7 +205,7 @@ def gripper_stale(rig: RobotRig) -> None:
     The late answer is about the past. Taken for the present one, it says `done` while the gripper
     is still moving, or reports one grip twice.
     """
-    grips.stale(rig)
+    late_answers.stale(rig)
 
 
 @EXAM.check(
@@ -231,7 +232,7 @@ def gripper_absent(rig: RobotRig) -> None:
         "Work on a copy, and let it take the place of the limits after `set_limits` has returned.",
         "Copy `self.limits`, check all, `try: self.wheels.set_limits(**copy)`, and then store.",
     ),
-    read=READ_ERRORS,
+    read=READ_SERVICES,
 )
 def speed_atomic(rig: RobotRig) -> None:
     """A half-good request, or wheels that raise, leave the old limits as they were.
@@ -248,7 +249,7 @@ def speed_atomic(rig: RobotRig) -> None:
         "The goal's answer, the result and the cancel's answer: none of them may wait for ever.",
         "Cancel each future after its time, then `lost`; empty `goals_canceling` means `runaway`.",
     ),
-    read=READ_ERRORS,
+    read=READ_STATUS,
 )
 def goals_lost(rig: RobotRig) -> None:
     """A navigator that refuses to cancel, dies on the way or is absent is reported, with a stop.
@@ -265,7 +266,7 @@ def goals_lost(rig: RobotRig) -> None:
         "A stop alone does not last: the loop drives on. Tell the loop, too.",
         "Set a flag, and stop the wheels; the loop looks at the flag, aborts the goal, returns.",
     ),
-    read="Chapter 5, “Nodes: the processing units”",
+    read="Chapter 5, “Nodes: lifecycle management”",
 )
 def drive_shutdown(rig: RobotRig) -> None:
     """A node that is shut down in the middle of a drive leaves the robot standing.
@@ -273,4 +274,4 @@ def drive_shutdown(rig: RobotRig) -> None:
     An update, Ctrl-C, a launch file that ends: nodes go down while the robot drives, and nobody
     is left to tell the wheels.
     """
-    drives.shutdown(rig)
+    shutdowns.shutdown(rig)

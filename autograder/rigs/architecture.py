@@ -14,10 +14,12 @@ from typing import Any
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from autograder.bench import Bench, StudentError
-from autograder.rigs.pouring import SETTLE, Poured, Pours
+from autograder.rigs.errands import SETTLE
+from autograder.rigs.pouring import Poured, Pours
 from autograder.rigs.quiet import QuietNode
 from autograder.rigs.robot_graph import RobotGraph, Topic, read_graph
-from autograder.rigs.robot_jobs import ACTION, SENSORS, Jobs
+from autograder.rigs.robot_jobs import ACTION, MOTORS, SENSORS, WHEELS, Jobs
+from autograder.rigs.robot_reasons import every, link_faults
 from autograder.rigs.robot_types import UnknownTypeError, load_type
 from course import WaitTimeout
 from course.design import dye
@@ -38,6 +40,7 @@ class ArchitectureRig:
         self.graph = RobotGraph()
         self.jobs = Jobs(self.graph)
         self.seen: dict[str, set[int]] = defaultdict(set)
+        self._heard: set[str] = set()
         self._pours = Pours(bench.session, self.node, self.seen)
         self._labels: list[str] = []
 
@@ -50,14 +53,25 @@ class ArchitectureRig:
         """
         self.subject.open(threads=THREADS)
         self._labels = list(self.subject.start_all(DESIGN))
-        mark = f"_mark_{secrets.token_hex(4)}"
-        self.subject.mark(mark)
-        self._session.until(partial(self._has_seen, mark), 4 * SETTLE, "the mark on the graph")
-        self.graph = read_graph(self.node)
+        self.graph = self._read_graph()
         self.jobs = Jobs(self.graph)
         for topic in self.graph.topics.values():
             if topic.writers:
                 self._tap(topic)
+
+    def _read_graph(self) -> RobotGraph:
+        """Read the graph when all is on it that the subject's nodes have by now."""
+        mark = f"_mark_{secrets.token_hex(4)}"
+        self.subject.mark(mark)
+        self._session.until(partial(self._has_seen, mark), 4 * SETTLE, "the mark on the graph")
+        return read_graph(self.node)
+
+    def new_faults(self) -> list[str]:
+        """Return what is wrong with endpoints that have come since the start, a sentence each."""
+        now = self._read_graph()
+        drivers = now.topic(MOTORS).written_by
+        two = [f"{every(drivers)} command the motors."] if len(drivers) > 1 else []
+        return (two if drivers - self.jobs.controllers else []) + link_faults(now.since(self.graph))
 
     def _has_seen(self, mark: str) -> bool:
         ends = (
@@ -81,6 +95,7 @@ class ArchitectureRig:
 
     def _note(self, topic: str, message: Any) -> None:
         tags = dye.read_all(message)
+        self._heard.add(topic)
         self.seen[topic].update(tags)
         self._pours.overheard(topic, tags)
 
@@ -99,6 +114,12 @@ class ArchitectureRig:
         return False
 
     # Dye.
+
+    def estimates(self, poses: Collection[str]) -> bool:
+        """Whether anything comes on one of ``poses`` while wheels and LIDAR report."""
+        self._wait_for_taps()
+        topics = [topic for topic in self._sensors() if topic.name in (WHEELS, "/scan")]
+        return self._pours.roll_until(topics, lambda: bool(self._heard & set(poses)))
 
     def colour_goal(self, action: str, action_type: Any, arrived_on: Collection[str]) -> Poured:
         """Send marked navigation goals: see `Pours.goals`."""

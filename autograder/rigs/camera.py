@@ -12,36 +12,22 @@ from __future__ import annotations
 
 import re
 import secrets
-import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
-from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from rclpy.duration import Duration
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import Image
 from std_msgs.msg import Int32
 
-from autograder.bench import REPLY_TIMEOUT, Bench, StudentError, SubjectGone
+from autograder.bench import PATIENCE, Bench, StudentError
 from autograder.exam import Failed
+from autograder.rigs.camera_graph import CameraGraph
+from autograder.rigs.camera_node import ExaminerNode, Picture
+from autograder.rigs.camera_program import Program
+from autograder.rigs.phrases import phrase
 from autograder.rigs.process import Process
-from autograder.rigs.quiet import QuietNode
 from course import WaitTimeout
-from course.runtime.names import full_name
 from course.runtime.waiting import Deadline
-
-IMAGE, ZOOM, SNAPSHOT = "camera/image", "camera/zoom", "camera/snapshot"
-
-PUBLISHER = f"a publisher on {IMAGE}"
-SUBSCRIPTION = f"a subscription to {ZOOM}"
-SERVICE = f"a service {SNAPSHOT}"
-TYPES = {
-    PUBLISHER: "sensor_msgs/msg/Image",
-    SUBSCRIPTION: "std_msgs/msg/Int32",
-    SERVICE: "std_srvs/srv/Trigger",
-}
 
 SETTLE = 8.0
 """Seconds that something expected may take: it takes milliseconds, on a busy machine a few s."""
@@ -49,54 +35,10 @@ GHOSTS = 1.0
 """Seconds that endpoints of an earlier life are given to go off the graph."""
 RESEND = 1.0
 """Seconds after which a request that has no response is made again."""
+NUDGE = 0.05
+"""Seconds after which a callback that does not answer may be one that awaits something."""
 PERIOD = 0.1
 """Seconds of simulated time between two pictures, and of wall time between two probes."""
-
-
-class Picture(NamedTuple):
-    """What a picture's pixels say: its device, its number since the device was opened, its zoom.
-
-    And when it was published, by DDS: in ns of this machine's time of day.
-    """
-
-    device: str
-    number: int
-    zoom: int
-    published: int
-
-
-def _picture(message: Any, published: int) -> Picture | None:
-    label = bytes(message.data[:200]).split(b"\n")[0].decode(errors="replace")
-    found = re.fullmatch(r"([\w-]{1,100}) (\d{1,9}) (\d{1,3})", label)
-    return Picture(found[1], int(found[2]), int(found[3]), published) if found else None
-
-
-class ExaminerNode(QuietNode):
-    """The examiner's endpoints, and what each of two readers got, in the order of its arrival."""
-
-    def __init__(self) -> None:
-        """Listen on the image topic, whichever reliability is offered."""
-        super().__init__(f"examiner_{secrets.token_hex(4)}")
-        self.heard: dict[ReliabilityPolicy, list[Picture]] = {}
-        for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
-            qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=reliability)
-            heard = self.heard[reliability] = []
-            note = partial(self._note, heard)
-            self.create_subscription(Image, IMAGE, note, qos)
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self.zoom = self.create_publisher(Int32, ZOOM, latched)
-
-    def _note(self, heard: list[Picture], message: Any, info: dict[str, int]) -> None:
-        if (picture := _picture(message, info["source_timestamp"])) is not None:
-            heard.append(picture)
-
-    def of(self, device: str) -> list[Picture]:
-        """Return the pictures of ``device``, from the reliable reader if it gets any."""
-        reliable, any_offer = (
-            [picture for picture in list(heard) if picture.device == device]
-            for heard in self.heard.values()
-        )
-        return reliable or any_offer
 
 
 class CameraRig:
@@ -115,11 +57,13 @@ class CameraRig:
         assert isinstance(node, ExaminerNode)
         bench.memory[ExaminerNode.__name__] = node
         self.node = node
+        self.graph = CameraGraph(node)
+        self.program = Program(bench.subject, self.graph)
         self.memory = bench.memory
-        self._ghosts: set[bytes] = set()
         self._clean = False
         self._provoked = False
         self._clients: dict[str, Any] = {}
+        self.requests = 0  # that were made of services so far
 
     # The subject.
 
@@ -136,7 +80,7 @@ class CameraRig:
         for another check to find.
         """
         with self.trying():
-            node = self.start(name, *args)
+            node = self.program.start(name, *args)
             yield node
         try:
             self.subject.stop(name)
@@ -164,59 +108,11 @@ class CameraRig:
         """
         if not self._clean or self._provoked:
             self.fresh()
-        self.wait(lambda: not self.endpoints(), GHOSTS)
-        self._ghosts = {end for _, end in self._endpoints()}
+        self.wait(lambda: not self.graph.endpoints(), GHOSTS)
+        self.graph.disregard()
         self._clean = False
         yield
         self._clean = True
-
-    def start(self, name: str, *args: Any) -> str:
-        """Make a node; return its fully qualified name."""
-        try:
-            return self.subject.start(name, *args)
-        except StudentError as error:
-            shown = ", ".join(repr(arg) for arg in args)
-            raise Failed(
-                expected=f"{name}({shown}) makes a node without an error.",
-                actual=error.told,
-            ) from None
-
-    def stop(self, name: str, *, bare: bool = False) -> None:
-        """Have the node taken out of its executor and destroyed.
-
-        A session tidies up after its ``destroy_node()``; ``bare``: nobody does.
-        """
-        self._cleanup(name, lambda: self.subject.stop(name, bare=bare))
-
-    def destroy(self, name: str) -> None:
-        """Have ``destroy_node()`` called while the node spins."""
-        self._cleanup(name, lambda: self.subject.call(name, "destroy_node"))
-
-    def destroy_again(self, name: str) -> None:
-        """Have ``destroy_node()`` called a second time, which must return as well."""
-        try:
-            self.destroy(name)
-        except SubjectGone as gone:
-            if not self.subject.hangs:
-                raise
-            raise Failed(
-                expected="destroy_node() can be called a second time.",
-                actual=f"The second call did not return within {REPLY_TIMEOUT:.0f} s.",
-            ) from gone
-
-    def drop(self, name: str) -> None:
-        """Have the session let go of a node that is destroyed; it destroys it once more."""
-        with suppress(StudentError):
-            self.subject.stop(name)
-
-    def _cleanup(self, name: str, act: Callable[[], object]) -> None:
-        try:
-            act()
-        except StudentError as error:
-            raise Failed(
-                expected=f"destroy_node() of {name} ends without an error.",
-                actual=error.told,
-            ) from None
 
     def advance(self, seconds: float) -> None:
         """Move simulated time on."""
@@ -224,14 +120,25 @@ class CameraRig:
             self.subject.advance(seconds)
         except StudentError as error:
             raise Failed(
-                expected="Your callbacks return, so that the next one can run.",
-                actual=f"{error}{self.raised()}",
+                expected="Your callbacks return, and the driver follows the robot's time.",
+                actual=f"{_held_up(str(error))}{self.raised()}.",
             ) from None
+
+    def nudge(self) -> None:
+        """Give the subject's executors something to do, and no timer a reason to fire.
+
+        rclpy 7.1 resumes a callback that awaits something when its executor has something else to
+        do: on a robot, at the next tick. Here it learns that a nanosecond has passed.
+        """
+        with suppress(StudentError):  # a callback may block: it is waited for elsewhere
+            self.subject.advance(1e-9, patience=PERIOD)
 
     def raised(self) -> str:
         """Return what the student's callbacks raised, as the end of a sentence."""
-        errors = self.subject.errors()
-        return f" (a callback raised: {errors[-1]})" if errors else ""
+        raised, ended = self.subject.errors(), self.subject.thread_errors()
+        told = [f"a callback raised: {raised[-1].rstrip('.')}"] if raised else []
+        told += [f"a thread of yours ended with {ended[-1].rstrip('.')}"] if ended else []
+        return f" ({phrase(told)})" if told else ""
 
     def refused_zoom(self, factor: int) -> None:
         """Send a zoom that the camera does not have; it is with the driver when this returns."""
@@ -239,22 +146,30 @@ class CameraRig:
         self.node.zoom.publish(Int32(data=factor))
         self.node.zoom.wait_for_all_acked(Duration(seconds=SETTLE))
 
-    def ask(self, service: Any, name: str, request: Any, patience: float = SETTLE) -> Any:
-        """Call a service; return its response, or None if none came in ``patience`` seconds.
+    def ask(self, service: Any, name: str, request: Any, *, nudging: bool = False) -> Any:
+        """Call a service; return its response, or None if none came in time.
 
         A response that goes out before its way back is known is lost: it is asked for again, so
-        this is for requests that may be made twice.
+        this is for requests that may be made twice. ``nudging``: a callback may await something.
         """
-        deadline = Deadline(patience)
+        deadline = Deadline(SETTLE)
         client = self.client(service, name)
         self.wait(client.service_is_ready, deadline.left)
         replies: list[Any] = []
         while deadline.left:
             replies.append(client.call_async(request))
-            self.wait(lambda: any(reply.done() for reply in replies), min(RESEND, deadline.left))
-            for reply in replies:
-                if reply.done():
-                    return reply.result()
+            self.requests += 1
+            again = Deadline(min(RESEND, deadline.left))
+            while again.left:
+                self.wait(
+                    lambda: any(reply.done() for reply in replies),
+                    min(NUDGE if nudging else RESEND, again.left),
+                )
+                for reply in replies:
+                    if reply.done():
+                        return reply.result()
+                if nudging:
+                    self.nudge()
         return None
 
     def client(self, service: Any, name: str) -> Any:
@@ -279,25 +194,6 @@ class CameraRig:
     def cameras(self, device: str) -> list[int]:
         """Return how often each open camera of ``device`` was asked for a picture."""
         return self.process.positions(f"camera:{device}")
-
-    def asked_during(self, device: str, act: Callable[[], object]) -> int:
-        """Return for how many pictures the camera of ``device`` was asked while ``act`` ran."""
-        before = highest = sum(self.cameras(device))
-        over = threading.Event()
-
-        def look() -> None:
-            nonlocal highest
-            while not over.wait(PERIOD):
-                highest = max(highest, sum(self.cameras(device)))
-
-        with ThreadPoolExecutor(max_workers=1) as beside:
-            looking = beside.submit(look)
-            try:
-                act()
-            finally:
-                over.set()
-        looking.result()
-        return highest - before
 
     def streams(self, device: str) -> bool:
         """Whether the stream of ``device`` runs."""
@@ -328,48 +224,6 @@ class CameraRig:
         self.subject.mark(mark)
         self.wait(lambda: self.node.count_publishers(mark) and self.node.count_subscribers(mark))
 
-    def publishers(self) -> int:
-        """Return how many publishers there are on the image topic."""
-        return sum(what == PUBLISHER and end not in self._ghosts for what, end in self._endpoints())
-
-    def endpoints(self, node: str = "") -> list[str]:
-        """Return the driver's endpoints that are on the graph, and whether ``node`` is."""
-        ours = (*TYPES, f"the node {node}")
-        there = {what for what, end in self._endpoints() if end not in self._ghosts}
-        return [what for what in ours if what in there]
-
-    def missing(self, node: str) -> list[str]:
-        """Return what the driver ``node`` lacks on the graph, or has with another type."""
-        services = dict(self.node.get_service_names_and_types())
-        types = {
-            PUBLISHER: {e.topic_type for e in self.node.get_publishers_info_by_topic(IMAGE)},
-            SUBSCRIPTION: {e.topic_type for e in self.node.get_subscriptions_info_by_topic(ZOOM)},
-            SERVICE: set(services.get(f"/{SNAPSHOT}", [])),
-        }
-        there = self.endpoints(node)
-        found = [f"There is no {what[2:]} on the graph." for what in TYPES if what not in there]
-        found += [
-            f"There is {what} of the type {phrase(sorted(types[what]))}, not {wanted}."
-            for what, wanted in TYPES.items()
-            if what in there and wanted not in types[what]
-        ]
-        if not found and f"the node {node}" not in there:
-            found = [f"The node {node} is not on the graph."]
-        return found
-
-    def _endpoints(self) -> list[tuple[str, bytes]]:
-        found = {
-            PUBLISHER: self.node.get_publishers_info_by_topic(IMAGE),
-            SUBSCRIPTION: self.node.get_subscriptions_info_by_topic(ZOOM),
-            # A service has no endpoints in ROS's eyes; in DDS it reads its requests.
-            SERVICE: self.node.get_subscriptions_info_by_topic(f"rq/{SNAPSHOT}Request", True),
-        }
-        # Every node announces changes of its parameters: a node itself has no endpoint.
-        for end in self.node.get_publishers_info_by_topic("/parameter_events"):
-            name = full_name(end.node_name, end.node_namespace)
-            found.setdefault(f"the node {name}", []).append(end)
-        return [(what, bytes(end.endpoint_gid)) for what, ends in found.items() for end in ends]
-
 
 @contextmanager
 def camera_rig(bench: Bench) -> Iterator[CameraRig]:
@@ -377,6 +231,17 @@ def camera_rig(bench: Bench) -> Iterator[CameraRig]:
     yield CameraRig(bench)
 
 
-def phrase(items: list[str]) -> str:
-    """Return a list as a phrase: "a, b and c"."""
-    return " and ".join(part for part in (", ".join(items[:-1]), *items[-1:]) if part)
+def _held_up(error: str) -> str:
+    """Return why simulated time could not be moved on, from the session's error."""
+    found = re.fullmatch(r"\w+: (.+) did not follow simulated time to ([\d.]+) s: .*", error, re.S)
+    if found is None:
+        return error.rstrip(".")
+    if found[1] == "the session":  # all nodes know the time: something goes on without end
+        return (
+            f"At {found[2]} s of the robot's time your program did not come to rest: for "
+            f"{PATIENCE:.0f} s there always was a callback running, or the next one ready"
+        )
+    return (
+        f"At {found[2]} s of the robot's time a callback of {found[1]} had been running for "
+        f"{PATIENCE:.0f} s"
+    )

@@ -17,7 +17,8 @@ from itertools import pairwise
 from rclpy.qos import ReliabilityPolicy
 
 from autograder.exam import Failed
-from autograder.rigs.robot import STEP, Picture, RobotRig
+from autograder.rigs.hardware import Picture
+from autograder.rigs.robot import STEP, RobotRig
 from autograder.rigs.scenarios import NAMES
 
 PATIENCE = 1.0

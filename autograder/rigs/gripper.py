@@ -18,24 +18,28 @@ from rclpy.task import Future
 from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import SetBool
 
+from autograder.rigs.player import Player
 from autograder.rigs.quiet import QuietNode
-from autograder.rigs.safety import Player
 
 
 @dataclass
 class Try:
-    """One request that reached the gripper: when (simulated s), what, and its answer to come."""
+    """One request that reached the gripper: when (simulated s), what, and its answer to come.
+
+    ``crash`` lets the gripper's callback raise: rclpy then sends no answer at all.
+    """
 
     at: float
     close: bool
     reply: Callable[[bool], None]
+    crash: Callable[[], None]
 
 
 class Gripper(QuietNode):
     """The server of `gripper/set`: notes each request, and answers when it is told to."""
 
-    def __init__(self, arrived: Callable[[bool, Callable[[bool], None]], None]) -> None:
-        """Tell ``arrived`` of each request: what it asks for, and how to answer it."""
+    def __init__(self, arrived: Callable[[bool, Callable[[bool], None], Callable[[], None]], None]):
+        """Tell ``arrived`` of each request: what it asks for, how to answer it, how to crash."""
         super().__init__("gripper")
         self._arrived = arrived
         group = ReentrantCallbackGroup()
@@ -52,7 +56,11 @@ class Gripper(QuietNode):
             answer.set_result(success)
             executor.wake()
 
-        self._arrived(request.data, reply)
+        def crash() -> None:
+            answer.set_exception(RuntimeError("the gripper's server raises"))
+            executor.wake()
+
+        self._arrived(request.data, reply, crash)
         response.success = await answer
         return response
 
@@ -80,7 +88,7 @@ class GripUser(Player):
 
     def gripper(self) -> Gripper:
         """Return a gripper whose requests are noted here; it is for the session to run."""
-        return Gripper(lambda close, reply: self.tries.append(Try(self.now, close, reply)))
+        return Gripper(lambda *arrived: self.tries.append(Try(self.now, *arrived)))
 
     def request(self, close: bool) -> None:
         """Ask for a grip, and forget what was before, but for how it ended."""
@@ -147,6 +155,17 @@ def text(name: str, value: str) -> Parameter:
     """Return a parameter that is a string."""
     kind = ParameterType.PARAMETER_STRING
     return Parameter(name=name, value=ParameterValue(type=kind, string_value=value))
+
+
+def unset(name: str) -> Parameter:
+    """Return a parameter that has no type, and no value."""
+    return Parameter(name=name)
+
+
+def doubles(name: str, *values: float) -> Parameter:
+    """Return a parameter that is an array of doubles."""
+    kind = ParameterType.PARAMETER_DOUBLE_ARRAY
+    return Parameter(name=name, value=ParameterValue(type=kind, double_array_value=list(values)))
 
 
 def ready(future: Any) -> Callable[[], bool]:

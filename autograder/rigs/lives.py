@@ -9,19 +9,16 @@ from __future__ import annotations
 import time
 from typing import NamedTuple
 
-from autograder.bench import StudentError
-from autograder.exam import Failed
 from autograder.rigs.camera import CameraRig
+from autograder.rigs.camera_duties import DRIVER
 from autograder.rigs.process import Usage
 
-DRIVER = "CameraDriver"
 WARM_UP, LIVES = 5, 50
 FEWEST = 26
 """Lives of a driver that takes its time: a camera may need a second to get warm."""
 TIME = 50.0
 """Seconds of wall time for all lives after the warm-up, if more than the fewest are to be made."""
 MEMORY = 100  # KiB a life
-WORDS = {"threads": "threads", "files": "open files"}
 PICTURES = 0.5  # s of simulated time that a life lasts: five pictures of 64 KiB
 
 
@@ -29,9 +26,9 @@ def live(rig: CameraRig, lives: int) -> None:
     """Start and end the driver ``lives`` times, then collect what is garbage."""
     device = rig.device()
     for _ in range(lives):
-        rig.start(DRIVER, device)
+        rig.program.start(DRIVER, device)
         rig.advance(PICTURES)
-        rig.stop(DRIVER)
+        rig.program.stop(DRIVER)
         # A thread of the driver may close the camera a moment later.
         rig.wait(lambda: not rig.cameras(device))
     rig.subject.collect()
@@ -89,44 +86,3 @@ def _leaks(grown: Usage, lives: int) -> list[str]:
 
 def _each(a_life: float) -> str:
     return {1: "one", 2: "two"}.get(round(a_life), "some")
-
-
-def failing_starts(rig: CameraRig, kind: str, times: int) -> None:
-    """Fail unless the constructor raises, and the process keeps none of its threads and files."""
-    before = rig.process.usage()
-    for _ in range(times):
-        attempt(rig, rig.device(kind))
-    require_flat(
-        rig, before, times, "A driver that cannot start leaves nothing behind,", "such starts"
-    )
-
-
-def require_flat(rig: CameraRig, before: Usage, times: int, expected: str, rounds: str) -> None:
-    """Fail if since ``before`` the process has kept threads or files of so many ``rounds``."""
-    rig.subject.collect()
-    # Half of them: a notebook has threads of its own, which come and go.
-    for what in ("threads", "files"):
-
-        def grown(what: str = what) -> int:
-            return int(getattr(rig.process.usage().grown(before), what))
-
-        if not rig.wait(lambda grown=grown: grown() < times / 2):  # type: ignore[misc]
-            raise Failed(
-                expected=f"{expected} no thread and no file.",
-                actual=f"After {times} {rounds} the process had {grown()} more {WORDS[what]} "
-                "than before.",
-            )
-
-
-def attempt(rig: CameraRig, device: str) -> None:
-    """Start the driver on a ``device`` that has something wrong with it, as bare rclpy would."""
-    try:
-        rig.subject.start(DRIVER, device, bare=True)
-    except StudentError:
-        return
-    rig.stop(DRIVER)
-    raise Failed(
-        expected=f"{DRIVER}({device!r}) raises: who starts a driver must learn that it has no "
-        "picture to give.",
-        actual="It made a node as if all were well.",
-    )

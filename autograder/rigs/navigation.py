@@ -14,14 +14,14 @@ from geometry_msgs.msg import Twist
 from rclpy.action.client import ActionClient
 from rclpy.action.server import ActionServer, CancelResponse, GoalResponse, ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.task import Future
 from std_msgs.msg import Bool, Int32, String
 from test_msgs.action import Fibonacci as Drive
 
+from autograder.rigs.holding import Held
+from autograder.rigs.player import Player
 from autograder.rigs.quiet import QuietNode
-from autograder.rigs.safety import Player
 from course.runtime.executor import BackgroundExecutor
 
 
@@ -72,6 +72,7 @@ class Navigator(QuietNode):
     async def _refuses(self) -> bool:
         self._user.cancels.append(self._user.now)
         await self._user.pause(self)
+        await self._user.ponder(self)
         return not self._user.obeys
 
     def destroy_node(self) -> None:
@@ -89,8 +90,9 @@ class NavigatorUser(Player):
         """Create everything but the navigator."""
         super().__init__("navigator_user")
         self.accepts = self.obeys = True
-        self.hesitates = False
-        self._undecided: list[tuple[Executor, Future]] = []
+        self.hesitates = self.ponders = False
+        self.metres = 0
+        self._undecided = Held()
         self.orders: list[int] = []
         self.goals: list[ServerGoalHandle] = []
         self.cancels: list[float] = []
@@ -106,14 +108,22 @@ class NavigatorUser(Player):
         return Navigator(self)
 
     def request(
-        self, metres: int, *, accepts: bool = True, obeys: bool = True, hesitates: bool = False
+        self,
+        metres: int,
+        *,
+        accepts: bool = True,
+        obeys: bool = True,
+        hesitates: bool = False,
+        ponders: bool = False,
     ) -> None:
         """Ask for a drive that is accepted or not, and that can be cancelled or not.
 
-        A navigator that ``hesitates`` answers the goal when it is told to `decide`.
+        A navigator that ``hesitates`` answers the goal when it is told to `decide`, and one that
+        ``ponders`` does so with the cancel.
         """
         self.before = self.outcomes[-1:]
-        self.accepts, self.obeys, self.hesitates = accepts, obeys, hesitates
+        self.metres, self.accepts, self.obeys = metres, accepts, obeys
+        self.hesitates, self.ponders = hesitates, ponders
         for noted in (self.orders, self.goals, self.cancels, self.outcomes, self.speeds):
             noted.clear()
         self._request.publish(Int32(data=metres))
@@ -121,18 +131,16 @@ class NavigatorUser(Player):
     async def hesitate(self, server: Node) -> None:
         """Let the navigator wait until it is to decide, if this goal is one of that kind."""
         if self.hesitates:
-            executor = server.executor
-            assert isinstance(executor, Executor)
-            over = Future(executor=executor)
-            self._undecided.append((executor, over))
-            await over
+            await self._undecided.wait(server)
+
+    async def ponder(self, server: Node) -> None:
+        """Do the same with a request to cancel."""
+        if self.ponders:
+            await self._undecided.wait(server)
 
     def decide(self) -> None:
-        """Have the navigator answer the goal that it has."""
-        undecided, self._undecided = self._undecided, []
-        for executor, over in undecided:
-            over.set_result(None)
-            executor.wake()
+        """Have the navigator answer the goal, or the request to cancel, that it has."""
+        self._undecided.release()
 
     def feedback(self, metres: int) -> None:
         """Tell how far the drive has come."""

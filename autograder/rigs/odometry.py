@@ -7,7 +7,7 @@ from __future__ import annotations
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from autograder.rigs.listening import LateJoiner, numbers
+from autograder.rigs.listening import LateJoiner, acquaint, numbers
 from autograder.rigs.robot import Asker, RobotRig
 from autograder.rigs.scenarios import NAMES
 
@@ -22,20 +22,24 @@ LONGEST = 200  # characters of an answer that are shown
 def fault(rig: RobotRig, asker: Asker, position: float) -> str:
     """Return what whoever wants to know the position learns if it is wrong, or an empty string.
 
-    It is the end of a sentence, with its full stop.
+    It is the end of a sentence, with its full stop. The hardware has reported the ``position``, and
+    says no more: a callback may take its time over each report.
     """
     answer = ""
 
     def right() -> bool:
         nonlocal answer
-        # Odometry repeats itself: what came before the two had found each other is made good.
-        rig.publish("position", position)
         answer, found = asker(rig)
         return any(abs(number - position) < CLOSE for number in found)
 
     if rig.wait_stepping(right, AGE):
         return ""
     return answer if answer.endswith("?") else f"{answer}{rig.because()}."
+
+
+def asker_by(rig: RobotRig, pattern: str) -> Asker:
+    """Return a new way of finding out the position, by a service or a topic."""
+    return ask if pattern == "service" else Overhearing(rig)
 
 
 def ask(rig: RobotRig) -> tuple[str, list[float]]:
@@ -54,8 +58,9 @@ class Overhearing:
     """Listens to the topic, from now on."""
 
     def __init__(self, rig: RobotRig) -> None:
-        """Subscribe."""
+        """Subscribe, and be known to the publisher."""
         self._late = LateJoiner(rig, Float64, NAMES["position"])
+        acquaint(rig)
 
     def __call__(self, _: RobotRig) -> tuple[str, list[float]]:
         """Tell the newest message."""

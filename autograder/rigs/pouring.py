@@ -19,16 +19,14 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
+from autograder.rigs.errands import SETTLE, Errands, marked
 from autograder.rigs.robot_graph import Topic
 from autograder.rigs.robot_jobs import EYES
 from autograder.rigs.robot_types import load_type
 from course import Session, WaitTimeout
 from course.design import dye
-from course.design.lifelike import AHEAD, lifelike
-from course.runtime.actions import GoalRun
+from course.design.lifelike import FAR, lifelike
 
-SETTLE = 8.0
-"""Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
 POURS = 8
 """How often dye is poured in before it counts as lost, each time with another tag."""
 ARRIVALS = 2
@@ -39,16 +37,14 @@ REPEAT = 0.02
 """Seconds until a marked message is sent again: a node may work on the newest now and then."""
 AT_ONCE = 0.005
 """Seconds until it may be sent again because somebody else's message was newer than it."""
-WAKE = 0.25
-"""Seconds until the other sensors send again."""
+WAKE = 0.6
+"""Seconds until the other sensors send again: a node looks at the newest twice a second, or more
+often, and until then what was poured in must be the newest on its way."""
+PLANNING, SLOW = 4.0, 3
+"""Seconds for each of the last goals, and how many that are, if nothing has come of those before: a
+planner may think for a while, and a navigator drop what is cancelled before it has a plan."""
 BLIND = 3
 """Goals before scans and images go on, too: a robot with something in its way may stand still."""
-WAYPOINT = 5.0
-"""Metres to the waypoint of a goal: a robot that is there already would not start."""
-GRACE = 0.1
-"""Seconds that a goal may take to be over before it is asked to end."""
-PATIENCE = 2.0
-"""Seconds that a goal may take to end when it is cancelled."""
 
 
 class GoalRejectedError(Exception):
@@ -64,71 +60,12 @@ class Poured:
     arrived: int
     lost_on: list[str]
     """Topics on which marks were seen that did not arrive."""
+    tags: frozenset[int] = frozenset()
+    """The marks that arrived."""
     aside: str = ""
     """What became of goals that were not taken."""
-
-
-class Errands:
-    """The goals that the examiner sends to one action, one after the other."""
-
-    def __init__(self, session: Session, name: str, action_type: Any) -> None:
-        """Send none yet."""
-        self._session = session
-        self._name = name
-        self._type = action_type
-        self._run: GoalRun | None = None
-        self._answers = True
-        self._rejected = 0
-        self.outlasts = False
-        """Whether a goal went on although it was asked to end."""
-
-    def send(self, tag: int) -> bool:
-        """Send a marked goal; return whether the server took it.
-
-        Raises:
-            WaitTimeout: the server did not answer to the first goal; says why.
-        """
-        first = self._run is None
-        if not self._answers:
-            return False
-        goal = marked(self._type.Goal, tag, WAYPOINT)
-        try:
-            run = self._session.send_goal(
-                self._type, self._name, goal, timeout=SETTLE if first else PATIENCE
-            )
-        except WaitTimeout:
-            self._answers = False
-            if first:
-                raise
-            return False
-        if run.accepted:
-            self._run = run
-        elif not first:
-            self._rejected += 1
-        return run.accepted
-
-    @property
-    def aside(self) -> str:
-        """What became of goals that were not taken; empty if there were none."""
-        if not self._answers:
-            return f"while that goal went on, {self._name} did not answer to another"
-        times = "once" if self._rejected == 1 else f"{self._rejected} times"
-        return f"another goal was rejected, {times}" if self._rejected else ""
-
-    def end(self) -> None:
-        """Cancel the goal before, and wait until it is over; it may go on all the same."""
-        run = self._run
-        if self._answers and run is not None and not run.done_within(GRACE):
-            with suppress(WaitTimeout):
-                if run.cancel(PATIENCE):
-                    run.done_within(PATIENCE)
-        self.outlasts = run is not None and not run.done
-
-    def keep_one(self, tag: int) -> None:
-        """See to it that a goal is under way, as far as the server takes one."""
-        if self._run is None or self._run.done:
-            with suppress(WaitTimeout):
-                self.send(tag)
+    turned_away: int = 0
+    """Goals that were rejected although one had been taken before, and was over."""
 
 
 class Pours:
@@ -166,7 +103,8 @@ class Pours:
         A node may have to be woken by a reading before it asks for what a goal has changed, or
         before it takes one: a robot that does not know where it is may reject a goal. Scans and
         images come late: they show something in the way, which may stop a robot. Where a goal goes
-        on though it was cancelled (a queue, say), the mark of the first is enough.
+        on though it was cancelled (a queue, say), the mark of the first is enough. Where goals end,
+        one more than needed is sent: whoever has been at one waypoint has to take the next.
 
         Raises:
             WaitTimeout: the action server did not answer; says why.
@@ -190,8 +128,18 @@ class Pours:
             wake.put_off()
             return taken
 
-        poured = self._pour(send, wake, arrived_on, lambda: errands.outlasts)
-        return replace(poured, aside=errands.aside)
+        poured = self._pour(send, wake, arrived_on, lambda: errands.outlasts, PLANNING)
+        if poured.enough:
+            errands.end()
+            if not errands.outlasts:
+                errands.send(self._fresh())
+        aside = errands.aside
+        if errands.cancelled and not poured.arrived:
+            aside = aside or (
+                f"goals of which nothing had come within {SETTLE / POURS:g} s, and later "
+                f"{PLANNING:g} s, were cancelled"
+            )
+        return replace(poured, aside=aside, turned_away=errands.turned_away)
 
     def topics(
         self, topics: Iterable[Topic], others: Iterable[Topic], arrived_on: Collection[str]
@@ -204,7 +152,6 @@ class Pours:
             UnknownTypeError: a topic's type is not installed here.
         """
         inlets = [(self._inlet(topic), topic) for topic in topics]
-        wake = self._waking(others)
         # The examiner's own tap is a subscription, too. Who is late all the same gets a later pour.
         with suppress(WaitTimeout):
             self._session.until(
@@ -213,26 +160,49 @@ class Pours:
                 "the readers of a topic",
             )
         stream = _Stream({topic.name: inlet for inlet, topic in inlets})
+        again, wake = _Every(REPEAT, stream.publish), _Every(WAKE, self._waking(others))
 
         def pour(tag: int) -> bool:
             if self._errands is not None:
                 self._errands.keep_one(self._fresh())
             stream.tag = tag
             stream.publish()
-            wake()
+            wake.put_off()  # as for goals
             self._stream = stream
             return True
 
-        again, on = _Every(REPEAT, stream.publish), _Every(WAKE, wake)
-
         def meanwhile() -> None:
             again()
-            on()
+            wake()
 
         try:
             return self._pour(pour, meanwhile, arrived_on)
         finally:
             self._stream = None
+
+    def roll_until(self, sensors: Iterable[Topic], heard: Callable[[], bool]) -> bool:
+        """Have the wheels report, and the LIDAR see free room, until something is ``heard``.
+
+        Only the wheels' readings bear marks: what the library's nodes make of a mark may be an
+        obstacle, and a robot that has seen one may stand still from then on.
+        """
+        inlets = [(self._inlet(topic), topic.name in EYES) for topic in sensors]
+
+        def report() -> None:
+            for inlet, sees in inlets:
+                kind = inlet.msg_type
+                inlet.publish(lifelike(kind, FAR) if sees else marked(kind, self._fresh()))
+
+        on = _Every(0.1, report)
+
+        def look() -> bool:
+            on()
+            return heard()
+
+        report()
+        with suppress(WaitTimeout):
+            self._session.until(look, SETTLE, "a message")
+        return heard()
 
     def _pour(
         self,
@@ -240,34 +210,44 @@ class Pours:
         meanwhile: Callable[[], object],
         arrived_on: Collection[str],
         goes_on: Callable[[], bool] = lambda: False,
+        patience: float = SETTLE / POURS,
     ) -> Poured:
         # A link may still be about to connect: what it loses does not come back, so pour again.
         tags: set[int] = set()
-        for _ in range(POURS):
+        slow = 0
+        for left in reversed(range(POURS)):
             if pour(tag := self._fresh()):
                 tags.add(tag)
             known = len(self._at(arrived_on, tags))
             if tag in tags or not (known and goes_on()):
-                self._wait(lambda n=known: len(self._at(arrived_on, tags)) > n, meanwhile)  # type: ignore[misc]
+                slow += tag in tags and left < SLOW and (not known or slow > 0)
+                self._wait(
+                    lambda n=known: len(self._at(arrived_on, tags)) > n,  # type: ignore[misc]
+                    meanwhile,
+                    patience if slow else SETTLE / POURS,
+                )
             arrived = self._at(arrived_on, tags)
-            if len(arrived) >= ARRIVALS:
+            if len(arrived) >= ARRIVALS or (slow >= ARRIVALS and not arrived):
                 break
             if arrived and goes_on() and not self._made_up(arrived_on):
-                return Poured(True, len(tags), len(arrived), [])
+                return Poured(True, len(tags), len(arrived), [], frozenset(arrived))
         if not tags:
             raise GoalRejectedError
         lost = tags - arrived
         seen = list(self._seen.items())  # at once: another thread adds to it
         lost_on = sorted(name for name, those in seen if those & lost)
-        return Poured(len(arrived) >= ARRIVALS, len(tags), len(arrived), lost_on)
+        enough = len(arrived) >= ARRIVALS
+        return Poured(enough, len(tags), len(arrived), lost_on, frozenset(arrived))
 
-    def _wait(self, arrived: Callable[[], bool], meanwhile: Callable[[], object]) -> None:
+    def _wait(
+        self, arrived: Callable[[], bool], meanwhile: Callable[[], object], seconds: float
+    ) -> None:
         def look() -> bool:
             meanwhile()
             return arrived()
 
         with suppress(WaitTimeout):
-            self._session.until(look, SETTLE / POURS, "a mark")
+            self._session.until(look, seconds, "a mark")
 
     def _at(self, topics: Collection[str], tags: set[int]) -> set[int]:
         return {tag for name in topics for tag in tags & self._seen.get(name, set())}
@@ -330,13 +310,6 @@ class _Every:
     def put_off(self) -> None:
         """Act no earlier than so many seconds from now."""
         self._last = time.monotonic()
-
-
-def marked(msg_type: Any, tag: int, ahead: float = AHEAD) -> Any:
-    """Return a message as a robot would send it, with a mark in it."""
-    message = lifelike(msg_type, ahead)
-    dye.mark(message, tag)
-    return message
 
 
 def _serving(topic: Topic) -> QoSProfile:

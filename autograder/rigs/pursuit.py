@@ -12,7 +12,7 @@ from __future__ import annotations
 import time
 from bisect import bisect_right
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from autograder.rigs.readings import SENSORS, STOP, Sensor
 from autograder.rigs.sensors import SensorRig
@@ -21,6 +21,7 @@ WATCHED = 0.8  # s after a pause; from then on a fresh reading shows that a cons
 FRESH = 0.2  # s: a control loop at 5 Hz that acts on the newest hands it on within this time
 GENEROUS = 2  # times what a consumer may find waiting: beyond it is not just a busy moment
 LASTING = 0.5  # s for which it has to stay beyond
+STEADY, MANY = 3.0, 8  # s, and readings, that have to be beyond the bound itself, all of them
 QUIET = 2.0  # s without a reading after which there is nothing more to see
 RATED, ENOUGH = 1.0, 0.7  # s before, and the share of what is to come in then, for that to count
 PATIENCE = 8.0  # s for those that are neither fresh nor far behind
@@ -28,11 +29,28 @@ PATIENCE = 8.0  # s for those that are neither fresh nor far behind
 
 @dataclass(frozen=True)
 class Handing:
-    """A reading that was handed on: when (ns), how old it was (s), and how many newer ones wait."""
+    """A reading that was handed on: when (ns), how old it was (s), and how many newer ones wait.
+
+    ``freshest`` says that none was fresher than this one, of all that were handed on for a while.
+    """
 
     when: int
     age: float
     waiting: int
+    freshest: bool = False
+
+    def told(self, sensor: Sensor) -> str:
+        """Return in a sentence how far behind a sensor's consumer was."""
+        while_they_came = f"while readings came in at {sensor.rate:.0f} Hz"
+        if self.freshest:
+            return (
+                f"Afterwards, {while_they_came}, even the freshest that it handed on was "
+                f"{self.age:.1f} s old, and {self.waiting} newer ones were waiting."
+            )
+        return (
+            f"Afterwards it fell further and further behind: {while_they_came}, it handed on one "
+            f"that was {self.age:.1f} s old, and {self.waiting} newer ones were waiting."
+        )
 
 
 def left_behind(rig: SensorRig, phase: str, resumed: int) -> dict[str, Handing]:
@@ -67,9 +85,14 @@ class Pursuit:
             return True
         if self._fresh(handings[-1]) and self._at_rate():
             return True
-        late = list(self._late_at_last(handings))
+        late = list(self._late_at_last(handings, GENEROUS))
         if late and late[0].when - late[-1].when > LASTING * 1e9:
             self.behind = late[0]
+        # A list that is always full does not grow, but no reading that comes out of it is fresh.
+        always = list(self._late_at_last(handings, 1))
+        if len(always) >= MANY and always[0].when - always[-1].when > STEADY * 1e9:
+            freshest = min(always, key=lambda handing: handing.age)
+            self.behind = self.behind or replace(freshest, freshest=True)
         return self.behind is not None
 
     def _fresh(self, handing: Handing) -> bool:
@@ -82,9 +105,9 @@ class Pursuit:
         came = sum(now - RATED * 1e9 < moment <= now for moment in moments)
         return came >= ENOUGH * RATED * self.sensor.rate
 
-    def _late_at_last(self, handings: list[Handing]) -> Iterable[Handing]:
+    def _late_at_last(self, handings: list[Handing], generous: int) -> Iterable[Handing]:
         """Go back through those that are late until one is not."""
-        most = GENEROUS * self.sensor.most
+        most = generous * self.sensor.most
         for handing in reversed(handings):
             if handing.waiting <= most or handing.age <= most / self.sensor.rate:
                 return

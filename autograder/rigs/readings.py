@@ -87,6 +87,13 @@ class Sensor:
             threes = [[vector.x, vector.y, vector.z] for vector in _vectors(message)]
         return [header, *("/".join(f"{number:.0f}" for number in three) for three in threes)]
 
+    def blank(self, message: Any) -> bool:
+        """Whether nothing is left of a reading but its header."""
+        nothing = self.type()
+        if self.type is not String:
+            nothing.header = message.header
+        return bool(message == nothing)
+
     def unchanged(self, message: Any, tag: Tag) -> bool:
         """Whether a reading is what the hardware delivered; its header is the driver's to fill."""
         delivered = self.message(tag, Time())

@@ -10,24 +10,20 @@ or on the wall's, and what comes before what is known for certain.
 
 from __future__ import annotations
 
-import secrets
 import time
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures import wait as wait_for
 from contextlib import contextmanager, suppress
-from operator import itemgetter
-from typing import Any, NamedTuple, TypeVar, overload
+from typing import Any, TypeVar
 
 from rclpy.duration import Duration
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import BatteryState, Image
 from std_msgs.msg import Float64
 
 from autograder.bench import Bench, StudentError
 from autograder.exam import Failed
-from autograder.rigs.quiet import QuietNode
+from autograder.rigs.hardware import ExaminerNode
 from course import WaitTimeout
 
 T = TypeVar("T")
@@ -42,119 +38,9 @@ SETTLE = 8.0
 ANSWERED, AGAIN = 1.0, 0.1
 """Seconds of wall time for an answer before the clock moves on, which it may wait for: the first
 time, and where one has been found to wait."""
+LEVEL_MARGIN = 1e-3
 STEP, GRAIN = 0.1, 0.01
 """Seconds of simulated time in one step, and between two moments of it that nodes get to see."""
-
-
-class Picture(NamedTuple):
-    """What is kept of a picture: when it was published (ns), and what its fields say.
-
-    Not its pixels: a camera of 640 x 480 sends nearly 10 MB a second. ``number`` is the writer's
-    count, which goes on where a picture is lost on the way; 0 if the middleware has none.
-    """
-
-    published: int
-    number: int
-    height: int
-    width: int
-    step: int
-    size: int  # bytes
-
-
-class Ears(Sequence[T]):
-    """What two subscriptions to one topic have heard, each message once, in order of publication.
-
-    One is best effort and matches every publisher, the other is reliable and loses nothing. Neither
-    alone has all: the first may lose the newest message, the second may have matched later.
-    """
-
-    def __init__(self) -> None:
-        """Nothing yet."""
-        self._heard: list[tuple[int, T]] = []
-        self._forgotten = 0
-
-    def hear(self, published: int, item: T) -> None:
-        """Note what was published at ``published`` (ns), unless it has been heard before."""
-        at = bisect_left(self._heard, published, key=itemgetter(0))
-        known = at < len(self._heard) and self._heard[at][0] == published
-        if published > self._forgotten and not known:
-            self._heard.insert(at, (published, item))
-
-    @overload
-    def __getitem__(self, index: int) -> T: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[T]: ...
-    def __getitem__(self, index: int | slice) -> T | list[T]:
-        """Return one item, or some."""
-        if isinstance(index, slice):
-            return [item for _, item in self._heard[index]]
-        return self._heard[index][1]
-
-    def __len__(self) -> int:
-        """Return how many there are."""
-        return len(self._heard)
-
-    def __iter__(self) -> Iterator[T]:
-        """Go through a copy."""
-        return iter(self[:])
-
-    def clear(self) -> None:
-        """Forget all, and what the other subscription may still hear of it."""
-        if self._heard:
-            self._forgotten = self._heard[-1][0]
-            self._heard = []
-
-
-class ExaminerNode(QuietNode):
-    """The examiner's endpoints: the hardware, and listeners on what the robot tells everybody."""
-
-    def __init__(self) -> None:
-        """Create what does not depend on the student."""
-        super().__init__(f"examiner_{secrets.randbelow(2**24)}")
-        # It serves every subscription, and one that asks for the last value gets it.
-        qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self.hardware = {
-            what: self.create_publisher(Float64, f"hardware/{what}", qos)
-            for what in ("position", "charge")
-        }
-        self.speeds = Ears[float]()
-        self.levels = Ears[float]()
-        self.pictures = Ears[Picture]()
-        self._both(Float64, "hardware/speed", self.speeds, lambda msg, _: msg.data)
-        self._both(BatteryState, "robot/battery", self.levels, lambda msg, _: msg.percentage)
-        self._both(Image, "robot/camera", self.pictures, _picture)
-
-    def _both(self, msg_type: Any, topic: str, ears: Ears[T], value: Callable[..., T]) -> None:
-        """Listen with two subscriptions; ``value`` says what is kept of a message and its info."""
-
-        def note(message: Any, info: dict[str, Any]) -> None:
-            ears.hear(int(info["source_timestamp"]), value(message, info))
-
-        for reliable in (False, True):
-            self.listen(msg_type, topic, note, reliable=reliable)
-
-    def listen(
-        self,
-        msg_type: Any,
-        topic: str,
-        heard: Callable[..., None],
-        *,
-        durable: bool = False,
-        reliable: bool = False,
-    ) -> Any:
-        """Subscribe so that every writer matches (every durable, reliable one), and keep all."""
-        lossless = durable or reliable
-        qos = QoSProfile(
-            history=HistoryPolicy.KEEP_ALL,
-            reliability=ReliabilityPolicy.RELIABLE if lossless else ReliabilityPolicy.BEST_EFFORT,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL if durable else DurabilityPolicy.VOLATILE,
-        )
-        return self.create_subscription(msg_type, topic, heard, qos)
-
-
-def _picture(image: Image, info: dict[str, Any]) -> Picture:
-    published, number = int(info["source_timestamp"]), int(info["publication_sequence_number"] or 0)
-    return Picture(published, number, image.height, image.width, image.step, len(image.data))
 
 
 class RobotRig:
@@ -167,6 +53,9 @@ class RobotRig:
         first_top: the highest speed of the first drive, if the limit was untouched until then.
         films: whether the camera has been found to stream.
         asker: how the position has been found out, once it has been.
+        broadcasts: whether a new battery level has been found to come.
+        limit: the speed limit that was set last, once setting it has been found to work.
+        obeyed: the one that the robot has last been found to drive at.
     """
 
     def __init__(self, bench: Bench) -> None:
@@ -184,6 +73,9 @@ class RobotRig:
         self.first_top: float | None = None
         self.films = False
         self.asker: Asker | None = None
+        self.broadcasts = False
+        self.limit: float | None = None
+        self.obeyed: float | None = None
         self._steps = [(0, 0.0)]
         self._beside = ThreadPoolExecutor(thread_name_prefix="asking")
         self._clients: dict[str, Any] = {}
@@ -217,8 +109,9 @@ class RobotRig:
             told = str(error).partition(": ")[2] or str(error)  # without the exception's name
             raise Failed(
                 expected="Your callbacks end, sleep or await, so that the others get their turn.",
-                actual=f"{told.rstrip('.')}. A callback that runs long needs a callback group of "
-                "its own.",
+                actual=f"{told.rstrip('.')}. Does one go on without a pause, wait for another "
+                f"one, or spin the node, which spins already? Or do so many wait for the clock at "
+                f"once that all {THREADS} threads are taken?",
             ) from None
         self.elapsed = round(self.elapsed + seconds, 6)
         self.stands_still()
@@ -332,6 +225,10 @@ class RobotRig:
         """The last commanded speed in m/s."""
         return self.node.speeds[-1] if self.node.speeds else 0.0
 
+    def told_level(self, level: float) -> bool:
+        """Return whether the last battery level that was heard is ``level``."""
+        return bool(self.node.levels) and abs(self.node.levels[-1] - level) < LEVEL_MARGIN
+
     def because(self) -> str:
         """Return what a callback of the student's raised, as the end of a sentence.
 
@@ -342,7 +239,7 @@ class RobotRig:
         except StudentError:
             return ""
         self._told.update(raised)
-        return f" (a callback raised {raised[-1]})" if raised else ""
+        return f" (a callback raised an error, in {raised[-1]})" if raised else ""
 
 
 @contextmanager

@@ -1,14 +1,14 @@
 """The ROS graph of a robot as data: who is connected with whom, and where information can flow.
 
-It is read once, when all of the subject's nodes are known to be on the graph, and then only looked
-at: every question about a design's structure is a function of these data.
+It is read when all of the subject's nodes are known to be on the graph, and then only looked at:
+every question about a design's structure is a function of these data.
 """
 
 # mypy: allow-untyped-calls
 
 from __future__ import annotations
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -31,6 +31,8 @@ INFRASTRUCTURE = frozenset(
 """Topics that nobody in particular reads or writes."""
 
 _OF_EVERY_NODE = ("rcl_interfaces/", "type_description_interfaces/", "lifecycle_msgs/")
+_TRANSITIONS = "lifecycle_msgs/msg/TransitionEvent"
+"""What every lifecycle node publishes, whether anybody wants to know or not."""
 
 
 @dataclass(frozen=True)
@@ -68,12 +70,17 @@ class Topic:
 
 @dataclass
 class Offer:
-    """A service or an action: the nodes that offer it and those that use it."""
+    """A service or an action: the nodes that offer it and those that use it.
+
+    Attributes:
+        ways: for a service, what DDS makes of it: a topic of requests and one of replies.
+    """
 
     name: str
     type: str
     servers: set[str] = field(default_factory=set)
     clients: set[str] = field(default_factory=set)
+    ways: tuple[Topic, ...] = field(default=(), compare=False)
 
 
 @dataclass
@@ -84,6 +91,8 @@ class RobotGraph:
     topics: dict[str, Topic] = field(default_factory=dict)
     services: dict[str, Offer] = field(default_factory=dict)
     actions: dict[str, Offer] = field(default_factory=dict)
+    namesakes: frozenset[str] = frozenset()
+    """Full names that more than one node has."""
 
     def topic(self, name: str) -> Topic:
         """Return a topic; one without endpoints if it is not there."""
@@ -92,6 +101,24 @@ class RobotGraph:
     def action(self, name: str) -> Offer:
         """Return an action; one without nodes if it is not there."""
         return self.actions.get(name, Offer(name, ""))
+
+    def since(self, earlier: RobotGraph) -> RobotGraph:
+        """Return the part of it with endpoints that were not there earlier."""
+        before: dict[str, set[End]] = {
+            name: {*topic.writers, *topic.readers} for name, topic in earlier.topics.items()
+        }
+        new = {
+            name: topic
+            for name, topic in self.topics.items()
+            if {*topic.writers, *topic.readers} - before.get(name, set())
+        }
+        return RobotGraph(
+            self.nodes - earlier.nodes,
+            new,
+            _more(self.services, earlier.services),
+            _more(self.actions, earlier.actions),
+            self.namesakes - earlier.namesakes,
+        )
 
     def writes(self, node: str) -> list[Topic]:
         """Return the topics that a node publishes on."""
@@ -125,6 +152,14 @@ class RobotGraph:
         return found
 
 
+def _more(offers: dict[str, Offer], earlier: dict[str, Offer]) -> dict[str, Offer]:
+    def grew(offer: Offer) -> bool:
+        old = earlier.get(offer.name, Offer(offer.name, ""))
+        return not (offer.servers <= old.servers and offer.clients <= old.clients)
+
+    return {name: offer for name, offer in offers.items() if grew(offer)}
+
+
 def _pairs(
     sources: Iterable[str], targets: Iterable[str], by: str
 ) -> Iterator[tuple[str, str, str]]:
@@ -139,7 +174,10 @@ def read_graph(node: Node) -> RobotGraph:
         for name, namespace in node.get_node_names_and_namespaces()
         if not name.startswith("_") and name != node.get_name()
     ]
-    graph = RobotGraph(nodes=frozenset(full_name(name, space) for name, space in names))
+    count = Counter(full_name(name, space) for name, space in names)
+    graph = RobotGraph(
+        nodes=frozenset(count), namesakes=frozenset(name for name in count if count[name] > 1)
+    )
     for topic, _ in node.get_topic_names_and_types():
         if topic not in INFRASTRUCTURE and "/_" not in topic:
             found = Topic(
@@ -147,10 +185,15 @@ def read_graph(node: Node) -> RobotGraph:
                 _ends(node.get_publishers_info_by_topic(topic), graph.nodes),
                 _ends(node.get_subscriptions_info_by_topic(topic), graph.nodes),
             )
-            if found.types:
+            if found.readers or found.types not in ((), (_TRANSITIONS,)):
                 graph.topics[topic] = found
-    for name, space in names:
+    for name, space in dict.fromkeys(names):
         _add_offers(graph, node, name, space)
+    for offer in [*graph.services.values()]:
+        if offer.servers and offer.type.startswith(_OF_EVERY_NODE):
+            del graph.services[offer.name]
+        else:
+            offer.ways = _ways(offer.name, node, graph.nodes)
     return graph
 
 
@@ -163,9 +206,25 @@ def _add_offers(graph: RobotGraph, node: Node, name: str, space: str) -> None:
         (graph.actions, False, get_action_client_names_and_types_by_node(node, name, space)),
     ):
         for offer_name, types in found:
-            if "/_action/" not in offer_name and not types[0].startswith(_OF_EVERY_NODE):
+            if "/_action/" not in offer_name:
                 offer = offers.setdefault(offer_name, Offer(offer_name, types[0]))
                 (offer.servers if serves else offer.clients).add(full)
+
+
+def _ways(service: str, node: Node, nodes: frozenset[str]) -> tuple[Topic, ...]:
+    """Return the two topics of a service, by the names that ROS 2 gives them on DDS.
+
+    See https://design.ros2.org/articles/topic_and_service_names.html. A middleware that has others
+    shows no endpoints there.
+    """
+    return tuple(
+        Topic(
+            service,
+            _ends(node.get_publishers_info_by_topic(name, no_mangle=True), nodes),
+            _ends(node.get_subscriptions_info_by_topic(name, no_mangle=True), nodes),
+        )
+        for name in (f"rq{service}Request", f"rr{service}Reply")
+    )
 
 
 def _ends(infos: Iterable[TopicEndpointInfo], nodes: frozenset[str]) -> tuple[End, ...]:

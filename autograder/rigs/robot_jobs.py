@@ -42,7 +42,10 @@ IMAGES = frozenset(
 )
 CLOUDS = frozenset(["sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/PointCloud"])
 OTHER_READINGS = frozenset(["sensor_msgs/msg/Imu", "nav_msgs/msg/Odometry"])
-NO_PLACE = frozenset(f"std_msgs/msg/{name}" for name in ("Bool", "Empty"))
+NO_PLACE = frozenset(
+    ["builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration"]
+    + [f"std_msgs/msg/{name}" for name in ("Bool", "Empty", "Header", "ColorRGBA")]
+)
 """Types that cannot say where something is."""
 NOT_OBSTACLES = (
     POSES | VELOCITIES | IMAGES | OTHER_READINGS | NO_PLACE
@@ -83,15 +86,34 @@ class Jobs:
         return self.reading(EYES, IMAGES | CLOUDS)
 
     @cached_property
-    def sensing(self) -> set[str]:
-        """The nodes that know of some sensor: they read one, or drive one of the three."""
-        readings = {
+    def readings(self) -> set[str]:
+        """The topics of sensors: the three, and what others a design has."""
+        return set(SENSORS) | {
             topic.name
             for topic in self.graph.topics.values()
             if topic.writers and any(name.startswith("sensor_msgs/msg/") for name in topic.types)
         }
-        read = self.reading({*SENSORS, *readings}, IMAGES | CLOUDS | OTHER_READINGS)
-        return read | self.drivers
+
+    @cached_property
+    def sensing(self) -> set[str]:
+        """The nodes that know of some sensor: they read one, or drive one."""
+        read = self.reading(self.readings, IMAGES | CLOUDS | OTHER_READINGS)
+        return read | {node for name in self.readings for node in self.graph.topic(name).written_by}
+
+    @cached_property
+    def informed(self) -> set[str]:
+        """The navigation nodes to which topics bring what a sensor sees.
+
+        The last of these topics must be able to say it: that somebody is alive is no reading.
+        """
+        read = {node for name in self.readings for node in self.graph.topic(name).read_by}
+        aware = self.graph.reached(read | self.sensing - self.navigators, ("topic",))
+        return {
+            node
+            for topic in self.graph.topics.values()
+            if (topic.written_by - self.navigators) & aware and set(topic.types) - NO_PLACE
+            for node in topic.read_by & self.navigators
+        } | (read & self.navigators)
 
     def reading(self, topics: Collection[str], readings: Collection[str]) -> set[str]:
         """Return who reads ``topics``, also where a node filters and hands on raw readings."""
@@ -164,6 +186,17 @@ class Jobs:
         ]
 
     @cached_property
+    def pose_of_wheels(self) -> bool:
+        """Whether odometry (and scans and a map) is all that any of the poses is made from.
+
+        Then nothing is missing where only those come in.
+        """
+        writers = {node for topic in self.pose_topics for node in topic.written_by}
+        read = {node: {t.name for t in self.graph.topics.values() if node in t.read_by}
+                for node in writers}  # fmt: skip
+        return all({WHEELS} <= read[node] <= {WHEELS, "/scan", MAP} for node in writers)
+
+    @cached_property
     def map_readers(self) -> set[str]:
         """The nodes that read the map: from its topic, from its service, or from a costmap."""
         asking = {
@@ -172,9 +205,12 @@ class Jobs:
             if offer.type == GET_MAP and offer.servers
             for node in offer.clients
         }
-        topic = self.graph.topic(MAP)
-        readers = self.reading([MAP], [MAP_TYPE]) if MAP_TYPE in topic.types else set()
-        return readers | asking
+        maps = {
+            topic.name
+            for topic in self.graph.topics.values()
+            if MAP_TYPE in topic.types and (topic.name == MAP or topic.written_by & asking)
+        }
+        return self.reading(maps, [MAP_TYPE]) | asking
 
     @cached_property
     def knowing_map(self) -> set[str]:

@@ -4,10 +4,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 
-from rclpy.qos import QoSCompatibility, qos_check_compatible
-
+from autograder.rigs.refusal import refusal
 from autograder.rigs.robot_graph import Offer, RobotGraph, Topic
 from autograder.rigs.robot_jobs import (
     ACTION,
@@ -156,7 +155,12 @@ def why_no_planner(jobs: Jobs) -> str:
     if not known and actions:
         return f"{does(readers, 'plan')} by the action {actions[0].name}: the task is a service."
     if not known:
-        serving = f" ({listed([o.name for o in services])} does not know it)" if services else ""
+        others = [o.name for o in services if not o.servers & jobs.knowing_map]
+        serving = (
+            f" ({listed(others)} {'does' if len(others) == 1 else 'do'} not know it)"
+            if others
+            else ""
+        )
         return f"{does(readers, 'read')} the map, but no service comes from there{serving}."
     offer = (fitting or known)[0]
     if not offer.clients - offer.servers:
@@ -181,8 +185,16 @@ def _gets_goal(offer: Offer, jobs: Jobs) -> bool:
     return in_request or bool(offer.servers & jobs.graph.reached(jobs.navigators, ("topic",)))
 
 
-def topic_faults(graph: RobotGraph) -> Iterator[str]:
-    """Yield what is wrong with the links of topics, a sentence each."""
+def link_faults(graph: RobotGraph) -> list[str]:
+    """Return what is wrong with the links of a design, a sentence each."""
+    twins = [
+        f"More than one node is called {nodes([name])}: on the graph nobody can tell them apart."
+        for name in sorted(graph.namesakes)
+    ]
+    return [*twins, *_topic_faults(graph), *_offer_faults(graph)]
+
+
+def _topic_faults(graph: RobotGraph) -> Iterator[str]:
     for topic in graph.topics.values():
         if len(topic.types) > 1:
             yield f"{topic.name} has more than one type: {listed(topic.types)}."
@@ -197,30 +209,31 @@ def topic_faults(graph: RobotGraph) -> Iterator[str]:
 def _refusals(topic: Topic) -> Iterator[str]:
     for writer in topic.writers:
         for reader in topic.readers:
-            verdict, reason = qos_check_compatible(writer.qos, reader.qos)
-            if verdict == QoSCompatibility.ERROR:
-                parts = [part.strip() for part in str(reason).split(";")]
-                why = [p.removeprefix("ERROR: ") for p in parts if p.startswith("ERROR:")]
-                yield (
-                    f"{nodes([writer.node])} and {nodes([reader.node])} do not connect on "
-                    f"{topic.name}: {', '.join(why)}."
-                )
+            if reason := refusal(writer.qos, reader.qos):
+                yield reason.told(nodes([writer.node]), nodes([reader.node]), topic.name)
 
 
-def offer_faults(graph: RobotGraph) -> Iterator[str]:
-    """Yield what is wrong with services and actions, a sentence each."""
+def _offer_faults(graph: RobotGraph) -> Iterator[str]:
     for offers, verb in ((graph.services, "call"), (graph.actions, "send")):
         for offer in offers.values():
             if not offer.servers:
                 goals = "goals to " if verb == "send" else ""
                 yield f"{does(offer.clients, verb)} {goals}{offer.name}, but no node is its server."
             elif len(offer.servers) > 1 and offer.name != ACTION:
-                yield f"{nodes(offer.servers)} are all servers of {offer.name}: one is right."
+                both = "both" if len(offer.servers) == 2 else "all"
+                yield f"{nodes(offer.servers)} are {both} servers of {offer.name}: one is right."
+            for way in offer.ways:
+                yield from _refusals(way)
 
 
 def nodes(names: Iterable[str]) -> str:
     """Return the names of nodes as a phrase."""
     return listed(sorted(name.removeprefix("/") for name in names))
+
+
+def every(names: Collection[str]) -> str:
+    """Return the names of several nodes as the subject of a sentence: “a and b both”."""
+    return f"{nodes(names)} {'both' if len(names) == 2 else 'all'}"
 
 
 def listed(names: Iterable[str], last: str = "and") -> str:

@@ -57,6 +57,8 @@ class ExaminerNode(QuietNode):
         self.witnessed: Heard = defaultdict(list)
         self.altered: set[str] = set()  # topics with readings that the hardware did not deliver so
         self.foreign: set[str] = set()  # topics with messages that cannot be told to be readings
+        self.blank: set[str] = set()  # topics with readings of which only the header is left
+        self.sent: dict[tuple[str, Tag], int] = {}  # when the hardware delivered it, ns since 1970
         # When the driver published a reading, and when the consumer handed readings on, in order.
         self.published: dict[tuple[str, Tag], int] = {}  # ns since 1970
         self.handed: dict[str, list[tuple[Tag, int]]] = defaultdict(list)
@@ -86,6 +88,8 @@ class ExaminerNode(QuietNode):
                 heard[sensor.name].append(tag)
                 if not sensor.unchanged(message, tag):
                     self.altered.add(topic)
+                    if sensor.blank(message):
+                        self.blank.add(topic)
                 if heard is self.witnessed:
                     self.published.setdefault((sensor.name, tag), info["source_timestamp"])
                 elif heard is self.consumed:
@@ -117,6 +121,7 @@ class ExaminerNode(QuietNode):
         tag = Tag(self.nonce, self.phase(phase), index)
         now = self.get_clock().now()
         self._stamps[sensor.name, now.nanoseconds] = tag
+        self.sent[sensor.name, tag] = now.nanoseconds
         self.hardware[sensor.name].publish(sensor.message(tag, now))
 
     def _tag(self, sensor: Sensor, message: Any) -> Tag | None:

@@ -10,17 +10,20 @@ ends belong to the examiner, and so does a witness that listens on the topic bet
 
 from __future__ import annotations
 
+import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
 from typing import Any
 
-from rclpy.qos import QoSCompatibility, ReliabilityPolicy, qos_check_compatible
+from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import Bench
-from autograder.rigs.readings import SENSORS, Heard, Sensor, Tag
+from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor, Tag
 from autograder.rigs.sensor_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
+from autograder.rigs.stillness import Stillness
 from course import WaitTimeout
 
 DRIVERS, CONSUMERS = "SensorDrivers", "SensorConsumers"
@@ -30,7 +33,13 @@ SETTLE = 8.0
 ENDLESS = 3600 * 10**9
 """Nanoseconds: a lifespan of an hour or more is as good as none."""
 PROBE_PERIOD = 0.1
-"""Seconds between two probes while endpoints find each other."""
+"""Seconds between two rounds of probes while endpoints find each other."""
+ROUND = 5
+"""IMU readings in a round, at their own rate: a consumer may take a lone one for an outlier."""
+
+
+PRESSES = "presses"
+"""The phase of the stop events that bear the words of earlier ones."""
 
 
 class SensorRig:
@@ -45,7 +54,8 @@ class SensorRig:
         assert isinstance(node, ExaminerNode)
         self.node = node
         self._experiments = bench.memory
-        self._probes = self._sent = 0  # how often probed, and with how many readings the last time
+        self._probes = 0  # how often probed
+        self._still = Stillness(bench.subject.pid)
 
     def offered(self, topic: str) -> list[TopicEndpointInfo]:
         """Return the publishers on ``topic`` that are not the examiner's."""
@@ -75,6 +85,10 @@ class SensorRig:
             return True
         return False
 
+    def rest(self) -> None:
+        """Return when all that was sent has been dealt with, or a quarter of a second later."""
+        self._still.reached()
+
     def probe(
         self,
         sensors: Iterable[Sensor],
@@ -90,42 +104,39 @@ class SensorRig:
         phase = f"probe{self._probes}"
         silent = list(sensors)
         for attempt in range(int(SETTLE / PROBE_PERIOD)):
-            self._sent = attempt + 1
-            for sensor in silent:
-                # No two alike: what becomes of repeated words is another check's question.
-                self.node.publish(sensor, phase, attempt)
-            self.wait(partial(self._all_heard, silent, heard, phase), PROBE_PERIOD)
+            self._round(silent, heard, phase, attempt)
             silent = self._silent(silent, heard, phase)
             if all(give_up is not None and give_up(sensor) for sensor in silent):
                 break
         return silent
 
+    def _round(self, sensors: list[Sensor], heard: Heard, phase: str, attempt: int) -> None:
+        """Send a reading of each sensor, of the IMU a few at its rate, until all were heard from.
+
+        No two alike: what becomes of repeated words is another check's question.
+        """
+        end = time.monotonic() + PROBE_PERIOD
+        everyone = partial(self._all_heard, sensors, heard, phase)
+        for number in range(attempt * ROUND, (attempt + 1) * ROUND):
+            silent = self._silent(sensors, heard, phase)
+            for sensor in silent:
+                if sensor is IMU or number % ROUND == 0:
+                    self.node.publish(sensor, phase, number)
+            if IMU in silent:
+                self.wait(everyone, 1 / IMU.rate)
+        self.wait(everyone, max(0.0, end - time.monotonic()))
+
     def probed(self, sensor: Sensor) -> str:
         """Return what the driver did with the newest probes of a sensor, as a phrase."""
-        passed = len(set(self.witnessed(sensor, f"probe{self._probes}")))
-        return f"while the driver published {passed} of the {self._sent} that came in"
+        phase = f"probe{self._probes}"
+        passed, sent = len(set(self.witnessed(sensor, phase))), len(self.sent(sensor, phase))
+        return f"while the driver published {passed} of the {sent} that came in"
 
     def _all_heard(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> bool:
         return not self._silent(sensors, heard, phase)
 
     def _silent(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> list[Sensor]:
         return [sensor for sensor in sensors if not self.indices(heard, sensor, phase)]
-
-    def withheld(self, sensors: Iterable[Sensor]) -> list[Sensor]:
-        """Send one reading of each sensor; return those whose driver does not publish it by itself.
-
-        Tried once more for these: a best-effort link may have lost it.
-        """
-        missing = list(sensors)
-        for index in range(2):
-            for sensor in missing:
-                self.node.publish(sensor, "single", index)
-            self.wait(partial(self._all_witnessed, missing, index), SETTLE / 2)
-            missing = [s for s in missing if not self._all_witnessed([s], index)]
-        return missing
-
-    def _all_witnessed(self, sensors: Iterable[Sensor], index: int) -> bool:
-        return all(index in self.witnessed(sensor, "single") for sensor in sensors)
 
     def burst(self, sensor: Sensor, phase: str, count: int) -> bool:
         """Send ``count`` readings; return whether the last was seen on the sensor's topic.
@@ -157,6 +168,15 @@ class SensorRig:
             if name == sensor.name and tag.phase == number
         }
 
+    def sent(self, sensor: Sensor, phase: str) -> dict[int, int]:
+        """Return when the hardware delivered the readings of a phase: {index: ns since 1970}."""
+        number = self.node.phase(phase)
+        return {
+            tag.number: when
+            for (name, tag), when in list(self.node.sent.items())
+            if name == sensor.name and tag.phase == number
+        }
+
     def published(self, sensor: Sensor, phase: str, index: int) -> int:
         """Return when the driver published a reading, in ns since 1970; 0 if it was not seen."""
         tag = Tag(self.node.nonce, self.node.phase(phase), index)
@@ -178,9 +198,18 @@ class SensorRig:
         return [tag.number for tag in list(heard[sensor.name]) if tag.phase == number]
 
     def expires(self, sensor: Sensor) -> bool:
-        """Whether readings of a sensor are dropped when they get old (a lifespan is offered)."""
-        lifespans = [end.qos_profile.lifespan.nanoseconds for end in self.offered(sensor.topic)]
-        return any(0 < lifespan < ENDLESS for lifespan in lifespans)
+        """Whether readings of a sensor are dropped when they get old: by a lifespan, at any end."""
+        ends = [*self.offered(sensor.topic), *self.requested(sensor.topic)]
+        return any(0 < end.qos_profile.lifespan.nanoseconds < ENDLESS for end in ends)
+
+    def comes_again(self) -> int:
+        """Return how many stop events the consumer has handed on more than once so far.
+
+        Those that were sent with the words of earlier ones (`PRESSES`) do not count.
+        """
+        presses = self.node.phase(PRESSES)
+        numbers = Counter(t for t in list(self.node.consumed[STOP.name]) if t.phase != presses)
+        return sum(number > 1 for number in numbers.values())
 
     def once(self, experiment: Callable[[SensorRig], Any]) -> Any:
         """Run an experiment that several checks read, once a sitting."""
@@ -198,15 +227,3 @@ def sensor_rig(bench: Bench) -> Iterator[SensorRig]:
         yield rig
     finally:
         bench.session.stop(rig.node)
-
-
-def mismatch(offered: TopicEndpointInfo, requested: TopicEndpointInfo) -> str:
-    """Return why DDS refuses to connect two endpoints, or an empty string.
-
-    Only an ERROR is a refusal: rmw reports a WARNING for two default profiles, too.
-    """
-    compatibility, reason = qos_check_compatible(offered.qos_profile, requested.qos_profile)
-    if compatibility != QoSCompatibility.ERROR:
-        return ""
-    parts = (part.strip().removeprefix("ERROR: ") for part in str(reason).split(";"))
-    return f"{'; '.join(part for part in parts if part)}."

@@ -9,13 +9,13 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 
 from autograder.exam import Failed
+from autograder.rigs.backlogs import backlog, few, lost
 from autograder.rigs.readings import STOP, Heard
 from autograder.rigs.sensor_node import LAG, lossless, undemanding
-from autograder.rigs.sensors import DRIVERS, SETTLE, SensorRig
-from autograder.rigs.stalling import few, lost
+from autograder.rigs.sensors import DRIVERS, PRESSES, SETTLE, SensorRig
 
 EVENTS = 5
-PRESSES = (0, 1, 0, 1)
+WORDS = (0, 1, 0, 1)
 """Events that bear the same words again, as pressed, released, pressed, released do."""
 
 
@@ -49,7 +49,7 @@ def require_all_heard(rig: SensorRig, *, give_up: bool) -> Sequence[Heard]:
                 if len(published) == EVENTS
                 else f"Of {EVENTS} that came in, the driver published {len(published)} on "
                 f"{STOP.topic}. {EVENTS - 1} had come in while it was busy: how many does its own "
-                "queue hold?",
+                "queue hold, or does it skip some?",
             )
     return listeners
 
@@ -114,18 +114,45 @@ def require_no_repeats(rig: SensorRig, listeners: Sequence[Heard]) -> None:
 
 def require_told_apart(rig: SensorRig) -> None:
     """Fail unless the consumer also hands on events that bear the words of earlier ones."""
-    for sent, number in enumerate(PRESSES, 1):
-        rig.node.publish(STOP, "presses", number)
+    for sent, number in enumerate(WORDS, 1):
+        rig.node.publish(STOP, PRESSES, number)
         # Of stop events only one is ever on its way into a driver.
-        rig.wait(lambda n=sent: len(rig.witnessed(STOP, "presses")) >= n, LAG)  # type: ignore[misc]
-    rig.wait(lambda: len(rig.consumed(STOP, "presses")) >= len(PRESSES))
-    if (got := rig.consumed(STOP, "presses")) != list(PRESSES):
+        rig.wait(lambda n=sent: len(rig.witnessed(STOP, PRESSES)) >= n, LAG)  # type: ignore[misc]
+    rig.wait(lambda: len(rig.consumed(STOP, PRESSES)) >= len(WORDS))
+    if (got := rig.consumed(STOP, PRESSES)) != list(WORDS):
         raise Failed(
             expected="A stop event is handled even if it bears the words of an earlier one, as one "
             "press of the button does of another.",
-            actual=f"{len(PRESSES)} events came in, the last two with the words of the first two. "
-            f"The driver published {len(rig.witnessed(STOP, 'presses'))} of them, and your "
+            actual=f"{len(WORDS)} events came in, the last two with the words of the first two. "
+            f"The driver published {len(rig.witnessed(STOP, PRESSES))} of them, and your "
             f"consumer handed on {len(got)}.",
+        )
+
+
+def require_all_handled(rig: SensorRig) -> None:
+    """Fail unless the consumer handles all events of a pause, once and in order, and none later."""
+    found = backlog(rig, STOP)
+    count, kept = found.count, found.kept
+    if kept != list(range(count)):
+        raise Failed(
+            expected=f"All {count} events of the pause are handled, once and in order.",
+            actual=f"{amiss(kept, count)}: the consumer handled {around(kept)}.",
+        )
+    if found.again or rig.comes_again():
+        raise Failed(
+            expected="Each stop event is handled once.",
+            actual=f"{found.again or rig.comes_again()} came out on consumer/{STOP.name} once more "
+            "later on, though no new event bore these words. Whoever listens there brakes again.",
+        )
+
+
+def require_only_events(rig: SensorRig, topic: str) -> None:
+    """Fail if something else than stop events was heard on ``topic``."""
+    if topic in rig.node.foreign:
+        raise Failed(
+            expected=f"Nothing but stop events comes on {topic}.",
+            actual="Messages came that hardware/emergency_stop did not deliver. Whoever hears one "
+            "takes it for a press of the button.",
         )
 
 

@@ -32,7 +32,7 @@ WHOLE = "qos"
 """The exam whose corpus is always run whole."""
 
 SAMPLE = ("right-exemplar", "right-chapter", "wrong-stub", "broken-syntax", "broken-says-passed")
-"""What is run of the other corpora: together they are 270 runs of some seconds each, for which
+"""What is run of the other corpora: together they are 500 runs of some seconds each, for which
 `autograder corpus` is there. With AUTOGRADER_WHOLE_CORPUS=1 they are run whole here, too."""
 
 
@@ -88,6 +88,12 @@ def test_every_mutant_is_killed_and_designs_differ(exam: str) -> None:
     assert sum(bool(case.fails) for case in own) >= 15
 
 
+@EXAMS
+def test_every_mistake_is_told_in_words_that_are_tested(exam: str) -> None:
+    mistakes = [case for case in CASES[exam] if case.name.startswith("wrong-")]
+    assert [case.name for case in mistakes if not case.says] == []
+
+
 def test_the_table_of_checks_and_mutants_is_in_step() -> None:
     assert (SUBMISSIONS / "README.md").read_text(encoding="utf-8") == tables.matrix(CASES)
 
@@ -114,6 +120,13 @@ def test_what_the_grader_failed_at_is_reported_with_the_reason() -> None:
     difference = case.verdict_of(outcome)
     assert "grader error in " in difference
     assert "the examiner was ended" in difference
+
+
+def test_feedback_that_shows_the_insides_of_the_grader_is_reported() -> None:
+    case = CASES["qos"][0]
+    program = submission.program(case.submission(*notebooks("qos")))
+    outcome = runner.refuse(program, "see /tmp/x/exam.py", "not_examined")
+    assert "feedback holds '/tmp/'" in case.verdict_of(outcome)
 
 
 def test_a_flip_between_repeats_is_found() -> None:

@@ -12,6 +12,7 @@ import pytest
 from autograder import exams, points
 from autograder.bench import Bench, StudentError, SubjectGone
 from autograder.exam import Exam, ExamError, Failed, unexamined
+from autograder.verdict import CheckResult
 
 
 @contextmanager
@@ -76,6 +77,19 @@ def test_a_check_whose_need_failed_is_not_checked(exam: Exam[list[str]]) -> None
     assert (first.title, first.rationale, first.note) == ("It starts.", "Because it must.", "nice")
     assert (second.expected, second.actual) == ("left", "right")
     assert "It runs." in third.actual
+
+
+def test_what_failed_only_when_an_earlier_part_was_over_is_told_with_the_reason(
+    exam: Exam[list[str]],
+) -> None:
+    failed: dict[str, CheckResult] = {}
+    assert exam.sit("visible", BENCH, failed).checks[0].passed
+    exam.checks["first"] = replace(exam.checks["first"], run=exam.checks["second"].run)
+    (last,) = exam.sit("hidden", BENCH, failed).checks
+    assert last.status == "not_checked"
+    assert last.actual == "This needs “It starts.” first. This time it failed: right"
+    (again,) = exam.sit("hidden", BENCH, failed).checks  # what a report says is not said again
+    assert again.actual == "This needs “It starts.” first."
 
 
 def test_the_graders_own_fault_is_never_the_students(exam: Exam[list[str]]) -> None:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 import pytest
 
 from autograder import corpus, exams, points
@@ -14,9 +11,9 @@ from autograder.rigs.robot_types import NAVIGATE_TO, NAVIGATE_TO_TEXT
 from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS
+from .goldens import golden
 
 EXAM = "architecture"
-GOLDEN = Path(__file__).parent / "golden"
 CASES = {case.name: case for case in corpus.load(SUBMISSIONS, EXAM)}
 
 
@@ -43,10 +40,7 @@ def test_the_whole_report_is_the_golden_one(
     text = "\n\n".join(
         repr(Report(verdicts[f"{EXAM}-{part}"], hints=hints)) for part in points.table()[EXAM].parts
     )
-    golden = GOLDEN / f"{EXAM}-{name}.txt"
-    if "WRITE_GOLDEN" in os.environ:
-        golden.write_text(text + "\n", encoding="utf-8")
-    assert text + "\n" == golden.read_text(encoding="utf-8")
+    assert text + "\n" == golden(f"{EXAM}-{name}", text + "\n")
 
 
 def test_the_examiner_has_the_action_that_the_notebook_gives(notebooks: trials.Notebooks) -> None:

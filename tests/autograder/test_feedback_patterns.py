@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import pytest
 
@@ -13,8 +12,7 @@ from autograder.report import Report
 from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS
-
-GOLDEN = Path(__file__).parent / "golden"
+from .goldens import golden
 
 
 @cache
@@ -42,5 +40,5 @@ def report(name: str, part: str) -> str:
     ],
 )
 def test_the_report_reads_as_it_should(name: str, part: str) -> None:
-    golden = GOLDEN / f"patterns-{name.removeprefix('wrong-')}-{part}.txt"
-    assert report(name, part) == golden.read_text(encoding="utf-8")
+    text = report(name, part)
+    assert text == golden(f"patterns-{name.removeprefix('wrong-')}-{part}", text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 
@@ -13,10 +12,15 @@ from autograder.report import Report
 from tests.machine import needs_sandbox
 
 from .conftest import SUBMISSIONS
+from .goldens import golden
 
-GOLDEN = Path(__file__).parent / "golden"
 CASES = {case.name: case for case in corpus.load(SUBMISSIONS, "qos")}
-MISTAKES = ("wrong-camera-reliable", "wrong-imu-single", "wrong-incompatible")
+MISTAKES = (
+    "wrong-camera-reliable",
+    "wrong-constructor-raises",
+    "wrong-imu-single",
+    "wrong-incompatible",
+)
 
 
 @needs_sandbox
@@ -29,4 +33,4 @@ def test_the_report_reads_as_it_should(name: str) -> None:
     # the last frames of the gap one may have got through.
     text = re.sub(r"\bof \d{3} readings", "of 151 readings", text)
     text = re.sub(r"\b[34] frames that were lost", "4 frames that were lost", text)
-    assert text == (GOLDEN / f"qos-{name}.txt").read_text(encoding="utf-8")
+    assert text == golden(f"qos-{name}", text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 from nbclient import NotebookClient
@@ -16,8 +15,7 @@ from autograder.report import Report
 from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS
-
-GOLDEN = Path(__file__).parent / "golden"
+from .goldens import golden
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +38,7 @@ def test_the_report_of_a_typical_mistake(
     reports = [repr(Report(verdict, hints=3)) for verdict in outcome.verdicts.values()]
     # A device of the examiner's has a random number in its name.
     text = re.sub(r"-[0-9a-f]{8}\b", "-1234abcd", "\n\n".join(reports)) + "\n"
-    assert text == (GOLDEN / f"resources-{name}.txt").read_text(encoding="utf-8")
+    assert text == golden(f"resources-{name}", text)
 
 
 def test_what_else_a_kernel_does_does_not_disturb(

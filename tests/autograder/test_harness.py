@@ -12,6 +12,8 @@ import threading
 from collections import deque
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import pytest
@@ -24,6 +26,7 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from autograder import harness
 from autograder.bench import StudentError, Subject, SubjectGone
 from autograder.harness import Harness
 from autograder.raised import MUST_NOT_SPIN
@@ -339,7 +342,8 @@ def test_who_spins_in_a_callback_is_told_so_and_nobody_else(
 def test_a_trace_has_the_students_lines_only(subject: Subject) -> None:
     with pytest.raises(StudentError, match="no signature found") as raised:
         subject.start("Deaf")
-    assert re.findall(r'File "(.*)", line', raised.value.trace) == [__file__]
+    places = re.findall(r"^  line \d+ of (.*), in ", raised.value.trace, flags=re.MULTILINE)
+    assert places == [Path(__file__).name]
     assert inspect.__file__ not in raised.value.trace
 
 
@@ -357,6 +361,27 @@ def test_what_is_missing_is_not_said_to_have_raised(
     assert raised.value.told == f"{sentence} The last error of a cell was ValueError: no depth."
 
 
+def test_the_first_error_of_the_notebook_is_told_and_not_what_came_of_it(
+    subject: Subject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    missing = NameError("name 'Nobody' is not defined", name="Nobody")
+    monkeypatch.setattr(sys, "last_value", missing, raising=False)
+    with pytest.raises(StudentError) as raised:
+        subject.start("Nobody")
+    assert raised.value.told == "No Nobody was defined: did its cell end with an error?"
+    monkeypatch.setattr(
+        harness, "get_ipython", lambda: SimpleNamespace(first_error=ValueError("no depth"))
+    )
+    with pytest.raises(StudentError) as raised:
+        subject.start("Nobody")
+    assert raised.value.told.endswith(" The first error of a cell was ValueError: no depth.")
+    unread = SyntaxError("invalid syntax", ("<ipython-input-2>", 3, 1, "a b"))
+    monkeypatch.setattr(harness, "get_ipython", lambda: SimpleNamespace(first_error=unread))
+    with pytest.raises(StudentError) as raised:
+        subject.start("Nobody")
+    assert raised.value.told.endswith(" SyntaxError: invalid syntax, in line 3.")
+
+
 def test_an_error_without_a_message_is_told_by_its_name(subject: Subject) -> None:
     with pytest.raises(StudentError) as raised:
         subject.start("Speechless")
@@ -371,10 +396,12 @@ def test_errors_of_the_students_own_lines_are_told_from_those_of_rclpy(
     outside.until(lambda: len(subject.errors()) == 2)
     (told,) = subject.own_errors()
     assert re.fullmatch(
-        r"Careless\.fail raised ValueError: mine \(at line \d+: raise ValueError\(.mine.\)\)", told
+        r"Careless\.fail raised ValueError: mine "
+        r"\(at line \d+ of test_harness\.py: raise ValueError\(.mine.\)\)",
+        told,
     )
     (ended,) = subject.thread_errors()
-    assert re.fullmatch(r"ValueError: mine \(at line \d+: raise .*\)", ended)
+    assert re.fullmatch(r"ValueError: mine \(at line \d+ of test_harness\.py: raise .*\)", ended)
     subject.open()
     assert not subject.own_errors()
     assert not subject.thread_errors()

@@ -88,6 +88,16 @@ def test_no_text_of_a_choice_check_names_a_pattern() -> None:
             assert pattern not in said, (scenario, pattern)
 
 
+def test_no_visible_check_of_the_node_says_which_pattern_to_take() -> None:
+    """Neither as a hint nor as what is to be read; what works, the node shows by working."""
+    checks = exams.load("patterns").checks
+    for name in exams.load("patterns").part("visible"):
+        check = checks[name]
+        said = " ".join((check.title, check.rationale, *check.hints, check.read)).lower()
+        for word in () if name == "choices_made" else (*scenarios.PATTERNS, "publish", "trigger"):
+            assert word not in said, (name, word)
+
+
 def test_the_report_of_a_wrong_choice_names_no_other_pattern(root: Path) -> None:
     """Every wrong answer to every question, as the student would read it."""
     checks = exams.load("patterns").checks

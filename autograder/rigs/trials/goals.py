@@ -12,7 +12,9 @@ from rclpy.action.server import ServerGoalHandle
 
 from autograder.exam import Failed
 from autograder.rigs.navigation import NavigatorUser, services_of
-from autograder.rigs.safety import COARSE, STRIDE, Robot, RobotRig, following, serving
+from autograder.rigs.player import following
+from autograder.rigs.safety import RobotRig, serving
+from autograder.rigs.safety_robot import COARSE, STRIDE, Robot
 
 NAVIGATOR = {"services": services_of("navigate")}
 
@@ -20,9 +22,11 @@ PROMPT = 1.0  # s for an outcome that is clear; a node may look for it by a time
 SILENCE = 2.0  # s without feedback after which a drive is canceled
 ANSWER = 1.0  # s that an answer may take
 BREATH = 1.5  # s between the feedbacks of a navigator that is slow, not dead
-TOLERANCE = 0.5  # s: what the task allows, strides, and a node that looks by a timer
+TOLERANCE = 0.2 + STRIDE  # s: what the task allows, and a node that looks by a timer
 AFTER = 2.5  # s in which a second outcome would show
-METRES = 3
+METRES = 3  # of a drive whose length does not matter; others differ, lest one be remembered
+FAR = 40  # m
+BREATHS = 8  # feedbacks of a slow drive, which takes longer than anyone would wait for the whole
 HESITATION = 0.7  # s that an answer takes which is slow, but in time whatever the tolerance
 
 
@@ -38,9 +42,9 @@ def _user(rig: RobotRig, navigator: bool = True) -> Iterator[tuple[Robot, Naviga
                 yield robot, user
 
 
-def _accepted(robot: Robot, user: NavigatorUser, *, obeys: bool = True) -> None:
+def _accepted(robot: Robot, user: NavigatorUser, metres: int = METRES) -> None:
     """Ask for a drive, and wait until its goal has been accepted."""
-    user.request(METRES, obeys=obeys)
+    user.request(metres)
     _sent(robot, user)
     if not robot.run(lambda: user.goals, PROMPT):
         raise RuntimeError("the examiner's navigator did not accept a goal")
@@ -48,11 +52,12 @@ def _accepted(robot: Robot, user: NavigatorUser, *, obeys: bool = True) -> None:
 
 def _sent(robot: Robot, user: NavigatorUser) -> None:
     robot.run(lambda: user.orders, PROMPT)
-    if user.orders[:1] != [METRES]:
+    metres = user.metres
+    if user.orders[:1] != [metres]:
         order = f"a goal with order={user.orders[0]}" if user.orders else "no goal"
         raise Failed(
-            expected=f"After navigate/request {METRES}{following(user.before)}, a goal with "
-            f"order={METRES} is sent.",
+            expected=f"After navigate/request {metres}{following(user.before)}, a goal with "
+            f"order={metres} is sent.",
             actual=f"The request was published, and the navigator got {order}." + robot.complaint(),
         )
 
@@ -92,11 +97,15 @@ def ended(rig: RobotRig) -> None:
         user.feedback(1)
         user.end(ServerGoalHandle.succeed)
         _ends(robot, user, "When the goal succeeded", "arrived")
-        user.request(METRES, accepts=False)
+        user.request(FAR, accepts=False, hesitates=True)
         _sent(robot, user)
+        user.speeds.clear()  # what came with the request is no answer to the rejection
+        user.decide()
         _ends(robot, user, "When the navigator rejected the goal", "rejected")
-        _accepted(robot, user)
+        _accepted(robot, user, METRES - 1)
         user.feedback(1)
+        robot.rest()
+        user.speeds.clear()  # nor is what came with the acceptance one to the abort
         user.end(ServerGoalHandle.abort)
         _ends(robot, user, "When the navigator aborted the goal", "aborted")
         robot.require_no_errors()
@@ -111,8 +120,8 @@ def _ends(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
 def stalled(rig: RobotRig) -> None:
     """A slow drive that goes on, then one whose feedback ceases."""
     with _user(rig) as (robot, user):
-        _accepted(robot, user)
-        for metre in range(1, METRES + 1):
+        _accepted(robot, user, BREATHS)
+        for metre in range(1, BREATHS + 1):
             robot.spend(BREATH, COARSE)
             if user.cancels or user.outcomes:
                 raise Failed(
@@ -131,11 +140,13 @@ def stalled(rig: RobotRig) -> None:
         _outcome(robot, user, when, "stalled")
         user.end(ServerGoalHandle.canceled)
         _once(robot, user, when, "stalled")
+        robot.require_no_errors()
 
 
 def _canceled(robot: Robot, user: NavigatorUser) -> None:
     """Wait in silence until the goal is canceled, neither too early nor too late."""
     robot.rest()
+    user.speeds.clear()  # what came before the silence does not answer it
     since = user.now
     robot.run(lambda: user.cancels, SILENCE + TOLERANCE)
     expected = f"{SILENCE:g} s after its acceptance or the last feedback the goal is canceled."
@@ -149,24 +160,31 @@ def _canceled(robot: Robot, user: NavigatorUser) -> None:
         raise Failed(expected=expected, actual=f"It came after {user.cancels[0] - since:.1f} s.")
 
 
-def _accepted_slowly(robot: Robot, user: NavigatorUser, *, obeys: bool) -> None:
-    """Ask for a drive whose goal is accepted after a while, but in time."""
-    user.request(METRES, obeys=obeys, hesitates=True)
+def _slowly_refused(robot: Robot, user: NavigatorUser) -> None:
+    """Ask for a drive that is accepted late, but in time, and its cancel refused the same way."""
+    user.request(FAR, obeys=False, hesitates=True, ponders=True)
     _sent(robot, user)
+    _answers_slowly(robot, user, "the goal")
+    robot.run(lambda: user.goals, PROMPT)
+    _canceled(robot, user)
+    _answers_slowly(robot, user, "the request to cancel")
+
+
+def _answers_slowly(robot: Robot, user: NavigatorUser, what: str) -> None:
     robot.spend(HESITATION)
     if user.outcomes:
         raise Failed(
-            expected=f"An answer to the goal after {HESITATION:g} s is in time.",
+            expected=f"An answer to {what} after {HESITATION:g} s is in time.",
             actual=f"Before that it said “{user.outcomes[0]}”.",
         )
     user.decide()
-    robot.run(lambda: user.goals, PROMPT)
 
 
 def _too_late(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive whose goal is accepted, and reached, when it has been given up."""
     user.request(METRES, hesitates=True)
     _sent(robot, user)
+    user.speeds.clear()  # what came with the request does not answer the silence
     when = f"When the navigator did not answer the goal for {ANSWER:g} s"
     _outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
     user.decide()
@@ -179,8 +197,7 @@ def _too_late(robot: Robot, user: NavigatorUser) -> None:
 def lost(rig: RobotRig) -> None:
     """A navigator that refuses to cancel, one that is slow or dies on the way, and none at all."""
     with _user(rig) as (robot, user):
-        _accepted_slowly(robot, user, obeys=False)
-        _canceled(robot, user)
+        _slowly_refused(robot, user)
         when = "When the navigator refused to cancel"
         _outcome(robot, user, when, "runaway")
         user.feedback(2)
@@ -200,3 +217,4 @@ def lost(rig: RobotRig) -> None:
         _accepted(robot, user)
         user.end(ServerGoalHandle.succeed)
         _outcome(robot, user, "When the navigator had come back, and the goal succeeded", "arrived")
+        robot.require_no_errors()

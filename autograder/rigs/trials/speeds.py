@@ -11,8 +11,18 @@ from typing import Any
 from rcl_interfaces.msg import Parameter
 
 from autograder.exam import Failed
-from autograder.rigs.gripper import Operator, double, flag, ready, text, whole
-from autograder.rigs.safety import Robot, RobotRig
+from autograder.rigs.gripper import (
+    Operator,
+    double,
+    doubles,
+    flag,
+    ready,
+    text,
+    unset,
+    whole,
+)
+from autograder.rigs.safety import RobotRig
+from autograder.rigs.safety_robot import Robot
 
 PATIENCE = 1.0  # s for an answer; a service callback may await something
 SAME = 1e-6  # limits that differ by less are equal
@@ -24,23 +34,38 @@ NONSENSE: tuple[tuple[str, list[Parameter]], ...] = (
     ("angular = minus infinity", [double("angular", -math.inf)]),
     ("linear = -0.1", [double("linear", -0.1)]),
     ("linear = 1.5", [double("linear", 1.5)]),
+    ("linear = 1.01", [double("linear", 1.01)]),
     ("angular = -0.1", [double("angular", -0.1)]),
     ("angular = 2.5", [double("angular", 2.5)]),
     ("linear = “fast”, a string", [text("linear", "fast")]),
     ("linear = 1, an integer", [whole("linear", 1)]),
     ("angular = true, a bool", [flag("angular", True)]),
+    ("linear = [0.5], an array of doubles", [doubles("linear", 0.5)]),
+    ("linear without a type", [unset("linear")]),
     ("a limit named “warp”", [double("warp", 0.5)]),
+    ("a limit named “Linear”", [double("Linear", 0.5)]),
+    (
+        "linear = 0.2, angular = 0.5 and a limit named “warp”",
+        [double("linear", 0.2), double("angular", 0.5), double("warp", 0.5)],
+    ),
+    (
+        "linear = 0.2 and angular = “fast”, a string",
+        [double("linear", 0.2), text("angular", "fast")],
+    ),
+    ("linear = NaN, then linear = 0.2", [double("linear", math.nan), double("linear", 0.2)]),
     ("an empty list", []),
 )
 
 
 def good(rig: RobotRig) -> None:
-    """Good requests: both limits, then one at a time, at its bounds."""
+    """Good requests: the first one, both limits, then one at a time, at its bounds."""
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
+        _accepted(robot, operator, "angular = 0.8 alone, the first one,", (0.5, 0.8), angular=0.8)
         _accepted(
-            robot, operator, "linear = 0.3, angular = 0.6", (0.3, 0.6), linear=0.3, angular=0.6
-        )
-        _accepted(robot, operator, "angular = 2.0 alone", (0.3, 2.0), angular=2.0)
+            robot, operator, "linear = 0.33, angular = 0.66", (0.33, 0.66),
+            linear=0.33, angular=0.66,
+        )  # fmt: skip
+        _accepted(robot, operator, "angular = 2.0 alone", (0.33, 2.0), angular=2.0)
         _accepted(robot, operator, "linear = 0.0 alone", (0.0, 2.0), linear=0.0)
         _accepted(robot, operator, "linear = 1.0 alone", (1.0, 2.0), linear=1.0)
 
@@ -59,10 +84,9 @@ def bad(rig: RobotRig) -> None:
 
 def atomic(rig: RobotRig) -> None:
     """Requests that are good in part, and wheels that raise."""
+    rig.renew()
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
-        _accepted(
-            robot, operator, "linear = 0.5, angular = 1.0", (0.5, 1.0), linear=0.5, angular=1.0
-        )
+        _accepted(robot, operator, "linear = 0.4 alone, the first one,", (0.4, 1.0), linear=0.4)
         halves = [double("linear", 0.2), double("angular", math.nan)]
         _refused(robot, operator, "linear = 0.2 together with angular = NaN", halves)
         _refused(robot, operator, "angular = NaN together with linear = 0.2", halves[::-1])
@@ -70,7 +94,7 @@ def atomic(rig: RobotRig) -> None:
             robot,
             operator,
             "angular = 1.5 alone, after a half-good request",
-            (0.5, 1.5),
+            (0.4, 1.5),
             angular=1.5,
         )
         operator.jam(True)
@@ -78,7 +102,8 @@ def atomic(rig: RobotRig) -> None:
         _refused(robot, operator, "linear = 0.9 with jammed wheels", [double("linear", 0.9)])
         operator.jam(False)
         robot.rest()
-        _accepted(robot, operator, "angular = 1.1, after the jam", (0.5, 1.1), angular=1.1)
+        _accepted(robot, operator, "angular = 1.1, after the jam", (0.4, 1.1), angular=1.1)
+        robot.require_no_errors()
 
 
 def _answer(robot: Robot, operator: Operator, what: str, parameters: list[Parameter]) -> Any:

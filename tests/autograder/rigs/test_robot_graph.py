@@ -9,7 +9,7 @@ import pytest
 from geometry_msgs.msg import Twist
 from nav_msgs.srv import GetPlan
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from test_msgs.action import Fibonacci
@@ -17,6 +17,7 @@ from test_msgs.action import Fibonacci
 from autograder.harness import Harness
 from autograder.rigs.robot_graph import End, Offer, RobotGraph, Topic, read_graph
 from autograder.rigs.robot_jobs import Jobs
+from autograder.rigs.robot_reasons import link_faults
 from course import Design, Session
 
 QOS = QoSProfile(depth=1)
@@ -186,3 +187,52 @@ def test_a_debugging_pose_is_not_held_against_a_busy_node() -> None:
     assert jobs["/estimator"] == ["estimates the state"]
     alone = Jobs(graph(topics[0], *topics[2:], services=services)).of_each_node()
     assert alone["/pilot"] == ["estimates the state", "plans paths", "controls the motors"]
+
+
+def test_ends_that_disagree_about_a_type_are_a_fault() -> None:
+    text = End("/display", "std_msgs/msg/String", QOS)
+    velocity = topic("/velocity", TWIST, "navigation", "controller")
+    clash = Topic(velocity.name, velocity.writers, (*velocity.readers, text))
+    (fault,) = link_faults(graph(clash))
+    assert fault == f"/velocity has more than one type: {TWIST} and std_msgs/msg/String."
+
+
+def test_only_endpoints_that_came_later_are_new() -> None:
+    velocity = topic("/velocity", TWIST, "navigation", "controller")
+    plan = Offer("/plan", "", {"/planner"}, {"/navigation"})
+    earlier = graph(velocity, topic("/path", ARRAY, "navigation", ""), services=[plan])
+    later = graph(
+        velocity,
+        topic("/goal", ARRAY, "", "planner"),
+        services=[plan, Offer("/reset", "", set(), {"/controller"})],
+    )
+    assert link_faults(later.since(earlier)) == [
+        "planner reads /goal, but nobody publishes on it.",
+        "controller calls /reset, but no node is its server.",
+    ]
+
+
+def test_who_calls_a_service_that_offers_less_is_told() -> None:
+    with Session() as subject, Session(domain_id=subject.domain_id) as examiner:
+        less = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+        design = Design()
+        design.node("navigation").calls("plan", GetPlan, less)
+        design.node("planner").serves("plan", GetPlan)
+        design.run(subject)
+        reader = examiner.run(Node, "examiner")
+        examiner.until(lambda: len(read_graph(reader).services) == 1, timeout=20)
+        examiner.until(lambda: link_faults(read_graph(reader)), timeout=20)
+        assert link_faults(read_graph(reader)) == [
+            "navigation offers BEST_EFFORT on /plan, and planner requests RELIABLE, so DDS never "
+            "connects them."
+        ]
+
+
+def test_two_nodes_of_one_name_are_told_apart_from_one() -> None:
+    with Session() as subject, Session(domain_id=subject.domain_id) as examiner:
+        for _ in range(2):
+            subject.run_beside(partial(Node, "twin"))
+        subject.run(Node, "single")
+        reader = examiner.run(Node, "examiner")
+        examiner.until(lambda: read_graph(reader).namesakes, timeout=20)
+        assert read_graph(reader).namesakes == {"/twin"}

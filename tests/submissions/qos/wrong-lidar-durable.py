@@ -1,5 +1,6 @@
 # title: Old scans for whoever starts late
 # fails: late_joiner
+# says: late_joiner: It was handed lidar readings from before it started.
 # in: the stub
 
 camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -1,5 +1,7 @@
 # title: A stop queue that is deep, but not deep enough
 # fails: stop_complete, stop_repaired
+# says: stop_complete: of 100 were lost: the consumer handled
+# says: stop_repaired: of 100 were lost: it got
 # in: the stub
 
 camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)

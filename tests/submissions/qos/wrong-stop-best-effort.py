@@ -1,5 +1,6 @@
 # title: A stop that may get lost
 # fails: stop_reaches_all
+# says: stop_reaches_all: A consumer that asks for RELIABLE heard nothing on emergency/stop
 # in: the stub
 
 camera_qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -1,5 +1,7 @@
 # title: Stop events that expire while they wait
 # fails: stop_complete, stop_repaired
+# says: stop_complete: of 100 were lost
+# says: stop_repaired: of 100 were lost
 # in: the stub
 
 from rclpy.duration import Duration

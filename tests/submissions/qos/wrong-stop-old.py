@@ -1,5 +1,6 @@
 # title: Stop events that are forgotten after five seconds
 # fails: stop_complete
+# says: stop_complete: A lifespan on emergency/stop throws events away when they get old.
 # in: the stub
 
 from rclpy.duration import Duration

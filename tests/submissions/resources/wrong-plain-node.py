@@ -1,5 +1,6 @@
 # title: States in a variable of a plain node, without a state machine that others can drive
 # fails: driver_runs, managed_runs
+# says: driver_runs: takes 1 positional argument but 2 were given
 # says: managed_runs: Your node answers its service /managed_camera/get_state.
 
 

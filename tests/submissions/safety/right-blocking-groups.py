@@ -59,6 +59,8 @@ class SpeedServer(Node):
 
     def apply(self, parameters):
         given = {p.name: p.value for p in parameters}
+        if len(given) < len(parameters):
+            raise KeyError('a limit is named twice')
         if not given or set(given) - {'linear', 'angular'}:
             raise KeyError(f'what is {sorted(given)}?')
         if any(v.type != ParameterType.PARAMETER_DOUBLE for v in given.values()):

@@ -25,7 +25,7 @@
 # | `camera/image` | topic, `sensor_msgs/Image` | what the camera sees |
 # | `wheel/odometry` | topic, `nav_msgs/Odometry` | what the wheel encoders count |
 # | `map` | topic, `nav_msgs/OccupancyGrid` | the map of the warehouse, which a node of yours publishes (or serves, as `nav_msgs/GetMap`) |
-# | `navigate_to` | action, `NavigateTo` below or any other | a person sends a waypoint, follows the progress, may cancel |
+# | `navigate_to` | action, `NavigateTo` below or any other that is installed | a person sends a waypoint, follows the progress, may cancel |
 # | `motors/command` | topic, `geometry_msgs/Twist` | the motors' electronics carries it out |
 #
 # Six jobs have to be done:
@@ -36,13 +36,15 @@
 #    `PoseStamped`, `PoseWithCovariance`, `PoseWithCovarianceStamped`), on a topic other than
 #    `wheel/odometry`. The navigation node does not do this.
 # 3. **Obstacle detection** reads `scan` or `camera/image` and publishes obstacle information: of
-#    another type than a reading (so no `LaserScan` and no `Image`), not a velocity and not a pose,
-#    able to say where or how far (a `Bool` is not), and with room for a 32-bit number or a text (a
-#    `UInt16` has none). Another node reads it. Navigation and control do not do the detection.
+#    another type than a reading (so no `LaserScan` and no `Image`), not a velocity, a pose, a path
+#    or diagnostics, able to say where or how far (a `Bool`, a time, a colour or a bare `Header` is
+#    not), and with room for a 32-bit number or a text (a `UInt16` has none). Another node reads it.
+#    Navigation and control do not do the detection.
 # 4. **Path planning** is a service. Its node knows the map: it reads it, or is the one that hands it
 #    out. Another node, which has the goal, calls it, and the request (or a topic) brings the goal.
-# 5. **Navigation** is the server of the action `navigate_to` and accepts its goals. Topics bring it
-#    what the sensors see: readings, obstacle information, or the pose.
+# 5. **Navigation** is the server of the action `navigate_to` and accepts its goals: whenever one is
+#    over, the next. Topics bring it what the sensors see: readings, obstacle information, or the
+#    pose.
 # 6. **Control**: exactly one node publishes `motors/command`. From the navigation node links lead to
 #    it: topics, services or action goals, whichever you like.
 #
@@ -52,8 +54,9 @@
 # - What obstacle detection finds reaches the motors **as a stream**: over topics or action goals,
 #    without anybody having to ask a service for it.
 # - **Nothing dangles**: every topic has a writer and a reader, whoever calls a service or sends
-#   goals finds one server, and the QoS of the two sides fits. Only `motors/command` is read, and
-#   `navigate_to` used, by someone outside your design.
+#   goals finds one server, and the QoS of the two sides fits, that of services, too. Every node has
+#   a name of its own. Only `motors/command` is read, and `navigate_to` used, by someone outside
+#   your design.
 # - Use message types that are installed (`std_msgs`, `geometry_msgs`, `sensor_msgs`, `nav_msgs`,
 #   `diagnostic_msgs`, …).
 #
@@ -65,6 +68,12 @@
 # just before it sends. A mark stands in a message's `frame_id` or, where there is none, in its text
 # or its numbers, so turn no message away because of these. While scans are poured in, a goal is
 # under way; before another goal is sent, the one before is cancelled.
+#
+# So that this can be seen from outside, nodes that you write yourself keep to the following. All
+# endpoints are there when the constructor returns. A node works on each message that comes in, or
+# at least twice a second on the newest, also if nothing has changed. While the wheels report, the
+# pose is published. A goal gets to the motors within two seconds. And a further node that one of
+# yours makes for itself counts as one more node: what the two hand each other in Python is no link.
 #
 # **20 points:** 10 for the visible checks, 5 for checks that run when your work is graded, 5 for
 # your explanation.

@@ -28,6 +28,7 @@
 # plays the gripper, the operators, the navigator and the dispatchers, makes them fail, and watches
 # **what your nodes do** on their topics, services and actions. How you write them is your choice:
 # `async` callbacks, futures with callbacks, timers, threads; node names, QoS and helpers are free.
+# Every topic, service and action of the task is there when a constructor returns, as in the stubs.
 #
 # Three rules hold for all four nodes.
 #
@@ -217,7 +218,7 @@ class GripperClient(Node):
 # - **A bad request** is answered `successful=False` with a reason in words, and nothing at all
 #   reaches the wheels: NaN, infinite, negative or too large; a parameter that is no double
 #   (`parameter.value.type`); any other name; an empty list. One bad parameter makes the whole
-#   request bad.
+#   request bad, even if a good one of the same name follows.
 # - **Wheels that raise** are answered `successful=False` with a reason, and the old limits hold.
 # - Whatever came in, the next request is answered as if nothing had happened.
 
@@ -309,17 +310,23 @@ class NavigationClient(Node):
 
     async def drive(self, metres):
         """Send a goal and follow it to its end; return the outcome."""
-        self.watchdog = None
+        watchdog = None
+
+        def on_feedback(_):
+            # Of this goal alone: one that was given up as lost may still send some.
+            if watchdog is not None and not watchdog.is_canceled():
+                watchdog.reset()
+
         goal = Drive.Goal(order=metres)
-        handle = await self.answer(self.navigator.send_goal_async(goal, self.on_feedback))
+        handle = await self.answer(self.navigator.send_goal_async(goal, on_feedback))
         if handle is None:
             return 'lost'
         if not handle.accepted:
             return 'rejected'
         result = handle.get_result_async()
-        self.watchdog = once(self, 2.0, result.cancel)
+        watchdog = once(self, 2.0, result.cancel)
         response = await result
-        self.watchdog.cancel()
+        watchdog.cancel()
         if response is not None:
             return 'arrived' if response.status == GoalStatus.STATUS_SUCCEEDED else 'aborted'
         canceling = await self.answer(handle.cancel_goal_async())
@@ -333,11 +340,6 @@ class NavigationClient(Node):
         answer = await future
         self.destroy_timer(timer)
         return answer
-
-    def on_feedback(self, feedback):
-        """Be patient for another 2 s."""
-        if self.watchdog is not None and not self.watchdog.is_canceled():
-            self.watchdog.reset()
         ### END SOLUTION
 
 
@@ -354,10 +356,10 @@ class NavigationClient(Node):
 # - If the wheels raise, the goal is **aborted** within 1 s, and the reason is published in words on
 #   `drive/fault` (`String`). The next goal is served as usual.
 # - Whoever takes the node down calls its method `shutdown()` first, in a thread of their own. It does
-#   not wait: it stops the wheels, and the goal that is under way, if there is one, is **aborted**
-#   within 1 s.
-# - **However it ends** (succeeded, canceled, aborted, shut down) the robot stands: the last message
-#   on `cmd_vel` is a zero `Twist`, within 0.5 s of the end.
+#   not wait: it stops the wheels, which are told nothing but to stop from then on, and the goal that
+#   is under way, if there is one, is **aborted** within 1 s.
+# - **However it ends** (succeeded, canceled, aborted, shut down), and even if it never got to move,
+#   the robot is stopped: a zero `Twist` is the last message on `cmd_vel`, within 0.5 s of the end.
 
 # %% nbgrader={"grade": false, "grade_id": "safety-drive", "locked": false, "schema_version": 3, "solution": true}
 class NavigationServer(Node):

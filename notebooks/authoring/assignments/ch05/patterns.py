@@ -64,13 +64,14 @@ choices = {
 #
 # | | Name | What the others rely on |
 # |---|---|---|
-# | position | `robot/position` | Whoever wants to know gets the robot's position in metres, never older than 0.5 s. |
+# | position | `robot/position` | Whoever wants to know gets the robot's position in metres, never older than 0.5 s: also who begins to listen while the robot stands still and the hardware has nothing new. |
 # | camera | `robot/camera` | 10 pictures a second (9 to 11). |
-# | navigation | `robot/navigate` | Somebody names a station further along the line, and the robot drives there at `max_speed`. At each station they hear which stations it has passed so far on this drive, and at the end, when it has stopped, which it passed in all. They can call it off: then the robot stops where it is, within 0.5 s, and does not wait for the next station; which stations the result then has is up to you. Pictures and the position go on while it drives. The aisle may be blocked for a while; then the robot waits, and where it is tells `hardware/position`, not the time. |
+# | navigation | `robot/navigate` | Somebody names a station further along the line, and the robot drives there at `max_speed`. At each station they hear all stations that it has passed so far on this drive, in the order passed, and at the end, when it has stopped, all of the whole drive. They can call it off, at any moment: then the robot stops where it is, within 0.5 s, and does not wait for the next station; which stations the result then has is up to you. It stays there until the next goal, which begins there. All the others in this table go on while it drives, and after that. The aisle may be blocked for a while; then the robot waits, and where it is tells `hardware/position`, not the time. That comes every few centimetres, so hardly ever just at a station: one is passed when the robot is there, to within 5 cm, or beyond it. |
 # | parameters | `max_speed` | The highest speed in m/s, 0.5 at the start. Whoever changes it hears whether the new value holds. Values from 0.1 to 1.0 are good; any other is refused with a reason, and the old one stays. A new value counts from the next goal on, or sooner. |
 # | battery | `robot/battery` | Everyone who is interested knows a new level within 1 s. So does whoever joins later, within 1 s: the hardware reports the level only when it changes. |
 #
-# All times are those of the node's clock: `create_timer` and `self.get_clock()` go by it,
+# All five are there within 1 s after the node has started; what tells the battery level may wait for
+# the first one. All times are those of the node's clock: `create_timer` and `self.get_clock()` go by it,
 # `time.sleep` does not. The examiner moves that clock faster than the one on the wall.
 #
 # **Types.** Which one you need follows from the pattern that you choose.

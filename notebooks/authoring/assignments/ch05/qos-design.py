@@ -21,16 +21,22 @@
 # |---|---|---|---|
 # | camera | `camera/image` | `sensor_msgs/Image`, 10 Hz | A live picture over Wi-Fi. A lost frame is gone: nothing newer may wait for it, and after a gap in the radio link none is sent again. After a pause a consumer goes on with the newest frames, at most the last 10 (1 s). |
 # | LIDAR | `scan` | `sensor_msgs/LaserScan`, 10 Hz | Obstacle avoidance wants the latest scan. After a pause nothing older than 0.5 s (5 scans) is acted on. |
-# | IMU | `imu/data` | `sensor_msgs/Imu`, 100 Hz | State estimation may be busy for 50 ms (5 readings) and must still see each of them, but never more than the last 0.5 s (50 readings). |
+# | IMU | `imu/data` | `sensor_msgs/Imu`, 100 Hz | State estimation may be busy for 50 ms (5 readings) and must still see each of them, once, but never more than the last 0.5 s (50 readings). |
 # | emergency stop | `emergency/stop` | `std_msgs/String`, on each press and release; one press reads like another | Every event, once and in order, at every consumer, whichever reliability it asks for. Up to 100 events can queue up while a consumer is busy or out of radio range; whoever comes back into range gets all that it missed. A driver that is busy for a moment finds up to 4. |
 #
 # And one rule for camera, LIDAR and IMU together: a node that starts late must not be handed old
-# readings, not even if it asks for them. Whether the emergency stop remembers its last event for late joiners is up to you.
+# readings, not even if it asks for them; nor does a driver publish a reading again. Whether the
+# emergency stop remembers its last event for late joiners is up to you.
 #
-# The drivers publish each reading as soon as the hardware delivers it, with its content unchanged;
-# the consumers hand on what they act on, and may change its header. What a consumer already held
-# before a pause does not count against it. And it keeps up while readings come in: a list that
-# fills faster than it is emptied is a queue, too, and the same bounds hold for it.
+# The drivers publish each reading as soon as the hardware delivers it, at most 0.1 s later, with
+# its content unchanged; the consumers hand on what they act on: they may change its header and
+# clean its content, but not leave it out. On `emergency/stop` and `consumer/emergency_stop` come
+# stop events and nothing else. What a consumer already held before a pause does not count against
+# it. And it keeps up while readings come in: a list that fills faster than it is emptied, or is
+# always full, is a queue, too, and the same bounds hold for it.
+#
+# Each node has all its publishers and subscriptions once its constructor has returned, whether or
+# not anybody listens yet.
 #
 # Leave the threads to ROS 2: the examiner keeps your consumer busy by holding back its callbacks. A
 # consumer that goes on all the same fails what is examined by a pause.

@@ -1,0 +1,131 @@
+"""What is required of what is left for a consumer that was busy for a while."""
+
+from __future__ import annotations
+
+from autograder.exam import Failed, NotExaminable
+from autograder.rigs.readings import STOP, Sensor
+from autograder.rigs.sensors import SensorRig
+from autograder.rigs.singles import thinned
+from autograder.rigs.stalling import (
+    BURST,
+    EVENTS,
+    LONGEST,
+    PROMPT,
+    Backlog,
+    Burst,
+    busy_consumer,
+    short_pause,
+)
+
+THINNED = 0.8  # a driver that publishes less than this share of the readings drops some
+
+
+def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
+    """Return what became of one sensor's readings.
+
+    Fail if the driver keeps readings back, or if the consumer cannot be held back.
+    """
+    backlogs: dict[str, Backlog] = rig.once(busy_consumer)
+    found = backlogs[sensor.name]
+    if found.early:
+        raise Failed(
+            expected="Only callbacks of your consumer, which ROS 2 calls, hand readings on.",
+            actual="Your consumer went on while its callbacks were held back: does a thread, or "
+            "another executor, do its work?",
+        )
+    if found.altered or sensor.topic in rig.node.altered:
+        raise altered(sensor)
+    if found.published < (found.count if sensor is STOP else (found.count - 1) * THINNED):
+        raise _withheld(sensor, found.count, found.published)
+    if fewer := thinned(rig, sensor):
+        raise _withheld(sensor, *fewer)
+    if sensor is STOP and found.count < EVENTS:
+        _require_quick(found)
+    return found
+
+
+def altered(sensor: Sensor) -> Failed:
+    """Return that a driver changed a sensor's readings."""
+    return Failed(
+        expected="The drivers publish each reading with its content unchanged.",
+        actual=f"The {sensor.name} readings on {sensor.topic} are not what "
+        f"hardware/{sensor.name} delivered: something in the message was changed or left out.",
+    )
+
+
+def _withheld(sensor: Sensor, came: int, went: int) -> Failed:
+    return Failed(
+        expected=f"The driver publishes each {sensor.name} reading as it comes in.",
+        actual=f"Of {came} that came in, {went} went over {sensor.topic}.",
+    )
+
+
+def _require_quick(found: Backlog) -> None:
+    """Say whose doing it is that fewer events than planned came to the topic in a minute."""
+    if found.took < PROMPT:
+        raise NotExaminable(
+            f"This machine was too busy: in {LONGEST} s only {found.count} stop events got through "
+            "the driver. A person will look at it."
+        )
+    raise Failed(
+        expected="The driver publishes each stop event as it comes in.",
+        actual=f"In {LONGEST} s it published {found.published}: each took it {found.took:.1f} s "
+        "or longer.",
+    )
+
+
+def require_fresh(rig: SensorRig, sensor: Sensor, expected: str) -> None:
+    """Fail unless the consumer goes on with the newest after a long pause, and keeps up then."""
+    found = backlog(rig, sensor)
+    count, kept, most = found.count, found.kept, sensor.most
+    if max(kept, default=-1) < count - 1:
+        actual = f"Of {count} readings in a pause the newest never came out: it got {few(kept)}."
+    elif min(kept) < count - most and found.oldest > most / sensor.rate:
+        actual = f"It then worked through the last {count - min(kept)} of {count} readings."
+    elif kept != sorted(kept):
+        actual = f"It passed them on out of order: {few(kept)}."
+    elif found.behind is not None:
+        actual = found.behind.told(sensor)
+    else:
+        return
+    raise Failed(expected=expected, actual=actual)
+
+
+def require_burst(rig: SensorRig, expected: str) -> None:
+    """Fail unless the consumer passes on every IMU reading of a short pause, in order."""
+    found: Burst = rig.once(short_pause)
+    if found.missing and found.aged:
+        raise NotExaminable(
+            "This machine was too busy to tell a short queue from readings that had grown old. A "
+            "person will look at it."
+        )
+    if found.missing:
+        passed = BURST - found.missing
+        actual = (
+            f"Of {BURST} readings that came in while it was busy {lost(found.missing)}, "
+            f"{passed or 'none'} {'were' if passed > 1 else 'was'} passed on."
+        )
+    elif len(found.kept) > BURST:
+        actual = (
+            f"It passed on {BURST} readings as {len(found.kept)}: some came out more than once, "
+            "and an estimator that adds them up turns too far."
+        )
+    elif found.kept != sorted(found.kept):
+        actual = f"It passed them on out of order: {few(found.kept)}."
+    else:
+        return
+    raise Failed(expected=expected, actual=actual)
+
+
+def lost(number: int, of: int = 0) -> str:
+    """Return a phrase such as "1 was lost", or "2 of 7 were lost"."""
+    return f"{number}{f' of {of}' if of else ''} {'was' if number == 1 else 'were'} lost"
+
+
+def few(numbers: list[int]) -> str:
+    """Return the first of some reading numbers, as a phrase."""
+    if not numbers:
+        return "nothing at all"
+    shown = ", ".join(str(number) for number in numbers[:6])
+    some = "reading" if len(numbers) == 1 else "readings"
+    return f"{some} {shown}{' …' if len(numbers) > 6 else ''}"

@@ -1,0 +1,51 @@
+"""A blocked aisle on a drive: its feedback stands still, and nothing else is held up."""
+
+from __future__ import annotations
+
+from autograder.rigs import filming, meanwhile
+from autograder.rigs.driving import Drive
+from autograder.rigs.stations import require_no_further
+
+FURTHER = (0.8, 0.9)
+"""Parts of the way to which the robot creeps on, for who is content with less than all of it."""
+BLOCKED, BLOCKED_WALL = 1.2, 0.3
+"""Seconds of the node's clock, and then on the wall, for which the robot cannot get on."""
+WAITS = 5.0
+"""Seconds of the node's clock for which it cannot get on in all: longer than a metre takes who
+reckons by the time, and than the patience of who gives up."""
+COARSE = 0.05
+"""Seconds of the node's clock between two looks of those who wait all that time: a fifth as many
+take a fifth of the time."""
+
+
+def hold(drive: Drive) -> None:
+    """Let the aisle be blocked before the next station, whatever the robot is told.
+
+    Raises:
+        Failed: the feedback goes on, so it does not look where the robot is, or not closely.
+    """
+    drive.leave()
+    stretch = filming.Stretch(drive.rig)
+    if drive.rig.films:
+        stretch.run(BLOCKED, sum(meanwhile.FILMED) / 2)
+    else:
+        drive.go_by(BLOCKED)
+    require_no_further(drive)
+    _require_the_rest(drive, stretch)
+    drive.rig.wait(lambda: drive.latest > drive.station, BLOCKED_WALL)
+    require_no_further(drive)
+    drive.go_by(WAITS - BLOCKED, COARSE)
+    require_no_further(drive)
+
+
+def _require_the_rest(drive: Drive, stretch: filming.Stretch) -> None:
+    """Fail if the drive, of which ``stretch`` is a part, holds up what worked without one."""
+    where = drive.where.replace("while", "While", 1)
+    meanwhile.require_pictures(drive.rig, stretch, where)
+    # Twice: a position that is looked up now and then may be right by chance, but then it has
+    # just been looked up.
+    for part in FURTHER:
+        drive.move(drive.station + part)
+        meanwhile.require_position(drive.rig, drive.position, where)
+    meanwhile.require_battery(drive.rig, where)
+    meanwhile.require_parameters(drive.rig, where)

@@ -1,0 +1,83 @@
+"""The examiner's own node of the resources exam: its endpoints, and the pictures that it got."""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections import Counter
+from functools import partial
+from typing import Any, NamedTuple
+
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import Image
+from std_msgs.msg import Int32
+
+from autograder.rigs.quiet import QuietNode
+
+IMAGE, ZOOM, SNAPSHOT = "camera/image", "camera/zoom", "camera/snapshot"
+
+
+class Picture(NamedTuple):
+    """What a picture's pixels say: its device, its number since the device was opened, its zoom.
+
+    And when it was published, by DDS: in ns of this machine's time of day.
+    """
+
+    device: str
+    number: int
+    zoom: int
+    published: int
+
+
+def _picture(message: Any, published: int) -> Picture | None:
+    label = bytes(message.data[:200]).split(b"\n")[0].decode(errors="replace")
+    found = re.fullmatch(r"([\w-]{1,100}) (\d{1,9}) (\d{1,3})", label)
+    return Picture(found[1], int(found[2]), int(found[3]), published) if found else None
+
+
+class ExaminerNode(QuietNode):
+    """The examiner's endpoints, and what each of two readers got, in the order of its arrival."""
+
+    def __init__(self) -> None:
+        """Listen on the image topic, whichever reliability is offered."""
+        super().__init__(f"examiner_{secrets.token_hex(4)}")
+        self.heard: dict[ReliabilityPolicy, list[Picture]] = {}
+        self._strange: Counter[ReliabilityPolicy] = Counter()
+        for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
+            qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=reliability)
+            heard = self.heard[reliability] = []
+            note = partial(self._note, heard, reliability)
+            self.create_subscription(Image, IMAGE, note, qos)
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.zoom = self.create_publisher(Int32, ZOOM, latched)
+
+    def _note(
+        self,
+        heard: list[Picture],
+        reader: ReliabilityPolicy,
+        message: Any,
+        info: dict[str, int],
+    ) -> None:
+        if (picture := _picture(message, info["source_timestamp"])) is None:
+            self._strange[reader] += 1
+        else:
+            heard.append(picture)
+
+    def of(self, device: str) -> list[Picture]:
+        """Return the pictures of ``device``, from the reader that got more of them.
+
+        A driver may have two publishers, one for each reliability: only the best-effort reader
+        hears both. If both hear all, it is the reliable reader, which loses none.
+        """
+        reliable, any_offer = (
+            [picture for picture in list(heard) if picture.device == device]
+            for heard in self.heard.values()
+        )
+        return max(reliable, any_offer, key=len)
+
+    def strange(self) -> int:
+        """Return how many images came that are not a camera's."""
+        return max(self._strange.values(), default=0)

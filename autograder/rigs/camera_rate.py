@@ -1,0 +1,144 @@
+"""How often a camera driver sends pictures, and that it goes by the robot's clock."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from autograder.exam import Failed
+from autograder.rigs.camera import PERIOD, SETTLE, CameraRig
+from course.runtime.waiting import Deadline
+
+STEPS = 10  # at least, in which a rate is counted
+KEEP_UP = 0.25  # s of wall time that a picture which is due is waited for before time moves on
+STANDSTILL = 0.5  # s of wall time without two pictures: they stand still
+BACKLOG = 3.0  # s of wall time in which pictures may come that had been ordered before
+AT_ONCE = 3  # pictures in a step in which one is due, and one of the step before may come
+PHASE = 2  # steps, in which pictures of before may come
+SLICES = 20  # of a period, in which time moves on where it does so by and by
+AGAIN = 2.0  # s of wall time for pictures that are late in all, where they can be counted again
+PACES = (0.0, 1.0, 2.0)  # s of wall time for a second of the robot's
+
+
+class _Count(NamedTuple):
+    """How many pictures came, how many are to come, and the most that came in one step."""
+
+    came: int
+    wanted: float
+    tolerance: float
+    most: int
+
+    @property
+    def right(self) -> bool:
+        return abs(self.came - self.wanted) <= self.tolerance and self.most <= AT_ONCE
+
+
+def require_rate(
+    rig: CameraRig, device: str, rate: float, when: str = "", seconds: int = 1
+) -> None:
+    """Fail unless ``rate`` pictures of ``device`` come a second of simulated time, one by one.
+
+    Where time jumps from one picture to the next, a thread that looks at the clock now and then
+    loses what it sees too late. So a count that is not right is made again, as time passes on a
+    robot, and once more with twice as much time.
+    """
+    for pace in PACES:
+        count = _count(rig, device, rate, seconds, pace)
+        if count.right:
+            return
+    time = "one second" if seconds == 1 else f"{seconds} seconds"
+    expected = f"In {time} {count.wanted:.0f} pictures come{when}."
+    if abs(count.came - count.wanted) > count.tolerance:
+        raise Failed(
+            expected=expected,
+            actual=f"In {time} of the robot's time {count.came} came{rig.raised()}.",
+        )
+    raise Failed(
+        expected=f"{expected[:-1]}, one after the other.",
+        actual=f"There were as many, but up to {count.most} of them came at once.",
+    )
+
+
+def _count(rig: CameraRig, device: str, rate: float, seconds: int, pace: float) -> _Count:
+    """Count pictures of ``device`` while ``seconds`` of simulated time pass.
+
+    Time moves on picture by picture: a thread may publish a moment after the timer, and a design
+    may keep one order at a time and drop the next one while it is busy.
+    """
+    wanted = rate * seconds
+    steps = max(STEPS, round(wanted))
+    before, late, most, last = len(rig.pictures(device)), 0, 0, 0
+    deadline = Deadline(SETTLE if pace == PACES[-1] else AGAIN)
+
+    def came() -> int:
+        return len(rig.pictures(device)) - before
+
+    for step in range(1, steps + 1):
+        _move_on(rig, seconds / steps, 1 / rate / SLICES, pace)
+        due = int(wanted * step / steps)
+        # By its phase a design may be one picture behind, and stay so: it is not waited for twice.
+        if not rig.wait(lambda least=due - late: came() >= least, KEEP_UP):  # type: ignore[misc]
+            rig.wait(lambda least=due - 1: came() >= least, deadline.left)  # type: ignore[misc]
+        now = came()
+        late = max(0, due - now)
+        most = max(most, now - last) if step > PHASE else 0
+        last = now
+    let_arrive(rig, device)
+    # Some of those before may have been on their way: not more than come in a tenth of a second.
+    return _Count(came(), wanted, max(1.0, rate / STEPS), most)
+
+
+def _move_on(rig: CameraRig, seconds: float, part: float, pace: float) -> None:
+    """Move simulated time on: at once, or with a ``pace`` by and by, each ``part`` of it."""
+    if not pace:
+        rig.advance(seconds)
+        return
+    parts = max(1, round(seconds / part))
+    for _ in range(parts):
+        clock = Deadline(pace * seconds / parts)
+        rig.advance(seconds / parts)
+        rig.wait(lambda clock=clock: not clock.left, clock.left)  # type: ignore[misc]
+
+
+def let_arrive(rig: CameraRig, device: str) -> None:
+    """Wait for pictures of ``device`` that were read and are on their way.
+
+    Not for long: a thread may read all the time, and publish just some of what it reads.
+    """
+
+    def newest_is_here() -> bool:
+        newest = [picture.number for picture in rig.pictures(device)[-1:]]
+        return newest >= [max(rig.cameras(device), default=0) - 1]
+
+    rig.wait(newest_is_here, 1.0)
+
+
+def require_own_clock(rig: CameraRig, device: str) -> None:
+    """Fail if pictures of ``device`` are published while the robot's time stands still.
+
+    Only those: a thread may read the camera all the time, and a timer publish the newest picture.
+    """
+    deadline = Deadline(BACKLOG)
+    while deadline.left:
+        before = len(rig.pictures(device))
+        if not rig.wait(lambda n=before: len(rig.pictures(device)) >= n + 2, STANDSTILL):  # type: ignore[misc]
+            return
+    raise Failed(
+        expected="The pictures are timed by a ROS timer, or by the node's clock.",
+        actual="Pictures came although the robot's time, which is simulated, stood still.",
+    )
+
+
+def require_tick_zoom(rig: CameraRig, device: str, factor: int, when: str) -> None:
+    """Fail unless pictures that nobody asks for have the zoom ``factor``, too."""
+    before = len(rig.pictures(device))
+    for _ in range(2 * STEPS):
+        rig.advance(PERIOD)
+        if rig.wait(
+            lambda: any(p.zoom == factor for p in rig.pictures(device)[before:]),
+            PERIOD,
+        ):
+            return
+    raise Failed(
+        expected=f"{when} the ten pictures a second have a zoom of {factor} as well.",
+        actual=f"They had a zoom of {rig.pictures(device)[-1].zoom}{rig.raised()}.",
+    )

@@ -1,0 +1,99 @@
+"""Errands: the marked goals that an examiner sends to a robot's navigation, one after the other."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+from course import Session, WaitTimeout
+from course.design import dye
+from course.design.lifelike import AHEAD, lifelike
+from course.runtime.actions import GoalRun
+
+SETTLE = 8.0
+"""Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
+WAYPOINT = 5.0
+"""Metres to the waypoint of a goal: a robot that is there already would not start."""
+GRACE = 0.1
+"""Seconds that a goal may take to be over before it is asked to end."""
+PATIENCE = 2.0
+"""Seconds that a goal may take to end when it is cancelled."""
+
+
+class Errands:
+    """The goals that the examiner sends to one action, one after the other."""
+
+    def __init__(self, session: Session, name: str, action_type: Any) -> None:
+        """Send none yet."""
+        self._session = session
+        self._name = name
+        self._type = action_type
+        self._run: GoalRun | None = None
+        self._answers = True
+        self._rejected = 0
+        self.cancelled = 0
+        """How many goals were cancelled and said yes to it."""
+        self.turned_away = 0
+        """Goals that were rejected after an earlier one was over."""
+        self.outlasts = False
+        """Whether a goal went on although it was asked to end."""
+
+    def send(self, tag: int) -> bool:
+        """Send a marked goal; return whether the server took it.
+
+        Raises:
+            WaitTimeout: the server did not answer to the first goal; says why.
+        """
+        first = self._run is None
+        if not self._answers:
+            return False
+        over = self._run is not None and self._run.done
+        goal = marked(self._type.Goal, tag, WAYPOINT)
+        try:
+            run = self._session.send_goal(
+                self._type, self._name, goal, timeout=SETTLE if first else PATIENCE
+            )
+        except WaitTimeout:
+            self._answers = False
+            if first:
+                raise
+            return False
+        if run.accepted:
+            self._run = run
+        elif not first:
+            self._rejected += 1
+            self.turned_away += over
+        return run.accepted
+
+    @property
+    def aside(self) -> str:
+        """What became of goals that were not taken; empty if there were none."""
+        if not self._answers:
+            return f"while that goal went on, {self._name} did not answer to another"
+        times = "once" if self._rejected == 1 else f"{self._rejected} times"
+        return f"another goal was rejected, {times}" if self._rejected else ""
+
+    def end(self) -> None:
+        """Cancel the goal before, and wait until it is over; it may go on all the same."""
+        run = self._run
+        if self._answers and run is not None and not run.done_within(GRACE):
+            with suppress(WaitTimeout):
+                if run.cancel(PATIENCE):
+                    self.cancelled += 1
+                    run.done_within(PATIENCE)
+        self.outlasts = run is not None and not run.done
+
+    def keep_one(self, tag: int) -> None:
+        """See to it that a goal is under way, as far as the server takes one."""
+        if self._run is None or self._run.done:
+            with suppress(WaitTimeout):
+                self.send(tag)
+
+
+def marked(msg_type: Any, tag: int, ahead: float = AHEAD) -> Any:
+    """Return a message as a robot would send it, with a mark in it."""
+    message = lifelike(msg_type, ahead)
+    dye.mark(message, tag)
+    return message

@@ -1,0 +1,92 @@
+"""What no drive may hold up or end: pictures, the position, the battery level, a new speed limit.
+
+Each counts only if it worked without a drive; what did not has failed in a check of its own.
+"""
+
+from __future__ import annotations
+
+import time
+
+from autograder.exam import Failed
+from autograder.rigs import filming, odometry, offers
+from autograder.rigs.robot import RobotRig
+
+FILMED = (8.0, 12.0)
+"""Pictures a second, as far as such a short time tells."""
+LEVEL, LEVEL_AGE = 0.55, 1.0  # s
+HOLDS_UP = "the drive holds nobody up."
+
+
+def require_pictures(rig: RobotRig, stretch: filming.Stretch, where: str) -> None:
+    """Fail if the pictures came at another rate in a ``stretch`` of a drive.
+
+    ``where`` says when that was, as the beginning of a sentence.
+    """
+    if not rig.films:
+        return
+    rates = stretch.rates()
+    wrong = "" if rates is None else filming.rate_fault(rates, FILMED)
+    if wrong or rates is None:
+        came = f"they came at {wrong} a second" if wrong else "no picture came"
+        raise Failed(
+            expected="While the robot drives, pictures come as they did before, 10 a second: "
+            f"{HOLDS_UP}",
+            actual=f"{where}, {came}{rig.because()}.",
+        )
+
+
+def require_position(rig: RobotRig, position: float, where: str) -> None:
+    """Fail if whoever wants to know a ``position`` that has just been reported does not get it."""
+    if rig.asker is None:
+        return
+    if answer := odometry.fault(rig, rig.asker, position):
+        raise Failed(
+            expected="While the robot drives, whoever wants to know the position gets it, at most "
+            f"{odometry.AGE:g} s old: {HOLDS_UP}",
+            actual=f"{where}, at {position:g} m, {answer}",
+        )
+
+
+def require_battery(rig: RobotRig, where: str) -> None:
+    """Fail if a new level does not reach who listens."""
+    if not rig.broadcasts:
+        return
+    rig.report("charge", LEVEL)
+    if not rig.wait_stepping(lambda: rig.told_level(LEVEL), LEVEL_AGE):
+        raise Failed(
+            expected="While the robot drives, too, whoever listens to robot/battery knows a new "
+            f"level within {LEVEL_AGE:g} s: {HOLDS_UP}",
+            actual=f"{where}, the level became {LEVEL:g}, and {LEVEL_AGE:g} s later the last "
+            f"percentage was {rig.node.levels[-1]:.4g}{rig.because()}.",
+        )
+
+
+def require_parameters(rig: RobotRig, where: str) -> None:
+    """Fail if a good speed limit, the one that holds already, is not taken."""
+    if rig.limit is None:
+        return
+    expected = "While the robot drives, too, max_speed takes any value from 0.1 to 1.0; it may "
+    expected += "count from the next goal on."
+    try:
+        taken, reason = offers.set_speed_limit(rig, rig.limit)
+    except Failed as failed:
+        raise Failed(expected=expected, actual=f"{where}. {failed.actual}") from None
+    if not taken:
+        raise Failed(
+            expected=expected,
+            actual=f"{where}, {rig.limit:g} m/s was refused, with the reason {reason[:200]!r}.",
+        )
+
+
+def require_the_same_after(rig: RobotRig, position: float, before: str) -> None:
+    """Fail if pictures or the position do not come any more after a drive, the one ``before``.
+
+    That they came without it may have been found in an earlier part of the exam.
+    """
+    expected = f"After {before} pictures and the position come as they did before."
+    if rig.memory.get("films") and not filming.another(rig, time.time_ns()):
+        raise Failed(expected=expected, actual=f"No picture came any more{rig.because()}.")
+    if pattern := rig.memory.get("position"):
+        asker = rig.asker or odometry.asker_by(rig, pattern)
+        if answer := odometry.fault(rig, asker, position):
+            raise Failed(expected=expected, actual=f"With the robot at {position:g} m, {answer}")

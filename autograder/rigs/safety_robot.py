@@ -1,0 +1,159 @@
+"""One of the student's nodes at work in the error-handling exam, on simulated time.
+
+Only the examiner moves time. It does so in short strides, and lets both processes come to rest
+after each, so that what it observes does not depend on the machine's load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from autograder.bench import Bench, Endpoints, StudentError
+from autograder.exam import Failed
+from autograder.rigs.player import Player
+from autograder.rigs.stillness import Stillness
+from course import WaitTimeout
+
+STRIDE = 0.1  # s of simulated time between two looks
+COARSE = 0.5  # s between two looks where it does not matter when exactly something happens
+ROUNDS = 10  # of requests that may follow from each other while time stands still
+SETTLE = 8.0  # s of wall time that endpoints may take to find each other; 0.3 s as a rule
+
+
+class Robot:
+    """One of the student's nodes at work."""
+
+    def __init__(self, bench: Bench, name: str, player: Player, still: Stillness) -> None:
+        """Make the node of class ``name`` in the subject's present session.
+
+        Raises:
+            Failed: it cannot be made, or lacks an endpoint of the task.
+        """
+        self.name, self._bench, self._player, self._still = name, bench, player, still
+        self._unserved = False
+        # What earlier nodes of the same session raised, of whom this one knows nothing.
+        self._known = bench.subject.own_errors()
+        self._raised = frozenset(bench.subject.errors())
+        self._ended = frozenset(bench.subject.thread_errors())
+        try:
+            bench.subject.start(name)
+        except StudentError as error:
+            raise Failed(
+                expected=f"{name}() makes a node without an error.",
+                actual=error.told,
+            ) from None
+        self.wait(lambda: not player.missing())
+        if lacking := player.missing():
+            raise Failed(
+                expected=f"{name} has every endpoint of the task right after it was made.",
+                actual=lacking,
+            )
+        if unheard := player.unheard():
+            raise Failed(expected=f"{name} can hear what it is told.", actual=unheard)
+        player.attend()
+        self.sees(
+            {"publishers": player.spoken, "subscribers": player.heard, "clients": player.used}
+        )
+        self.rest()
+
+    def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
+        """Wait for something of DDS's own: simulated time stands still."""
+        with suppress(WaitTimeout):
+            self._bench.session.until(condition, timeout=timeout, what="an observation")
+            return True
+        return False
+
+    def sees(self, endpoints: Endpoints, there: bool = True) -> bool:
+        """Wait until the node has discovered each endpoint, or the loss of each; return if so."""
+
+        def all_seen() -> bool:
+            counts = self._bench.subject.sees(self.name, endpoints)
+            return all(bool(n) is there for kind in counts.values() for n in kind.values())
+
+        return self.wait(all_seen)
+
+    def rest(self) -> None:
+        """Return when all that was sent has been dealt with, on both sides.
+
+        A node that meets each answer with another request never comes to rest: time goes on.
+        """
+        self._still.reached()
+        for _ in range(ROUNDS):
+            if not self._player.resume():
+                return
+            self._still.reached()
+
+    def run(self, until: Callable[[], Any], limit: float, stride: float = STRIDE) -> bool:
+        """Let time pass until ``until`` holds, ``limit`` s at most; return whether it does."""
+        end = self._player.now + limit
+        self.rest()
+        while not until():
+            if self._player.now >= end - STRIDE / 2:
+                return False
+            self._go_on(min(stride, end - self._player.now))
+        return True
+
+    def spend(self, seconds: float, stride: float = STRIDE) -> None:
+        """Let so much time pass."""
+        self.run(lambda: False, seconds, stride)
+
+    @contextmanager
+    def unserved(self) -> Iterator[None]:
+        """Let no callback wait by the wall clock within the block: nobody serves what it asks for.
+
+        How much simulated time such a wait takes depends on the machine, and so would every
+        observation. Threads of the student's own may wait as they like.
+        """
+        self._unserved = True
+        try:
+            yield
+        finally:
+            self._unserved = False
+
+    def _go_on(self, seconds: float) -> None:
+        # Now, and not after the stride: what the node does has just come to rest, so that a wait
+        # has only begun, while a stride with a blocked callback takes long in real time.
+        waits = self._bench.subject.wall_waits() if self._unserved else []
+        self._player.now += seconds  # before: what comes in on the way bears the stride's end
+        try:
+            self._bench.subject.advance(seconds)
+        except StudentError:
+            raise Failed(
+                expected=f"No callback of {self.name} blocks while something is slow or broken.",
+                actual="A callback held up the node so that even its clock stood still."
+                + _of_waits(waits)
+                + self.complaint(),
+            ) from None
+        if waits:
+            raise Failed(
+                expected=f"All waiting of {self.name} runs on the node's clock.",
+                actual=_of_waits(waits).strip(),
+            )
+        self.rest()
+
+    def complaint(self) -> str:
+        """Return what a callback and a thread raised last, a sentence each; empty if none did.
+
+        What was raised before this node was made is another one's.
+        """
+        subject = self._bench.subject
+        raised = [error for error in subject.errors() if error not in self._raised]
+        ended = [error for error in subject.thread_errors() if error not in self._ended]
+        told = f" A callback raised {raised[-1].rstrip('.')}." if raised else ""
+        return told + (f" A thread of yours ended with {ended[-1].rstrip('.')}." if ended else "")
+
+    def require_no_errors(self) -> None:
+        """Require that nothing of the student's own has left a callback since the node was made."""
+        for told, count in self._bench.subject.own_errors().items():
+            if count > self._known.get(told, 0):
+                raise Failed(
+                    expected="Nothing leaves a callback as an exception.",
+                    actual=f"What was seen from outside was right, but {told.rstrip('.')}.",
+                )
+
+
+def _of_waits(waits: list[str]) -> str:
+    """Return a sentence on callbacks that wait by the wall clock, to add; empty if none does."""
+    return f" A callback waits on the wall clock in {waits[0].rstrip('.')}." if waits else ""

@@ -1,0 +1,16 @@
+"""Golden texts: what a student reads, word for word. WRITE_GOLDEN=1 writes them anew."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+def golden(name: str, text: str) -> str:
+    """Return the golden text ``name``, for which ``text`` was found now."""
+    file = GOLDEN / f"{name}.txt"
+    if "WRITE_GOLDEN" in os.environ:
+        file.write_text(text, encoding="utf-8")
+    return file.read_text(encoding="utf-8")
