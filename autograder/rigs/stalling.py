@@ -182,6 +182,7 @@ def _burst(rig: SensorRig, phase: str, patience: float) -> Burst:
     handed = dict(rig.handed(IMU, phase)).get(BURST - 1)
     decided = _turns_later(rig, f"{phase}, later") if handed is None else handed
     rig.wait(lambda: len(set(rig.consumed(IMU, phase))) == BURST, PROMPT)
+    rig.rest()  # one that hands on a reading again is heard out: how many there are is told
     return Burst(rig.consumed(IMU, phase), decided - rig.published(IMU, phase, 0) > YOUNG * 1e9)
 
 
