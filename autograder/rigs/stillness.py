@@ -39,6 +39,8 @@ class Stillness:
         """Watch both."""
         self._pids = (subject_pid, os.getpid())
         self._nap = threading.Event()  # never set
+        self._open: dict[Task, _Status] = {}
+        self._suspect: Task | None = None  # who was awake last, and so may well be again
 
     def reached(self, restless: float = RESTLESS, timeout: float = HANGS) -> bool:
         """Return once both processes are at rest, or prove to be restless; say which it was.
@@ -67,35 +69,56 @@ class Stillness:
             before, looked = now, moment
 
     def _look(self) -> Look:
-        me = threading.get_native_id()
+        if self._suspect in self._open and self._runs(self._suspect) is None:
+            return Look({}, self._suspect)
+        self._suspect = None
+        mine = os.getpid(), threading.get_native_id()
+        tasks = [task for pid in self._pids for task in _tasks(pid) if task != mine]
+        for ended in self._open.keys() - tasks:
+            del self._open[ended]
         found: dict[Task, str] = {}
-        for pid in self._pids:
-            for task in _tasks(pid):
-                name = pid, int(task.name)
-                if name[1] == me:
-                    continue
-                runs = _runs(task)
-                if runs is None:
-                    return Look({}, name)
-                found[name] = runs
+        for task in tasks:
+            runs = self._runs(task)
+            if runs is None:
+                self._suspect = task
+                return Look({}, task)
+            found[task] = runs
         return Look(found)
 
+    def _runs(self, task: Task) -> str | None:
+        """Return a thread's count of context switches, or None if it is not asleep."""
+        try:
+            if task not in self._open:
+                self._open[task] = _Status(task)
+            return self._open[task].runs()
+        except OSError:  # it has just ended; another may get its number
+            self._open.pop(task, None)
+            return None
 
-def _tasks(pid: int) -> list[Path]:
+
+class _Status:
+    """What the kernel says of a thread (proc(5)); kept open, as it is looked at very often."""
+
+    def __init__(self, task: Task) -> None:
+        self._file = os.open("/proc/{}/task/{}/status".format(*task), os.O_RDONLY)
+
+    def __del__(self) -> None:
+        if hasattr(self, "_file"):
+            os.close(self._file)
+
+    def runs(self) -> str | None:
+        """Return its count of context switches, or None if it is not asleep."""
+        status = os.pread(self._file, 8192, 0).decode("ascii", "replace")
+        state = status.partition("\nState:\t")[2][:1]
+        return status[status.index("voluntary_ctxt") :] if state in "SI" else None
+
+
+def _tasks(pid: int) -> list[Task]:
     try:
-        return list(Path(f"/proc/{pid}/task").iterdir())
+        with os.scandir(f"/proc/{pid}/task") as tasks:
+            return [(pid, int(task.name)) for task in tasks]
     except OSError:  # it has ended, or is not to be seen: then the examiner's own must do
         return []
-
-
-def _runs(task: Path) -> str | None:
-    """Return a thread's count of context switches, or None if it is not asleep (proc(5))."""
-    try:
-        status = (task / "status").read_text(encoding="ascii", errors="replace")
-    except OSError:  # it has just ended
-        return None
-    state = status.partition("\nState:\t")[2][:1]
-    return status[status.index("voluntary_ctxt") :] if state in "SI" else None
 
 
 def _worked(task: Task) -> float:
