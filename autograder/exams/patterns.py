@@ -19,7 +19,7 @@ from autograder.bench import StudentError
 from autograder.exam import Exam, Failed
 from autograder.rigs import choosing, endings, filming, meanwhile, odometry, offers, stations
 from autograder.rigs.driving import ACTIONS, SPEED_MARGIN, Drive
-from autograder.rigs.listening import LateJoiner, acquaint
+from autograder.rigs.listening import LateJoiner, acquaint, arrives
 from autograder.rigs.robot import LEVEL_MARGIN, NODE, RobotRig, robot_rig
 from autograder.rigs.scenarios import NAMES, SCENARIOS, Scenario
 from course import GoalState
@@ -320,10 +320,11 @@ def battery_late_joiner(rig: RobotRig) -> str:
             count = len(rig.node.levels)
             late = LateJoiner(rig, BatteryState, NAMES["battery"])
             acquaint(rig)
-            if not rig.wait_stepping(
+            if not arrives(
+                rig,
                 lambda count=count: len(rig.node.levels) > count,  # type: ignore[misc]
                 LEVEL_AGE + tolerance,
-                step=TICK,
+                TICK,
             ):
                 raise Failed(
                     expected=needed,

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters
@@ -60,6 +61,22 @@ def hear_out(rig: RobotRig) -> None:
     """Return when what the subject has sent so far has come in: it has answered since."""
     if name := _answering(rig):
         rig.call(GetParameters, name, GetParameters.Request())
+
+
+def arrives(rig: RobotRig, condition: Callable[[], bool], seconds: float, step: float) -> bool:
+    """Let the student's clock run until what was sent makes ``condition`` hold; return if it did.
+
+    For a moment from which another is reckoned: on a busy machine `RobotRig.wait_stepping` may
+    notice some steps late. ``seconds`` and ``step`` are of simulated time.
+    """
+    began = rig.elapsed
+    hear_out(rig)
+    while not condition():
+        if seconds - (rig.elapsed - began) <= step / 2:
+            return rig.wait(condition)
+        rig.step(step)
+        hear_out(rig)
+    return True
 
 
 def _answering(rig: RobotRig) -> str | None:

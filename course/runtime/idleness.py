@@ -8,9 +8,9 @@ a row of looks can, with the lock let go in between (proc(5): `status`, `schedst
 
 from __future__ import annotations
 
+import os
 import threading
 import time
-from pathlib import Path
 from typing import NamedTuple
 
 PATIENCE = 0.2  # s that a callback must have slept
@@ -27,22 +27,38 @@ class Look(NamedTuple):
     worked: float
 
 
-def look_at(native_id: int) -> Look:
-    """Look at a thread of this process; one that has ended is not asleep."""
-    task = Path(f"/proc/self/task/{native_id}")
+def look_at(native_id: int, before: Look | None = None) -> Look:
+    """Look at a thread of this process, last seen as `before`; one that ended is not asleep."""
+    task = f"/proc/self/task/{native_id}"
     try:
-        status = (task / "status").read_text(encoding="ascii", errors="replace")
+        status = _read(f"{task}/status")
     except OSError:
         return Look(False, "", 0.0)
     asleep = status.partition("\nState:\t")[2][:1] == "S"
-    return Look(asleep, status[status.index("voluntary_ctxt") :], _worked(task))
+    switches = status[status.index("voluntary_ctxt") :]
+    if before is not None and asleep and switches == before.switches:
+        return Look(True, switches, before.worked)  # it has not run since
+    return Look(asleep, switches, _worked(task))
 
 
-def _worked(task: Path) -> float:
+def _worked(task: str) -> float:
     try:
-        return int((task / "schedstat").read_text(encoding="ascii").split()[0]) / 1e9
-    except (OSError, ValueError):  # a kernel without CONFIG_SCHED_INFO: sleeping must do
+        return int(_read(f"{task}/schedstat").split()[0]) / 1e9
+    except (
+        OSError,
+        ValueError,
+        IndexError,
+    ):  # a kernel without CONFIG_SCHED_INFO: sleeping must do
         return 0.0
+
+
+def _read(path: str) -> str:
+    """Return what a small file of the kernel's holds; looks are many, and `open` is slower."""
+    file = os.open(path, os.O_RDONLY)
+    try:
+        return os.read(file, 8192).decode("ascii", "replace")
+    finally:
+        os.close(file)
 
 
 class Idleness:
@@ -65,7 +81,8 @@ class Idleness:
 
         Between two calls the caller lets go of the interpreter's lock for a moment.
         """
-        look, before = look_at(self._native_id), self._last
+        before = self._last
+        look = look_at(self._native_id, before)
         self._last = look
         return self._still_blocked(look, before) if self._found else self._by_now_blocked(look)
 
