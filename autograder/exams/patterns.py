@@ -317,12 +317,12 @@ def battery_late_joiner(rig: RobotRig) -> str:
         # Somebody may join just after one repetition: from there on the next one counts. And it
         # may be joining that sets it off, so somebody joins each time.
         for tolerance in (0.0, TICK):
-            count = len(rig.node.levels)
+            joined = time.time_ns()
             late = LateJoiner(rig, BatteryState, NAMES["battery"])
             acquaint(rig)
             if not arrives(
                 rig,
-                lambda count=count: len(rig.node.levels) > count,  # type: ignore[misc]
+                lambda joined=joined: rig.node.levels.newest > joined,  # type: ignore[misc]
                 LEVEL_AGE + tolerance,
                 TICK,
             ):

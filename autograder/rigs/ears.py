@@ -29,6 +29,14 @@ class Ears(Sequence[T]):
         if published > self._forgotten and not known:
             self._heard.insert(at, (published, item))
 
+    @property
+    def newest(self) -> int:
+        """When the newest was published (ns), or 0: it says what came after a moment.
+
+        To count says less: what is still under way at that moment comes in later.
+        """
+        return self._heard[-1][0] if self._heard else 0
+
     @overload
     def __getitem__(self, index: int) -> T: ...
     @overload
