@@ -194,6 +194,20 @@ def _too_late(robot: Robot, user: NavigatorUser) -> None:
     _once(robot, user, f"{when}, then accepted it and arrived", "lost")
 
 
+def _cancel_too_late(robot: Robot, user: NavigatorUser) -> None:
+    """Ask for a drive whose cancel is accepted when it has been given up."""
+    user.request(METRES + 1, ponders=True)
+    _sent(robot, user)
+    robot.run(lambda: user.goals, PROMPT)
+    _canceled(robot, user)
+    when = f"When the navigator did not answer the request to cancel for {ANSWER:g} s"
+    _outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
+    user.decide()
+    robot.rest()
+    user.end(ServerGoalHandle.canceled)
+    _once(robot, user, f"{when}, then accepted it", "lost")
+
+
 def lost(rig: RobotRig) -> None:
     """A navigator that refuses to cancel, one that is slow or dies on the way, and none at all."""
     with _user(rig) as (robot, user):
@@ -204,6 +218,7 @@ def lost(rig: RobotRig) -> None:
         user.end(ServerGoalHandle.succeed)
         _once(robot, user, f"{when}, and reported success later", "runaway")
         _too_late(robot, user)
+        _cancel_too_late(robot, user)
         _accepted(robot, user)
     with _user(rig, navigator=False) as (robot, user):
         when = "When the navigator died on the way"

@@ -13,8 +13,18 @@ ALLOWED = 0.2  # s more or less that do no harm
 BLUR = 1.5 * STRIDE  # s: a beat is known to a stride; and half a one, lest sums of floats decide
 
 
-def beats(seen: Sequence[float], since: float, until: float, when: str) -> None:
+BY_THE_WALL = "Does it beat on the wall clock? In simulated time that hardly moves."
+HELD_UP = (
+    "It had beaten before: was it stopped, or is it in one callback group with what waits here?"
+)
+
+
+def beats(
+    seen: Sequence[float], since: float, until: float, when: str, guess: str = HELD_UP
+) -> None:
     """Require a heartbeat every 0.5 s from ``since`` to ``until``, by the times of those seen.
+
+    ``guess`` is what to ask a student for whom there were hardly any.
 
     What counts is each silence between two beats, and not how many there were: a node that looks
     by a timer may be late each time. Too many are told by their number: some may come soon after
@@ -24,11 +34,12 @@ def beats(seen: Sequence[float], since: float, until: float, when: str) -> None:
     lasted = until - since
     silence = max(after - before for before, after in pairwise([since, *there, until]))
     if silence > BEAT + ALLOWED + BLUR:
+        hint = f" {guess}" if len(there) <= lasted / BEAT / 2 else ""
         raise Failed(
             expected=f"{when}, the heartbeat goes on at one every {BEAT:g} s: no silence is longer "
             f"than {BEAT + ALLOWED:g} s.",
             actual=f"In {lasted:.1f} s there {_heartbeats(len(there))}; the longest silence lasted "
-            f"{silence:.1f} s.{_hint_of_clock(len(there), lasted)}",
+            f"{silence:.1f} s.{hint}",
         )
     most = int((lasted + BLUR) / (BEAT - ALLOWED)) + 1
     if len(there) > most:
@@ -41,10 +52,3 @@ def beats(seen: Sequence[float], since: float, until: float, when: str) -> None:
 
 def _heartbeats(count: int) -> str:
     return "was 1 heartbeat" if count == 1 else f"were {count or 'no'} heartbeats"
-
-
-def _hint_of_clock(count: int, lasted: float) -> str:
-    """Return a hint where there are hardly any: real time hardly passes during simulated time."""
-    if count > lasted / BEAT / 2:
-        return ""
-    return " Does it beat on the wall clock? In simulated time that hardly moves."

@@ -18,7 +18,12 @@ def stale(rig: RobotRig) -> None:
         robot.spend(LATE)
         _require_patience(user)
         user.tries[0].reply(False)
-        _ignored(robot, user, f"first try comes {LATE:g} s after it")
+        late_by = f"first try comes {LATE:g} s after it"
+        _ignored(robot, user, late_by)
+        # Who looks at an answer only when the next try is due takes it for one then.
+        robot.run(lambda: len(user.tries) > 1 or user.outcomes, LONGEST)
+        if user.outcomes[:1] == ["refused"]:
+            _ignored(robot, user, late_by)
         _answered_again(robot, user)
         once(robot, user, "When the second try was answered, after a late answer to the first")
 

@@ -8,9 +8,11 @@ from autograder.bench import StudentError
 from autograder.exam import Failed
 from autograder.rigs.navigation import Dispatcher
 from autograder.rigs.safety import RobotRig
+from autograder.rigs.safety_robot import Robot
 from autograder.rigs.trials import sending
 
 AT_ONCE = 1.0  # s of wall time that shutdown() may take where it does not wait; 0.01 s as a rule
+AFTERWARDS = 2  # m of a goal that comes after shutdown(), and s in which it would drive
 LOOKS = 3  # calls of it, if need be, of which the fastest counts: any may be held up by the machine
 
 
@@ -37,6 +39,19 @@ def shutdown(rig: RobotRig) -> None:
                 actual="Nothing came on cmd_vel.",
             )
         robot.require_no_errors()
+        _goal_afterwards(robot, dispatcher)
+
+
+def _goal_afterwards(robot: Robot, dispatcher: Dispatcher) -> None:
+    """Send a goal to a node that is about to be taken down: whatever it answers, nothing moves."""
+    dispatcher.send(AFTERWARDS)
+    robot.spend(AFTERWARDS)
+    if any(dispatcher.speeds):
+        raise Failed(
+            expected="After shutdown() the wheels are told nothing any more but to stop, whoever "
+            "sends a goal then.",
+            actual=f"A goal of {AFTERWARDS} m that came after shutdown() drove the robot.",
+        )
 
 
 def _shutdown_on_the_way(rig: RobotRig) -> float:
