@@ -123,9 +123,9 @@ def lost(number: int, of: int = 0) -> str:
 
 
 def few(numbers: list[int]) -> str:
-    """Return the first of some reading numbers, as a phrase."""
+    """Return the first of some reading numbers, as a phrase that counts from 1, as people do."""
     if not numbers:
         return "nothing at all"
-    shown = ", ".join(str(number) for number in numbers[:6])
+    shown = ", ".join(str(number + 1) for number in numbers[:6])
     some = "reading" if len(numbers) == 1 else "readings"
     return f"{some} {shown}{' …' if len(numbers) > 6 else ''}"

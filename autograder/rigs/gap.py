@@ -1,8 +1,10 @@
 """The experiment of a radio gap: what a consumer far away gets of the readings that it missed.
 
-Stop events and camera frames go out while the link is down, one more of each when it is up again.
-That one also tells a reliable reader what it has missed (its heartbeat), and DDS hands over in
-order: so once it is there, everything that will ever come of the others is there, too.
+Stop events and camera frames go out while the link is down, and one more frame when it is up again.
+A reliable writer then tells its readers what they have missed (its heartbeat), and DDS hands over
+in order: so once the last stop event is there, or the frame from after the gap, everything that
+will ever come of the others is there, too. A stop event after the gap would push one of 100 out of
+a queue that holds just these, or not, as the heartbeat comes before or after it.
 """
 
 from __future__ import annotations
@@ -16,17 +18,19 @@ from autograder.rigs.readings import CAMERA, STOP, Heard, Sensor
 from autograder.rigs.sensor_node import lossless, undemanding
 from autograder.rigs.sensors import SensorRig
 
-LOST = {STOP.name: 99, CAMERA.name: 5}
-"""Readings sent while the link is down; with the next one 100 stop events, as the task promises."""
+LOST = {STOP.name: 100, CAMERA.name: 5}
+"""Readings sent while the link is down: as many stop events as the task promises to keep."""
+LAST = {STOP.name: LOST[STOP.name] - 1, CAMERA.name: LOST[CAMERA.name]}
+"""The reading with which all have come that will: of the gap, or the one after it."""
 
 
 @dataclass(frozen=True)
 class Aftermath:
     """What the far end heard of one sensor after the gap, in order; ``None``: nothing before it.
 
-    Numbers below ``count`` were sent during the gap, ``count`` itself right after it. The last one
+    Numbers below ``count`` were sent during the gap, a frame ``count`` right after it. The last one
     of the gap, ``count - 1``, may also have got through: a driver sends a reading to one listener
-    after the other, so only the next reading proves that it has been sent to the far end, too.
+    after the other, and it was seen at the near end.
     """
 
     count: int
@@ -50,8 +54,8 @@ def radio_gap(rig: SensorRig) -> dict[str, Aftermath]:
                 # Seen at the near end: the driver has sent them all.
                 rig.burst(sensor, "gap", LOST[sensor.name])
             _require_silence(rig, link.heard)
-        for sensor in sensors:
-            rig.node.publish(sensor, "gap", LOST[sensor.name])
+        if CAMERA in sensors:
+            rig.node.publish(CAMERA, "gap", LAST[CAMERA.name])
         return {
             sensor.name: Aftermath(
                 LOST[sensor.name],
@@ -68,5 +72,5 @@ def _require_silence(rig: SensorRig, heard: Heard) -> None:
 
 
 def _heard_after(rig: SensorRig, sensor: Sensor, heard: Heard) -> list[int]:
-    rig.wait(lambda: LOST[sensor.name] in rig.indices(heard, sensor, "gap"))
+    rig.wait(lambda: LAST[sensor.name] in rig.indices(heard, sensor, "gap"))
     return rig.indices(heard, sensor, "gap")

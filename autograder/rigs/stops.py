@@ -133,16 +133,18 @@ def require_all_handled(rig: SensorRig) -> None:
     """Fail unless the consumer handles all events of a pause, once and in order, and none later."""
     found = backlog(rig, STOP)
     count, kept = found.count, found.kept
+    # Whether one that comes again is among those of the pause is a matter of the machine's speed.
+    again = len(_repeated(kept)) or found.again or rig.comes_again()
+    if again and len(set(kept)) == count:
+        raise Failed(
+            expected="Each stop event is handled once.",
+            actual=f"{again} came out on consumer/{STOP.name} more than once, though no new event "
+            "bore these words. Whoever listens there brakes again.",
+        )
     if kept != list(range(count)):
         raise Failed(
             expected=f"All {count} events of the pause are handled, once and in order.",
             actual=f"{amiss(kept, count)}: the consumer handled {around(kept)}.",
-        )
-    if found.again or rig.comes_again():
-        raise Failed(
-            expected="Each stop event is handled once.",
-            actual=f"{found.again or rig.comes_again()} came out on consumer/{STOP.name} once more "
-            "later on, though no new event bore these words. Whoever listens there brakes again.",
         )
 
 
