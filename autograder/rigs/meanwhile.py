@@ -6,9 +6,12 @@ Each counts only if it worked without a drive; what did not has failed in a chec
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from autograder.exam import Failed
 from autograder.rigs import filming, odometry, offers
+from autograder.rigs.listening import hear_out
 from autograder.rigs.robot import RobotRig
 
 FILMED = (8.0, 12.0)
@@ -78,11 +81,31 @@ def require_parameters(rig: RobotRig, where: str) -> None:
         )
 
 
+@contextmanager
+def standing(rig: RobotRig) -> Iterator[None]:
+    """Have the speed limit changed while nobody has sent a goal; fail if the robot drives off."""
+    rig.node.speeds.clear()
+    yield
+    rig.step()
+    hear_out(rig)
+    if any(rig.node.speeds):
+        raise Failed(
+            expected="A new max_speed is for drives: without a goal the robot stands.",
+            actual="max_speed was changed while the robot had no goal, and hardware/speed said "
+            f"{max(rig.node.speeds, key=abs):g} m/s.",
+        )
+
+
 def require_the_same_after(rig: RobotRig, position: float, before: str) -> None:
     """Fail if pictures or the position do not come any more after a drive, the one ``before``.
 
-    That they came without it may have been found in an earlier part of the exam.
+    Or if a new speed limit has the robot drive on. That these three were right without a drive may
+    have been found in an earlier part of the exam.
     """
+    limit = rig.limit if rig.obeyed is None else rig.obeyed  # the one that holds
+    if limit is not None:
+        with standing(rig):
+            offers.set_speed_limit(rig, limit)
     expected = f"After {before} pictures and the position come as they did before."
     if rig.memory.get("films") and not filming.another(rig, time.time_ns()):
         raise Failed(expected=expected, actual=f"No picture came any more{rig.because()}.")
