@@ -36,8 +36,9 @@ def require_snapshot(rig: CameraRig, device: str, when: str, *, slow: bool = Fal
     answered = time.time_ns()
     if reply is None:
         raise Failed(
-            expected=f"{when} the service {SNAPSHOT} answers.",
-            actual=f"No answer came within {SETTLE:.0f} s{rig.raised()}.",
+            expected=f"{when} the service {SNAPSHOT} answers, without waiting for the next tick.",
+            actual=f"No answer came within {SETTLE:.0f} s, in which the node's clock stood still"
+            f"{rig.raised()}.",
         )
     if not reply.success:
         raise Failed(
@@ -81,8 +82,8 @@ def require_snapshots_under_way(rig: CameraRig, device: str) -> None:
     """Ask for some snapshots; fail unless one is answered. A callback waits for the next one then.
 
     rclpy 7.1 resumes a callback that awaits a future when its executor has something else to do: on
-    a robot, at the next tick. Here time stands still, so that ticks ask the camera for no picture,
-    and a zoom is that something.
+    a robot, at the next tick. Here time stands still, so that ticks ask the camera for no picture;
+    a zoom is that something, or a nudge, where zooms are of the callback group that awaits.
     """
     snapshot = rig.client(Trigger, SNAPSHOT)
     asked = sum(rig.cameras(device))
@@ -96,6 +97,7 @@ def require_snapshots_under_way(rig: CameraRig, device: str) -> None:
     deadline = Deadline(SETTLE)
     while not rig.wait(next_one_waits, min(PERIOD, deadline.left)) and deadline.left:
         rig.node.zoom.publish(Int32(data=1))
+        rig.nudge()
     if not any(reply.done() for reply in replies):
         raise Failed(
             expected=f"The service {SNAPSHOT} answers when the picture is there.",
