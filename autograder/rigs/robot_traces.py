@@ -78,7 +78,7 @@ def _see_stream(rig: ArchitectureRig, poured: Poured, names: list[str]) -> None:
         raise Failed(
             expected=f"What is on {listed(names, 'or')} gets to {MOTORS} over topics or action "
             "goals.",
-            actual=f"Its mark was seen on {MOTORS}, but never on "
-            f"{listed([t.name for t in last], 'or')}, which {nodes(rig.jobs.controllers)} reads: "
-            "it comes by a service, only when somebody asks.",
+            actual=f"Its mark was seen on {MOTORS}, but on no topic that "
+            f"{nodes(rig.jobs.controllers)} reads ({listed([t.name for t in last], 'and')}): it "
+            "came with a request of a service, or an answer, only when somebody asked.",
         )
