@@ -81,6 +81,7 @@ class RobotRig:
         self._clients: dict[str, Any] = {}
         self._by_the_clock: set[str] = set()
         self._told: set[str] = set()
+        self._deaf_to: set[str] = set()
 
     # Time.
 
@@ -208,6 +209,7 @@ class RobotRig:
 
     def report(self, what: str, value: float) -> None:
         """Have the hardware report a value once, and the student's node take it in."""
+        self.listens_to(what)  # what is sent before DDS has connected them is lost
         self.publish(what, value)
         self.node.hardware[what].wait_for_all_acked(Duration(seconds=SETTLE))
         self.step(0.01)
@@ -217,8 +219,15 @@ class RobotRig:
         self.node.hardware[what].publish(Float64(data=value))
 
     def listens_to(self, what: str) -> bool:
-        """Return whether the student's node subscribes to ``hardware/<what>``."""
-        return self.wait(lambda: self.node.hardware[what].get_subscription_count())
+        """Return whether the student's node subscribes to ``hardware/<what>``.
+
+        One that did not in good time is not waited for again.
+        """
+        there = self.node.hardware[what].get_subscription_count
+        if what in self._deaf_to or self.wait(there):
+            return bool(there())
+        self._deaf_to.add(what)
+        return False
 
     @property
     def speed(self) -> float:
