@@ -24,11 +24,16 @@ def beats(
 ) -> None:
     """Require a heartbeat every 0.5 s from ``since`` to ``until``, by the times of those seen.
 
-    ``guess`` is what to ask a student for whom there were hardly any.
-
     What counts is each silence between two beats, and not how many there were: a node that looks
     by a timer may be late each time. Too many are told by their number: some may come soon after
     one that was late.
+
+    Args:
+        seen: when each was seen, in s of simulated time.
+        since: from when on.
+        until: until when.
+        when: that time in words, as the beginning of a sentence.
+        guess: what a student is asked for whom there were hardly any.
     """
     there = [beat for beat in seen if since < beat <= until]
     lasted = until - since
