@@ -96,7 +96,7 @@ def needed(check: Callable[[CameraRig], None]) -> Callable[[CameraRig], None]:
         "Try it beside the check: `course.run(CameraDriver)`, and then `course.logs()`.",
         "Compare names and types of the four endpoints with the row “Running” of the table.",
         "Open Camera(device), start() it, publish read() from a 0.1 s timer; zoom() and a second "
-        "read() belong into the callbacks of camera/zoom and camera/snapshot.",
+        "read() belong in the callbacks of camera/zoom and camera/snapshot.",
     ),
     read="Chapter 5, “Nodes: the processing units”",
 )

@@ -25,7 +25,8 @@ READ_GROUPS = "ROS 2 documentation, “Using callback groups”"
     hints=(
         "Follow one request through your node: from grip/request to the service and to the word.",
         "`call_async` gives a future. Publish the outcome when it is done, not before.",
-        "`answer = await self.ask(...)`, with a timer of 1 s that cancels the future, then `done`.",
+        "`future = self.gripper.call_async(SetBool.Request(data=request.data))`, "
+        "`timer = once(self, 1.0, future.cancel)`, `answer = await future`: None is no answer.",
     ),
     read=READ_SERVICES,
 )
@@ -144,7 +145,8 @@ def goals_stall(rig: RobotRig) -> None:
     hints=(
         "Send a goal of your own: `course.send_goal(Drive, 'drive', Drive.Goal(order=2))`.",
         "Reject bad orders in the goal callback: in `execute` it is too late, it was accepted.",
-        "A second a metre: command the wheels, `await sleep`, feedback; then succeed, and stop.",
+        "For each metre a few times: command the wheels, `await sleep`, 1 s in all. Then feedback; "
+        "at the end succeed, and stop.",
     ),
     read=READ_GOALS,
 )

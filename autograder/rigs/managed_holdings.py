@@ -37,7 +37,7 @@ def require_one_publisher(rig: CameraRig) -> None:
     if not rig.wait(lambda: rig.graph.publishers() == 1):
         raise Failed(
             expected=f"A configured node has one publisher on {IMAGE}.",
-            actual=f"It had {rig.graph.publishers()}.",
+            actual=f"The number of its publishers was {rig.graph.publishers()}.",
         )
 
 
@@ -47,7 +47,7 @@ def require_nothing_held(rig: CameraRig, device: str, when: str) -> None:
     if not rig.wait(lambda: not rig.graph.publishers()):
         raise Failed(
             expected=f"{when} there is no publisher on {IMAGE}.",
-            actual=f"{SETTLE:.0f} s later there were {rig.graph.publishers()}.",
+            actual=f"{SETTLE:.0f} s later the number of publishers was {rig.graph.publishers()}.",
         )
 
 

@@ -138,7 +138,8 @@ def aborted(rig: RobotRig) -> None:
         robot.spend(THIRD)  # so long that a node is seen to go on as it began
         jammed = dispatcher.now
         dispatcher.jam(True)
-        sending.ends(robot, drive, "A goal whose wheels jam", "aborted", sending.ABORT)
+        # They raise at the next command.
+        sending.ends(robot, drive, "A goal whose wheels jam", "aborted", COMMAND + sending.ABORT)
         sending.stands(robot, dispatcher, "been aborted")
         _require_reason(robot, dispatcher, "The goal")
         _require_commands(dispatcher, jammed)

@@ -22,7 +22,8 @@ PROMPT = 1.0  # s for an outcome that is clear; a node may look for it by a time
 SILENCE = 2.0  # s without feedback after which a drive is canceled
 ANSWER = 1.0  # s that an answer may take
 BREATH = 1.5  # s between the feedbacks of a navigator that is slow, not dead
-TOLERANCE = 0.2 + STRIDE  # s: what the task allows, and a node that looks by a timer
+ALLOWED = 0.2  # s more or less that do no harm
+TOLERANCE = ALLOWED + STRIDE  # s: what the task allows, and a node that looks by a timer
 AFTER = 2.5  # s in which a second outcome would show
 METRES = 3  # of a drive whose length does not matter; others differ, lest one be remembered
 FAR = 40  # m
@@ -222,7 +223,7 @@ def lost(rig: RobotRig) -> None:
         _accepted(robot, user)
     with _user(rig, navigator=False) as (robot, user):
         when = "When the navigator died on the way"
-        limit = SILENCE + ANSWER + TOLERANCE
+        limit = SILENCE + ANSWER + 2 * ALLOWED + STRIDE
         _outcome(robot, user, when, "lost", limit)
         _once(robot, user, when, "lost")
         user.request(METRES)

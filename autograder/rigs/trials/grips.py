@@ -55,7 +55,7 @@ def refused(rig: RobotRig) -> None:
         robot.run(lambda: len(user.tries) > 1 or user.outcomes, LONGEST, COARSE)
         tries_again = len(user.tries) > 1
         if tries_again:
-            when = "When the gripper did not answer the first try, and success=False to the second"
+            when = "When the gripper answered not the first try, but the second with success=False"
             _refuses(robot, user, when)
         robot.require_no_errors()
     if not tries_again:  # that is another check's, and what is still under way must not be

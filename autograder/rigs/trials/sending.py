@@ -10,7 +10,7 @@ from autograder.rigs.safety_robot import Robot
 
 PROMPT = 1.0  # s for an answer
 STOP = 0.5  # s from the end of a drive to the stop
-ABORT = 1.0  # s from a jam to the end of the drive
+ABORT = 1.0  # s from wheels that raise, or a shutdown, to the end of the drive
 TOLERANCE = 0.25  # s: what the task allows, and strides
 LONG, LONGEST = 8, 10  # m: what is still under way when something happens
 

@@ -158,7 +158,8 @@ class Wheels:
 #   ignored: it is not the answer to the try that runs now.
 # - Between a failed try and the next one there is a pause: at least 0.5 s before the second try, and
 #   before the third at least 0.5 s longer than before the second. Within 10 s of the request there
-#   is an outcome. A gripper that is not there at all is treated the same way: it may come back.
+#   is an outcome. The first try comes at once, and so does an outcome that is clear. A gripper that
+#   is not there at all is treated the same way: it may come back.
 # - With every outcome but `done`, the arm must hold still: publish an `Empty` on `arm/hold`.
 # - All the time, whatever happens, an `Empty` on `grip/heartbeat` every 0.5 s shows that the node is
 #   alive.
