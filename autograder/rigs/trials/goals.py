@@ -43,9 +43,11 @@ def _user(rig: RobotRig, navigator: bool = True) -> Iterator[tuple[Robot, Naviga
                 yield robot, user
 
 
-def _accepted(robot: Robot, user: NavigatorUser, metres: int = METRES) -> None:
-    """Ask for a drive, and wait until its goal has been accepted."""
-    user.request(metres)
+def _accepted(
+    robot: Robot, user: NavigatorUser, metres: int = METRES, *, ponders: bool = False
+) -> None:
+    """Ask for a drive, and wait until its goal has been accepted; see `NavigatorUser.request`."""
+    user.request(metres, ponders=ponders)
     _sent(robot, user)
     if not robot.run(lambda: user.goals, PROMPT):
         raise RuntimeError("the examiner's navigator did not accept a goal")
@@ -197,9 +199,7 @@ def _too_late(robot: Robot, user: NavigatorUser) -> None:
 
 def _cancel_too_late(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive whose cancel is accepted when it has been given up."""
-    user.request(METRES + 1, ponders=True)
-    _sent(robot, user)
-    robot.run(lambda: user.goals, PROMPT)
+    _accepted(robot, user, METRES + 1, ponders=True)
     _canceled(robot, user)
     when = f"When the navigator did not answer the request to cancel for {ANSWER:g} s"
     _outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
