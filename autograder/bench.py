@@ -126,7 +126,7 @@ class Subject:
         DDS announces a process's endpoints in order: whoever sees both on the graph has seen all
         that the subject's nodes had before. So what is missing then is missing, not late.
         """
-        self._ask("mark", name)
+        self._ask("mark", name, doing="make a small node beside yours")
 
     def stop(self, name: str, *, bare: bool = False) -> None:
         """Destroy the node made of a class, as a session does: its ``destroy_node`` is called.
@@ -192,7 +192,7 @@ class Subject:
         Raises:
             StudentError: there is no such variable, or it is made of something else.
         """
-        reply = self._ask("value", name)
+        reply = self._ask("value", name, doing=f"read the variable `{name}`")
         return self._read(lambda: reply["value"])
 
     def sees(self, name: str, endpoints: Endpoints) -> dict[str, dict[str, int]]:
@@ -207,7 +207,9 @@ class Subject:
                 "services", "clients".
         """
         wanted = {kind: list(names) for kind, names in endpoints.items()}
-        reply = self._ask("sees", name, endpoints=wanted)
+        reply = self._ask(
+            "sees", name, endpoints=wanted, doing=f"say what the node of `{name}` has discovered"
+        )
         return self._read(
             lambda: {
                 kind: {n: int(reply["counts"][kind][n]) for n in names}
@@ -220,17 +222,17 @@ class Subject:
 
         Each is like ``wait_for_service: Asker.ask of /asker (at line 7: ...)``.
         """
-        reply = self._ask("wall_waits", "its waits")
+        reply = self._ask("wall_waits", "", doing="say what its callbacks wait for")
         return self._read(lambda: _texts(reply["waits"], MAX_ERROR))
 
     def errors(self) -> list[str]:
         """Return what the student's callbacks raised: for an explanation, never as evidence."""
-        reply = self._ask("errors", "its errors")
+        reply = self._ask("errors", "", doing="list its errors")
         return self._read(lambda: _texts(reply["errors"], MAX_ERROR))
 
     def thread_errors(self) -> list[str]:
         """Return what ended threads of the student's: for an explanation, never as evidence."""
-        reply = self._ask("errors", "its errors")
+        reply = self._ask("errors", "", doing="list its errors")
         return self._read(lambda: _texts(reply["of_threads"], MAX_ERROR))
 
     def own_errors(self) -> dict[str, int]:
@@ -239,7 +241,7 @@ class Subject:
         What rclpy raised, in a call of theirs or elsewhere, is not among it: that may be a race of
         its own.
         """
-        reply = self._ask("own_errors", "its errors")
+        reply = self._ask("own_errors", "", doing="list its errors")
         return self._read(
             lambda: {
                 _text(error["told"], MAX_ERROR): int(error["count"])

@@ -193,13 +193,17 @@ def _result_of(check: Check[RigT], status: Status) -> CheckResult:
 
 
 def _not_checked(check: Check[RigT], missing: CheckResult) -> CheckResult:
-    return replace(_result_of(check, "not_checked"), actual=f"This needs “{missing.title}” first.")
+    title = missing.title.rstrip(".")
+    actual = f"This needs “{title}” first."
+    if missing.status in ("grader_error", "not_examined"):
+        actual = f"This needs “{title}”, which could not be examined here. It is not your fault."
+    return replace(_result_of(check, "not_checked"), actual=actual)
 
 
 def _not_reached(check: Check[RigT], gone: CheckResult) -> CheckResult:
     return replace(
         _result_of(check, "not_checked"),
-        actual=f"Your program hung or ended in “{gone.title}”, and was gone by then.",
+        actual=f"Your program hung or ended in “{gone.title.rstrip('.')}”, and was gone by then.",
     )
 
 
@@ -228,7 +232,7 @@ def _run(check: Check[RigT], rig: RigT, gone: list[CheckResult]) -> CheckResult:
         return replace(
             _result_of(check, "grader_error"),
             actual=f"The grader itself failed ({type(error).__name__}: {error}, in "
-            f"{_innermost(error)}). This is not your fault: a person will look at it.",
+            f"{_innermost(error)}). This is not your fault; after a hand-in a person looks at it.",
         )
     return replace(_result_of(check, "passed"), note=note)
 

@@ -20,6 +20,7 @@ from autograder.exam import Exam, Failed
 from autograder.rigs import choosing, endings, filming, meanwhile, odometry, offers, stations
 from autograder.rigs.driving import ACTIONS, SPEED_MARGIN, Drive
 from autograder.rigs.listening import LateJoiner, acquaint, arrives
+from autograder.rigs.phrases import with_reason
 from autograder.rigs.robot import LEVEL_MARGIN, NODE, RobotRig, robot_rig
 from autograder.rigs.scenarios import NAMES, SCENARIOS, Scenario
 from course import GoalState
@@ -219,7 +220,7 @@ def parameter_changes(rig: RobotRig) -> str:
             if not taken:
                 raise Failed(
                     expected=f"{needed} {good:g} m/s is a good value: from 0.1 to 1.0 all are.",
-                    actual=f"It was refused, with the reason {reason[:200]!r}.",
+                    actual=f"It was refused, {with_reason(reason)}.",
                 )
     for bad in BAD_SPEEDS:
         taken, reason = offers.set_speed_limit(rig, bad)

@@ -65,7 +65,7 @@ def _require_quick(found: Backlog) -> None:
     if found.took < PROMPT:
         raise NotExaminable(
             f"This machine was too busy: in {LONGEST} s only {found.count} stop events got through "
-            "the driver. A person will look at it."
+            "the driver. After a hand-in a person looks at it."
         )
     raise Failed(
         expected="The driver publishes each stop event as it comes in.",
@@ -96,8 +96,8 @@ def require_burst(rig: SensorRig, expected: str) -> None:
     found: Burst = rig.once(short_pause)
     if found.missing and found.aged:
         raise NotExaminable(
-            "This machine was too busy to tell a short queue from readings that had grown old. A "
-            "person will look at it."
+            "This machine was too busy to tell a short queue from readings that had grown old. "
+            "After a hand-in a person looks at it."
         )
     if found.missing:
         passed = BURST - found.missing

@@ -9,7 +9,7 @@ from autograder.exam import Failed
 from autograder.rigs.camera import SETTLE, CameraRig
 from autograder.rigs.camera_graph import PUBLISHER
 from autograder.rigs.camera_node import IMAGE
-from autograder.rigs.phrases import phrase
+from autograder.rigs.phrases import phrase, pictures
 
 DRIVER = "CameraDriver"
 DEFAULT = "front"
@@ -85,7 +85,7 @@ def require_gone(rig: CameraRig, device: str, when: str, node: str = "") -> None
     before = len(rig.pictures(device))
     rig.advance(1.0)
     sent = len(rig.pictures(device)) - before
-    more = f" In one more second it sent {sent} pictures." if sent else ""
+    more = f" In one more second it sent {pictures(sent)}." if sent else ""
     raise Failed(
         expected=f"{when} no endpoint of the driver is on the graph.",
         actual=f"{SETTLE:.0f} s later there still was {phrase(left)}.{more}",

@@ -113,10 +113,34 @@ def let_arrive(rig: CameraRig, device: str) -> None:
 
 
 def require_own_clock(rig: CameraRig, device: str) -> None:
-    """Fail if pictures of ``device`` are published while the robot's time stands still.
+    """Fail if pictures of ``device`` come while the robot's time stands still, or many at once.
 
-    Only those: a thread may read the camera all the time, and a timer publish the newest picture.
+    Only those that are published: a thread may read the camera all the time, and a timer publish
+    the newest picture. How many come at once is seen here, where they are waited for until no more
+    come; while they are counted time moves on, and they may come in the midst of that.
     """
+    for _ in PACES:
+        came = _at_once(rig, device)
+        if came <= AT_ONCE:
+            return
+    raise Failed(
+        expected="The pictures come one after the other, at even intervals.",
+        actual=f"In a tenth of a second of the robot's time {came} of them came at once.",
+    )
+
+
+def _at_once(rig: CameraRig, device: str) -> int:
+    """Return how many pictures come in the next step of time in which there are any."""
+    before = len(rig.pictures(device))
+    for _ in range(STEPS):
+        rig.advance(PERIOD)
+        if rig.wait(lambda: len(rig.pictures(device)) > before, KEEP_UP):
+            break
+    _require_standstill(rig, device)
+    return len(rig.pictures(device)) - before
+
+
+def _require_standstill(rig: CameraRig, device: str) -> None:
     deadline = Deadline(BACKLOG)
     while deadline.left:
         before = len(rig.pictures(device))

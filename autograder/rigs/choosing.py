@@ -25,8 +25,12 @@ def read(rig: RobotRig) -> dict[Scenario, str]:
     try:
         value = rig.subject.value(VARIABLE)
     except StudentError as error:
+        if error.missing:
+            raise Failed(expected=expected, actual=error.told) from None
         reason = str(error).partition(": ")[2] or str(error)  # without the exception's name
-        raise Failed(expected=expected, actual=f"It could not be read: {reason}.") from None
+        raise Failed(
+            expected=expected, actual=f"It could not be read: {reason.rstrip('.')}."
+        ) from None
     if not isinstance(value, dict):
         raise Failed(expected=expected, actual=f"choices is not a dictionary but {_few(value)}.")
     chosen: dict[Scenario, str] = {}

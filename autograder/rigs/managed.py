@@ -120,7 +120,8 @@ class Managed:
         """Return why rclpy says nothing, and how to see it: it catches what on_…() raises."""
         return (
             f"Your on_{transition}() did not return SUCCESS, or it raised. rclpy keeps such an "
-            "exception to itself: call the method in a cell of your own to see it."
+            "exception to itself. To see it, call your methods one after the other in a cell of "
+            "your own: `node = course.run(ManagedCamera)`, then `node.on_configure(None)` …"
         )
 
     def _ask(self, service: Any, name: str, request: Any) -> Any:

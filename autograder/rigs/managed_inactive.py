@@ -9,7 +9,7 @@ from autograder.rigs.camera import CameraRig
 from autograder.rigs.camera_node import IMAGE
 from autograder.rigs.camera_rate import let_arrive
 from autograder.rigs.managed import Managed
-from autograder.rigs.phrases import phrase
+from autograder.rigs.phrases import phrase, pictures
 from course.runtime.waiting import Deadline
 
 EXPOSURE = 0.3  # s of a slow camera
@@ -34,7 +34,7 @@ def require_still(rig: CameraRig, device: str, transition: str) -> None:
     if asked:
         raise Failed(
             expected="An inactive node asks its camera for no picture: it has no timer.",
-            actual=f"In one second after “{transition}” it asked {asked} times.",
+            actual=f"In one second after “{transition}” it asked for {pictures(asked)}.",
         )
 
 
@@ -92,11 +92,13 @@ def require_fresh(rig: CameraRig, device: str, sent: int, asked: int, strange: i
         )
     if old := [p for p in rig.pictures(device)[sent:] if p.number < asked]:
         raise Failed(
-            expected="An inactive node publishes nothing.",
-            actual=f"It published {len(old)} pictures between deactivate and activate.",
+            expected="An inactive node publishes nothing, and one that is active again only "
+            "pictures that its camera has taken since.",
+            actual=f"After “deactivate”, or after the next “activate”, it published "
+            f"{pictures(len(old))} taken before that “activate”.",
         )
     if more := rig.node.strange() - strange:
         raise Failed(
             expected="An inactive node publishes nothing.",
-            actual=f"It published {more} images that its camera had not taken.",
+            actual=f"It published {pictures(more)} that its camera had not taken.",
         )

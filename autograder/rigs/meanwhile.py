@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from autograder.exam import Failed
 from autograder.rigs import filming, odometry, offers
 from autograder.rigs.listening import hear_out
+from autograder.rigs.phrases import with_reason
 from autograder.rigs.robot import RobotRig
 
 FILMED = (8.0, 12.0)
@@ -77,7 +78,7 @@ def require_parameters(rig: RobotRig, where: str) -> None:
     if not taken:
         raise Failed(
             expected=expected,
-            actual=f"{where}, {rig.limit:g} m/s was refused, with the reason {reason[:200]!r}.",
+            actual=f"{where}, {rig.limit:g} m/s was refused, {with_reason(reason)}.",
         )
 
 

@@ -1,4 +1,4 @@
-"""How a message names several things at once."""
+"""How a message names several things, counts them, or quotes a reason."""
 
 from __future__ import annotations
 
@@ -6,3 +6,13 @@ from __future__ import annotations
 def phrase(items: list[str]) -> str:
     """Return a list as a phrase: "a, b and c"."""
     return " and ".join(part for part in (", ".join(items[:-1]), *items[-1:]) if part)
+
+
+def pictures(number: int) -> str:
+    """Return a number of pictures as a phrase: "one picture", "3 pictures"."""
+    return "one picture" if number == 1 else f"{number} pictures"
+
+
+def with_reason(reason: str) -> str:
+    """Return the reason that came with a refusal, as the end of a sentence: "with the reason …"."""
+    return f"with the reason “{reason[:200]}”" if reason.strip() else "and without a reason"

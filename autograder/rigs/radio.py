@@ -29,7 +29,7 @@ from course import Session, tools
 TABLE = "inet ros2_course_radio"
 NOT_HERE = (
     "What becomes of lost packets could not be examined on this machine, which cannot make a "
-    "network that loses them{why}. A person will look at it."
+    "network that loses them{why}. After a hand-in a person looks at it."
 )
 
 

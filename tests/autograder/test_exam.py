@@ -87,9 +87,9 @@ def test_what_failed_only_when_an_earlier_part_was_over_is_told_with_the_reason(
     exam.checks["first"] = replace(exam.checks["first"], run=exam.checks["second"].run)
     (last,) = exam.sit("hidden", BENCH, failed).checks
     assert last.status == "not_checked"
-    assert last.actual == "This needs “It starts.” first. This time it failed: right"
+    assert last.actual == "This needs “It starts” first. This time it failed: right"
     (again,) = exam.sit("hidden", BENCH, failed).checks  # what a report says is not said again
-    assert again.actual == "This needs “It starts.” first."
+    assert again.actual == "This needs “It starts” first."
 
 
 def test_the_graders_own_fault_is_never_the_students(exam: Exam[list[str]]) -> None:

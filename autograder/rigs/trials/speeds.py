@@ -21,6 +21,7 @@ from autograder.rigs.gripper import (
     unset,
     whole,
 )
+from autograder.rigs.phrases import with_reason
 from autograder.rigs.safety import RobotRig
 from autograder.rigs.safety_robot import Robot
 
@@ -125,7 +126,7 @@ def _accepted(
     if not result.successful:
         raise Failed(
             expected=f"A request with {what} is good, and answered successful=True.",
-            actual=f"It was answered successful=False, “{result.reason}”.",
+            actual=f"It was answered successful=False, {with_reason(result.reason)}.",
         )
     wanted = _limits([due])
     reached = operator.limits

@@ -29,7 +29,7 @@
 # | Phase | What it does |
 # |---|---|
 # | Initialization | Opens `Camera(device)` and starts its stream. If either raises, the constructor raises too, and leaves **nothing** behind: no node, no endpoint, no thread, no open camera, and less than 1 MiB of memory each time. Nobody calls `destroy_node()` on a node that was never made. The endpoints are there when the constructor returns. |
-# | Running | Publishes a picture on `camera/image` (`sensor_msgs/Image`) 10 times a second, one after the other, by a ROS timer or the node's clock: the examiner moves simulated time. One `std_msgs/Int32` on `camera/zoom` sets the zoom of all next pictures; a factor that the camera refuses costs that one message and nothing else. The service `camera/snapshot` (`std_srvs/Trigger`) takes one picture at once, publishes it too, and answers with `success=True` when it has been published. |
+# | Running | Publishes a picture on `camera/image` (`sensor_msgs/Image`) 10 times a second, one after the other, by a ROS timer or the node's clock: the examiner moves simulated time. One `std_msgs/Int32` on `camera/zoom` sets the zoom of all next pictures; a factor that the camera refuses costs that one message and nothing else (catch its `ValueError`: here a session goes on when a callback raises, but `rclpy.spin()` in a program of your own would end). The service `camera/snapshot` (`std_srvs/Trigger`) takes one picture at once, publishes it too, and answers with `success=True` when it has been published. |
 # | Cleanup | `destroy_node()` is the one door; rclpy, a session and the examiner all use it. After it no node and no endpoint of the driver is left on the graph, the camera is closed, and every thread of the driver has ended (within a second). It may be called twice, while the node spins, and while one of its callbacks is still waiting for the camera, which then ends, too. The driver can then be started again. |
 #
 # Over 50 lives the process keeps its number of threads and open files, and grows by less than
@@ -47,7 +47,7 @@
 # |---|---|
 # | `unconfigured` | Nothing: no camera, no publisher on `camera/image`. |
 # | `inactive` | The open camera and the publisher, with the parameters read when it was configured. The stream is stopped; the node sends no picture and asks the camera for none. |
-# | `active` | The stream and the timer as well. |
+# | `active` | The stream and the timer as well; the pictures that it sends were taken since it was activated. |
 # | `finalized` | Nothing, wherever the shutdown came from. |
 #
 # A configuration that is not possible (a rate out of bounds, a camera that cannot be opened) leaves
@@ -250,7 +250,10 @@ class CameraDriver(Node):
         return True
 
     def zoom(self, message):
-        self.camera.zoom(message.data)
+        try:
+            self.camera.zoom(message.data)
+        except ValueError as error:
+            self.get_logger().warning(str(error))
 
     def snapshot(self, request, response):
         response.success = self.take_picture()
