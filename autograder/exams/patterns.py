@@ -271,18 +271,16 @@ def battery_broadcast(rig: RobotRig) -> None:
     offers.require(rig, "battery", WORKING["battery"], needed)
     if not rig.listens_to("charge"):
         raise Failed(expected=needed, actual="Your node does not listen to hardware/charge.")
-    levels = rig.node.levels
     acquaint(rig)
     for level in LEVELS:
         rig.report("charge", level)
         if not rig.wait_stepping(lambda level=level: rig.told_level(level), LEVEL_AGE):  # type: ignore[misc]
-            said = f"the last percentage was {levels[-1]:.4g}" if levels else "nothing was heard"
             raise Failed(
                 expected=f"{needed} Its percentage is 0.0 to 1.0.",
-                actual=f"{LEVEL_AGE:g} s after the level had become {level:g}, {said}"
-                f"{rig.because()}.",
+                actual=f"{LEVEL_AGE:g} s after the level had become {level:g}, "
+                f"{meanwhile.last_level(rig)}{rig.because()}.",
             )
-    rig.broadcasts = True
+    rig.broadcasts = rig.memory["broadcasts"] = True
 
 
 @EXAM.check(

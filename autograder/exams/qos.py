@@ -137,7 +137,7 @@ def _why_silent(rig: SensorRig, sensor: Sensor) -> str:
     if (target := f"consumer/{sensor.name}") in rig.node.foreign:
         return _changed(target, f"{sensor.topic} carried")
     raised = rig.subject.errors()
-    why = f" (a callback raised {raised[-1]})" if raised else ""
+    why = f" (a callback raised an error, in {raised[-1].rstrip('.')})" if raised else ""
     return f"{sensor.topic} carries readings, but none comes out on {target}{why}."
 
 
@@ -323,6 +323,9 @@ def late_joiner(rig: SensorRig) -> None:
     require_no_past(rig, (CAMERA, LIDAR, IMU))
 
 
+_UNHEARD = "A consumer at the far end of the link heard nothing, not even before the gap."
+
+
 def _after_gap(rig: SensorRig, sensor: Sensor) -> Aftermath:
     found: dict[str, Aftermath] = rig.once(radio_gap)
     return found[sensor.name]
@@ -343,12 +346,14 @@ def stop_repaired(rig: SensorRig) -> None:
     RELIABLE alone does not promise it: DDS can send again only what the publisher has kept.
     """
     found = _after_gap(rig, STOP)
-    if found.heard != list(range(found.count)):
-        got = found.heard or []
+    got = found.heard
+    if got != list(range(found.count)):
         raise Failed(
             expected=f"After a gap in the radio link all {found.count} stop events of the gap "
             "arrive, in order.",
-            actual=f"{amiss(got, found.count)}: it got {around(got)}.",
+            actual=_UNHEARD
+            if got is None
+            else f"{amiss(got, found.count)}: it got {around(got, found.count)}.",
         )
 
 
@@ -369,10 +374,14 @@ def camera_moves_on(rig: SensorRig) -> None:
     """
     found = _after_gap(rig, CAMERA)
     expected = "After a gap in the radio link the next frame arrives, and none from the gap."
+    if found.heard is None:
+        raise Failed(expected=expected, actual=_UNHEARD)
     if not found.heard or found.heard[-1] != found.count:
         raise Failed(expected=expected, actual="The next frame did not arrive.")
     if old := [number for number in found.heard if number < found.count - 1]:
+        frames = "A frame that was" if len(old) == 1 else f"{len(old)} frames that were"
+        sent = "was" if len(old) == 1 else "were"
         raise Failed(
             expected=expected,
-            actual=f"{len(old)} frames that were lost in the gap were sent again before it.",
+            actual=f"{frames} lost in the gap {sent} sent again before it.",
         )

@@ -124,8 +124,8 @@ def require_own_clock(rig: CameraRig, device: str) -> None:
         if came <= AT_ONCE:
             return
     raise Failed(
-        expected="The pictures come one after the other, at even intervals.",
-        actual=f"In a tenth of a second of the robot's time {came} of them came at once.",
+        expected="The pictures come one by one, 10 a second.",
+        actual=f"In a tenth of a second of the robot's time {came} of them came.",
     )
 
 

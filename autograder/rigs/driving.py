@@ -13,6 +13,7 @@ from rclpy.qos import ReliabilityPolicy
 from autograder.bench import SubjectGone
 from autograder.exam import Failed
 from autograder.rigs.listening import acquaint, hear_out
+from autograder.rigs.phrases import ended
 from autograder.rigs.robot import GRAIN, SETTLE, STEP, RobotRig
 from autograder.rigs.scenarios import NAMES
 from course import GoalRun, WaitTimeout
@@ -141,7 +142,7 @@ class Drive:
         if self.run.done:
             raise Failed(
                 expected="The goal ends when the robot is there.",
-                actual=f"It ended as {self.run.status.name} {self.where}{self.rig.because()}.",
+                actual=f"It {ended(self.run.status.name)} {self.where}{self.rig.because()}.",
             )
 
     def roll_on(self) -> None:

@@ -8,6 +8,7 @@ from autograder.exam import Failed
 from autograder.rigs.blocked_aisle import hold
 from autograder.rigs.driving import Drive
 from autograder.rigs.listening import acquaint
+from autograder.rigs.phrases import ended
 from autograder.rigs.robot import SETTLE, STEP
 from autograder.rigs.stations import require_report
 from course import GoalState, WaitTimeout
@@ -55,7 +56,7 @@ def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool 
     rig = drive.rig
     rig.wait_stepping(lambda: drive.run.done)
     if not drive.run.done or drive.run.status != state:
-        how = f"ended as {drive.run.status.name}" if drive.run.done else "went on and on"
+        how = ended(drive.run.status.name) if drive.run.done else "went on and on"
         raise Failed(
             expected=f"{expected} The goal ends as {state.name}.",
             actual=f"The goal {how}, with the robot {drive.place}{rig.because()}.",

@@ -43,6 +43,7 @@ def require_flat_rounds(rig: CameraRig, node: Managed) -> None:
     device = rig.device()
     node.require(device=device, rate=10.0)
     rig.subject.collect()
+    rig.catch_up()
     nodes, before = len(rig.graph.nodes()), rig.process.usage()
 
     def some() -> None:

@@ -17,7 +17,7 @@ from autograder.rigs.robot import RobotRig
 
 FILMED = (8.0, 12.0)
 """Pictures a second, as far as such a short time tells."""
-LEVEL, LEVEL_AGE = 0.55, 1.0  # s
+LEVEL, LATER, LEVEL_AGE = 0.55, 0.35, 1.0  # s
 HOLDS_UP = "the drive holds nobody up."
 
 
@@ -60,8 +60,8 @@ def require_battery(rig: RobotRig, where: str) -> None:
         raise Failed(
             expected="While the robot drives, too, whoever listens to robot/battery knows a new "
             f"level within {LEVEL_AGE:g} s: {HOLDS_UP}",
-            actual=f"{where}, the level became {LEVEL:g}, and {LEVEL_AGE:g} s later the last "
-            f"percentage was {rig.node.levels[-1]:.4g}{rig.because()}.",
+            actual=f"{where}, the level became {LEVEL:g}, and {LEVEL_AGE:g} s later "
+            f"{last_level(rig)}{rig.because()}.",
         )
 
 
@@ -98,19 +98,33 @@ def standing(rig: RobotRig) -> Iterator[None]:
 
 
 def require_the_same_after(rig: RobotRig, position: float, before: str) -> None:
-    """Fail if pictures or the position do not come any more after a drive, the one ``before``.
+    """Fail if pictures, position or battery level do not come any more after the drive ``before``.
 
-    Or if a new speed limit has the robot drive on. That these three were right without a drive may
+    Or if a new speed limit has the robot drive on. That these four were right without a drive may
     have been found in an earlier part of the exam.
     """
     limit = rig.limit if rig.obeyed is None else rig.obeyed  # the one that holds
     if limit is not None:
         with standing(rig):
             offers.set_speed_limit(rig, limit)
-    expected = f"After {before} pictures and the position come as they did before."
+    expected = f"After {before} pictures, position and battery level come as they did before."
     if rig.memory.get("films") and not filming.another(rig, time.time_ns()):
         raise Failed(expected=expected, actual=f"No picture came any more{rig.because()}.")
     if pattern := rig.memory.get("position"):
         asker = rig.asker or odometry.asker_by(rig, pattern)
         if answer := odometry.fault(rig, asker, position):
             raise Failed(expected=expected, actual=f"With the robot at {position:g} m, {answer}")
+    if rig.memory.get("broadcasts"):
+        rig.report("charge", LATER)
+        if not rig.wait_stepping(lambda: rig.told_level(LATER), LEVEL_AGE):
+            raise Failed(
+                expected=expected,
+                actual=f"The level became {LATER:g}, and {LEVEL_AGE:g} s later "
+                f"{last_level(rig)}{rig.because()}.",
+            )
+
+
+def last_level(rig: RobotRig) -> str:
+    """Return which battery level was heard last, as a phrase."""
+    levels = rig.node.levels
+    return f"the last percentage was {levels[-1]:.4g}" if levels else "nothing was heard"

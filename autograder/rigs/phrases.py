@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+LEFT_OPEN = (
+    "rclpy aborts a goal whose execute callback raises, or returns without succeed(), canceled() "
+    "or abort()"
+)
+
 
 def phrase(items: list[str]) -> str:
     """Return a list as a phrase: "a, b and c"."""
@@ -16,3 +21,9 @@ def pictures(number: int) -> str:
 def with_reason(reason: str) -> str:
     """Return the reason that came with a refusal, as the end of a sentence: "with the reason …"."""
     return f"with the reason “{reason[:200]}”" if reason.strip() else "and without a reason"
+
+
+def ended(word: str) -> str:
+    """Return how a goal ended, in rclpy's ``word`` for it, as a phrase: "ended as aborted …"."""
+    aborted = word.lower() == "aborted"
+    return f"ended as {word}" + (f" ({LEFT_OPEN})" if aborted else "")

@@ -32,7 +32,7 @@ def stranded(rig: ArchitectureRig, poured: Poured, wanted: Iterable[str]) -> str
 def raised(rig: ArchitectureRig) -> str:
     """Return what the student's callbacks raised, as the end of a sentence."""
     errors = rig.subject.errors()
-    return f"; a callback raised {errors[-1]}" if errors else ""
+    return f"; a callback raised an error, in {errors[-1].rstrip('.')}" if errors else ""
 
 
 def see_scan_arrive(rig: ArchitectureRig, topics: dict[str, Topic]) -> None:

@@ -141,7 +141,7 @@ class Robot:
         subject = self._bench.subject
         raised = [error for error in subject.errors() if error not in self._raised]
         ended = [error for error in subject.thread_errors() if error not in self._ended]
-        told = f" A callback raised {raised[-1].rstrip('.')}." if raised else ""
+        told = f" A callback raised an error, in {raised[-1].rstrip('.')}." if raised else ""
         return told + (f" A thread of yours ended with {ended[-1].rstrip('.')}." if ended else "")
 
     def require_no_errors(self) -> None:

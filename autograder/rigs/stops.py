@@ -144,7 +144,7 @@ def require_all_handled(rig: SensorRig) -> None:
     if kept != list(range(count)):
         raise Failed(
             expected=f"All {count} events of the pause are handled, once and in order.",
-            actual=f"{amiss(kept, count)}: the consumer handled {around(kept)}.",
+            actual=f"{amiss(kept, count)}: the consumer handled {around(kept, count)}.",
         )
 
 
@@ -167,9 +167,14 @@ def amiss(got: list[int], count: int) -> str:
     return "Some came out of order"
 
 
-def around(got: list[int]) -> str:
-    """Return the numbers from one before the first that is out of place on, as a phrase."""
+def around(got: list[int], count: int) -> str:
+    """Return the numbers from one before the first that is out of place on, as a phrase.
+
+    Or that those from the first on are there, and then no more up to ``count``.
+    """
     first = next((place for place, number in enumerate(got) if number != place), len(got))
+    if got and first == len(got) < count:
+        return f"only the first {first} of them" if first > 1 else "only the first of them"
     return few(got[max(0, first - 1) :])
 
 

@@ -17,6 +17,7 @@ from autograder.rigs.trials.gripping import (
     once,
     outcome,
     require_data,
+    said,
     tried,
 )
 
@@ -24,6 +25,7 @@ SLOW = 0.7  # s that an answer takes which is slow, but in time whatever the tol
 FIRST_GAP = 1.5  # s between the first two tries: 1 s without an answer, 0.5 s of pause
 GROWTH = 0.5  # s by which the second pause is longer, at least
 IDLE = 2.0  # s in which a node that has not been asked for anything shows its heartbeat
+BACK = 1.8  # s after a request in which the gripper comes back: a third try is still to come
 SHORTEST = 4.5 - 5 * ALLOWED - STRIDE  # s: three tries and two pauses, each as short as may be
 
 
@@ -135,7 +137,7 @@ def _require_pauses(first: float, second: float) -> None:
 
 
 def absent(rig: RobotRig) -> None:
-    """The gripper dies with a request in its hands and stays away, then comes back."""
+    """The gripper dies with a request in its hands, stays away, and comes back during another."""
     rig.begin_anew()
     with client(rig) as (robot, user):
         began = user.now
@@ -147,12 +149,28 @@ def absent(rig: RobotRig) -> None:
         _gone(robot, user, "When the gripper died in the middle of a call", began)
         user.request(True)
         _gone(robot, user, "When there was no gripper at all", user.now)
+        user.request(False)
+        robot.spend(BACK)
     with client(rig) as (robot, user):
+        _come_back(robot, user)
         tried(robot, user, True)
         user.tries[0].reply(True)
         outcome(robot, user, "When the gripper had come back and answered success=True", "done")
         _refused_alive(robot, user)
         robot.require_no_errors()
+
+
+def _come_back(robot: Robot, user: GripUser) -> None:
+    """Require that a gripper is tried that was not there when the grip was asked for."""
+    when = f"When the gripper was not there, and came back {BACK:g} s after the request"
+    if not robot.run(lambda: user.tries, DEADLINE - BACK):
+        raise Failed(
+            expected=f"{when}, it is called: the third try comes 3.5 s after the request or later.",
+            actual=f"It was never called. {said(user)}{robot.complaint()}",
+        )
+    require_data(user, False)
+    user.tries[-1].reply(True)
+    outcome(robot, user, f"{when} and answered success=True", "done")
 
 
 def _refused_alive(robot: Robot, user: GripUser) -> None:

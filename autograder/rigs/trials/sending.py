@@ -6,6 +6,7 @@ from action_msgs.msg import GoalStatus
 
 from autograder.exam import Failed
 from autograder.rigs.navigation import Dispatcher, Drives
+from autograder.rigs.phrases import ended
 from autograder.rigs.safety_robot import Robot
 
 PROMPT = 1.0  # s for an answer
@@ -66,7 +67,7 @@ def ends(robot: Robot, drive: Drives, what: str, how: str, limit: float) -> None
     if WORDS.get(drive.status) != how:
         raise Failed(
             expected=f"{what} ends as {how}.",
-            actual=f"It ended as {WORDS.get(drive.status, 'unknown')}.{robot.complaint()}",
+            actual=f"It {ended(WORDS.get(drive.status, 'unknown'))}.{robot.complaint()}",
         )
 
 
