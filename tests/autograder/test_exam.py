@@ -11,7 +11,7 @@ import pytest
 
 from autograder import exams, points
 from autograder.bench import Bench, StudentError, SubjectGone
-from autograder.exam import Exam, ExamError, Failed, unexamined
+from autograder.exam import Exam, ExamError, Failed, NotExaminable, unexamined
 from autograder.verdict import CheckResult
 
 
@@ -76,7 +76,19 @@ def test_a_check_whose_need_failed_is_not_checked(exam: Exam[list[str]]) -> None
     first, second, third = verdict.checks
     assert (first.title, first.rationale, first.note) == ("It starts.", "Because it must.", "nice")
     assert (second.expected, second.actual) == ("left", "right")
-    assert "It runs." in third.actual
+    assert "“It runs”" in third.actual
+
+
+def test_what_needs_a_check_that_could_not_be_made_is_not_at_fault(exam: Exam[list[str]]) -> None:
+    def not_here(rig: list[str]) -> None:
+        raise NotExaminable("Not on this machine.")
+
+    exam.checks["second"] = replace(exam.checks["second"], run=not_here)
+    third = exam.sit("visible", BENCH).checks[2]
+    assert third.status == "not_checked"
+    assert third.actual == (
+        "This needs “It runs”, which could not be examined here. It is not your fault."
+    )
 
 
 def test_what_failed_only_when_an_earlier_part_was_over_is_told_with_the_reason(
@@ -132,7 +144,7 @@ def test_what_comes_after_a_subject_is_gone_is_not_at_fault(
     points.table()["toy"].parts["late"] = {"loses": 1.0, "later": 1.0}
     first, second = exam.sit("late", BENCH).checks
     assert (first.status, second.status) == ("failed", "not_checked")
-    assert "“It comes back.”" in second.actual
+    assert "“It comes back”" in second.actual
 
 
 def test_each_check_runs_once_a_sitting(exam: Exam[list[str]]) -> None:
