@@ -13,6 +13,7 @@ from autograder.rigs.phrases import phrase, pictures
 
 DRIVER = "CameraDriver"
 DEFAULT = "front"
+WAKES = 3.0  # s of wall time in which a thread does something that it has been given
 
 
 def require_endpoints(rig: CameraRig, node: str) -> None:
@@ -108,17 +109,29 @@ def require_callbacks_ended(rig: CameraRig, among: set[int], usual: int, when: s
     """Fail if a callback of a driver that was taken down goes on for ever.
 
     A session gives such a callback's thread up and goes on with a new one. So there is a thread
-    that is not ``among`` those of before, and one more than the ``usual`` number without a driver.
+    that is not ``among`` those of before, and one more than the ``usual`` number without a driver;
+    and it works when the session has something to do. One that does not was left by the driver,
+    which is another check's.
     """
 
     def replaced() -> bool:
         now = rig.process.thread_ids()
         return bool(now - among) and len(now) > usual
 
-    if not rig.wait(lambda: not replaced()):
+    if not rig.wait(lambda: not replaced()) and _works(rig, rig.process.thread_ids() - among):
         raise Failed(
             expected=f"{when} every callback of the driver comes to its end.",
             actual=f"One that waited for the camera was still waiting {SETTLE:.0f} s later. The "
             "thread that runs it is lost: a program with that one thread takes up no callback "
             "ever again.",
         )
+
+
+def _works(rig: CameraRig, threads: set[int]) -> bool:
+    """Whether one of these ``threads`` has a part in what the session now has to do."""
+    before = rig.process.naps(threads)
+    rig.catch_up()
+    return rig.wait(
+        lambda: any(naps > before[thread] for thread, naps in rig.process.naps(before).items()),
+        WAKES,
+    )

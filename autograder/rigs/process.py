@@ -6,6 +6,7 @@ Linux keeps these under ``/proc/<pid>`` (proc(5)): ``task``, ``fd``, ``fdinfo`` 
 from __future__ import annotations
 
 import resource
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,6 +41,18 @@ class Process:
     def thread_ids(self) -> set[int]:
         """Return the kernel's numbers of its threads."""
         return {int(task.name) for task in (self._proc / "task").iterdir()}
+
+    def naps(self, threads: Iterable[int]) -> dict[int, int]:
+        """Return how often each of these threads, if it is there, has gone to sleep of itself.
+
+        So which of them works: one that waits for ever goes to sleep just once.
+        """
+        found = {}
+        for thread in threads:
+            with suppress(FileNotFoundError, ProcessLookupError):
+                status = (self._proc / "task" / str(thread) / "status").read_text("ascii")
+                found[thread] = int(status.partition("\nvoluntary_ctxt_switches:")[2].split()[0])
+        return found
 
     def usage(self) -> Usage:
         """Return what it holds now."""
