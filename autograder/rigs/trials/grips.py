@@ -22,6 +22,7 @@ from autograder.rigs.trials.gripping import (
 )
 
 SLOW = 0.7  # s that an answer takes which is slow, but in time whatever the tolerance
+ANSWER = 1.0  # s after which a try without an answer has failed
 FIRST_GAP = 1.5  # s between the first two tries: 1 s without an answer, 0.5 s of pause
 GROWTH = 0.5  # s by which the second pause is longer, at least
 IDLE = 2.0  # s in which a node that has not been asked for anything shows its heartbeat
@@ -83,7 +84,8 @@ def unanswered(rig: RobotRig) -> None:
     with client(rig) as (robot, user):
         tried(robot, user, True)
         began = user.now
-        robot.run(lambda: len(user.tries) > 1 or user.outcomes, DEADLINE)
+        # In half strides: they blur how short the first pause is.
+        robot.run(lambda: len(user.tries) > 1 or user.outcomes, DEADLINE, STRIDE / 2)
         if len(user.tries) > 1:
             user.tries[1].crash()
         robot.run(lambda: len(user.tries) > 2 or user.outcomes, DEADLINE + began - user.now)
@@ -95,6 +97,7 @@ def unanswered(rig: RobotRig) -> None:
                 actual=f"After {DEADLINE:.1f} s of simulated time there {_tries(len(user.tries))} "
                 f"and no outcome.{_hint_of_clock(user)}{robot.complaint()}",
             )
+        said_at = user.now
         when = "After three tries without an answer"
         times = [attempt.at for attempt in user.tries]
         if len(times) != 3:
@@ -105,6 +108,7 @@ def unanswered(rig: RobotRig) -> None:
         require_data(user, True)
         outcome(robot, user, when, "failed")
         _require_pauses(times[1] - times[0], times[2] - times[1])
+        _require_clear(said_at - times[2])
         user.tries[2].reply(True)
         once(robot, user, f"{when}, and a late answer to the third")
         robot.require_no_errors()
@@ -121,7 +125,7 @@ def _tries(count: int) -> str:
 
 
 def _require_pauses(first: float, second: float) -> None:
-    if first < FIRST_GAP - 2 * ALLOWED - STRIDE / 2:  # a try and a pause: two times, each allowed
+    if first < FIRST_GAP - 2 * ALLOWED - STRIDE / 4:  # a try and a pause: two times, each allowed
         raise Failed(
             expected="The second try comes 1.5 s after the first, or later: 1 s for an answer, and "
             f"0.5 s of pause. Each may be {ALLOWED:g} s shorter.",
@@ -133,6 +137,16 @@ def _require_pauses(first: float, second: float) -> None:
             f"{ALLOWED:g} s less do no harm.",
             actual=f"The second try came {first:.1f} s after the first, and the third "
             f"{second:.1f} s after the second.",
+        )
+
+
+def _require_clear(waited: float) -> None:
+    """Fail if the outcome came long after the third try had failed, when it was clear."""
+    if waited > ANSWER + PROMPT + TOLERANCE:
+        raise Failed(
+            expected=f"When the third try has had no answer for {ANSWER:g} s, the outcome is "
+            "clear, and comes at once.",
+            actual=f"It came {waited:.1f} s after the third try.",
         )
 
 

@@ -23,9 +23,10 @@ from autograder.rigs.gripper import (
 )
 from autograder.rigs.phrases import with_reason
 from autograder.rigs.safety import RobotRig
-from autograder.rigs.safety_robot import Robot
+from autograder.rigs.safety_robot import COARSE, Robot
 
 PATIENCE = 1.0  # s for an answer; a service callback may await something
+LATER = 1.5  # s in which a request that was refused might be made up for
 SAME = 1e-6  # limits that differ by less are equal
 
 NONSENSE: tuple[tuple[str, list[Parameter]], ...] = (
@@ -102,7 +103,14 @@ def atomic(rig: RobotRig) -> None:
         robot.rest()
         _refused(robot, operator, "linear = 0.9 with jammed wheels", [double("linear", 0.9)])
         operator.jam(False)
-        robot.rest()
+        robot.spend(LATER, COARSE)
+        if operator.limits:
+            raise Failed(
+                expected="A request that was refused is over: when the wheels work again, the old "
+                "limits hold.",
+                actual=f"Within {LATER:g} s after the jam, what reached the wheels: "
+                f"{_limits(operator.limits)}.",
+            )
         _accepted(robot, operator, "angular = 1.1, after the jam", (0.4, 1.1), angular=1.1)
         robot.require_no_errors()
 
