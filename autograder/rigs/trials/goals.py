@@ -71,16 +71,19 @@ def _outcome(
     """Require one outcome, and a stop unless it is good."""
     robot.run(lambda: user.outcomes, limit)
     if user.outcomes != [word]:
-        words = ", then ".join(f"“{said}”" for said in user.outcomes) or "nothing"
+        words = ", then ".join(f"“{said}”" for said in user.outcomes)
         raise Failed(
             expected=f"{when}, navigate/outcome says “{word}”, once.",
-            actual=f"It said {words}.{robot.complaint()}",
+            actual=(f"It said {words}." if words else f"Within {limit:.3g} s it said nothing.")
+            + robot.complaint(),
         )
     if word == "arrived":
         return
     robot.run(lambda: user.speeds, PROMPT)
     if not user.speeds or user.speeds[-1]:
-        last = "the last command was to drive" if user.speeds else "nothing came"
+        last = (
+            "the last command was to drive" if user.speeds else f"nothing came within {PROMPT:g} s"
+        )
         raise Failed(
             expected=f"With “{word}” the robot is stopped: a zero Twist on cmd_vel.",
             actual=f"It said “{word}”, but on cmd_vel {last}.",

@@ -41,7 +41,8 @@ def tried(robot: Robot, user: GripUser, close: bool) -> None:
         raise Failed(
             expected=f"After grip/request {str(close).lower()}{following(user.before)}, "
             "gripper/set is called.",
-            actual=f"The gripper was never called. {said(user)}{robot.complaint()}",
+            actual=f"Within {PROMPT:g} s the gripper was not called. {said(user)}"
+            f"{robot.complaint()}",
         )
     require_data(user, close)
 
@@ -63,12 +64,12 @@ def outcome(robot: Robot, user: GripUser, when: str, word: str, limit: float = P
     if user.outcomes != [word]:
         raise Failed(
             expected=f"{when}, grip/outcome says “{word}”, once.",
-            actual=said(user) + robot.complaint(),
+            actual=said(user, f"Within {limit:.3g} s it") + robot.complaint(),
         )
     if word != "done" and not robot.run(lambda: user.holds, PROMPT):
         raise Failed(
             expected=f"With “{word}” the arm is told to hold still, on arm/hold.",
-            actual=f"It said “{word}”, and nothing came on arm/hold.",
+            actual=f"It said “{word}”, and within {PROMPT:g} s nothing came on arm/hold.",
         )
 
 
@@ -79,7 +80,7 @@ def once(robot: Robot, user: GripUser, when: str) -> None:
         raise Failed(expected=f"{when}, there is exactly one outcome.", actual=said(user))
 
 
-def said(user: GripUser) -> str:
-    """Return which outcomes there were, as a sentence."""
+def said(user: GripUser, who: str = "It") -> str:
+    """Return which outcomes there were, as a sentence; ``who`` begins one that says: none."""
     words = ", then ".join(f"“{word}”" for word in user.outcomes)
-    return f"It said {words}." if words else "It said nothing."
+    return f"It said {words}." if words else f"{who} said nothing."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from autograder.bench import StudentError
+from autograder.bench import REPLY_TIMEOUT, StudentError, SubjectGone
 from autograder.exam import Failed
 from autograder.rigs.navigation import Dispatcher
 from autograder.rigs.safety import RobotRig
@@ -12,6 +12,7 @@ from autograder.rigs.safety_robot import Robot
 from autograder.rigs.trials import sending
 
 AT_ONCE = 1.0  # s of wall time that shutdown() may take where it does not wait; 0.01 s as a rule
+EXPECTED = "shutdown() does not wait: it tells the loop, and returns at once."
 AFTERWARDS = 2  # m of a goal that comes after shutdown(), and s in which it would drive
 LOOKS = 3  # calls of it, if need be, of which the fastest counts: any may be held up by the machine
 
@@ -24,7 +25,7 @@ def shutdown(rig: RobotRig) -> None:
         took.append(_shutdown_on_the_way(rig))
     if min(took) > AT_ONCE:
         raise Failed(
-            expected="shutdown() does not wait: it tells the loop, and returns at once.",
+            expected=EXPECTED,
             actual=f"Called {len(took)} times, it took {min(took):.1f} s or more each time, by the "
             "wall clock.",
         )
@@ -87,4 +88,12 @@ def _shut_down(rig: RobotRig, when: str) -> float:
             expected=f"{Dispatcher.SERVER} has a method shutdown() that does not raise {when}.",
             actual=error.told,
         ) from None
+    except SubjectGone as gone:
+        if not rig.bench.subject.hangs:
+            raise
+        raise Failed(
+            expected=EXPECTED,
+            actual=f"Called {when}, it had not returned {REPLY_TIMEOUT:.0f} s later. The node's "
+            "clock stands still during the call: does it wait for that, or for a callback?",
+        ) from gone
     return time.monotonic() - began
