@@ -26,7 +26,7 @@ def require_configuration(
     node.go("configure")
     require_open(rig, device)
     require_one_publisher(rig)
-    when = "" if seconds == 1 else f" with a rate of {rate:g} Hz"
+    when = f" with a rate of {rate:g} Hz"
     if later:
         node.set(device=rig.device())  # good for the next time as well
     if later and node.set(rate=later):
