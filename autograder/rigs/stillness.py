@@ -58,8 +58,9 @@ class Stillness:
                 if now == before:
                     return True
                 spent += min(moment - looked, _CLIP)
+            elif (total := _worked(now.awake)) is None:
+                worked.pop(now.awake, None)
             else:
-                total = _worked(now.awake)
                 spent += max(0.0, total - worked.get(now.awake, total))
                 worked[now.awake] = total
             if spent >= restless or moment >= deadline:
@@ -121,10 +122,13 @@ def _tasks(pid: int) -> list[Task]:
         return []
 
 
-def _worked(task: Task) -> float:
-    """Return for how many s a thread has computed, by the wall's clock if the kernel keeps none."""
+def _worked(task: Task) -> float | None:
+    """Return for how many s a thread has computed, by the wall's clock if the kernel keeps none.
+
+    None: it has ended since it was looked at.
+    """
+    kept = Path("/proc/{}/task/{}/schedstat".format(*task))
     try:
-        text = Path("/proc/{}/task/{}/schedstat".format(*task)).read_text(encoding="ascii")
-        return int(text.split()[0]) / 1e9
+        return int(kept.read_text(encoding="ascii").split()[0]) / 1e9
     except (OSError, ValueError):
-        return time.monotonic()
+        return time.monotonic() if kept.parent.exists() else None
