@@ -1,8 +1,4 @@
-"""Proof that nothing is under way: threads that run and sleep, in two processes.
-
-What is looked at is the process that looks, too: each test runs in one of its own, where no other
-test has left a thread.
-"""
+"""Proof that nothing is under way: threads that run and sleep, in two processes."""
 
 from __future__ import annotations
 
@@ -11,8 +7,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-
-import pytest
 
 from autograder.rigs.stillness import Stillness
 
@@ -34,17 +28,17 @@ def process(program: str) -> Iterator[subprocess.Popen[bytes]]:
             running.kill()
 
 
-def two_processes_that_sleep_are_still() -> None:
+def test_two_processes_that_sleep_are_still() -> None:
     with process(ASLEEP) as other:
         assert Stillness(other.pid).reached(timeout=30.0)
 
 
-def a_process_that_computes_is_not() -> None:
+def test_a_process_that_computes_is_not() -> None:
     with process(BUSY) as other:
         assert not Stillness(other.pid).reached(timeout=0.2)
 
 
-def a_thread_of_the_examiners_own_counts() -> None:
+def test_a_thread_of_the_examiners_own_counts() -> None:
     stop = threading.Event()
 
     def compute(until: Callable[[], bool] = stop.is_set) -> None:
@@ -64,27 +58,7 @@ def a_thread_of_the_examiners_own_counts() -> None:
         thread.join()
 
 
-def a_process_that_has_ended_leaves_the_examiners_own() -> None:
+def test_a_process_that_has_ended_leaves_the_examiners_own() -> None:
     with process(ASLEEP) as other:
         pass
     assert Stillness(other.pid).reached(timeout=30.0)
-
-
-@pytest.mark.parametrize(
-    "case",
-    [
-        two_processes_that_sleep_are_still,
-        a_process_that_computes_is_not,
-        a_thread_of_the_examiners_own_counts,
-        a_process_that_has_ended_leaves_the_examiners_own,
-    ],
-)
-def test_stillness(case: Callable[[], None]) -> None:
-    ran = subprocess.run(
-        [sys.executable, __file__, case.__name__], capture_output=True, text=True, check=False
-    )
-    assert ran.returncode == 0, ran.stderr
-
-
-if __name__ == "__main__":
-    globals()[sys.argv[1]]()
