@@ -5,12 +5,17 @@ On a platform without ROS 2 wheels the import itself would fail, in a traceback.
 
 from __future__ import annotations
 
-import importlib
+import importlib.util
 import os
 import signal
 import sys
 
-from course.platform_check import UnsupportedPlatformError, require_supported_platform
+from course.platform_check import (
+    WHEELS_ANEW,
+    WHEELS_TORN,
+    UnsupportedPlatformError,
+    require_supported_platform,
+)
 
 
 def course() -> None:
@@ -38,3 +43,8 @@ def _run(name: str) -> None:
     except KeyboardInterrupt:  # it takes a second until the command itself sees to Ctrl-C
         sys.stderr.write(f"{name}: stopped.\n")
         sys.exit(128 + signal.SIGINT)
+    except ModuleNotFoundError:
+        if importlib.util.find_spec("rclpy") is not None:
+            raise
+        sys.stderr.write(f"{name}: {WHEELS_TORN} {WHEELS_ANEW}\n")
+        sys.exit(2)

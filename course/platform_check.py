@@ -14,6 +14,19 @@ from course.errors import CourseError
 OLDEST, NEWEST = (3, 11), (3, 14)
 """First and last CPython that nbgrader, ipykernel and the ROS 2 wheels all support."""
 
+WHEELS_TORN = (
+    "Parts of ROS 2 are gone from this Python: there is no rclpy in it. A second `uv sync` does "
+    "that, as the ROS 2 wheels list what is in them under two names."
+)
+WHEELS_ANEW = (
+    "Install all of it anew with `uv run --reinstall course doctor`, and use `uv run` from then on."
+)
+"""What is wrong where the packages are listed as installed, and rclpy is not; and how to mend it.
+
+`uv sync` takes away what is not in its list: the metadata of the wheels ``ros-…`` names the modules
+themselves (``rclpy``), and nothing asks for those. `uv run` leaves alone what it does not know.
+"""
+
 
 class UnsupportedPlatformError(CourseError):
     """A Python or a platform that there are no ROS 2 wheels for."""

@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import sysconfig
 import tomllib
 from importlib import metadata
 from pathlib import Path
@@ -178,6 +179,40 @@ def test_a_command_on_a_foreign_platform_says_so_before_anything_is_imported(com
     assert done.stdout == ""
     [line] = done.stderr.splitlines()
     assert line.startswith(f"{command}: This course runs on Linux x86-64 only")
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments", "told"),
+    [
+        ("autograder", ["demo"], "autograder: "),
+        ("course", ["lab", "there"], "course: "),
+        ("course", ["doctor"], "problem  ROS 2 wheels: "),
+    ],
+)
+def test_a_command_without_rclpy_says_how_to_get_it_back(
+    command: str, arguments: list[str], told: str, tmp_path: Path
+) -> None:
+    """As after a second `uv sync`: all is there but the modules that it took for strangers."""
+    libraries = tmp_path / "libraries"
+    libraries.mkdir()
+    for path in Path(sysconfig.get_path("purelib")).iterdir():
+        if path.name != "rclpy":
+            (libraries / path.name).symlink_to(path)
+    code = f"import sys; sys.path[:0] = {[str(ROOT), str(libraries)]}; sys.argv[1:] = {arguments}\n"
+    code += f"from course.launch import {command}; {command}()"
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode != 0
+    assert "Traceback" not in done.stdout + done.stderr
+    said = done.stdout + done.stderr
+    assert f"{told}Parts of ROS 2 are gone" in said
+    assert "uv run --reinstall" in said
 
 
 def test_the_commands_start_at_the_launcher_which_needs_nothing(project: dict[str, Any]) -> None:

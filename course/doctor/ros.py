@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import socket
 import struct
@@ -13,6 +14,7 @@ from contextlib import ExitStack
 from course.doctor.finding import Finding, ok, problem, warning
 from course.domains import MAX_DOMAIN, MIN_DOMAIN, domains_in_use, lease_domain
 from course.errors import DomainError
+from course.platform_check import WHEELS_ANEW, WHEELS_TORN
 
 DEADLINE = 40.0  # s for a probe, its imports included; it takes about 1 on an idle machine
 FEW_DOMAINS = 10
@@ -23,6 +25,9 @@ def examine() -> Iterator[Finding]:
     """Yield what there is to say about the wheels, DDS and the domains."""
     yield domains(domains_in_use())
     yield multicast()
+    if importlib.util.find_spec("rclpy") is None:
+        yield problem("ROS 2 wheels", WHEELS_TORN, WHEELS_ANEW)
+        return
     imports = probe("imports")
     if "error" in imports:
         yield problem(
