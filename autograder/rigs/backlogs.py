@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from autograder.exam import Failed, NotExaminable
-from autograder.rigs.readings import STOP, Sensor
+from autograder.rigs.readings import IMU, STOP, Sensor
 from autograder.rigs.sensors import SensorRig
 from autograder.rigs.singles import thinned
 from autograder.rigs.stalling import (
@@ -80,8 +80,8 @@ def require_fresh(rig: SensorRig, sensor: Sensor, expected: str) -> None:
     count, kept, most = found.count, found.kept, sensor.most
     if max(kept, default=-1) < count - 1:
         actual = f"Of {count} readings in a pause the newest never came out: it got {few(kept)}."
-    elif min(kept) < count - most and found.oldest > most / sensor.rate:
-        actual = f"It then worked through the last {count - min(kept)} of {count} readings."
+    elif found.replayed > most and found.oldest > most / sensor.rate:
+        actual = f"It then worked through the last {found.replayed} of {found.published} readings."
     elif kept != sorted(kept):
         actual = f"It passed them on out of order: {few(kept)}."
     elif found.behind is not None:
@@ -94,6 +94,8 @@ def require_fresh(rig: SensorRig, sensor: Sensor, expected: str) -> None:
 def require_burst(rig: SensorRig, expected: str) -> None:
     """Fail unless the consumer passes on every IMU reading of a short pause, in order."""
     found: Burst = rig.once(short_pause)
+    if found.missing and found.published < BURST:
+        raise _withheld(IMU, BURST, found.published)
     if found.missing and found.aged:
         raise NotExaminable(
             "This machine was too busy to tell a short queue from readings that had grown old. "

@@ -38,6 +38,8 @@ class Backlog:
 
     ``published`` is how many of these the driver put on the topic. ``kept`` has the numbers in the
     order in which the consumer passed them on; those from ``count`` on came in after the pause.
+    ``replayed`` is how many the driver published from the first of them to the end of the pause: it
+    may have lost some of its own, which nobody can have kept.
     ``oldest`` is how old the first of them was at the end of the pause, in s since its publication.
     ``early`` says that some came out while the consumer was held back, ``behind`` what it handed on
     when it had fallen far behind later on, if it did. ``altered`` says that the driver changed some
@@ -48,6 +50,7 @@ class Backlog:
     count: int
     published: int
     kept: list[int]
+    replayed: int
     oldest: float
     early: bool
     behind: Handing | None
@@ -58,15 +61,24 @@ class Backlog:
 
 @dataclass(frozen=True)
 class Burst:
-    """What a consumer passed on of a burst, in order; ``aged`` if a reading may have got old."""
+    """What a consumer passed on of a burst, in order; ``aged`` if a reading may have got old.
+
+    ``published`` is how many of the burst the driver put on the topic.
+    """
 
     kept: list[int]
+    published: int
     aged: bool
 
     @property
     def missing(self) -> int:
         """How many readings were lost."""
         return BURST - len(set(self.kept))
+
+    @property
+    def telling(self) -> bool:
+        """Whether what is missing tells something of the consumer."""
+        return not self.missing or (self.published == BURST and not self.aged)
 
 
 def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
@@ -104,8 +116,9 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
         oldest = (resumed - rig.published(s, phase, min(kept))) / 1e9 if kept else 0.0
         found[s.name] = Backlog(
             count=counts[s.name],
-            published=published[s.name],
+            published=len(published[s.name]),
             kept=kept,
+            replayed=sum(number >= min(kept, default=0) for number in published[s.name]),
             oldest=oldest,
             early=s.name in early,
             behind=behind.get(s.name),
@@ -136,14 +149,14 @@ def _limit(sensor: Sensor) -> int:
     return EVENTS if sensor is STOP else 2**31
 
 
-def _published(rig: SensorRig, sensor: Sensor, phase: str, count: int) -> int:
-    """Return how many of the first ``count`` readings went over the sensor's topic.
+def _published(rig: SensorRig, sensor: Sensor, phase: str, count: int) -> set[int]:
+    """Return which of the first ``count`` readings went over the sensor's topic.
 
     Also the barrier: the last of them (or a later one, where a driver drops some) was seen on the
     wire, so the stalled reader has been sent all before it, too.
     """
     rig.wait(lambda: max(rig.witnessed(sensor, phase), default=-1) >= count - 1)
-    return len({number for number in rig.witnessed(sensor, phase) if number < count})
+    return {number for number in rig.witnessed(sensor, phase) if number < count}
 
 
 def _drain(rig: SensorRig, sensor: Sensor, phase: str, count: int) -> None:
@@ -161,12 +174,13 @@ def _drain(rig: SensorRig, sensor: Sensor, phase: str, count: int) -> None:
 def short_pause(rig: SensorRig) -> Burst:
     """Stall the consumer for as long as a burst of IMU readings takes, and see what it passes on.
 
-    Tried again while readings are missing that a slow machine may have let grow old.
+    Tried again while readings are missing that a slow machine may have let grow old, or that the
+    driver has lost.
     """
     for number in range(TRIES):
         patience = SETTLE if number == TRIES - 1 else PROMPT
         burst = _burst(rig, f"short pause {number}", patience)
-        if not (burst.missing and burst.aged):
+        if burst.telling:
             break
     return burst
 
@@ -175,7 +189,7 @@ def _burst(rig: SensorRig, phase: str, patience: float) -> Burst:
     rig.rest()  # what still waits for the consumer would be ahead of the burst
     rig.subject.pause(CONSUMERS)
     stream = Stream(rig.node, IMU, phase, BURST)
-    _published(rig, IMU, phase, BURST)
+    published = len(_published(rig, IMU, phase, BURST))
     rig.subject.resume(CONSUMERS)
     rig.wait(lambda: BURST - 1 in rig.consumed(IMU, phase), patience)
     stream.stop()
@@ -183,7 +197,8 @@ def _burst(rig: SensorRig, phase: str, patience: float) -> Burst:
     decided = _turns_later(rig, f"{phase}, later") if handed is None else handed
     rig.wait(lambda: len(set(rig.consumed(IMU, phase))) == BURST, PROMPT)
     rig.rest()  # one that hands on a reading again is heard out: how many there are is told
-    return Burst(rig.consumed(IMU, phase), decided - rig.published(IMU, phase, 0) > YOUNG * 1e9)
+    aged = decided - rig.published(IMU, phase, 0) > YOUNG * 1e9
+    return Burst(rig.consumed(IMU, phase), published, aged)
 
 
 def _turns_later(rig: SensorRig, phase: str) -> int:

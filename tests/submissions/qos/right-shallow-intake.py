@@ -1,4 +1,4 @@
-# title: Two plain nodes in the manner of C++, whose stop intake holds no more than the 4 that a busy driver finds
+# title: Two plain nodes in the manner of C++, whose intakes hold no more than the 4 that a busy driver finds
 # fails: nothing
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
@@ -6,7 +6,7 @@ from rclpy.subscription import Subscription
 CAMERA_DEPTH: int = 10
 LIDAR_DEPTH: int = 1
 IMU_DEPTH: int = 50
-STOP_INTAKE_DEPTH: int = 4
+INTAKE_DEPTH: int = 4
 
 
 def make_qos(depth: int, reliability: ReliabilityPolicy) -> QoSProfile:
@@ -26,6 +26,7 @@ STOP_QOS: QoSProfile = QoSProfile(
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.VOLATILE,
 )
+INTAKE_QOS: QoSProfile = make_qos(INTAKE_DEPTH, ReliabilityPolicy.RELIABLE)
 
 
 class SensorDrivers(Node):
@@ -48,14 +49,13 @@ class SensorDrivers(Node):
         self.stop_pub_ = self.create_publisher(String, 'emergency/stop', STOP_QOS)
 
         self.camera_sub_ = self.create_subscription(
-            Image, 'hardware/camera', self.on_camera_, CABLE)
+            Image, 'hardware/camera', self.on_camera_, INTAKE_QOS)
         self.lidar_sub_ = self.create_subscription(
-            LaserScan, 'hardware/lidar', self.on_lidar_, CABLE)
+            LaserScan, 'hardware/lidar', self.on_lidar_, INTAKE_QOS)
         self.imu_sub_ = self.create_subscription(
-            Imu, 'hardware/imu', self.on_imu_, CABLE)
+            Imu, 'hardware/imu', self.on_imu_, INTAKE_QOS)
         self.stop_sub_ = self.create_subscription(
-            String, 'hardware/emergency_stop', self.on_stop_,
-            make_qos(STOP_INTAKE_DEPTH, ReliabilityPolicy.RELIABLE))
+            String, 'hardware/emergency_stop', self.on_stop_, INTAKE_QOS)
 
     def on_camera_(self, msg: Image) -> None:
         self.camera_pub_.publish(msg)
