@@ -116,6 +116,13 @@ def driver_runs(rig: CameraRig) -> None:
         require_zoom(rig, device, 3, "While the driver runs")
         require_zoom_kept(rig, device, 3, "After a zoom of 3")
         require_one_picture_each(rig, device, "While the driver runs")
+        require_rate(
+            rig,
+            device,
+            1 / PERIOD,
+            " after a snapshot",
+            after=lambda: require_snapshot(rig, device, "While the driver runs"),
+        )
         require_zoom_at_once(rig, device, 8, "While the driver runs")
         require_tick_zoom(rig, device, 8, "After a zoom of 8")
     require_default_device(rig, DRIVER)
@@ -501,7 +508,13 @@ def callback_raises(rig: CameraRig) -> None:
             rig.refused_zoom(factor)
             require_zoom_kept(rig, device, 2, f"After a zoom of {factor}")
         require_zoom_at_once(rig, device, 1, "After a zoom of -1")
-        require_rate(rig, device, 1 / PERIOD, " after a zoom that was refused")
+        require_rate(
+            rig,
+            device,
+            1 / PERIOD,
+            " after a zoom that was refused",
+            after=lambda: rig.refused_zoom(99),
+        )
         before = rig.process.usage()
         refuse_zooms(rig)
         rig.program.stop(DRIVER)

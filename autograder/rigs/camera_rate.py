@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 from autograder.exam import Failed
@@ -34,15 +35,23 @@ class _Count(NamedTuple):
 
 
 def require_rate(
-    rig: CameraRig, device: str, rate: float, when: str = "", seconds: int = 1
+    rig: CameraRig,
+    device: str,
+    rate: float,
+    when: str = "",
+    seconds: int = 1,
+    after: Callable[[], object] = lambda: None,
 ) -> None:
     """Fail unless ``rate`` pictures of ``device`` come a second of simulated time, one by one.
+
+    Each time they are counted it is ``after`` something has been done, which must not cost any.
 
     Where time jumps from one picture to the next, a thread that looks at the clock now and then
     loses what it sees too late. So a count that is not right is made again, as time passes on a
     robot, and once more with twice as much time.
     """
     for pace in PACES:
+        after()
         count = _count(rig, device, rate, seconds, pace)
         if count.right:
             return
