@@ -26,16 +26,22 @@ from course.runtime.executor import BackgroundExecutor
 
 
 class _PlainServer(ActionServer):
-    """An action server that says in `return_code`, too, that it refuses to cancel.
+    """An action server that gives no result before `Player.pause` is over, and refuses clearly.
 
-    rclpy only leaves the goal out of `goals_canceling`, and the code at ERROR_NONE. By the comments
-    of action_msgs/srv/CancelGoal a refusal has the code ERROR_REJECTED, as rclcpp's servers answer:
-    a client may read either.
+    Of a refused request to cancel rclpy only leaves the goal out of `goals_canceling`, and the code
+    at ERROR_NONE. By the comments of action_msgs/srv/CancelGoal it has the code ERROR_REJECTED, as
+    rclcpp's servers answer: a client may read either.
     """
 
-    def __init__(self, node: Node, refuses: Callable[[], Awaitable[bool]], **options: Any) -> None:
+    def __init__(
+        self,
+        node: Node,
+        refuses: Callable[[], Awaitable[bool]],
+        pause: Callable[[], Awaitable[None]],
+        **options: Any,
+    ) -> None:
         """Serve `navigate` of ``node``; ``refuses`` says of each request whether it is refused."""
-        self._refuses = refuses
+        self._refuses, self._pause = refuses, pause
         super().__init__(node, Drive, "navigate", **options)
 
     async def _execute_cancel_request(self, request_header_and_message: Any) -> None:
@@ -47,6 +53,11 @@ class _PlainServer(ActionServer):
         answer = CancelGoal.Response(return_code=CancelGoal.Response.ERROR_REJECTED)
         self._handle.send_cancel_response(header, answer)
 
+    async def _execute_get_result_request(self, request_header_and_message: Any) -> None:
+        """Wait with a result that is there already: see `Player.pause`."""
+        await self._pause()
+        await super()._execute_get_result_request(request_header_and_message)
+
 
 class Navigator(QuietNode):
     """The server of `navigate`: takes goals and does with them what it is told to."""
@@ -56,7 +67,7 @@ class Navigator(QuietNode):
         super().__init__("navigator")
         self._user = user
         self._server = _PlainServer(
-            self, self._refuses,
+            self, self._refuses, lambda: user.pause(self),
             execute_callback=lambda _: Drive.Result(),
             goal_callback=self._goal, handle_accepted_callback=user.goals.append,
             cancel_callback=lambda _: CancelResponse.ACCEPT,

@@ -1,4 +1,4 @@
-# title: A thread of its own for each job, which sleeps on the node's clock
+# title: A thread of its own for each job, which sleeps on the node's clock, and is slow to note which answer it expects
 # fails: nothing
 
 import threading
@@ -81,6 +81,23 @@ class SpeedServer(Node):
 
 
 # %% safety-goals
+import time
+
+from rclpy.action import client as rclpy_client
+from rclpy.task import Future
+
+
+def future_of_a_busy_machine():
+    # Between rclpy's sending of a request and its noting it: a thread may well lose its turn there.
+    end = time.monotonic() + 0.02
+    while time.monotonic() < end:
+        pass
+    return Future()
+
+
+rclpy_client.Future = future_of_a_busy_machine
+
+
 class NavigationClient(Patient):
     def __init__(self):
         super().__init__('navigation_client')
