@@ -26,6 +26,7 @@ from autograder.rigs.camera_node import ExaminerNode, Picture
 from autograder.rigs.camera_program import Program
 from autograder.rigs.phrases import phrase
 from autograder.rigs.process import Process
+from autograder.rigs.stillness import Stillness
 from course import WaitTimeout
 from course.runtime.waiting import Deadline
 
@@ -53,6 +54,7 @@ class CameraRig:
         self.subject = bench.subject
         self.session = bench.session
         self.process = Process(bench.subject.pid)
+        self._still = Stillness(bench.subject.pid)
         node = bench.memory.get(ExaminerNode.__name__) or bench.session.run(ExaminerNode)
         assert isinstance(node, ExaminerNode)
         bench.memory[ExaminerNode.__name__] = node
@@ -186,6 +188,10 @@ class CameraRig:
             self.session.until(condition, timeout=timeout, what="an observation")
             return True
         return False
+
+    def rest(self) -> None:
+        """Return when all that was sent has been dealt with; soon, if a thread never rests."""
+        self._still.reached()
 
     def device(self, kind: str = "front") -> str:
         """Return a device that nobody else uses; ``kind`` is its name's beginning."""

@@ -126,8 +126,9 @@ def require_own_clock(rig: CameraRig, device: str) -> None:
     """Fail if pictures of ``device`` come while the robot's time stands still, or many at once.
 
     Only those that are published: a thread may read the camera all the time, and a timer publish
-    the newest picture. How many come at once is seen here, where they are waited for until no more
-    come; while they are counted time moves on, and they may come in the midst of that.
+    the newest picture. How many come at once is seen here, where they are waited for until all is
+    at rest and no more come; while pictures are counted, time moves on, and they may come in the
+    midst of that.
     """
     for _ in PACES:
         came = _at_once(rig, device)
@@ -144,6 +145,7 @@ def _at_once(rig: CameraRig, device: str) -> int:
     before = len(rig.pictures(device))
     for _ in range(STEPS):
         rig.advance(PERIOD)
+        rig.rest()
         if rig.wait(lambda: len(rig.pictures(device)) > before, KEEP_UP):
             break
     _require_standstill(rig, device)
@@ -153,6 +155,7 @@ def _at_once(rig: CameraRig, device: str) -> int:
 def _require_standstill(rig: CameraRig, device: str) -> None:
     deadline = Deadline(BACKLOG)
     while deadline.left:
+        rig.rest()
         before = len(rig.pictures(device))
         if not rig.wait(lambda n=before: len(rig.pictures(device)) >= n + 2, STANDSTILL):  # type: ignore[misc]
             return
