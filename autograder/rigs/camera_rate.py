@@ -142,6 +142,7 @@ def require_own_clock(rig: CameraRig, device: str) -> None:
 
 def _at_once(rig: CameraRig, device: str) -> int:
     """Return how many pictures come in the next step of time in which there are any."""
+    rig.rest()  # one of before may be on its way
     before = len(rig.pictures(device))
     for _ in range(STEPS):
         rig.advance(PERIOD)
