@@ -290,12 +290,12 @@ def stop_complete(rig: SensorRig) -> str:
 
     Pressed, released, pressed again: whoever sees only the last event does not know what happened.
     """
-    require_all_handled(rig)
-    if rig.expires(STOP):
+    if rig.expires(STOP):  # the cause of what may be lost: first
         raise Failed(
             expected="A stop event waits for a busy consumer as long as it must.",
             actual="A lifespan on emergency/stop throws events away when they get old.",
         )
+    require_all_handled(rig)
     require_told_apart(rig)
     if STOP.topic not in rig.node.foreign:  # else it only passes on what another check has found
         require_only_events(rig, f"consumer/{STOP.name}")

@@ -5,6 +5,10 @@ after a pause, while readings go on coming in: though they come at their rate, a
 hands on one that is fresh; with the other each is older than the one before. Both times, of
 publication and of handing on, are the student's own: how fast the examiner hears of them plays no
 part.
+
+A busy machine brings fewer readings than the sensor has, and a consumer that is too slow for the
+sensor then seems to keep up. So a fresh reading counts while they come at their rate; or else the
+consumer has to have shown that it can be quicker than the sensor.
 """
 
 from __future__ import annotations
@@ -23,8 +27,11 @@ GENEROUS = 2  # times what a consumer may find waiting: beyond it is not just a 
 LASTING = 0.5  # s for which it has to stay beyond
 STEADY, MANY = 3.0, 8  # s, and readings, that have to be beyond the bound itself, all of them
 QUIET = 2.0  # s without a reading after which there is nothing more to see
-RATED, ENOUGH = 1.0, 0.7  # s before, and the share of what is to come in then, for that to count
+RATED, ENOUGH = 1.0, 0.9  # s before, and the share of what is to come in then, for that to count
 PATIENCE = 8.0  # s for those that are neither fresh nor far behind
+STAMINA = 30.0  # s until a machine on which readings never came at their rate has proved too busy
+SPURT = 5  # readings that were handed on twice as fast as they come: their consumer can catch up
+LOOKS = 0.05  # s between two looks at all that was published and handed on
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,11 @@ class Handing:
     age: float
     waiting: int
     freshest: bool = False
+
+    @property
+    def undecided(self) -> bool:
+        """Whether the machine was too busy to tell whether its consumer keeps up."""
+        return self is UNKNOWN
 
     def told(self, sensor: Sensor) -> str:
         """Return in a sentence how far behind a sensor's consumer was."""
@@ -53,6 +65,10 @@ class Handing:
         )
 
 
+UNKNOWN = Handing(0, 0.0, 0)
+"""Stands for what a machine was too busy to tell."""
+
+
 def left_behind(rig: SensorRig, phase: str, resumed: int) -> dict[str, Handing]:
     """Watch what is handed on since ``resumed`` (ns); return where each that falls behind was.
 
@@ -60,6 +76,10 @@ def left_behind(rig: SensorRig, phase: str, resumed: int) -> dict[str, Handing]:
     """
     pursuits = [Pursuit(rig, sensor, phase, resumed) for sensor in SENSORS if sensor is not STOP]
     rig.wait(lambda: all(pursuit.settled() for pursuit in pursuits), WATCHED + PATIENCE)
+    rig.wait(lambda: all(p.settled() or p.able() for p in pursuits), STAMINA)
+    for pursuit in pursuits:
+        if not (pursuit.settled() or pursuit.able()):
+            pursuit.behind = UNKNOWN
     return {p.sensor.name: p.behind for p in pursuits if p.behind is not None}
 
 
@@ -72,18 +92,32 @@ class Pursuit:
         self.behind: Handing | None = None
         self._rig, self._phase, self._resumed = rig, phase, resumed
         self._settled = False
+        self._rated = False
+        self._look_at = resumed + WATCHED * 1e9
 
     def settled(self) -> bool:
         """Whether it has been seen that the consumer keeps up, or that it does not."""
-        if not self._settled and time.time_ns() > self._resumed + WATCHED * 1e9:
+        if not self._settled and time.time_ns() > self._look_at:
             self._settled = self._look()
+            self._look_at = time.time_ns() + LOOKS * 1e9
         return self._settled
+
+    def able(self) -> bool:
+        """Whether one that is neither fresh nor far behind has had to keep up, or could have."""
+        return self._rated or self._spurts()
+
+    def _spurts(self) -> bool:
+        when = [handing.when for handing in self._handings()]
+        within = SPURT / self.sensor.rate / 2 * 1e9
+        return any(b - a < within for a, b in zip(when, when[SPURT - 1 :], strict=False))
 
     def _look(self) -> bool:
         handings = self._handings()
         if not handings or time.time_ns() > handings[-1].when + QUIET * 1e9:
             return True
-        if self._fresh(handings[-1]) and self._at_rate():
+        rated = self._at_rate()
+        self._rated = self._rated or rated
+        if rated and self._fresh(handings[-1]):
             return True
         late = list(self._late_at_last(handings, GENEROUS))
         if late and late[0].when - late[-1].when > LASTING * 1e9:

@@ -1,6 +1,6 @@
 # title: Stop events that expire while they wait
 # fails: stop_complete, stop_repaired
-# says: stop_complete: of 100 were lost
+# says: stop_complete: A lifespan on emergency/stop throws events away when they get old.
 # says: stop_repaired: of 100 were lost
 # in: the stub
 
