@@ -189,9 +189,9 @@ class CameraRig:
             return True
         return False
 
-    def rest(self) -> None:
-        """Return when all that was sent has been dealt with; soon, if a thread never rests."""
-        self._still.reached()
+    def rest(self) -> bool:
+        """Return True when all that was sent has been dealt with, False if a thread never rests."""
+        return self._still.reached()
 
     def device(self, kind: str = "front") -> str:
         """Return a device that nobody else uses; ``kind`` is its name's beginning."""

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from autograder.exam import Failed
 from autograder.rigs.camera import CameraRig
-from autograder.rigs.camera_duties import require_closed, require_open, require_picture
+from autograder.rigs.camera_duties import (
+    require_closed,
+    require_open,
+    require_picture,
+    require_threads_ended,
+)
 from autograder.rigs.camera_rate import require_rate
 from autograder.rigs.managed import Managed
 from autograder.rigs.managed_holdings import require_nothing_held, require_one_publisher
@@ -63,6 +68,19 @@ def require_flat_rounds(rig: CameraRig, node: Managed) -> None:
             "not destroy them.",
         )
     require_flat_memory(rig, before, some, ROUNDS, expected, "rounds")
+    _require_no_thread_inactive(rig, node)
+
+
+def _require_no_thread_inactive(rig: CameraRig, node: Managed) -> None:
+    """Fail if a thread that was started by “activate” goes on after “deactivate”."""
+    node.go("configure")
+    threads = rig.process.thread_ids()
+    node.go("activate")
+    rig.advance(0.3)
+    node.go("deactivate")
+    rig.advance(0.3)  # one that waits for the node's clock gets to see it
+    require_threads_ended(rig, threads, "After “deactivate”")
+    node.go("cleanup")
 
 
 def require_refusals(rig: CameraRig, node: Managed, rates: tuple[float, ...]) -> None:
