@@ -57,6 +57,7 @@ from autograder.rigs.managed_inactive import (
 from autograder.rigs.managed_rounds import (
     require_configuration,
     require_flat_rounds,
+    require_no_thread_inactive,
     require_refusals,
 )
 from autograder.rigs.phrases import phrase
@@ -371,6 +372,7 @@ def managed_gives_back(rig: CameraRig) -> None:
         require_configuration(rig, node, FASTEST)
         require_configuration(rig, node, 1.5, seconds=4)  # neither 1 nor 2 Hz
         require_flat_rounds(rig, node)
+        require_no_thread_inactive(rig, node)
 
 
 @EXAM.check(

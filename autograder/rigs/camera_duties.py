@@ -106,8 +106,7 @@ def require_threads_ended(rig: CameraRig, among: set[int], when: str) -> None:
     if rig.wait(over, ENDED):
         return
     # A busy machine may not have come to it yet. But when all is at rest, who is left just waits.
-    while deadline.left and not rig.rest():
-        pass
+    rig.wait(lambda: over() or rig.rest(), deadline.left)
     if left := len(new & rig.process.thread_ids()):
         raise Failed(
             expected=f"{when} every thread of the driver has ended, within a second.",

@@ -68,10 +68,9 @@ def require_flat_rounds(rig: CameraRig, node: Managed) -> None:
             "not destroy them.",
         )
     require_flat_memory(rig, before, some, ROUNDS, expected, "rounds")
-    _require_no_thread_inactive(rig, node)
 
 
-def _require_no_thread_inactive(rig: CameraRig, node: Managed) -> None:
+def require_no_thread_inactive(rig: CameraRig, node: Managed) -> None:
     """Fail if a thread that was started by “activate” goes on after “deactivate”."""
     node.go("configure")
     threads = rig.process.thread_ids()

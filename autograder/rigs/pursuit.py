@@ -76,23 +76,26 @@ def left_behind(rig: SensorRig, phase: str, resumed: int) -> dict[str, Handing]:
     """
     pursuits = [Pursuit(rig, sensor, phase, resumed) for sensor in SENSORS if sensor is not STOP]
     rig.wait(lambda: all(pursuit.settled() for pursuit in pursuits), WATCHED + PATIENCE)
-    rig.wait(lambda: all(p.settled() or p.able() for p in pursuits), STAMINA)
+    rig.wait(lambda: all(pursuit.settled() or pursuit.able for pursuit in pursuits), STAMINA)
     for pursuit in pursuits:
-        if not (pursuit.settled() or pursuit.able()):
+        if not (pursuit.settled() or pursuit.able):
             pursuit.behind = UNKNOWN
     return {p.sensor.name: p.behind for p in pursuits if p.behind is not None}
 
 
 class Pursuit:
-    """One sensor's consumer, and whether it keeps up."""
+    """One sensor's consumer, and whether it keeps up.
+
+    ``able`` says of one that is neither fresh nor far behind that it has had to keep up, or could.
+    """
 
     def __init__(self, rig: SensorRig, sensor: Sensor, phase: str, resumed: int) -> None:
         """Watch what was handed on since ``resumed`` (ns)."""
         self.sensor = sensor
         self.behind: Handing | None = None
         self._rig, self._phase, self._resumed = rig, phase, resumed
+        self.able = False
         self._settled = False
-        self._rated = False
         self._look_at = resumed + WATCHED * 1e9
 
     def settled(self) -> bool:
@@ -102,21 +105,12 @@ class Pursuit:
             self._look_at = time.time_ns() + LOOKS * 1e9
         return self._settled
 
-    def able(self) -> bool:
-        """Whether one that is neither fresh nor far behind has had to keep up, or could have."""
-        return self._rated or self._spurts()
-
-    def _spurts(self) -> bool:
-        when = [handing.when for handing in self._handings()]
-        within = SPURT / self.sensor.rate / 2 * 1e9
-        return any(b - a < within for a, b in zip(when, when[SPURT - 1 :], strict=False))
-
     def _look(self) -> bool:
         handings = self._handings()
         if not handings or time.time_ns() > handings[-1].when + QUIET * 1e9:
             return True
         rated = self._at_rate()
-        self._rated = self._rated or rated
+        self.able = self.able or rated or self._spurts(handings)
         if rated and self._fresh(handings[-1]):
             return True
         late = list(self._late_at_last(handings, GENEROUS))
@@ -138,6 +132,11 @@ class Pursuit:
         moments = self._rig.publications(self.sensor, self._phase).values()
         came = sum(now - RATED * 1e9 < moment <= now for moment in moments)
         return came >= ENOUGH * RATED * self.sensor.rate
+
+    def _spurts(self, handings: list[Handing]) -> bool:
+        when = [handing.when for handing in handings]
+        within = SPURT / self.sensor.rate / 2 * 1e9
+        return any(b - a < within for a, b in zip(when, when[SPURT - 1 :], strict=False))
 
     def _late_at_last(self, handings: list[Handing], generous: int) -> Iterable[Handing]:
         """Go back through those that are late until one is not."""
