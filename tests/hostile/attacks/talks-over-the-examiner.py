@@ -1,6 +1,7 @@
 # title: Wrong profiles, and a node that answers the examiner on its own topics
 # told: It then worked through the last
-# score: 8
+# told: Messages came that hardware/emergency_stop did not deliver
+# score: 5
 
 import re
 
@@ -27,7 +28,13 @@ class SensorDrivers(Relay):
                 consumer.publish(message)
 
         self.create_subscription(Image, "hardware/camera", ahead, CABLE)
-        self.create_publisher(String, "hardware/emergency_stop", CABLE).publish(String(data="stop"))
+        button = self.create_publisher(String, "hardware/emergency_stop", CABLE)
+
+        def again(event):
+            if event.data != "stop":
+                button.publish(String(data="stop"))
+
+        self.create_subscription(String, "hardware/emergency_stop", again, CABLE)
 
 
 class SensorConsumers(Relay):
