@@ -154,17 +154,21 @@ class Subject:
         """Execute the node's callbacks again, beginning with what queued up."""
         self._ask("resume", name)
 
-    def advance(self, seconds: float, step: float = 0.01, patience: float = PATIENCE) -> None:
+    def advance(self, seconds: float, step: float = 0.01) -> None:
         """Move simulated time on (see `course.Session.sim`); needs `open` with ``sim_time``.
 
         Raises:
-            StudentError: a callback held up a step for longer than ``patience``, in s of wall time.
+            StudentError: a callback held up a step for longer than PATIENCE.
             SubjectGone: it does not answer at all.
         """
         self._ask(
-            "advance", f"{seconds:g} s of simulated time", REPLY_TIMEOUT + patience,
-            seconds=seconds, step=step, patience=patience,
+            "advance", f"{seconds:g} s of simulated time", REPLY_TIMEOUT + PATIENCE,
+            seconds=seconds, step=step, patience=PATIENCE,
         )  # fmt: skip
+
+    def nudge(self) -> None:
+        """Tell its nodes that a nanosecond of simulated time has passed; wait for no callback."""
+        self._ask("nudge", "", doing="tell its nodes that time goes on")
 
     def call(self, name: str, method: str, *args: Any, timeout: float = REPLY_TIMEOUT) -> Any:
         """Call a method of the node made of a class, in the main thread, while the node spins.

@@ -77,7 +77,8 @@ class Harness:
                 "open": self._open, "start": self._start, "declare": self._declare,
                 "start_declared": self._start_declared, "mark": self._mark, "stop": self._stop,
                 "pause": self._pause, "resume": self._resume, "collect": self._collect,
-                "advance": self._advance, "call": self._call, "value": self._value,
+                "advance": self._advance, "nudge": self._nudge,
+                "call": self._call, "value": self._value,
                 "errors": self._errors, "sees": self._sees, "wall_waits": self._wall_waits,
                 "own_errors": self._own_errors,
             }[request["op"]]  # fmt: skip
@@ -194,6 +195,10 @@ class Harness:
     def _advance(self, request: dict[str, Any]) -> dict[str, Any]:
         seconds, step, patience = (float(request[k]) for k in ("seconds", "step", "patience"))
         self._hosting.sim.advance(seconds, step, patience)
+        return {}
+
+    def _nudge(self, _: dict[str, Any]) -> dict[str, Any]:
+        self._hosting.sim.nudge()
         return {}
 
     def _call(self, request: dict[str, Any]) -> dict[str, Any]:

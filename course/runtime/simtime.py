@@ -88,6 +88,16 @@ class SimulatedTime:
                 moment = min(self._now_ns + self._stride(step_ns), target)
                 self._move_to(moment, _STEP_TIMEOUT if patience is None else patience)
 
+    def nudge(self) -> None:
+        """Tell every node that a nanosecond has passed, and wait for nothing.
+
+        This gives their executors something to do and hardly a timer a reason to fire. In contrast
+        to `advance`, no callback runs in the calling thread, where one might never return.
+        """
+        with self._moving:
+            self._now_ns += 1
+            self._publish()
+
     def welcome(self, node: Node) -> None:
         """Let a node that has just been made start from the present time.
 
@@ -122,13 +132,10 @@ class SimulatedTime:
 
     def _move_to(self, moment_ns: int, patience: float) -> None:
         self._now_ns = moment_ns
-        seconds, nanoseconds = divmod(moment_ns, _NS)
-        message = Clock()
-        message.clock.sec, message.clock.nanosec = seconds, nanoseconds
         deadline = time.monotonic() + patience
         executors = self._crew.all()
         while True:
-            self._publisher.publish(message)
+            self._publish()
             settled = come_to_rest(executors, deadline - time.monotonic())
             late = [node for node in self._followers() if _clock_ns(node) < moment_ns]
             if settled and not late:
@@ -141,6 +148,11 @@ class SimulatedTime:
                 )
             if late:  # blocked, or the message is on its way
                 executors[0].wait_for_a_job(0.001)
+
+    def _publish(self) -> None:
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = divmod(self._now_ns, _NS)
+        self._publisher.publish(message)
 
     def _followers(self) -> list[Node]:
         return [

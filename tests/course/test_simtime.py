@@ -8,12 +8,14 @@ import pytest
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.duration import Duration
 from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 import course
 from course.errors import SessionError, WaitTimeout
+from course.runtime.waiting import Pulse, poll
 
 
 class Sensors(Node):
@@ -218,6 +220,29 @@ def test_a_coroutine_that_awaits_for_ever_does_not_hold_up_time(lab):
     node.executor.create_task(wait)
     lab.sim.advance(1.0)
     assert len(node.fired[10.0]) == 10
+
+
+def test_a_nudge_is_heard_and_waits_for_no_callback(lab):
+    node = lab.run(Sensors)
+    lab.sim.advance(1.0)
+    fired = {rate: len(times) for rate, times in node.fired.items()}
+    lab.sim.nudge()
+    assert poll(lambda: node.get_clock().now().nanoseconds == lab.sim.now_ns, 5.0, Pulse())
+    assert lab.sim.now_ns == 1_000_000_001
+    assert fired == {rate: len(times) for rate, times in node.fired.items()}
+
+    begun, go_on = threading.Event(), threading.Event()
+
+    def block(_):
+        begun.set()
+        go_on.wait()
+
+    node.create_subscription(Clock, "/clock", block, qos_profile_sensor_data)
+    try:
+        # In the thread that calls, the callback would wait for what comes after the nudge.
+        assert poll(lambda: lab.sim.nudge() or begun.is_set(), 5.0, Pulse())
+    finally:
+        go_on.set()
 
 
 def test_patience_bounds_what_a_callback_may_hold_up():
