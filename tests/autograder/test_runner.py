@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from typing import Any
 import pytest
 
 from autograder import jobs, runner
+from autograder.corpus.trials import busy_loops
 from autograder.processes import ExaminerProcess
 from autograder.runner import Outcome
 from autograder.sandbox import BoxError
@@ -65,6 +67,21 @@ def test_a_cell_that_never_ends_is_ended() -> None:
     ((status, reason),) = verdict_reasons(outcome)
     assert status == "not_checked"
     assert "Code cell 1 was still running after 3 s (line 1 of code cell 1: while True" in reason
+
+
+def test_time_in_which_others_keep_a_cell_from_running_is_not_its_own() -> None:
+    source = """
+from pathlib import Path
+def kept_waiting():
+    return int(Path("/proc/self/schedstat").read_text().split()[1]) / 1e9
+begun = kept_waiting()
+while kept_waiting() < begun + 2.5:
+    pass
+"""
+    with busy_loops(4 * (os.cpu_count() or 1)):
+        outcome = runner.run((Cell(source), Cell("print('came')")), cell_timeout=2)
+    assert outcome.outputs[0] == []
+    assert text_of(outcome.outputs[1]) == "came\n"
 
 
 def test_the_line_of_a_cell_that_never_ends_is_found_in_another_cell() -> None:
