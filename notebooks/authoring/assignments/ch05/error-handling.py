@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "safety-task", "locked": true, "schema_version": 3, "solution": false}
-# # Exercise 5: error handling in a safety-critical robot
+# # Exercise 5: Error handling in a safety-critical robot
 #
 # A robot carries parcels through a hospital. Its gripper hangs, its wheels jam, requests are
 # nonsense, a server dies in the middle of a job: **everything that can fail will fail**, with people

@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-task", "locked": true, "schema_version": 3, "solution": false}
-# # Exercise 4: resource management
+# # Exercise 4: Resource management
 #
 # A delivery robot runs for weeks. Its camera driver does not: it is restarted after every update,
 # after every unplugged cable, and each time the robot changes between day and night mode. Whatever
