@@ -267,7 +267,7 @@ class Subject:
         doing = doing or f"{operation.replace('_', ' ')} {what}"
         try:
             self._channel.send({"op": operation, "name": what, **more})
-            reply = self._channel.receive(timeout)
+            reply = self._channel.receive_fairly(timeout, self.pid)
         except ChannelBroken as error:
             raise self._broken(str(error)) from None
         except ChannelClosed:

@@ -8,7 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from types import TracebackType
@@ -18,6 +17,7 @@ from autograder.descriptors import readable
 from autograder.verdict import Verdict, VerdictError
 from autograder.wire import parse
 from course.errors import CourseError
+from course.runtime.starving import FairDeadline
 
 if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
     from autograder.sandbox.place import Process
@@ -128,11 +128,11 @@ class ExaminerProcess:
                 is no verdict.
         """
         assert self._process.stdout is not None
-        deadline = time.monotonic() + timeout
+        deadline = FairDeadline(timeout, self._process.pid)
         stream = self._process.stdout.fileno()
         while b"\n" not in self._buffer:
-            if stream not in self._wait(deadline - time.monotonic()):
-                if time.monotonic() < deadline:
+            if stream not in self._wait(deadline.left):
+                if deadline.left:
                     continue
                 raise ExaminerError(f"The examiner gave no verdict within {timeout:.0f} s.")
             chunk = os.read(stream, 65536)

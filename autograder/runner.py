@@ -15,18 +15,12 @@ from autograder import exams, sandbox, stuck
 from autograder.exam import unexamined
 from autograder.processes import ExaminerError, ExaminerProcess
 from autograder.sandbox import Place, RunningSubject
-from autograder.sandbox.usage import kept_waiting
 from autograder.submission import Cell, Program
 from autograder.verdict import Status, Verdict
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 
 CELL_TIMEOUT = 30.0
 """Seconds one cell of a submission may run, as in nbgrader."""
-
-LONGEST_EXTENSION = 2
-"""How many times as long a cell may take in addition, while others keep it from running."""
-
-_SHORTEST_EXTENSION = 0.1  # s
 
 START_TIMEOUT = 60.0
 """Seconds until a subject must have started: it takes half a second on a machine that is idle."""
@@ -147,7 +141,7 @@ def _follow(
         _await(channel, subject)
         channel.send({"cells": [_shown(cell) for cell in program]})
         for number, cell in enumerate(program):
-            message = _next(channel, subject, cell_timeout)
+            message = channel.receive_fairly(cell_timeout, subject.pid)
             if cell.exam:
                 examiner.request(
                     cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key
@@ -183,27 +177,6 @@ def _follow(
         _give_up(program, outcome, fate, status, reached=number)
     except ExaminerError as error:
         _give_up(program, outcome, str(error), "grader_error", reached=number)
-
-
-def _next(channel: Channel, subject: RunningSubject, seconds: float) -> dict[str, Any]:
-    """Return the subject's next message.
-
-    That other programs keep it from running is no fault of the student's, and time in which they
-    do so is given in addition, within LONGEST_EXTENSION.
-
-    Raises:
-        ChannelTimeout: nothing came in ``seconds`` of its own.
-    """
-    kept_before, extension, granted = kept_waiting(subject.pid), 0.0, seconds
-    while True:
-        try:
-            return channel.receive(granted)
-        except ChannelTimeout:
-            kept = kept_waiting(subject.pid) - kept_before
-            granted = min(kept, LONGEST_EXTENSION * seconds) - extension
-            if granted < _SHORTEST_EXTENSION:
-                raise
-            extension += granted
 
 
 def _stuck(

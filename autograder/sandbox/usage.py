@@ -56,16 +56,6 @@ def _threads(folder: Path) -> Iterator[tuple[Path, bytes]]:
                 yield thread, _stat(thread)[0]
 
 
-def kept_waiting(pid: int) -> float:
-    """Return for how many s the first thread of a process was ready and got no processor.
-
-    0 if the kernel does not tell (proc_pid_schedstat: without CONFIG_SCHED_INFO).
-    """
-    with suppress(OSError, IndexError):
-        return int(Path(f"/proc/{pid}/schedstat").read_bytes().split()[1]) / 1e9
-    return 0.0
-
-
 def descriptors(process: Process) -> int:
     """Return the number of open file descriptors."""
     with suppress(OSError):

@@ -10,7 +10,6 @@ fires then depends on nothing but the clock, whatever the machine's load.
 from __future__ import annotations
 
 import threading
-import time
 
 from rclpy.clock import ROSClock
 from rclpy.clock_type import ClockType
@@ -27,6 +26,7 @@ from course.runtime.names import node_name
 from course.runtime.probe import Probe
 from course.runtime.residents import Residents
 from course.runtime.settle import all_held, come_to_rest
+from course.runtime.starving import FairDeadline, kept_waiting
 
 _NS = 1_000_000_000
 _LONGEST_STRIDE = 1000  # steps
@@ -65,7 +65,8 @@ class SimulatedTime:
         Args:
             seconds: of simulated time.
             step: s between two times that nodes get to see, if a timer is due or anybody watches.
-            patience: s of wall time that a callback may hold up one step; None for 10.
+            patience: s of wall time that a callback may hold up one step, not counting those in
+                which other programs keep this thread from running; None for 10.
 
         Raises:
             SessionError: called from a callback, or with a step or time that is not positive.
@@ -82,11 +83,12 @@ class SimulatedTime:
         seconds, step = arguments.seconds(seconds, "seconds"), arguments.seconds(step, "step")
         if current_job() is not None:
             raise SessionError("A callback cannot move the time that it runs in.")
+        kept = kept_waiting()
         with self._moving, all_held(self._crew.all()):
             step_ns, target = round(step * _NS), self._now_ns + round(seconds * _NS)
             while self._now_ns < target:
                 moment = min(self._now_ns + self._stride(step_ns), target)
-                self._move_to(moment, _STEP_TIMEOUT if patience is None else patience)
+                self._move_to(moment, _STEP_TIMEOUT if patience is None else patience, kept)
 
     def nudge(self) -> None:
         """Tell every node that a nanosecond has passed, and wait for nothing.
@@ -130,17 +132,17 @@ class SimulatedTime:
         steps = -(-min(waits) // step_ns) if waits else _LONGEST_STRIDE
         return step_ns * min(max(1, steps), _LONGEST_STRIDE)
 
-    def _move_to(self, moment_ns: int, patience: float) -> None:
+    def _move_to(self, moment_ns: int, patience: float, kept: float) -> None:
         self._now_ns = moment_ns
-        deadline = time.monotonic() + patience
+        deadline = FairDeadline(patience, since=kept)
         executors = self._crew.all()
         while True:
             self._publish()
-            settled = come_to_rest(executors, deadline - time.monotonic())
+            settled = come_to_rest(executors, deadline.left)
             late = [node for node in self._followers() if _clock_ns(node) < moment_ns]
             if settled and not late:
                 return
-            if time.monotonic() >= deadline:
+            if not deadline.left:
                 names = ", ".join(node_name(node) for node in late) or "the session"
                 raise WaitTimeout(
                     f"{names} did not follow simulated time to {self.now:g} s: "
