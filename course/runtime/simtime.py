@@ -26,7 +26,7 @@ from course.runtime.names import node_name
 from course.runtime.probe import Probe
 from course.runtime.residents import Residents
 from course.runtime.settle import all_held, come_to_rest
-from course.runtime.starving import FairDeadline, kept_waiting
+from course.runtime.starving import FairDeadline
 
 _NS = 1_000_000_000
 _LONGEST_STRIDE = 1000  # steps
@@ -83,12 +83,11 @@ class SimulatedTime:
         seconds, step = arguments.seconds(seconds, "seconds"), arguments.seconds(step, "step")
         if current_job() is not None:
             raise SessionError("A callback cannot move the time that it runs in.")
-        kept = kept_waiting()
         with self._moving, all_held(self._crew.all()):
             step_ns, target = round(step * _NS), self._now_ns + round(seconds * _NS)
             while self._now_ns < target:
                 moment = min(self._now_ns + self._stride(step_ns), target)
-                self._move_to(moment, _STEP_TIMEOUT if patience is None else patience, kept)
+                self._move_to(moment, _STEP_TIMEOUT if patience is None else patience)
 
     def nudge(self) -> None:
         """Tell every node that a nanosecond has passed, and wait for nothing.
@@ -132,9 +131,9 @@ class SimulatedTime:
         steps = -(-min(waits) // step_ns) if waits else _LONGEST_STRIDE
         return step_ns * min(max(1, steps), _LONGEST_STRIDE)
 
-    def _move_to(self, moment_ns: int, patience: float, kept: float) -> None:
+    def _move_to(self, moment_ns: int, patience: float) -> None:
         self._now_ns = moment_ns
-        deadline = FairDeadline(patience, since=kept)
+        deadline = FairDeadline(patience)
         executors = self._crew.all()
         while True:
             self._publish()
