@@ -14,10 +14,10 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 from autograder.descriptors import readable
+from autograder.starving import FairDeadline
 from autograder.verdict import Verdict, VerdictError
 from autograder.wire import parse
 from course.errors import CourseError
-from course.runtime.starving import FairDeadline
 
 if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
     from autograder.sandbox.place import Process

@@ -12,7 +12,7 @@ import time
 from contextlib import suppress
 from typing import Any
 
-from course.runtime.starving import FairDeadline
+from autograder.starving import FairDeadline
 
 MAX_LINE = 2 * 1024 * 1024
 """Largest message in bytes: the outputs of one cell are the largest, and are cut well below it."""

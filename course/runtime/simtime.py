@@ -10,6 +10,7 @@ fires then depends on nothing but the clock, whatever the machine's load.
 from __future__ import annotations
 
 import threading
+import time
 
 from rclpy.clock import ROSClock
 from rclpy.clock_type import ClockType
@@ -26,7 +27,6 @@ from course.runtime.names import node_name
 from course.runtime.probe import Probe
 from course.runtime.residents import Residents
 from course.runtime.settle import all_held, come_to_rest
-from course.runtime.starving import FairDeadline
 
 _NS = 1_000_000_000
 _LONGEST_STRIDE = 1000  # steps
@@ -65,8 +65,7 @@ class SimulatedTime:
         Args:
             seconds: of simulated time.
             step: s between two times that nodes get to see, if a timer is due or anybody watches.
-            patience: s of wall time that a callback may hold up one step, not counting those in
-                which other programs keep this thread from running; None for 10.
+            patience: s of wall time that a callback may hold up one step; None for 10.
 
         Raises:
             SessionError: called from a callback, or with a step or time that is not positive.
@@ -133,15 +132,15 @@ class SimulatedTime:
 
     def _move_to(self, moment_ns: int, patience: float) -> None:
         self._now_ns = moment_ns
-        deadline = FairDeadline(patience)
+        deadline = time.monotonic() + patience
         executors = self._crew.all()
         while True:
             self._publish()
-            settled = come_to_rest(executors, deadline.left)
+            settled = come_to_rest(executors, deadline - time.monotonic())
             late = [node for node in self._followers() if _clock_ns(node) < moment_ns]
             if settled and not late:
                 return
-            if not deadline.left:
+            if time.monotonic() >= deadline:
                 names = ", ".join(node_name(node) for node in late) or "the session"
                 raise WaitTimeout(
                     f"{names} did not follow simulated time to {self.now:g} s: "

@@ -1,0 +1,22 @@
+"""A deadline counts the time that a process had, not the time that others took from it."""
+
+from __future__ import annotations
+
+import os
+
+from autograder.corpus.trials import busy_loops
+from autograder.starving import FairDeadline, kept_waiting
+
+
+def test_a_deadline_is_put_off_while_others_keep_the_process_from_running_not_for_ever() -> None:
+    with busy_loops(4 * (os.cpu_count() or 1)):
+        before, deadline = kept_waiting(os.getpid()), FairDeadline(1.0, os.getpid())
+        while kept_waiting(os.getpid()) - before < 1.2:
+            pass
+        assert deadline.left > 0
+        while deadline.left:  # it is put off by no more than two seconds
+            pass
+
+
+def test_a_process_that_is_not_there_was_never_kept_waiting() -> None:
+    assert kept_waiting(0) == 0.0
