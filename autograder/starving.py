@@ -12,7 +12,6 @@ from contextlib import suppress
 from pathlib import Path
 
 _LONGEST = 2  # times its length by which a deadline can be put off
-_SHORTEST = 0.1  # s by which it is worth it
 
 
 def kept_waiting(pid: int) -> float:
@@ -30,19 +29,13 @@ class FairDeadline:
 
     def __init__(self, timeout: float, pid: int) -> None:
         """Set it `timeout` s from now, of the process's own; it is three times as far at most."""
-        self._pid = pid
-        self._end = time.monotonic() + timeout
-        self._before = kept_waiting(pid)
-        self._most = _LONGEST * timeout
-        self._added = 0.0
+        self._pid, self._timeout = pid, timeout
+        self._begun, self._kept = time.monotonic(), kept_waiting(pid)
 
     @property
     def left(self) -> float:
         """Seconds left, not below 0."""
-        if (left := self._end - time.monotonic()) <= 0:
-            more = min(kept_waiting(self._pid) - self._before, self._most) - self._added
-            if more >= _SHORTEST:
-                self._added += more
-                self._end += more
-                left = self._end - time.monotonic()
+        left = self._timeout - (time.monotonic() - self._begun)
+        if left <= 0:
+            left += min(kept_waiting(self._pid) - self._kept, _LONGEST * self._timeout)
         return max(0.0, left)

@@ -107,10 +107,14 @@ _LOOP = "import os, sys\nwhile os.getppid() == int(sys.argv[1]): pass"
 
 
 @contextmanager
-def busy_loops(number: int) -> Iterator[None]:
-    """Keep ``number`` processes computing for as long as the block lasts, or this process lives."""
+def busy_loops(number: int, *, apart: bool = False) -> Iterator[None]:
+    """Keep ``number`` processes computing for as long as the block lasts, or this process lives.
+
+    ``apart``: each in a session of its own, so that each takes as much of a processor as a whole
+    sandbox gets. Linux may share processors out among sessions first (sched(7): autogroups).
+    """
     command = [sys.executable, "-c", _LOOP, str(os.getpid())]
-    loops = [subprocess.Popen(command) for _ in range(number)]
+    loops = [subprocess.Popen(command, start_new_session=apart) for _ in range(number)]
     try:
         yield
     finally:
