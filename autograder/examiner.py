@@ -21,7 +21,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, TextIO
 
-from autograder import exams
+from autograder import exams, stuck
 from autograder.bench import MAX_REPLY, Bench, Subject
 from autograder.verdict import CheckResult, Verdict
 from autograder.wire import Channel
@@ -98,6 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # end up among them.
     verdicts = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    stuck.tell_when_asked(sys.stderr.fileno())
     subject = Subject(Channel(socket.socket(fileno=options.control), MAX_REPLY))
     with Session(domain_id=options.domain) as session:
         session.explains = False  # it asks whether something comes, and says itself what it means

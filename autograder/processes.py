@@ -8,11 +8,13 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from autograder import stuck
 from autograder.descriptors import readable
 from autograder.starving import FairDeadline
 from autograder.verdict import Verdict, VerdictError
@@ -134,7 +136,9 @@ class ExaminerProcess:
             if stream not in self._wait(deadline.left):
                 if deadline.left:
                     continue
-                raise ExaminerError(f"The examiner gave no verdict within {timeout:.0f} s.")
+                raise ExaminerError(
+                    f"The examiner gave no verdict within {timeout:.0f} s{self._place()}."
+                )
             chunk = os.read(stream, 65536)
             if not chunk or len(self._buffer) > MAX_ANSWER:
                 raise ExaminerError(f"The examiner ended without a verdict: {self._last_words()}")
@@ -161,6 +165,18 @@ class ExaminerProcess:
             self._mute = not said
             self._said = (self._said + said)[-LAST_WORDS:]
         return ready
+
+    def _place(self) -> str:
+        """Return where it is stuck, for whoever looks for the mistake; empty if it does not say."""
+        self._said = b""
+        with suppress(ProcessLookupError, PermissionError):
+            os.kill(self._process.pid, stuck.ASK)
+        end = time.monotonic() + stuck.PATIENCE
+        frames: list[stuck.Frame] = []
+        while not frames and not self._mute and (left := end - time.monotonic()) > 0:
+            self._wait(left)
+            frames = stuck.of_first_thread(self._said.decode(errors="replace"), stuck.EXAMINER)
+        return f" ({stuck.told(frames)})" if frames else ""
 
     def _last_words(self) -> str:
         self._kill()

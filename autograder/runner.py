@@ -196,10 +196,9 @@ def _stuck(
         ), "not_checked"
     # No cell of the student's: what it waits for is the end of the last examination.
     if frames and not theirs:
-        inner = " < ".join(f"{Path(f.file).name}:{f.line} {f.function}" for f in frames[:6])
         return (
             f"The nodes were still being taken down {seconds:.0f} s after an examination, and it "
-            f"was not in the student's code ({inner})."
+            f"was not in the student's code ({stuck.told(frames)})."
         ), "grader_error"
     return (
         f"Your nodes were still being taken down {seconds:.0f} s after an examination{where}, so "

@@ -1,4 +1,4 @@
-"""In which line a program is stuck that does not answer any more: a subject tells it on a signal.
+"""In which line a process is stuck that does not answer any more: it tells so on a signal.
 
 What a subject says is written where a stranger's code runs. So it is no evidence: it only helps
 whoever looks for the mistake.
@@ -13,11 +13,13 @@ import signal
 from contextlib import suppress
 from itertools import takewhile
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from autograder.raised import is_students
-from autograder.submission import Program
 from autograder.wire import Channel
+
+if TYPE_CHECKING:  # a student's kernel has no use for nbgrader's notebooks
+    from autograder.submission import Program
 
 ASK = signal.SIGUSR1
 PATIENCE, SILENCE = 3.0, 0.5
@@ -25,7 +27,8 @@ PATIENCE, SILENCE = 3.0, 0.5
 
 _FRAME = re.compile(r'  File "([^"\n]{1,500})", line (\d{1,9}) in (.{1,100})')
 _CELL = re.compile(r"<ipython-input-(\d{1,9})-")
-_OURS = ("autograder/subject.py", "run")  # what a subject's first thread runs
+SUBJECT, EXAMINER = ("autograder/subject.py", "run"), ("autograder/examiner.py", "main")
+"""The file and the function that the first thread of a process runs."""
 
 
 class Frame(NamedTuple):
@@ -54,15 +57,27 @@ def ask(pid: int, channel: Channel) -> list[Frame]:
     with suppress(ProcessLookupError, PermissionError):
         os.kill(pid, ASK)
     said = channel.leftovers(PATIENCE, SILENCE).decode(errors="replace")
-    return _of_first_thread("".join(c if c.isprintable() or c == "\n" else "?" for c in said))
+    dump = "".join(c if c.isprintable() or c == "\n" else "?" for c in said)
+    return of_first_thread(dump, SUBJECT)
 
 
-def _of_first_thread(dump: str) -> list[Frame]:
+def of_first_thread(dump: str, runs: tuple[str, str]) -> list[Frame]:
+    """Return where a process's first thread is, the innermost frame first; empty if it is not said.
+
+    Args:
+        dump: what the process wrote.
+        runs: what its first thread runs.
+    """
     for thread in re.split(r"^(?:Current thread|Thread) 0x.*$", dump, flags=re.MULTILINE):
         frames = [Frame(file, int(line), name) for file, line, name in _FRAME.findall(thread)]
-        if any(f.file.endswith(_OURS[0]) and f.function == _OURS[1] for f in frames):
+        if any(f.file.endswith(runs[0]) and f.function == runs[1] for f in frames):
             return frames
     return []
+
+
+def told(frames: list[Frame]) -> str:
+    """Return the innermost of some frames in a line, for whoever looks for our own mistake."""
+    return " < ".join(f"{Path(f.file).name}:{f.line} {f.function}" for f in frames[:6])
 
 
 def students(frames: list[Frame]) -> Frame | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -13,11 +14,13 @@ import pytest
 
 from autograder import jobs, runner
 from autograder.corpus.trials import busy_loops
-from autograder.processes import ExaminerProcess
+from autograder.processes import ExaminerError, ExaminerProcess
 from autograder.runner import Outcome
 from autograder.sandbox import BoxError
 from autograder.store import OutcomeStore
 from autograder.submission import Cell, Program
+from autograder.wire import Channel
+from course.domains import lease_domain
 from tests.machine import needs_sandbox
 
 pytestmark = needs_sandbox
@@ -72,6 +75,7 @@ def test_a_cell_that_never_ends_is_ended() -> None:
 def test_time_in_which_others_keep_a_cell_from_running_is_not_its_own() -> None:
     source = """
 import os
+import re
 from autograder.starving import kept_waiting
 begun = kept_waiting(os.getpid())
 while kept_waiting(os.getpid()) < begun + 2.5:
@@ -291,6 +295,7 @@ def test_exit_in_a_cell_does_not_end_the_notebook() -> None:
 
 def test_no_session_of_a_student_leases_the_domain_of_the_exam() -> None:
     every = """
+from autograder.wire import Channel
 from course.domains import lease_domain
 from course.errors import DomainError
 leases = []
@@ -331,6 +336,21 @@ def test_an_examiner_is_ended_even_before_it_leads_its_processes() -> None:
     ):
         raise BoxError("out of processes")
     assert started[0].returncode is not None
+
+
+def test_an_examiner_without_a_verdict_says_where_it_is_stuck() -> None:
+    ours, theirs = socket.socketpair()
+    lease = lease_domain()
+    try:
+        with ours, ExaminerProcess(theirs, lease.domain_id) as examiner:
+            examiner.request("qos", "visible", pid=os.getpid())
+            Channel(ours).receive(60.0)  # and is not answered
+            with pytest.raises(ExaminerError) as raised:
+                examiner.verdict(timeout=0.1)
+    finally:
+        lease.release()
+    place = r"\(wire\.py:\d+ _fill < wire\.py:\d+ receive < .*\)"
+    assert re.fullmatch(rf"The examiner gave no verdict within 0 s {place}\.", str(raised.value))
 
 
 def test_an_examiner_that_cannot_be_started_leaves_no_socket_open(
