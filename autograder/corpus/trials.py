@@ -107,14 +107,14 @@ _LOOP = "import os, sys\nwhile os.getppid() == int(sys.argv[1]): pass"
 
 
 @contextmanager
-def busy_loops(number: int, *, apart: bool = False) -> Iterator[None]:
+def busy_loops(number: int) -> Iterator[None]:
     """Keep ``number`` processes computing for as long as the block lasts, or this process lives.
 
-    ``apart``: each in a session of its own, so that each takes as much of a processor as a whole
-    sandbox gets. Linux may share processors out among sessions first (sched(7): autogroups).
+    Each is in a session of its own, as if it were started in a terminal of its own: Linux may share
+    processors out among sessions first (sched(7): autogroups), and each sandbox has sessions, too.
     """
     command = [sys.executable, "-c", _LOOP, str(os.getpid())]
-    loops = [subprocess.Popen(command, start_new_session=apart) for _ in range(number)]
+    loops = [subprocess.Popen(command, start_new_session=True) for _ in range(number)]
     try:
         yield
     finally:

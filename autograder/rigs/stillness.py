@@ -3,6 +3,9 @@
 "It did not publish" must not rest on a short wait. When every thread of both processes sleeps, and
 none has run between two looks, then every message that was sent has been dealt with: what has not
 happened now does not happen until something new comes in, or time moves on.
+
+A thread that computes for ever must not cost the patience for it again and again, or an exam would
+not end in its time. Once it has shown what it is, the others' rest is what counts.
 """
 
 from __future__ import annotations
@@ -18,6 +21,12 @@ RESTLESS = 0.25
 """Seconds of activity after which a subject counts as one that is never still: a thread polls."""
 HANGS = 5.0
 """Seconds of wall time after which it is not waited for in any case."""
+ENDLESS = 3.0
+"""Seconds of computing by which a thread keeps a row of rests from being reached, until it is known
+to compute for ever. A callback that takes as long has failed the exam by then."""
+QUIET = 0.02
+"""Seconds for which all others must have slept beside such a thread: one that waits for the
+interpreter's lock, which it holds, also sleeps, but wakes up to ask for it every 5 ms."""
 _NAP = 0.0005  # s between two looks
 _CLIP = 0.005  # s that one look may count for
 
@@ -41,33 +50,47 @@ class Stillness:
         self._nap = threading.Event()  # never set
         self._open: dict[Task, _Status] = {}
         self._suspect: Task | None = None  # who was awake last, and so may well be again
+        self._restless: dict[Task, float] = {}  # s of computing in the last rests, none reached
+        self._endless: set[Task] = set()  # who has done so for ENDLESS s
 
     def reached(self, restless: float = RESTLESS, timeout: float = HANGS) -> bool:
         """Return once both processes are at rest, or prove to be restless; say which it was.
 
         Restless is who has computed, or slept and woken again, for ``restless`` s. A thread that
         is kept from running by other processes does neither: it is waited for, but not longer
-        than ``timeout`` s.
+        than ``timeout`` s. One that has computed through one rest after another, for ENDLESS s in
+        all, does not count until it is found asleep.
         """
         deadline = time.monotonic() + timeout
-        spent, worked = 0.0, dict[Task, float]()
+        unrest = _Unrest()
+        asleep = {task: self._runs(task) for task in self._endless}
         before, looked = self._look(), time.monotonic()
+        since = looked  # when a thread was last seen to have run
         while True:
             now, moment = self._look(), time.monotonic()
-            if now.awake is None:
-                if now == before:
-                    return True
-                spent += min(moment - looked, _CLIP)
-            elif (total := _worked(now.awake)) is None:
-                worked.pop(now.awake, None)
-            else:
-                spent += max(0.0, total - worked.get(now.awake, total))
-                worked[now.awake] = total
-            if spent >= restless or moment >= deadline:
+            if now.awake is not None or now != before:
+                since = moment
+                unrest.add(now.awake, moment - looked)
+            elif not self._endless or moment - since >= QUIET:
+                self._recall(asleep)
+                return True
+            if unrest.spent >= restless or moment >= deadline:
+                self._blame(unrest.worked, restless / 2)
                 return False
-            if now.awake is not None:
+            if now.awake is not None or self._endless:
                 self._nap.wait(_NAP)
             before, looked = now, moment
+
+    def _blame(self, worked: Mapping[Task, float], most: float) -> None:
+        """Note who has computed for the larger part of a rest that was not reached."""
+        row = {t: s + self._restless.get(t, 0.0) for t, s in worked.items() if s >= most}
+        self._endless |= {task for task, seconds in row.items() if seconds >= ENDLESS}
+        self._restless, self._suspect = row, None
+
+    def _recall(self, asleep: Mapping[Task, str | None]) -> None:
+        """Begin a new row of rests; let those count again that slept through this one."""
+        self._restless = {}
+        self._endless -= {t for t, runs in asleep.items() if runs and runs == self._runs(t)}
 
     def _look(self) -> Look:
         if self._suspect in self._open and self._runs(self._suspect) is None:
@@ -77,8 +100,9 @@ class Stillness:
         tasks = [task for pid in self._pids for task in _tasks(pid) if task != mine]
         for ended in self._open.keys() - tasks:
             del self._open[ended]
+        self._endless.intersection_update(tasks)
         found: dict[Task, str] = {}
-        for task in tasks:
+        for task in set(tasks) - self._endless:
             runs = self._runs(task)
             if runs is None:
                 self._suspect = task
@@ -95,6 +119,27 @@ class Stillness:
         except OSError:  # it has just ended; another may get its number
             self._open.pop(task, None)
             return None
+
+
+class _Unrest:
+    """What keeps one rest from being reached, in s: ``spent`` in all, ``worked`` by each thread."""
+
+    def __init__(self) -> None:
+        self.spent = 0.0
+        self.worked: dict[Task, float] = {}
+        self._totals: dict[Task, float] = {}
+
+    def add(self, awake: Task | None, elapsed: float) -> None:
+        """Count what a thread has computed, or ``elapsed`` s if all slept, but one had run."""
+        if awake is None:
+            self.spent += min(elapsed, _CLIP)
+        elif (total := _worked(awake)) is None:
+            self._totals.pop(awake, None)
+        else:
+            more = max(0.0, total - self._totals.get(awake, total))
+            self._totals[awake] = total
+            self.worked[awake] = self.worked.get(awake, 0.0) + more
+            self.spent += more
 
 
 class _Status:

@@ -81,7 +81,7 @@ begun = kept_waiting(os.getpid())
 while kept_waiting(os.getpid()) < begun + 2.5:
     pass
 """
-    with busy_loops(4 * (os.cpu_count() or 1), apart=True):
+    with busy_loops(4 * (os.cpu_count() or 1)):
         outcome = runner.run((Cell(source), Cell("print('came')")), cell_timeout=2)
     assert outcome.outputs[0] == []
     assert text_of(outcome.outputs[1]) == "came\n"

@@ -8,9 +8,30 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from autograder.rigs.stillness import Stillness
+from autograder.descriptors import readable
+from autograder.rigs.stillness import ENDLESS, RESTLESS, Stillness
 
 BUSY = "import sys; print(flush=True)\nwhile True: pass"
+# Two threads: one computes from the first line of input on to the second, the other answers "?".
+BESIDE = """
+import sys, threading
+computes = threading.Event()
+def compute():
+    while True:
+        computes.wait()
+def answer():
+    for line in sys.stdin:
+        if line == "?\\n":
+            sum(range(10**6))
+            print("!", flush=True)
+        elif computes.is_set():
+            computes.clear()
+        else:
+            computes.set()
+threading.Thread(target=compute, daemon=True).start()
+print(flush=True)
+answer()
+"""
 ASLEEP = "import sys; print(flush=True); sys.stdin.read()"
 
 
@@ -62,3 +83,45 @@ def test_a_process_that_has_ended_leaves_the_examiners_own() -> None:
     with process(ASLEEP) as other:
         pass
     assert Stillness(other.pid).reached(timeout=30.0)
+
+
+def tell(other: subprocess.Popen[bytes], line: str) -> None:
+    assert other.stdin is not None
+    other.stdin.write(f"{line}\n".encode())
+    other.stdin.flush()
+
+
+def rests_not_reached(still: Stillness) -> int:
+    return next(n for n in range(100) if still.reached(timeout=30.0))
+
+
+def test_a_thread_that_computes_for_ever_costs_the_patience_but_once() -> None:
+    with process(BUSY) as other:
+        still = Stillness(other.pid)
+        assert 0 < rests_not_reached(still) <= ENDLESS / RESTLESS + 1
+        assert rests_not_reached(still) == 0
+
+
+def test_beside_a_thread_that_computes_for_ever_others_are_waited_for() -> None:
+    with process(BESIDE) as other:
+        assert other.stdout is not None
+        tell(other, "compute")
+        still = Stillness(other.pid)
+        rests_not_reached(still)
+        for _ in range(10):
+            tell(other, "?")
+            assert still.reached(timeout=30.0)
+            assert readable([other.stdout], 0.0)
+            assert other.stdout.readline() == b"!\n"
+
+
+def test_a_thread_that_has_fallen_asleep_counts_again() -> None:
+    with process(BESIDE) as other:
+        tell(other, "compute")
+        still = Stillness(other.pid)
+        assert rests_not_reached(still) > 0
+        tell(other, "sleep")
+        assert rests_not_reached(still) == 0
+        assert still.reached(timeout=30.0)
+        tell(other, "compute")
+        assert rests_not_reached(still) > 0
