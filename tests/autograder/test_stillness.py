@@ -22,7 +22,7 @@ def compute():
 def answer():
     for line in sys.stdin:
         if line == "?\\n":
-            sum(range(10**6))
+            sum(range(10**5))
             print("!", flush=True)
         elif computes.is_set():
             computes.clear()
