@@ -89,14 +89,18 @@ class SimulatedTime:
                 self._move_to(moment, _STEP_TIMEOUT if patience is None else patience)
 
     def nudge(self) -> None:
-        """Tell every node that a nanosecond has passed, and wait for nothing.
+        """Tell every node that a nanosecond has passed, wake the executors, and wait for nothing.
 
-        This gives their executors something to do and hardly a timer a reason to fire. In contrast
-        to `advance`, no callback runs in the calling thread, where one might never return.
+        This gives them something to do and hardly a timer a reason to fire: a callback that awaits
+        what has come by now goes on. In contrast to `advance`, no callback runs in the calling
+        thread, where one might never return.
         """
         with self._moving:
             self._now_ns += 1
             self._publish()
+        # Nobody hears the time while a callback awaits something in the node's own group.
+        for executor in self._crew.all():
+            executor.wake()
 
     def welcome(self, node: Node) -> None:
         """Let a node that has just been made start from the present time.

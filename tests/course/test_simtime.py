@@ -11,7 +11,7 @@ from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from rclpy.task import Future
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import String
+from std_msgs.msg import Empty, String
 
 import course
 from course.errors import SessionError, WaitTimeout
@@ -243,6 +243,25 @@ def test_a_nudge_is_heard_and_waits_for_no_callback(lab):
         assert poll(lambda: lab.sim.nudge() or begun.is_set(), 5.0, Pulse())
     finally:
         go_on.set()
+
+
+def test_a_nudge_resumes_a_callback_that_awaits_in_the_group_of_the_clock(lab):
+    node = lab.run(Node, "awaits")
+    awaited, done = Future(), threading.Event()
+    begun = threading.Event()
+
+    async def work(_):
+        begun.set()
+        await awaited
+        done.set()
+
+    node.create_subscription(Empty, "work", work, 10)
+    publisher = node.create_publisher(Empty, "work", 10)
+    assert poll(lambda: publisher.get_subscription_count(), 30.0, Pulse())
+    publisher.publish(Empty())
+    assert begun.wait(30.0)
+    awaited.set_result(None)  # from another thread, and in an executor that knows nothing of it
+    assert poll(lambda: lab.sim.nudge() or done.is_set(), 30.0, Pulse())
 
 
 def test_patience_bounds_what_a_callback_may_hold_up():
