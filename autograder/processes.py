@@ -8,7 +8,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from types import TracebackType
@@ -20,6 +19,7 @@ from autograder.starving import FairDeadline
 from autograder.verdict import Verdict, VerdictError
 from autograder.wire import parse
 from course.errors import CourseError
+from course.runtime.waiting import Deadline
 
 if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
     from autograder.sandbox.place import Process
@@ -171,10 +171,12 @@ class ExaminerProcess:
         self._said = b""
         with suppress(ProcessLookupError, PermissionError):
             os.kill(self._process.pid, stuck.ASK)
-        end = time.monotonic() + stuck.PATIENCE
+        assert self._process.stdout is not None
+        deadline = Deadline(stuck.PATIENCE)
         frames: list[stuck.Frame] = []
-        while not frames and not self._mute and (left := end - time.monotonic()) > 0:
-            self._wait(left)
+        while not frames and not self._mute and deadline.left:
+            if self._process.stdout.fileno() in self._wait(deadline.left):
+                break  # it is not stuck any more, or has ended: it says no more
             frames = stuck.of_first_thread(self._said.decode(errors="replace"), stuck.EXAMINER)
         return f" ({stuck.told(frames)})" if frames else ""
 

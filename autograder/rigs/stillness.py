@@ -97,12 +97,12 @@ class Stillness:
             return Look({}, self._suspect)
         self._suspect = None
         mine = os.getpid(), threading.get_native_id()
-        tasks = [task for pid in self._pids for task in _tasks(pid) if task != mine]
+        tasks = {task for pid in self._pids for task in _tasks(pid)} - {mine}
         for ended in self._open.keys() - tasks:
             del self._open[ended]
-        self._endless.intersection_update(tasks)
+        self._endless &= tasks
         found: dict[Task, str] = {}
-        for task in set(tasks) - self._endless:
+        for task in tasks - self._endless:
             runs = self._runs(task)
             if runs is None:
                 self._suspect = task

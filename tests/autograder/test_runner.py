@@ -75,7 +75,6 @@ def test_a_cell_that_never_ends_is_ended() -> None:
 def test_time_in_which_others_keep_a_cell_from_running_is_not_its_own() -> None:
     source = """
 import os
-import re
 from autograder.starving import kept_waiting
 begun = kept_waiting(os.getpid())
 while kept_waiting(os.getpid()) < begun + 2.5:
@@ -295,7 +294,6 @@ def test_exit_in_a_cell_does_not_end_the_notebook() -> None:
 
 def test_no_session_of_a_student_leases_the_domain_of_the_exam() -> None:
     every = """
-from autograder.wire import Channel
 from course.domains import lease_domain
 from course.errors import DomainError
 leases = []

@@ -24,14 +24,16 @@ class Silent(Node):
     def __init__(self):
         super().__init__("silent")
 
+def own(executor):
+    executor.add_node(node)
+    executor.spin()
+
 # Whoever started the tests in the background of a shell has had it ignored.
 signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 signal.signal(signal.SIGINT, signal.default_int_handler)
 node = course.run(Silent)
-# An executor is made before: rclpy's own prints a traceback when its making is interrupted.
+# They are made before: rclpy prints a traceback when the making of an executor is interrupted.
 single, multi = SingleThreadedExecutor(), MultiThreadedExecutor(2)
-single.add_node(Node("with_one_thread"))
-multi.add_node(Node("with_two_threads"))
 stranger = Node("stranger")
 rclpy.spin_once(stranger, timeout_sec=0)  # the global executor is there from now on
 try:
@@ -47,8 +49,8 @@ WAYS = [
     "rclpy.spin_once(node)",
     "rclpy.spin_until_future_complete(node, Future())",
     "rclpy.spin(stranger)",
-    "single.spin()",
-    "multi.spin()",
+    "own(single)",
+    "own(multi)",
     "rclpy.spin(node, executor=node.executor)",
     "node.executor.spin_until_future_complete(Future())",
     "node.executor.spin()",
