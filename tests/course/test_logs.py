@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
+from types import ModuleType
 
 import pytest
 import rclpy.logging
@@ -128,6 +130,33 @@ def test_the_warning_about_an_incompatible_qos_is_there(any_session):
     any_session.until(
         lambda: any("incompatible QoS" in m for m in any_session.logs("display").messages)
     )
+
+
+class Counted(ModuleType):
+    """A module that counts how often somebody looks for the file that it comes from."""
+
+    @property
+    def __file__(self):
+        self.searches = getattr(self, "searches", 0) + 1
+        return "/nowhere/counted.py"
+
+
+def test_who_logs_from_a_cell_is_searched_for_once(any_session, monkeypatch):
+    node = any_session.run(Node, "talker")
+    counted = Counted("counted")
+    monkeypatch.setitem(sys.modules, "counted", counted)
+    file, cell = "<a cell of this test>", {"__name__": "__main__"}
+    monkeypatch.delitem(inspect.modulesbyfile, file, raising=False)
+    code = "def say(logger):\n    logger.debug('a reading')\n    logger.info('another')\n"
+    exec(compile(code, file, "exec"), cell)
+    cell["say"](node.get_logger())
+    assert counted.searches > 0
+    counted.searches = 0
+    cell["say"](node.get_logger())
+    assert counted.searches == 0
+    assert any_session.logs(node, level="DEBUG").messages == ["a reading", "another"] * 2
+    # And what `inspect` says of the cell is what it said before.
+    assert inspect.getmodule(cell["say"].__code__, file) is None
 
 
 def test_a_table_in_a_notebook_is_escaped():
