@@ -137,6 +137,12 @@ class Case:
             )
             if names
         ]
+        if abilities().loss:
+            differences += [
+                f"{name} was not examined: {check.actual!r}"
+                for name, check in sorted(checks.items())
+                if check.status == "not_examined"
+            ]
         if spoilt:
             reasons = {checks[name].actual for name in spoilt}
             differences.append(f"grader error in {', '.join(sorted(spoilt))}: {min(reasons)!r}")

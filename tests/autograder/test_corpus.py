@@ -16,6 +16,7 @@ from autograder.cells import without_markers
 from autograder.corpus import Case, CorpusError, Trial, tables, trials
 from autograder.corpus.trials import Notebooks
 from autograder.sandbox import abilities
+from autograder.sandbox.probe import Abilities
 
 from .conftest import SUBMISSIONS
 
@@ -120,6 +121,20 @@ def test_what_the_grader_failed_at_is_reported_with_the_reason() -> None:
     difference = case.verdict_of(outcome)
     assert "grader error in " in difference
     assert "the examiner was ended" in difference
+
+
+def test_what_could_not_be_examined_is_reported_with_the_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    case = CASES["qos"][0]
+    program = submission.program(case.submission(*notebooks("qos")))
+    outcome = runner.refuse(program, "this machine was too busy", "not_examined")
+    told = "imu_burst was not examined: 'this machine was too busy'"
+    monkeypatch.setattr("autograder.corpus.case.abilities", lambda: Abilities(loss=True))
+    assert told in case.verdict_of(outcome)
+    # Without a sandbox the loss of packets is never examined, and that is no difference.
+    monkeypatch.setattr("autograder.corpus.case.abilities", lambda: Abilities())
+    assert told not in case.verdict_of(outcome)
 
 
 def test_feedback_that_shows_the_insides_of_the_grader_is_reported() -> None:
