@@ -7,15 +7,15 @@ publication and of handing on, are the student's own: how fast the examiner hear
 part.
 
 A busy machine brings fewer readings than the sensor has, and a consumer that is too slow for the
-sensor then seems to keep up. So a fresh reading counts while they come at their rate; or else the
-consumer has to have shown that it can be quicker than the sensor.
+sensor then seems to keep up. So a fresh reading counts if they had come at their rate until then;
+or else the consumer has to have shown that it can be quicker than the sensor.
 """
 
 from __future__ import annotations
 
 import time
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from autograder.rigs.readings import SENSORS, STOP, Sensor
@@ -28,10 +28,12 @@ LASTING = 0.5  # s for which it has to stay beyond
 STEADY, MANY = 3.0, 8  # s, and readings, that have to be beyond the bound itself, all of them
 QUIET = 2.0  # s without a reading after which there is nothing more to see
 RATED, ENOUGH = 1.0, 0.9  # s before, and the share of what is to come in then, for that to count
+EVENLY = 0.8  # the share in either half of it: a slow consumer may be given all at the last moment
 PATIENCE = 8.0  # s for those that are neither fresh nor far behind
 STAMINA = 30.0  # s until a machine on which readings never came at their rate has proved too busy
 SPURT = 5  # readings that were handed on twice as fast as they come: their consumer can catch up
 LOOKS = 0.05  # s between two looks at all that was published and handed on
+SELDOM = 10  # times what the last look took: the more there is to see, and the busier the machine
 
 
 @dataclass(frozen=True)
@@ -96,22 +98,27 @@ class Pursuit:
         self._rig, self._phase, self._resumed = rig, phase, resumed
         self.able = False
         self._settled = False
-        self._look_at = resumed + WATCHED * 1e9
+        self._look_at = time.monotonic() + WATCHED - (time.time_ns() - resumed) / 1e9
+        self._heard, self._heard_at = 0, time.monotonic()
 
     def settled(self) -> bool:
         """Whether it has been seen that the consumer keeps up, or that it does not."""
-        if not self._settled and time.time_ns() > self._look_at:
+        if not self._settled and (began := time.monotonic()) > self._look_at:
             self._settled = self._look()
-            self._look_at = time.time_ns() + LOOKS * 1e9
+            took = time.monotonic() - began
+            self._look_at = began + took + max(LOOKS, SELDOM * took)
         return self._settled
 
     def _look(self) -> bool:
-        handings = self._handings()
-        if not handings or time.time_ns() > handings[-1].when + QUIET * 1e9:
+        published = self._rig.publications(self.sensor, self._phase)
+        moments = sorted(published.values())
+        handings = self._handings(published, moments)
+        if self._is_quiet(moments, handings):
             return True
-        rated = self._at_rate()
-        self.able = self.able or rated or self._spurts(handings)
-        if rated and self._fresh(handings[-1]):
+        if not handings:
+            return False
+        self.able = self.able or self._at_rate(moments, moments[-1]) or self._spurts(handings)
+        if self._fresh(handings[-1]) and self._at_rate(moments, handings[-1].when):
             return True
         late = list(self._late_at_last(handings, GENEROUS))
         if late and late[0].when - late[-1].when > LASTING * 1e9:
@@ -126,12 +133,28 @@ class Pursuit:
     def _fresh(self, handing: Handing) -> bool:
         return handing.when > self._resumed + WATCHED * 1e9 and handing.age <= FRESH
 
-    def _at_rate(self) -> bool:
-        """Whether readings came in at the sensor's rate: a slow consumer keeps up with fewer."""
-        now = time.time_ns()
-        moments = self._rig.publications(self.sensor, self._phase).values()
-        came = sum(now - RATED * 1e9 < moment <= now for moment in moments)
-        return came >= ENOUGH * RATED * self.sensor.rate
+    def _is_quiet(self, moments: list[int], handings: list[Handing]) -> bool:
+        """Whether nothing is handed on though readings are published, or nothing heard at all.
+
+        An examiner that is late itself hears of both late, and goes on hearing.
+        """
+        heard = len(moments) + len(handings)
+        if heard != self._heard:
+            self._heard, self._heard_at = heard, time.monotonic()
+        last = handings[-1].when if handings else self._resumed
+        goes_on = bool(moments) and moments[-1] > last + QUIET * 1e9
+        return goes_on or time.monotonic() > self._heard_at + QUIET
+
+    def _at_rate(self, moments: list[int], end: int) -> bool:
+        """Whether readings came at the sensor's rate until ``end`` (ns since 1970).
+
+        A slow consumer keeps up with fewer.
+        """
+        half = int(RATED / 2 * 1e9)
+        at = [bisect_right(moments, end - ago) for ago in (2 * half, half, 0)]
+        expected = RATED * self.sensor.rate
+        evenly = min(at[1] - at[0], at[2] - at[1]) >= EVENLY * expected / 2
+        return evenly and at[2] - at[0] >= ENOUGH * expected
 
     def _spurts(self, handings: list[Handing]) -> bool:
         when = [handing.when for handing in handings]
@@ -146,9 +169,7 @@ class Pursuit:
                 return
             yield handing
 
-    def _handings(self) -> list[Handing]:
-        published = self._rig.publications(self.sensor, self._phase)
-        moments = sorted(published.values())
+    def _handings(self, published: Mapping[int, int], moments: list[int]) -> list[Handing]:
         return [
             Handing(
                 when,

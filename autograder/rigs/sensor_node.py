@@ -58,10 +58,11 @@ class ExaminerNode(QuietNode):
         self.altered: set[str] = set()  # topics with readings that the hardware did not deliver so
         self.foreign: set[str] = set()  # topics with messages that cannot be told to be readings
         self.blank: set[str] = set()  # topics with readings of which only the header is left
-        self.sent: dict[tuple[str, Tag], int] = {}  # when the hardware delivered it, ns since 1970
-        # When the driver published a reading, and when the consumer handed readings on, in order.
-        self.published: dict[tuple[str, Tag], int] = {}  # ns since 1970
-        self.handed: dict[str, list[tuple[Tag, int]]] = defaultdict(list)
+        # When the hardware delivered a sensor's readings of a phase, when the driver published
+        # them, and when the consumer handed them on, in order: by number, in ns since 1970.
+        self.sent: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)
+        self.published: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)
+        self.handed: dict[tuple[str, int], list[tuple[int, int]]] = defaultdict(list)
         self._stamps: dict[tuple[str, int], Tag] = {}  # ns since 1970
         for sensor in SENSORS:
             self.listen(sensor, sensor.topic, undemanding(), self.witnessed)
@@ -86,14 +87,15 @@ class ExaminerNode(QuietNode):
                 self.foreign.add(topic)
             elif tag.nonce == self.nonce:
                 heard[sensor.name].append(tag)
+                when, kind = info["source_timestamp"], (sensor.name, tag.phase)
                 if not sensor.unchanged(message, tag):
                     self.altered.add(topic)
                     if sensor.blank(message):
                         self.blank.add(topic)
                 if heard is self.witnessed:
-                    self.published.setdefault((sensor.name, tag), info["source_timestamp"])
+                    self.published[kind].setdefault(tag.number, when)
                 elif heard is self.consumed:
-                    self.handed[sensor.name].append((tag, info["source_timestamp"]))
+                    self.handed[kind].append((tag.number, when))
 
         note: Callable[..., None] = keep  # rclpy's stubs know nothing of the second argument
         events = SubscriptionEventCallbacks(
@@ -121,7 +123,7 @@ class ExaminerNode(QuietNode):
         tag = Tag(self.nonce, self.phase(phase), index)
         now = self.get_clock().now()
         self._stamps[sensor.name, now.nanoseconds] = tag
-        self.sent[sensor.name, tag] = now.nanoseconds
+        self.sent[sensor.name, tag.phase][index] = now.nanoseconds
         self.hardware[sensor.name].publish(sensor.message(tag, now))
 
     def _tag(self, sensor: Sensor, message: Any) -> Tag | None:

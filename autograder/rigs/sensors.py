@@ -21,7 +21,7 @@ from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import Bench
-from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor, Tag
+from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor
 from autograder.rigs.sensor_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
 from autograder.rigs.stillness import Stillness
 from course import WaitTimeout
@@ -160,33 +160,19 @@ class SensorRig:
 
     def publications(self, sensor: Sensor, phase: str) -> dict[int, int]:
         """Return when the driver published the readings of a phase: {index: ns since 1970}."""
-        number = self.node.phase(phase)
-        noted = list(self.node.published.items())
-        return {
-            tag.number: when
-            for (name, tag), when in noted
-            if name == sensor.name and tag.phase == number
-        }
+        return self.node.published[sensor.name, self.node.phase(phase)].copy()
 
     def sent(self, sensor: Sensor, phase: str) -> dict[int, int]:
         """Return when the hardware delivered the readings of a phase: {index: ns since 1970}."""
-        number = self.node.phase(phase)
-        return {
-            tag.number: when
-            for (name, tag), when in list(self.node.sent.items())
-            if name == sensor.name and tag.phase == number
-        }
+        return self.node.sent[sensor.name, self.node.phase(phase)].copy()
 
     def published(self, sensor: Sensor, phase: str, index: int) -> int:
         """Return when the driver published a reading, in ns since 1970; 0 if it was not seen."""
-        tag = Tag(self.node.nonce, self.node.phase(phase), index)
-        return self.node.published.get((sensor.name, tag), 0)
+        return self.node.published[sensor.name, self.node.phase(phase)].get(index, 0)
 
     def handed(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
         """Return which readings of a phase the consumer passed on, and when (ns since 1970)."""
-        number = self.node.phase(phase)
-        noted = list(self.node.handed[sensor.name])
-        return [(tag.number, when) for tag, when in noted if tag.phase == number]
+        return self.node.handed[sensor.name, self.node.phase(phase)].copy()
 
     def consumed(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings in the order the consumer passed them on."""
