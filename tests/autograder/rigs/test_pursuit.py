@@ -1,0 +1,87 @@
+"""Whether a consumer keeps up is told from the student's own times, however late they are heard."""
+
+from __future__ import annotations
+
+import time
+from typing import cast
+
+import pytest
+
+from autograder.rigs.pursuit import QUIET, WATCHED, Pursuit
+from autograder.rigs.readings import IMU, Sensor
+from autograder.rigs.sensors import SensorRig
+
+S = 10**9  # ns
+PERIOD = S // 100
+
+
+class Recorded:
+    """What an examiner has heard so far: times of publication and of handing on, by number."""
+
+    def __init__(self, published: list[int], handed: list[tuple[int, int]]) -> None:
+        """Have heard these."""
+        self._published, self._handed = dict(enumerate(published)), handed
+
+    def publications(self, sensor: Sensor, phase: str) -> dict[int, int]:
+        """Return when the readings were published."""
+        return self._published
+
+    def handed(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
+        """Return which were handed on, and when."""
+        return self._handed
+
+
+def pursuit(published: list[int], handed: list[tuple[int, int]], resumed: int) -> Pursuit:
+    return Pursuit(cast(SensorRig, Recorded(published, handed)), IMU, "phase", resumed)
+
+
+def at_rate(since: int, seconds: float) -> list[int]:
+    return [since + n * PERIOD for n in range(int(seconds * 100))]
+
+
+def prompt(published: list[int]) -> list[tuple[int, int]]:
+    return [(number, when + S // 1000) for number, when in enumerate(published)]
+
+
+@pytest.mark.parametrize("late", [0, 10])
+def test_a_consumer_that_hands_on_fresh_readings_keeps_up(late: int) -> None:
+    resumed = time.time_ns() - (late + 2) * S
+    published = at_rate(resumed, 2)
+    watched = pursuit(published, prompt(published), resumed)
+    assert watched.settled()
+    assert watched.behind is None
+
+
+def test_an_examiner_that_hears_late_does_not_take_that_for_silence() -> None:
+    # Half the rate, handed on at once: it may keep up with that, or with the sensor's rate, too.
+    resumed = time.time_ns() - int((QUIET + 5) * S)
+    published = at_rate(resumed, 3)[::2]
+    watched = pursuit(published, prompt(published), resumed)
+    assert not watched.settled()
+    assert not watched.able
+
+
+def test_readings_that_come_at_the_last_moment_do_not_show_that_a_slow_consumer_keeps_up() -> None:
+    # A second's readings come within 0.2 s, and one of them is handed on each 20 ms.
+    resumed = time.time_ns() - 3 * S
+    start = resumed + int(WATCHED * S)
+    published = [start + n * 2 * S // 1000 for n in range(100)]
+    handed = [(n, start + n * 2 * PERIOD) for n in range(9)]
+    watched = pursuit(published, handed, resumed)
+    assert not watched.settled()
+    assert not watched.able
+
+
+def test_a_consumer_that_hands_on_nothing_while_readings_go_on_has_shown_all_there_is() -> None:
+    resumed = time.time_ns() - 4 * S
+    published = at_rate(resumed, 4)
+    assert pursuit(published, prompt(published[:100]), resumed).settled()
+
+
+def test_a_list_that_fills_faster_than_it_is_emptied_falls_behind() -> None:
+    resumed = time.time_ns() - 8 * S
+    published = at_rate(resumed, 8)
+    watched = pursuit(published, [(n, resumed + n * 2 * PERIOD) for n in range(400)], resumed)
+    assert watched.settled()
+    assert watched.behind is not None
+    assert "newer ones were waiting" in watched.behind.told(IMU)
