@@ -21,9 +21,10 @@ def spare_the_next_search() -> None:
     """Have `inspect` remember that the file of who logs now belongs to no module, if that is so.
 
     To be called from what rclpy calls to write the line: by then it has made its search. A line of
-    the middleware's own, which comes without one, leaves everything as it is.
+    the middleware's own, which comes without one, and perhaps on a thread of C++ where no Python
+    runs, leaves everything as it is.
     """
-    frame: FrameType | None = sys._getframe(2)
+    frame: FrameType | None = sys._getframe(1).f_back
     searched = False
     while frame is not None and frame.f_globals.get("__name__") in _LOGGING:
         frame, searched = frame.f_back, True

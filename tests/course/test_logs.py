@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import inspect
 import sys
 from types import ModuleType
@@ -17,6 +18,7 @@ from std_msgs.msg import String
 
 import course
 from course.errors import SessionError
+from course.runtime.log_callers import spare_the_next_search
 from course.runtime.log_store import LogStore
 from course.runtime.logs import LogRow, LogTable
 
@@ -157,6 +159,22 @@ def test_who_logs_from_a_cell_is_searched_for_once(any_session, monkeypatch):
     assert any_session.logs(node, level="DEBUG").messages == ["a reading", "another"] * 2
     # And what `inspect` says of the cell is what it said before.
     assert inspect.getmodule(cell["say"].__code__, file) is None
+
+
+def test_a_line_of_the_middlewares_is_heard_on_a_thread_where_no_python_runs():
+    # DDS logs on threads of its own: there the handler is the first Python frame.
+    heard = []
+    start_routine = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)
+
+    @start_routine
+    def handler(_):
+        spare_the_next_search()
+        heard.append(True)
+
+    libc, thread = ctypes.CDLL(None), ctypes.c_ulong()
+    assert libc.pthread_create(ctypes.byref(thread), None, handler, None) == 0
+    assert libc.pthread_join(thread, None) == 0
+    assert heard == [True]
 
 
 def test_a_table_in_a_notebook_is_escaped():
