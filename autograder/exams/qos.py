@@ -11,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import StudentError
-from autograder.exam import Exam, Failed
+from autograder.exam import Exam, Failed, NotExaminable
 from autograder.rigs.backlogs import altered, require_burst, require_fresh
 from autograder.rigs.gap import Aftermath, radio_gap
 from autograder.rigs.joining import require_no_past
@@ -244,7 +244,11 @@ def imu_burst(rig: SensorRig) -> str:
         f"All {BURST} readings of a pause of 50 ms are processed once, and after a longer one "
         f"at most the last {IMU.most} (0.5 s)."
     )
-    require_fresh(rig, IMU, expected)
+    try:
+        require_fresh(rig, IMU, expected)
+    except NotExaminable:
+        require_burst(rig, expected)  # what it does lose is seen on a busy machine, too
+        raise
     require_burst(rig, expected)
     return _practice(rig, IMU)
 
