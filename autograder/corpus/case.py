@@ -125,9 +125,8 @@ class Case:
         failed = {name for name, check in checks.items() if check.status == "failed"}
         spoilt = {name for name, check in checks.items() if check.status == "grader_error"}
         # What this machine cannot examine (there is no sandbox) came out neither right nor wrong.
-        unknown = set()
-        if not abilities().loss:
-            unknown = {name for name, check in checks.items() if check.status == "not_examined"}
+        unexamined = {name for name, check in checks.items() if check.status == "not_examined"}
+        unknown = set() if abilities().loss else unexamined
         passed = {name for name, check in checks.items() if check.passed} | unknown
         differences = [
             f"{what} {', '.join(sorted(names))}"
@@ -137,12 +136,8 @@ class Case:
             )
             if names
         ]
-        if abilities().loss:
-            differences += [
-                f"{name} was not examined: {check.actual!r}"
-                for name, check in sorted(checks.items())
-                if check.status == "not_examined"
-            ]
+        for name in sorted(unexamined - unknown):
+            differences.append(f"{name} was not examined: {checks[name].actual!r}")
         if spoilt:
             reasons = {checks[name].actual for name in spoilt}
             differences.append(f"grader error in {', '.join(sorted(spoilt))}: {min(reasons)!r}")

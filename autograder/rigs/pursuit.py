@@ -98,15 +98,15 @@ class Pursuit:
         self._rig, self._phase, self._resumed = rig, phase, resumed
         self.able = False
         self._settled = False
-        self._look_at = time.monotonic() + WATCHED - (time.time_ns() - resumed) / 1e9
-        self._heard, self._heard_at = 0, time.monotonic()
+        self._look_at = resumed + WATCHED * 1e9
+        self._heard, self._heard_at = 0, time.time_ns()
 
     def settled(self) -> bool:
         """Whether it has been seen that the consumer keeps up, or that it does not."""
-        if not self._settled and (began := time.monotonic()) > self._look_at:
+        if not self._settled and (began := time.time_ns()) > self._look_at:
             self._settled = self._look()
-            took = time.monotonic() - began
-            self._look_at = began + took + max(LOOKS, SELDOM * took)
+            ended = time.time_ns()
+            self._look_at = ended + max(LOOKS * 1e9, SELDOM * (ended - began))
         return self._settled
 
     def _look(self) -> bool:
@@ -140,10 +140,10 @@ class Pursuit:
         """
         heard = len(moments) + len(handings)
         if heard != self._heard:
-            self._heard, self._heard_at = heard, time.monotonic()
+            self._heard, self._heard_at = heard, time.time_ns()
         last = handings[-1].when if handings else self._resumed
         goes_on = bool(moments) and moments[-1] > last + QUIET * 1e9
-        return goes_on or time.monotonic() > self._heard_at + QUIET
+        return goes_on or time.time_ns() > self._heard_at + QUIET * 1e9
 
     def _at_rate(self, moments: list[int], end: int) -> bool:
         """Whether readings came at the sensor's rate until ``end`` (ns since 1970).

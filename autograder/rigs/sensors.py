@@ -160,19 +160,23 @@ class SensorRig:
 
     def publications(self, sensor: Sensor, phase: str) -> dict[int, int]:
         """Return when the driver published the readings of a phase: {index: ns since 1970}."""
-        return self.node.published[sensor.name, self.node.phase(phase)].copy()
+        return self.node.published.get(self._filed(sensor, phase), {}).copy()
 
     def sent(self, sensor: Sensor, phase: str) -> dict[int, int]:
         """Return when the hardware delivered the readings of a phase: {index: ns since 1970}."""
-        return self.node.sent[sensor.name, self.node.phase(phase)].copy()
+        return self.node.sent.get(self._filed(sensor, phase), {}).copy()
 
     def published(self, sensor: Sensor, phase: str, index: int) -> int:
         """Return when the driver published a reading, in ns since 1970; 0 if it was not seen."""
-        return self.node.published[sensor.name, self.node.phase(phase)].get(index, 0)
+        return self.node.published.get(self._filed(sensor, phase), {}).get(index, 0)
 
     def handed(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
         """Return which readings of a phase the consumer passed on, and when (ns since 1970)."""
-        return self.node.handed[sensor.name, self.node.phase(phase)].copy()
+        return self.node.handed.get(self._filed(sensor, phase), []).copy()
+
+    def _filed(self, sensor: Sensor, phase: str) -> tuple[str, int]:
+        # What is read with `get` is not made: the executor's thread may be making it just now.
+        return sensor.name, self.node.phase(phase)
 
     def consumed(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings in the order the consumer passed them on."""
