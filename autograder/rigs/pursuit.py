@@ -8,7 +8,8 @@ part.
 
 A busy machine brings fewer readings than the sensor has, and a consumer that is too slow for the
 sensor then seems to keep up. So a fresh reading counts if they had come at their rate until then;
-or else the consumer has to have shown that it can be quicker than the sensor.
+or else the consumer has to have shown that it can be quicker than the sensor, and to have handed on
+one that was not too old: a delay line is quick, too.
 """
 
 from __future__ import annotations
@@ -88,7 +89,8 @@ def left_behind(rig: SensorRig, phase: str, resumed: int) -> dict[str, Handing]:
 class Pursuit:
     """One sensor's consumer, and whether it keeps up.
 
-    ``able`` says of one that is neither fresh nor far behind that it has had to keep up, or could.
+    ``able`` says of one that is neither fresh nor far behind that it has had to keep up, or could,
+    and that some reading that it handed on was not too old to act on.
     """
 
     def __init__(self, rig: SensorRig, sensor: Sensor, phase: str, resumed: int) -> None:
@@ -97,6 +99,7 @@ class Pursuit:
         self.behind: Handing | None = None
         self._rig, self._phase, self._resumed = rig, phase, resumed
         self.able = False
+        self._quick = False
         self._settled = False
         self._look_at = resumed + WATCHED * 1e9
         self._heard, self._heard_at = 0, time.time_ns()
@@ -117,7 +120,8 @@ class Pursuit:
             return True
         if not handings:
             return False
-        self.able = self.able or self._at_rate(moments, moments[-1]) or self._spurts(handings)
+        self._quick = self._quick or self._at_rate(moments, moments[-1]) or self._spurts(handings)
+        self.able = self._quick and any(map(self._young, handings))
         if self._fresh(handings[-1]) and self._at_rate(moments, handings[-1].when):
             return True
         late = list(self._late_at_last(handings, GENEROUS))
@@ -131,7 +135,13 @@ class Pursuit:
         return self.behind is not None
 
     def _fresh(self, handing: Handing) -> bool:
-        return handing.when > self._resumed + WATCHED * 1e9 and handing.age <= FRESH
+        return self._watched(handing) and handing.age <= FRESH
+
+    def _young(self, handing: Handing) -> bool:
+        return self._watched(handing) and handing.age <= self.sensor.most / self.sensor.rate
+
+    def _watched(self, handing: Handing) -> bool:
+        return handing.when > self._resumed + WATCHED * 1e9
 
     def _is_quiet(self, moments: list[int], handings: list[Handing]) -> bool:
         """Whether nothing is handed on though readings are published, or nothing heard at all.

@@ -85,3 +85,18 @@ def test_a_list_that_fills_faster_than_it_is_emptied_falls_behind() -> None:
     assert watched.settled()
     assert watched.behind is not None
     assert "newer ones were waiting" in watched.behind.told(IMU)
+
+
+@pytest.mark.parametrize(("delay", "able"), [(0.75, False), (0.4, True)])
+def test_a_quick_consumer_is_able_only_if_something_it_hands_on_is_not_too_old(
+    delay: float, able: bool
+) -> None:
+    # A timer hands on five at a time. A busy machine leaves out each other half second of readings,
+    # so that there is no streak of those that are late.
+    resumed = time.time_ns() - 9 * S
+    published = [when for when in at_rate(resumed, 9) if (when - resumed) % S < S // 2]
+    late = (when - (when - resumed) % (5 * PERIOD) + 5 * PERIOD for when in published)
+    handed = [(n, when + int(delay * S)) for n, when in enumerate(late)]
+    watched = pursuit(published, handed, resumed)
+    assert not watched.settled()
+    assert watched.able is able
