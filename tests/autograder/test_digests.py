@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -82,3 +83,16 @@ def test_what_makes_points_of_verdicts_enters_again_but_runs_nothing(copy: Path)
 def test_the_installed_code_has_the_digest_of_its_copy(copy: Path) -> None:
     digests.of_exams.cache_clear()
     assert digests.of_exams(("qos",)) == digests.of_exams(("qos",), copy)
+
+
+@pytest.mark.parametrize("package", digests.PACKAGES)
+def test_no_import_is_overlooked(package: str) -> None:
+    for file in (HOME / package).rglob("*.py"):
+        source = file.read_bytes()
+        found = digests._imports("a.module", source)
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.Import):
+                assert {alias.name for alias in node.names} <= found, file
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                names = {f"{node.module}.{alias.name}" for alias in node.names}
+                assert {node.module, *names} <= found, file
