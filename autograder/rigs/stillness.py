@@ -172,8 +172,12 @@ def _worked(task: Task) -> float | None:
 
     None: it has ended since it was looked at.
     """
-    kept = Path("/proc/{}/task/{}/schedstat".format(*task))
+    folder = "/proc/{}/task/{}".format(*task)
     try:
-        return int(kept.read_text(encoding="ascii").split()[0]) / 1e9
+        file = os.open(f"{folder}/schedstat", os.O_RDONLY)
+        try:
+            return int(os.read(file, 64).split()[0]) / 1e9
+        finally:
+            os.close(file)
     except (OSError, ValueError):
-        return time.monotonic() if kept.parent.exists() else None
+        return time.monotonic() if Path(folder).exists() else None
