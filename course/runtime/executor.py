@@ -41,6 +41,13 @@ def _never() -> bool:
     return False
 
 
+def _has_entities(node: Node) -> bool:
+    kinds = (
+        node.subscriptions, node.timers, node.clients, node.services, node.guards, node.waitables,
+    )  # fmt: skip
+    return any(True for entities in kinds for _ in entities)
+
+
 class BackgroundExecutor(Executor):
     """Runs callbacks in one thread of its own, or in a pool of `threads`.
 
@@ -134,6 +141,8 @@ class BackgroundExecutor(Executor):
         if self._workers is None and self.running:
             return False  # the one thread has a callback to run, and the others wait for it
         busy, self._returned = self._returned, False
+        if not self._may_be_ready():
+            return busy
         while True:
             if self.gate.stale:  # a callback removed a node under this round
                 self._round, self.gate.stale = _fresh_false(), False
@@ -278,6 +287,10 @@ class BackgroundExecutor(Executor):
             raise ShutdownException from None  # nothing to run for now
         finally:
             self.gate.leave()
+
+    def _may_be_ready(self) -> bool:
+        """Return whether there is anything to wait on: to wait in order to see takes far longer."""
+        return bool(self._tasks) or any(map(_has_entities, self.get_nodes()))
 
     def _job(self, task: Any, entity: Any, node: Any) -> Job:
         shown = None

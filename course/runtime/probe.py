@@ -13,8 +13,11 @@ from typing import Any
 from rclpy.client import Client
 from rclpy.context import Context
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 from rclpy.task import Future
@@ -35,6 +38,19 @@ _LISTEN_DEPTH = 1000
 _LONGEST = 1e9  # s: a Duration counts nanoseconds in 64 bits
 
 
+class _HiddenNode(Node):
+    """Has nothing for its executor to wait on until it listens or asks.
+
+    A step of simulated time looks at every executor, time and again. And what rclpy would log of
+    QoS events of a node that nobody knows helps nobody: whoever listens in vain hears why.
+    """
+
+    def create_publisher(self, *args: Any, **options: Any) -> Publisher:
+        """Do what every node does, without handlers of QoS events."""
+        options.setdefault("event_callbacks", PublisherEventCallbacks(use_default_callbacks=False))
+        return super().create_publisher(*args, **options)
+
+
 class Probe:
     """Subscribes, calls services and sends goals without disturbing the session's own nodes.
 
@@ -47,12 +63,13 @@ class Probe:
         """Make the hidden node in `context`."""
         self.pulse = pulse
         self.explaining: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext
-        self.node = Node(
+        self.node = _HiddenNode(
             f"_course_{os.getpid()}_{id(self):x}",
             context=context,
             use_global_arguments=False,
             enable_rosout=False,
             start_parameter_services=False,
+            parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
         self.executor = crew.executor(1, "probe")
         self.executor.add_node(self.node)

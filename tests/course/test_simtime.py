@@ -7,6 +7,7 @@ import threading
 import pytest
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.duration import Duration
+from rclpy.executors import Executor
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
 from rclpy.task import Future
@@ -275,3 +276,19 @@ def test_patience_bounds_what_a_callback_may_hold_up():
                 lab.sim.advance(1.0, patience=0.3)
         finally:
             go_on.set()
+
+
+def test_a_step_waits_on_no_executor_whose_nodes_have_nothing_to_wait_on(lab, monkeypatch):
+    sensors = lab.run(Sensors)
+    here, waited = threading.get_ident(), set()
+    wait = Executor.wait_for_ready_callbacks
+
+    def watched(executor, *args):
+        if threading.get_ident() == here:
+            waited.add(executor)
+        return wait(executor, *args)
+
+    monkeypatch.setattr(Executor, "wait_for_ready_callbacks", watched)
+    lab.sim.advance(1.0)
+    assert len(sensors.fired[10.0]) == 10
+    assert waited == {sensors.executor}
