@@ -219,6 +219,14 @@ class Asking(Hosting):
         node = made.node if made is not None else next(iter(self.nodes.values()), None)
         return {} if node is None or self.closed else who_offers(node, names)
 
+    def participate(self) -> None:
+        """Take part in DDS until the session is closed, also while it runs no node.
+
+        Without it the participant comes with the first node and goes with the last one, and
+        whoever comes next has to find all others anew.
+        """
+        assert self._probe.node
+
     # Inside.
 
     @property

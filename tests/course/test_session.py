@@ -116,6 +116,19 @@ def test_stop_takes_a_node_off_the_graph(session, how):
     session.stop(*what.get(how, []))  # once more: nothing to do, nothing to say
 
 
+@pytest.mark.parametrize("stays", [True, False])
+def test_a_session_can_keep_its_participant_from_node_to_node(session, stays):
+    def participant():
+        node = session.run(Talker)
+        (end,) = node.get_publishers_info_by_topic("chatter")
+        session.stop(node)
+        return bytes(end.endpoint_gid[:12])
+
+    if stays:
+        session.participate()
+    assert (participant() == participant()) is stays
+
+
 def test_a_stopped_node_runs_no_callback_any_more(any_session):
     talker = any_session.run(Talker)
     any_session.until(lambda: talker.count)
