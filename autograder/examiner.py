@@ -101,7 +101,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     stuck.tell_when_asked(sys.stderr.fileno())
     subject = Subject(Channel(socket.socket(fileno=options.control), MAX_REPLY))
     with Session(domain_id=options.domain) as session:
-        session.participate()  # from node to node, it need not find the subject anew
         session.explains = False  # it asks whether something comes, and says itself what it means
         serve(sys.stdin, verdicts, session, subject, own_network=options.own_network)
     return 0

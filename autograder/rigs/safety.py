@@ -22,7 +22,12 @@ class RobotRig:
     """Gives each check the node that it examines, and its counterpart."""
 
     def __init__(self, bench: Bench) -> None:
-        """Nothing runs yet."""
+        """Nothing runs yet, but the examiner takes part in DDS from now on.
+
+        Counterparts come and go. Each would otherwise bring a participant of its own, from which
+        it has to find the subject, and taking that down again is what Fast DDS can hang in.
+        """
+        bench.session.participate()
         self.bench = bench
         self._robot: Robot | None = None
         self._player: Player | None = None
