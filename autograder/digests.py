@@ -104,10 +104,10 @@ def _imports(name: str, source: bytes) -> frozenset[str]:
 
     Read from its lines: a syntax tree would keep each `autograder grade` from starting for longer.
     """
-    found = {name}
-    for package, names in _FROM.findall(source.decode()):
+    found, text = {name}, source.decode()
+    for package, names in _FROM.findall(text):
         found |= {package, *(f"{package}.{imported}" for imported in _NAME.findall(names))}
-    for names in _IMPORT.findall(source.decode()):
+    for names in _IMPORT.findall(text):
         found |= set(_NAME.findall(names))
     return frozenset(found | {parent for module in found for parent in _parents(module)})
 
