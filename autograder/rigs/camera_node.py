@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 import secrets
 from collections import Counter
-from functools import partial
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -39,44 +39,36 @@ def _picture(message: Any, published: int) -> Picture | None:
 
 
 class ExaminerNode(QuietNode):
-    """The examiner's endpoints, and what each of two readers got, in the order of its arrival."""
+    """The examiner's endpoints, and the pictures that its two readers got, in order of arrival.
+
+    A driver may offer either reliability, or have two publishers: only the best-effort reader then
+    hears both, while the reliable one loses none.
+    """
 
     def __init__(self) -> None:
         """Listen on the image topic, whichever reliability is offered."""
         super().__init__(f"examiner_{secrets.token_hex(4)}")
-        self.heard: dict[ReliabilityPolicy, list[Picture]] = {}
+        self._pictures: dict[Picture, None] = {}
         self._strange: Counter[ReliabilityPolicy] = Counter()
         for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
             qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=reliability)
-            heard = self.heard[reliability] = []
-            note = partial(self._note, heard, reliability)
-            self.create_subscription(Image, IMAGE, note, qos)
+            self.create_subscription(Image, IMAGE, self._noting(reliability), qos)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.zoom = self.create_publisher(Int32, ZOOM, latched)
 
-    def _note(
-        self,
-        heard: list[Picture],
-        reader: ReliabilityPolicy,
-        message: Any,
-        info: dict[str, int],
-    ) -> None:
-        if (picture := _picture(message, info["source_timestamp"])) is None:
-            self._strange[reader] += 1
-        else:
-            heard.append(picture)
+    def _noting(self, reader: ReliabilityPolicy) -> Callable[[Any, dict[str, int]], None]:
+        def note(message: Any, info: dict[str, int]) -> None:
+            if (picture := _picture(message, info["source_timestamp"])) is None:
+                self._strange[reader] += 1
+            else:
+                # By the time of its publishing it is known when the other reader gets it, too.
+                self._pictures.setdefault(picture)
+
+        return note
 
     def of(self, device: str) -> list[Picture]:
-        """Return the pictures of ``device``, from the reader that got more of them.
-
-        A driver may have two publishers, one for each reliability: only the best-effort reader
-        hears both. If both hear all, it is the reliable reader, which loses none.
-        """
-        reliable, any_offer = (
-            [picture for picture in list(heard) if picture.device == device]
-            for heard in self.heard.values()
-        )
-        return max(reliable, any_offer, key=len)
+        """Return the pictures of ``device``; later calls return them first, and then newer ones."""
+        return [picture for picture in list(self._pictures) if picture.device == device]
 
     def strange(self) -> int:
         """Return how many images came that are not a camera's."""

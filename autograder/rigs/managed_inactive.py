@@ -78,11 +78,12 @@ def require_still_held(rig: CameraRig, device: str) -> None:
         )
 
 
-def require_fresh(rig: CameraRig, device: str, sent: int, asked: int, strange: int) -> None:
-    """Fail unless pictures come again, and all but the first ``sent`` are new ones.
+def require_fresh(rig: CameraRig, device: str, inactive: int, asked: int, strange: int) -> None:
+    """Fail unless pictures come again, and all that were published while ``inactive`` are new.
 
-    Those that the camera took before it was ``asked`` so often are old. There had been so many
-    ``strange`` images, which are nobody's pictures, when the node was configured.
+    That is since when it was, in ns: by the times that DDS gives, as what was published before may
+    arrive after. Pictures that the camera took before it was ``asked`` so often are old. There had
+    been so many ``strange`` images, which are nobody's pictures, when the node was configured.
     """
     # Pictures of one publisher arrive in order: what was sent earlier is here by then.
     if not rig.see(device, lambda: rig.pictures(device)[-1].number >= asked):
@@ -90,7 +91,8 @@ def require_fresh(rig: CameraRig, device: str, sent: int, asked: int, strange: i
             expected="After a second “activate” pictures come again.",
             actual=f"None came{rig.raised()}.",
         )
-    if old := [p for p in rig.pictures(device)[sent:] if p.number < asked]:
+    after = [picture for picture in rig.pictures(device) if picture.published > inactive]
+    if old := [picture for picture in after if picture.number < asked]:
         raise Failed(
             expected="An inactive node publishes nothing, and one that is active again only "
             "pictures that its camera has taken since.",
