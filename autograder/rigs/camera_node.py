@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections import Counter
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -49,22 +47,20 @@ class ExaminerNode(QuietNode):
         """Listen on the image topic, whichever reliability is offered."""
         super().__init__(f"examiner_{secrets.token_hex(4)}")
         self._pictures: dict[Picture, None] = {}
-        self._strange: Counter[ReliabilityPolicy] = Counter()
+        self._strange: set[int] = set()
         for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
             qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=reliability)
-            self.create_subscription(Image, IMAGE, self._noting(reliability), qos)
+            self.create_subscription(Image, IMAGE, self._note, qos)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.zoom = self.create_publisher(Int32, ZOOM, latched)
 
-    def _noting(self, reader: ReliabilityPolicy) -> Callable[[Any, dict[str, int]], None]:
-        def note(message: Any, info: dict[str, int]) -> None:
-            if (picture := _picture(message, info["source_timestamp"])) is None:
-                self._strange[reader] += 1
-            else:
-                # By the time of its publishing it is known when the other reader gets it, too.
-                self._pictures.setdefault(picture)
-
-        return note
+    def _note(self, message: Any, info: dict[str, int]) -> None:
+        # By the time of its publishing it is known when the other reader gets it, too.
+        published = info["source_timestamp"]
+        if (picture := _picture(message, published)) is None:
+            self._strange.add(published)
+        else:
+            self._pictures.setdefault(picture)
 
     def of(self, device: str) -> list[Picture]:
         """Return the pictures of ``device``; later calls return them first, and then newer ones."""
@@ -72,4 +68,4 @@ class ExaminerNode(QuietNode):
 
     def strange(self) -> int:
         """Return how many images came that are not a camera's."""
-        return max(self._strange.values(), default=0)
+        return len(self._strange)

@@ -91,8 +91,7 @@ def require_fresh(rig: CameraRig, device: str, inactive: int, asked: int, strang
             expected="After a second “activate” pictures come again.",
             actual=f"None came{rig.raised()}.",
         )
-    after = [picture for picture in rig.pictures(device) if picture.published > inactive]
-    if old := [picture for picture in after if picture.number < asked]:
+    if old := [p for p in rig.pictures(device) if p.published > inactive and p.number < asked]:
         raise Failed(
             expected="An inactive node publishes nothing, and one that is active again only "
             "pictures that its camera has taken since.",

@@ -153,14 +153,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     leaving = _Leaving()  # before anything else has an exit function
     tasks = socket.socket(fileno=options.socket)
-    # What is here after this stays: nothing of it needs to be looked at, and so copied, by a fork.
-    gc.disable()
+    gc.disable()  # what is imported stays: there is little in it to collect
     module: Any = import_module(options.module)
     module.preload()
     # A fork has no thread but the one that forked. Two libraries have some that are not Python's:
     # the workers of OpenBLAS are made anew in a fork, LTTng's only listen for a tracer.
     if threading.active_count() > 1:
         sys.exit(f"{options.module} starts threads when it is imported, which no fork would have")
+    # What is here now stays: nothing of it needs to be looked at, and so copied, by a fork.
     gc.collect()
     gc.freeze()
     gc.enable()
