@@ -16,7 +16,7 @@ from autograder.sandbox.limits import Limits
 from autograder.sandbox.network import BoxError
 from autograder.sandbox.place import END_TIMEOUT
 from autograder.sandbox.watch import Watch
-from autograder.warm import ForkedProcess
+from autograder.warm import ForkedProcess, ZygoteError
 
 KILL_TIMEOUT = 10.0
 """Seconds until a killed subject must have ended: the kernel takes a moment for its memory."""
@@ -95,14 +95,19 @@ class WarmSubject(BoxedSubject):
         """Fork the subject once the sandbox is complete.
 
         Raises:
-            BoxError: the sandbox's tools refuse.
+            BoxError: the sandbox's tools refuse, or its watch has ended it already.
             ZygoteError: there is no fork to be had.
         """
         assert self._process.stdout is not None
         network.require_word(self._process.stdout, self._process)
         if not self._process.stdout.readline():
             raise BoxError(self.failed())
-        self._forked = warmth.subject(arguments, fds, self._handle, user)
+        try:
+            self._forked = warmth.subject(arguments, fds, self._handle, user)
+        except ZygoteError as error:
+            if self._watch.reason:  # there is nothing left to fork into
+                raise BoxError(self._watch.reason) from error
+            raise
         self.pid = self._forked.pid
 
     def ready(self) -> None:

@@ -16,9 +16,11 @@ import pytest
 
 from autograder import engine, runner, sandbox
 from autograder.corpus import Case
+from autograder.descriptors import readable
 from autograder.gradebook import CourseGradebook
-from autograder.sandbox import BoxError, SandboxError, network, probe, seccomp
+from autograder.sandbox import BoxError, SandboxError, network, probe, seccomp, usage, warmth
 from autograder.sandbox.limits import Limits
+from autograder.sandbox.usage import Process
 from autograder.sandbox.watch import Watch
 from autograder.store import OutcomeStore
 from autograder.submission import Cell
@@ -217,13 +219,34 @@ def test_files_that_stay_unreadable_end_a_sandbox(monkeypatch: pytest.MonkeyPatc
 
 @needs_sandbox
 def test_a_failure_of_the_watch_is_left_to_a_person(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stumble(_: Watch, processes: list[Process]) -> str:
+        if max(map(usage.descriptors, processes), default=0) > 200:  # the cell has been reached
+            raise ValueError("odd")
+        return ""
+
+    monkeypatch.setattr(Watch, "_held", stumble)
+    cell = "files = [open('/dev/null') for _ in range(200)]; import threading; "
+    outcome = runner.run((Cell(cell + "threading.Event().wait()"), EXAM))
+    assert {check.status for check in outcome.verdicts["qos-hidden"].checks} == {"grader_error"}
+    assert "the grader could not see what it used" in outcome.notes[0]
+
+
+@needs_sandbox
+def test_a_sandbox_that_is_gone_before_its_subject_says_why(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     def stumble(*_: object) -> str:
         raise ValueError("odd")
 
-    monkeypatch.setattr(Watch, "_held", stumble)
-    outcome = runner.run((Cell("import threading; threading.Event().wait()"), EXAM))
-    assert {check.status for check in outcome.verdicts["qos-hidden"].checks} == {"grader_error"}
-    assert "the grader could not see what it used" in outcome.notes[0]
+    def late(arguments: list[str], fds: list[int], process: int, user: int | None) -> object:
+        assert readable([process], 30), "the watch ends the sandbox"
+        return subject(arguments, fds, process, user)
+
+    subject = warmth.subject
+    monkeypatch.setattr(Watch, "_excess", stumble)
+    monkeypatch.setattr(warmth, "subject", late)
+    with pytest.raises(BoxError, match=r"could not see what it used .*odd"):
+        runner.run((EXAM,))
 
 
 def test_the_filter_is_a_whole_number_of_instructions() -> None:
