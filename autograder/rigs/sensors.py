@@ -34,6 +34,8 @@ ENDLESS = 3600 * 10**9
 """Nanoseconds: a lifespan of an hour or more is as good as none."""
 PROBE_PERIOD = 0.1
 """Seconds between two rounds of probes while endpoints find each other."""
+NOW = 0.05
+"""Seconds in which a busy machine comes to a look at all threads, and another."""
 ROUND = 5
 """IMU readings in a round, at their own rate: a consumer may take a lone one for an outlier."""
 
@@ -88,6 +90,10 @@ class SensorRig:
     def rest(self) -> None:
         """Return when all that was sent has been dealt with, or a quarter of a second later."""
         self._still.reached()
+
+    def rests(self) -> bool:
+        """Return whether all is at rest just now."""
+        return self._still.reached(timeout=NOW)
 
     def probe(
         self,
