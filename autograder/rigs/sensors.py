@@ -23,7 +23,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from autograder.bench import Bench
 from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor
 from autograder.rigs.sensor_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
-from autograder.rigs.stillness import Stillness
+from autograder.rigs.stillness import HANGS, RESTLESS, Stillness
 from course import WaitTimeout
 
 DRIVERS, CONSUMERS = "SensorDrivers", "SensorConsumers"
@@ -87,9 +87,9 @@ class SensorRig:
             return True
         return False
 
-    def rest(self) -> None:
-        """Return when all that was sent has been dealt with, or a quarter of a second later."""
-        self._still.reached()
+    def rest(self, patience: float = RESTLESS) -> None:
+        """Return when all that was sent has been dealt with, or after ``patience`` s of work."""
+        self._still.reached(patience, max(patience, HANGS))
 
     def rests(self) -> bool:
         """Return whether all is at rest just now."""

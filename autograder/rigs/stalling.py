@@ -9,7 +9,7 @@ what is too old, a short one what must not be lost, in so little time that nothi
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -103,7 +103,7 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
         rig.subject.resume(CONSUMERS)
     # All but the events go on, as on a robot.
     for sensor in SENSORS:
-        _drain(rig, sensor, phase, counts[sensor.name])
+        _drain(rig, sensor, phase, counts[sensor.name], streams.values())
     for sensor in SENSORS:
         if sensor is not STOP:
             streams[sensor.name].insist()
@@ -159,14 +159,28 @@ def _published(rig: SensorRig, sensor: Sensor, phase: str, count: int) -> set[in
     return {number for number in rig.witnessed(sensor, phase) if number < count}
 
 
-def _drain(rig: SensorRig, sensor: Sensor, phase: str, count: int) -> None:
-    """Wait until the consumer has passed on the newest, for as long as it makes progress."""
+def _drain(
+    rig: SensorRig, sensor: Sensor, phase: str, count: int, streams: Iterable[Stream]
+) -> None:
+    """Wait until the consumer has passed on the newest, for as long as it makes progress.
+
+    One that leaves out what is too old may, on a busy machine, not get through what has piled up
+    while more comes in: if nothing comes out, nothing comes in until it has.
+    """
     newest = max((n for n in rig.witnessed(sensor, phase) if n < count), default=-1)
+
+    def is_out() -> bool:
+        return max(rig.consumed(sensor, phase), default=-1) >= newest
+
     passed = -1
-    while passed < (now := len(rig.consumed(sensor, phase))):
+    while passed < (now := len(rig.consumed(sensor, phase))) and not rig.wait(is_out):
         passed = now
-        if rig.wait(lambda: max(rig.consumed(sensor, phase), default=-1) >= newest):
-            break
+    if sensor is not STOP and not is_out():
+        with ExitStack() as held:
+            for stream in streams:
+                held.enter_context(stream.held())
+            rig.rest(SETTLE)
+        rig.wait(is_out)
     if sensor is STOP:  # one that handles the newest first has lost nothing
         rig.wait(lambda: len(set(rig.consumed(sensor, phase))) >= count, PROMPT)
 
@@ -194,11 +208,21 @@ def _burst(rig: SensorRig, phase: str, patience: float) -> Burst:
     rig.wait(lambda: BURST - 1 in rig.consumed(IMU, phase), patience)
     stream.stop()
     handed = dict(rig.handed(IMU, phase)).get(BURST - 1)
-    decided = _turns_later(rig, f"{phase}, later") if handed is None else handed
+    decided = _decided(rig, phase) if handed is None else handed
     rig.wait(lambda: len(set(rig.consumed(IMU, phase))) == BURST, PROMPT)
     rig.rest()  # one that hands on a reading again is heard out: how many there are is told
     aged = decided - rig.published(IMU, phase, 0) > YOUNG * 1e9
     return Burst(rig.consumed(IMU, phase), published, aged)
+
+
+def _decided(rig: SensorRig, phase: str) -> int:
+    """Return when (ns) the machine had come to all of a burst whose last reading is not out.
+
+    That is the moment in which all is at rest; a subject that never rests is given more to do.
+    """
+    at_rest, moment = rig.rests(), time.time_ns()
+    turned = _turns_later(rig, f"{phase}, later")
+    return min(moment, turned) if at_rest else turned
 
 
 def _turns_later(rig: SensorRig, phase: str) -> int:
