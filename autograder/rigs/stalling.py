@@ -43,8 +43,7 @@ class Backlog:
     ``oldest`` is how old the first of them was at the end of the pause, in s since its publication.
     ``early`` says that some came out while the consumer was held back, ``behind`` what it handed on
     when it had fallen far behind later on, if it did. ``altered`` says that the driver changed some
-    reading, ``again`` how many stop events have been handed on more than once. The events that were
-    published took the driver ``took`` s each, or longer.
+    reading, ``again`` how many stop events have been handed on more than once.
     """
 
     count: int
@@ -56,7 +55,6 @@ class Backlog:
     behind: Handing | None
     altered: bool
     again: int
-    took: float
 
 
 @dataclass(frozen=True)
@@ -124,15 +122,8 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
             behind=behind.get(s.name),
             altered=s.topic in rig.node.altered,
             again=rig.comes_again() if s is STOP else 0,
-            took=_took(rig, s, phase),
         )
     return found
-
-
-def _took(rig: SensorRig, sensor: Sensor, phase: str) -> float:
-    """Return how long the driver's quickest readings took from the hardware to the topic, in s."""
-    sent, published = rig.sent(sensor, phase), rig.publications(sensor, phase)
-    return min(((published[n] - sent[n]) / 1e9 for n in published), default=0.0)
 
 
 def _youngest(rig: SensorRig, phase: str, counts: Mapping[str, int]) -> float:
