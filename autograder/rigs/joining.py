@@ -34,8 +34,9 @@ def require_no_past(rig: SensorRig, sensors: Sequence[Sensor]) -> None:
             rig.node.listen(sensor, sensor.topic, undemanding(), plain)
         # Either DDS refuses to hand out the past, or the writer replays it at once.
         rig.wait(lambda: all(refused[s.name] or asking[s.name] for s in sensors))
-        # A driver of which each reader is known has had its chance to greet it.
+        # A driver of which each reader is known has its chance to greet it, until all is at rest.
         rig.wait(lambda: all(n >= known[t] + 2 for t, n in _readers(rig, sensors).items()))
+        rig.rest()
         rig.wait(lambda: any(plain.values()), REPEATED)
     for sensor in sensors:
         if asking[sensor.name] and not plain[sensor.name]:

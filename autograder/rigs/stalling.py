@@ -173,6 +173,7 @@ def _drain(
             rig.rest(SETTLE)
         rig.wait(is_out)
     if sensor is STOP:  # one that handles the newest first has lost nothing
+        rig.rest()
         rig.wait(lambda: len(set(rig.consumed(sensor, phase))) >= count, PROMPT)
 
 
