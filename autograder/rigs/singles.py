@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, field
-from functools import partial
 
 from autograder.exam import Failed
 from autograder.rigs.readings import SENSORS, Sensor
@@ -17,7 +16,7 @@ from autograder.rigs.sensors import SETTLE, SensorRig
 
 SINGLES = 16
 MOST = 3 * SINGLES
-"""Singles on a machine that is so busy that from the first ones nothing can be said."""
+"""Singles for a driver of which the first ones do not tell: some were late, or the machine busy."""
 AT_ONCE = 0.15
 """Seconds from the hardware to the topic: the task says 0.1."""
 PROMPT, SLOW = 5, 12
@@ -98,24 +97,21 @@ def _send(rig: SensorRig, records: list[_Record], index: int) -> bool:
     for record in records:
         rig.node.publish(record.sensor, _PHASE, index)
     sent = time.monotonic()
+
+    def unseen() -> list[_Record]:
+        return [record for record in records if record.unseen(index)]
+
     rig.rest()
-    for record in records:
-        if record.unseen(index):
-            record.waited.add(index)
-    all_seen = partial(_all_seen, records, index)
-    if not rig.wait(all_seen, max(0.0, sent + AT_ONCE - time.monotonic())) and rig.rests():
-        for record in records:
-            if record.unseen(index):
-                record.held.add(index)
-    rig.wait(all_seen, LAG)
-    for record in records:
-        if record.unseen(index):
-            record.missed.append(index)
+    for record in unseen():
+        record.waited.add(index)
+    at_once = rig.wait(lambda: not unseen(), max(0.0, sent + AT_ONCE - time.monotonic()))
+    if not at_once and rig.rests():
+        for record in unseen():
+            record.held.add(index)
+    rig.wait(lambda: not unseen(), LAG)
+    for record in unseen():
+        record.missed.append(index)
     return bool(records)
-
-
-def _all_seen(records: list[_Record], index: int) -> bool:
-    return not any(record.unseen(index) for record in records)
 
 
 def _held_for_the_next(rig: SensorRig, records: dict[Sensor, _Record]) -> list[Sensor]:

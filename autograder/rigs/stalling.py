@@ -9,8 +9,8 @@ what is too old, a short one what must not be lost, in so little time that nothi
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 
@@ -87,9 +87,8 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     rig.wait(
         lambda: all(stream.sent >= _least(stream.sensor) for stream in streams.values()), LONGEST
     )
-    with ExitStack() as held:
+    with _held(streams.values()):
         for stream in streams.values():
-            held.enter_context(stream.held())
             stream.spare()
         streams[STOP.name].stop()
         counts = {name: stream.sent for name, stream in streams.items()}
@@ -124,6 +123,15 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
             again=rig.comes_again() if s is STOP else 0,
         )
     return found
+
+
+@contextmanager
+def _held(streams: Iterable[Stream]) -> Iterator[None]:
+    """Let nothing come in for the length of the block."""
+    with ExitStack() as held:
+        for stream in streams:
+            held.enter_context(stream.held())
+        yield
 
 
 def _youngest(rig: SensorRig, phase: str, counts: Mapping[str, int]) -> float:
@@ -166,15 +174,13 @@ def _drain(
     passed = -1
     while passed < (now := len(rig.consumed(sensor, phase))) and not rig.wait(is_out):
         passed = now
-    if sensor is not STOP and not is_out():
-        with ExitStack() as held:
-            for stream in streams:
-                held.enter_context(stream.held())
-            rig.rest(SETTLE)
-        rig.wait(is_out)
     if sensor is STOP:  # one that handles the newest first has lost nothing
         rig.rest()
         rig.wait(lambda: len(set(rig.consumed(sensor, phase))) >= count, PROMPT)
+    elif not is_out():
+        with _held(streams):
+            rig.rest(SETTLE)
+        rig.wait(is_out)
 
 
 def short_pause(rig: SensorRig) -> Burst:
