@@ -6,6 +6,7 @@ once the last of their outcomes is there.
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
@@ -157,7 +158,7 @@ class ClassRun:
             yield from pieces
 
     def _run(self, pieces: Iterator[Piece]) -> None:
-        more = True
+        more, cold = True, self._feedback
         while more or self._running:
             while more and len(self._running) < self._workers.room():
                 self._interruption.check()
@@ -166,6 +167,9 @@ class ClassRun:
                     more = False
                 else:
                     self._begin(piece)
+            if cold and not more and 0 < len(self._running) <= (os.cpu_count() or 1):
+                self._desk.warm_up()  # a processor has little to do from here on
+                cold = False
             if self._running:
                 self._interruption.check()
                 for done in self._workers.wait():

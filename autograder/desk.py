@@ -18,6 +18,7 @@ from autograder.beside import Beside, files_beside
 from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.jobs import Job
 from autograder.ledger import Standing
+from autograder.nbgrader_once import FeedbackExporter
 from autograder.runner import Outcome
 from autograder.submission import SubmissionError
 from autograder.verdict import Status, Verdict
@@ -73,6 +74,11 @@ class Desk:
         self._originals = {
             name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
         }
+
+    def warm_up(self) -> None:
+        """Prepare for writing feedback, while there is nothing else to do."""
+        _, released = self._originals[self.notebooks[0]]
+        FeedbackExporter.warm_up(released)
 
     @property
     def folders(self) -> tuple[Path, Path]:

@@ -10,7 +10,7 @@ half of the time in which a student's scores and feedback are written.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import CodeType
 from typing import Any
 
@@ -19,6 +19,7 @@ import sqlalchemy
 from jinja2 import BytecodeCache, Environment
 from jinja2.bccache import Bucket
 from nbconvert.exporters import HTMLExporter
+from nbformat import NotebookNode
 from sqlalchemy.exc import DataError, IntegrityError
 
 
@@ -46,6 +47,16 @@ class FeedbackExporter(HTMLExporter):
         environment: Environment = super()._create_environment()  # type: ignore[no-untyped-call]
         environment.bytecode_cache = _compiled
         return environment
+
+    @classmethod
+    def warm_up(cls, notebook: NotebookNode) -> None:
+        """Compile what feedback is made with, by rendering a ``notebook`` for nobody.
+
+        nbgrader's template is one of nbconvert's ``classic``, with which most of it is compiled,
+        and what highlights code and renders Markdown as well.
+        """
+        with suppress(Exception):  # only time is lost: where it matters, nbgrader meets it, too
+            cls(template_name="classic").from_notebook_node(notebook)
 
 
 class Engines:

@@ -57,7 +57,7 @@ def preload() -> None:
     """Import what a run is going to need: `autograder.warm` calls it before it forks subjects."""
     from autograder.warm import modules
 
-    modules.import_all(SHELL)
+    modules.import_all((*SHELL, "autograder.notebook_check"))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

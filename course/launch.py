@@ -41,16 +41,15 @@ def _run(name: str) -> None:
     scripts = os.path.dirname(sys.executable)  # noqa: PTH120 - nothing else is imported yet
     os.environ["PATH"] = os.pathsep.join([scripts, os.environ.get("PATH", os.defpath)])
     _collect_garbage_seldom()
+    # Not when a command comes to it, in a thread or half done. The doctor tells it in its own way.
+    if importlib.util.find_spec("rclpy") is None and sys.argv[1:2] != ["doctor"]:
+        sys.stderr.write(f"{name}: {WHEELS_TORN} {WHEELS_ANEW}\n")
+        sys.exit(2)
     try:
         importlib.import_module(f"{name}.cli").main()
     except KeyboardInterrupt:  # it takes a second until the command itself sees to Ctrl-C
         sys.stderr.write(f"{name}: stopped.\n")
         sys.exit(128 + signal.SIGINT)
-    except ModuleNotFoundError:
-        if importlib.util.find_spec("rclpy") is not None:
-            raise
-        sys.stderr.write(f"{name}: {WHEELS_TORN} {WHEELS_ANEW}\n")
-        sys.exit(2)
 
 
 def _collect_garbage_seldom() -> None:

@@ -15,10 +15,11 @@ import pytest
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 
-from autograder import engine, runner, submission
+from autograder import engine, nbgrader_once, runner, submission
 from autograder.corpus import Case
 from autograder.engine import AssignmentError
 from autograder.gradebook import CourseGradebook, Grade, GradebookError
+from autograder.nbgrader_once import FeedbackExporter
 from tests.machine import needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
@@ -294,3 +295,13 @@ def test_an_empty_class_says_where_files_belong(course: Course) -> None:
 def test_a_folder_that_is_no_course_says_so(tmp_path: Path) -> None:
     with pytest.raises(GradebookError, match=r"no nbgrader_config\.py"):
         engine.grade(tmp_path, ASSIGNMENT)
+
+
+def test_a_warm_up_compiles_what_feedback_is_made_with(course: Course) -> None:
+    compiled = nbgrader_once._compiled._codes
+    compiled.clear()
+    FeedbackExporter.warm_up(course.released)
+    assert {"index.html.j2", "base.html.j2"} <= {
+        Path(code.co_filename).name for code in compiled.values()
+    }
+    FeedbackExporter.warm_up(nbformat.from_dict({"cells": 3}))  # that is for nbgrader to tell
