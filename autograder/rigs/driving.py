@@ -27,6 +27,8 @@ PART_OF_THE_WAY = 0.7
 """Of the metre between two stations: who rounds a position is at the next one too early."""
 BEYOND = 0.04
 """Metres past a station where the robot says that it is there: it rarely says so just in time."""
+HALTS = 3
+"""Times that a robot may be found halting where it had been driving a moment before."""
 CLEARING = 2.0
 """Seconds of wall time that a goal gets to end after its check has failed."""
 
@@ -103,22 +105,26 @@ class Drive:
     def require_driving(self) -> None:
         """Wait until the robot is commanded to drive.
 
+        What was commanded before its last report may still hold, and a halt come just after.
+
         Raises:
             Failed: it is not, or the goal has ended.
         """
         rig = self.rig
-        rig.wait_stepping(lambda: rig.speed > 0 or self.run.done)
-        rig.step(0.01)
-        hear_out(rig)  # a goal that has ended here, not at the next station, is told so
-        self.require_going_on()
-        if rig.speed <= 0:
-            speeds = "hardware/speed said nothing"
-            if rig.node.speeds:
-                speeds = f"hardware/speed said {rig.speed:g} m/s"
-            raise Failed(
-                expected="The robot drives until it is there: hardware/speed is more than 0.",
-                actual=f"Speed {self.where}: {speeds}{rig.because()}.",
-            )
+        for _ in range(HALTS):
+            drives = rig.wait_stepping(lambda: rig.speed > 0 or self.run.done)
+            rig.step(0.01)
+            hear_out(rig)  # a goal that has ended here, not at the next station, is told so
+            self.require_going_on()
+            if rig.speed > 0:
+                return
+            if not drives:
+                break
+        speeds = f"said {rig.speed:g} m/s" if rig.node.speeds else "said nothing"
+        raise Failed(
+            expected="The robot drives until it is there: hardware/speed is more than 0.",
+            actual=f"Speed {self.where}: hardware/speed {speeds}{rig.because()}.",
+        )
 
     def top_speed(self, limit: float) -> float:
         """Return the highest speed so far, once it is ``limit``; or the last, if it never is."""
