@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Sequence
 
 from autograder import exams, sandbox
@@ -45,23 +46,32 @@ def run(
         ExamError: an unknown exam.
         CorpusError: no case of that name; or a corpus that is not well formed.
     """
+    chosen = _chosen(cases(exam), only)
     trust = untrusting(say)
     done = []
     with trials.busy_loops(load):
-        for name, own in cases(exam).items():
-            chosen = [case for case in own if not only or case.name in only]
-            if exam and not chosen:
-                raise CorpusError(
-                    f"The corpus of '{name}' has no case {', '.join(only)}: there are "
-                    f"{', '.join(case.name for case in own)}."
-                )
-            if chosen:
-                source, released = trials.notebooks(name)
-                done += trials.run(
-                    chosen, source, released, jobs=jobs, repeat=repeat, trust=trust,
-                    done=lambda trial: say(_line(trial)),
-                )  # fmt: skip
+        for name, own in chosen.items():
+            source, released = trials.notebooks(name)
+            done += trials.run(
+                own, source, released, jobs=jobs, repeat=repeat, trust=trust,
+                done=lambda trial: say(_line(trial)),
+            )  # fmt: skip
     return done
+
+
+def _chosen(every: dict[str, list[Case]], only: Sequence[str]) -> dict[str, list[Case]]:
+    """Return the cases with the names in ``only``; all, if there are none."""
+    names = sorted({case.name for own in every.values() for case in own})
+    for name in only:
+        if name not in names:
+            corpus = f"corpus of '{next(iter(every))}'" if len(every) == 1 else "corpus"
+            close = ", ".join(difflib.get_close_matches(name, names, n=3, cutoff=0.5))
+            guess = f"did you mean {close}?" if close else "`--table` shows the ones there are."
+            raise CorpusError(f"The {corpus} has no case '{name}': {guess}")
+    chosen = {
+        exam: [case for case in own if not only or case.name in only] for exam, own in every.items()
+    }
+    return {exam: own for exam, own in chosen.items() if own}
 
 
 def untrusting(say: Callable[[str], None]) -> bool:

@@ -13,7 +13,7 @@ import pytest
 
 from autograder import corpus, exams, runner, submission
 from autograder.cells import without_markers
-from autograder.corpus import Case, CorpusError, Trial, tables, trials
+from autograder.corpus import Case, CorpusError, Trial, command, tables, trials
 from autograder.corpus.trials import Notebooks
 from autograder.sandbox import abilities
 from autograder.sandbox.probe import Abilities
@@ -206,6 +206,12 @@ def test_busy_loops_end_with_the_block_and_with_a_process_that_is_killed() -> No
 def test_a_missing_corpus_is_named(tmp_path: Path) -> None:
     with pytest.raises(CorpusError, match="no corpus for 'other'"):
         corpus.load(tmp_path, "other")
+
+
+def test_a_case_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trials, "run", lambda *_, **__: pytest.fail("nothing should be run"))
+    with pytest.raises(CorpusError, match="no case 'right-halt': did you mean right-halts"):
+        command.run(only=["right-exemplar", "right-halt"])
 
 
 def test_a_splice_that_does_not_fit_the_exemplar_is_refused() -> None:
