@@ -20,9 +20,12 @@ from autograder.exam import Failed
 from autograder.rigs.hardware import Picture
 from autograder.rigs.robot import STEP, RobotRig
 from autograder.rigs.scenarios import NAMES
+from course.runtime.waiting import Deadline
 
 PATIENCE = 1.0
 """Seconds of wall time that a stream may lag behind its clock in all, while it is counted."""
+NUDGE = 0.1
+"""Seconds of wall time after which a thread may have missed that time has moved."""
 LOST = 0.05
 """Seconds of wall time for one picture, where some have been lost on the way."""
 NEXT, NEXT_LOSSY = 2.0, 10.0
@@ -60,10 +63,20 @@ class Stretch:
             spent = self._rig.elapsed - first
             due = before + math.floor(spent * hertz + 1e-6) - 1  # one may be on its way
             lossy = pictures and self._newest() > len(pictures)
-            started = time.monotonic()
-            self._rig.wait(lambda due=due: self._newest() >= due, LOST if lossy else self._budget)  # type: ignore[misc]
+            patience = Deadline(LOST if lossy else self._budget)
+            self._await(due, patience)
             if not lossy:
-                self._budget = max(0.0, self._budget - (time.monotonic() - started))
+                self._budget = patience.left
+
+    def _await(self, due: int, patience: Deadline) -> None:
+        """Wait until so many pictures have been published, the clock standing still.
+
+        A thread that rclpy put to sleep just when its time came sleeps until time moves again.
+        """
+        while not self._rig.wait(lambda: self._newest() >= due, min(NUDGE, patience.left)):
+            if not patience.left:
+                return
+            self._rig.subject.nudge()
 
     def _newest(self) -> int:
         """Return how many pictures have been published since the first that was heard."""

@@ -1,4 +1,4 @@
-"""A node's clock sleeps in the node's own context, whatever the process's default context is."""
+"""A node's clock sleeps in the node's own context, and not at all until a time that has passed."""
 
 # mypy: allow-untyped-calls
 
@@ -15,10 +15,16 @@ def sleeps_in_own_context(node: Node) -> None:
 
     rclpy takes the process's default context then, although the clock is a node's; a session
     beside the notebook's own is not that context, and rclpy would raise NotInitializedException.
+
+    rclpy also waits for the next /clock if the time has passed already, which a clock that is moved
+    step by step may not send before somebody hears from the one who sleeps.
     """
     clock, own = node.get_clock(), node.context
 
     def sleep_until(until: Time, context: Context | None = None) -> bool:
-        return bool(Clock.sleep_until(clock, until, own if context is None else context))
+        context = own if context is None else context
+        if context.ok() and until.clock_type == clock.clock_type and clock.now() >= until:
+            return True
+        return bool(Clock.sleep_until(clock, until, context))
 
     clock.sleep_until = sleep_until  # type: ignore[method-assign]

@@ -87,6 +87,16 @@ def test_a_nodes_clock_sleeps_without_being_told_its_context(lab):
         assert other.run(Node, "other").get_clock().sleep_for(Duration(seconds=0.001))
 
 
+def test_a_clock_does_not_sleep_until_a_time_that_has_passed(lab):
+    clock = lab.run(Node, "late").get_clock()
+    lab.sim.advance(1.0)
+    woke = []
+    past = clock.now() - Duration(seconds=0.5)
+    thread = threading.Thread(target=lambda: woke.append(clock.sleep_until(past)), daemon=True)
+    thread.start()
+    lab.until(lambda: woke == [True])  # nobody moves the clock
+
+
 def test_a_recorder_stamps_in_simulated_time(lab):
     lab.run(Sensors)
     recorder = lab.record("readings", String)
