@@ -158,7 +158,7 @@ class ClassRun:
             yield from pieces
 
     def _run(self, pieces: Iterator[Piece]) -> None:
-        more, cold = True, self._feedback
+        more = True
         while more or self._running:
             while more and len(self._running) < self._workers.room():
                 self._interruption.check()
@@ -167,10 +167,9 @@ class ClassRun:
                     more = False
                 else:
                     self._begin(piece)
-            if cold and not more and 0 < len(self._running) <= (os.cpu_count() or 1):
-                self._desk.warm_up()  # a processor has little to do from here on
-                cold = False
             if self._running:
+                if self._feedback and not more and len(self._running) <= (os.cpu_count() or 1):
+                    self._desk.warm_up()  # a processor has little to do from here on
                 self._interruption.check()
                 for done in self._workers.wait():
                     self._finish(done)

@@ -76,9 +76,10 @@ class Desk:
         }
 
     def warm_up(self) -> None:
-        """Prepare for writing feedback, while there is nothing else to do."""
-        _, released = self._originals[self.notebooks[0]]
-        FeedbackExporter.warm_up(released)
+        """Prepare for writing feedback, while there is nothing else to do, unless some was."""
+        if not FeedbackExporter.is_warm():
+            _, released = self._originals[self.notebooks[0]]
+            FeedbackExporter.warm_up(released)
 
     @property
     def folders(self) -> tuple[Path, Path]:

@@ -48,6 +48,11 @@ class FeedbackExporter(HTMLExporter):
         environment.bytecode_cache = _compiled
         return environment
 
+    @staticmethod
+    def is_warm() -> bool:
+        """Whether templates have been compiled: for feedback that was written, or a warm-up."""
+        return bool(_compiled._codes)
+
     @classmethod
     def warm_up(cls, notebook: NotebookNode) -> None:
         """Compile what feedback is made with, by rendering a ``notebook`` for nobody.
