@@ -12,7 +12,12 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import StudentError
 from autograder.exam import Exam, Failed, NotExaminable
-from autograder.rigs.backlogs import altered, require_burst, require_fresh
+from autograder.rigs.backlogs import (
+    altered,
+    require_burst,
+    require_fresh,
+    require_open_scans,
+)
 from autograder.rigs.gap import Aftermath, radio_gap
 from autograder.rigs.joining import require_no_past
 from autograder.rigs.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Sensor
@@ -136,9 +141,7 @@ def _why_silent(rig: SensorRig, sensor: Sensor) -> str:
         return f"Nothing of {sensor.name} is published on {sensor.topic}."
     if (target := f"consumer/{sensor.name}") in rig.node.foreign:
         return _changed(target, f"{sensor.topic} carried")
-    raised = rig.subject.errors()
-    why = f" (a callback raised an error, in {raised[-1].rstrip('.')})" if raised else ""
-    return f"{sensor.topic} carries readings, but none comes out on {target}{why}."
+    return f"{sensor.topic} carries readings, but none comes out on {target}{rig.raised()}."
 
 
 def _changed(topic: str, what: str) -> str:
@@ -210,6 +213,7 @@ def lidar_fresh(rig: SensorRig) -> str:
     """
     expected = f"After a pause no scan older than 0.5 s (the last {LIDAR.most}) is acted on."
     require_fresh(rig, LIDAR, expected)
+    require_open_scans(rig)
     return _practice(rig, LIDAR)
 
 

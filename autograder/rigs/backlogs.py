@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from autograder.exam import Failed, NotExaminable
-from autograder.rigs.readings import IMU, STOP, Sensor
+from autograder.rigs.readings import IMU, LIDAR, STOP, Sensor, is_open
 from autograder.rigs.sensors import SensorRig
 from autograder.rigs.singles import thinned
 from autograder.rigs.stalling import (
@@ -17,6 +17,7 @@ from autograder.rigs.stalling import (
 )
 
 THINNED = 0.8  # a driver that publishes less than this share of the readings drops some
+OPEN_SCANS = 10  # scans that are sent until the consumer hands one on
 
 
 def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
@@ -112,6 +113,28 @@ def require_burst(rig: SensorRig, expected: str) -> None:
     else:
         return
     raise Failed(expected=expected, actual=actual)
+
+
+def require_open_scans(rig: SensorRig) -> None:
+    """Fail if the consumer leaves out scans with beams that have no echo."""
+    phase = "open"
+    numbers = [number for number in range(2 * OPEN_SCANS) if is_open(number)]
+
+    def came() -> bool:
+        return bool(rig.consumed(LIDAR, phase))
+
+    for number in numbers:
+        rig.node.publish(LIDAR, phase, number)
+        if rig.wait(came, 1 / LIDAR.rate):
+            return
+    if not rig.wait(came):
+        passed = len(set(rig.witnessed(LIDAR, phase)))
+        raise Failed(
+            expected="Scans with beams that have no echo (inf, or nan) are acted on, too: nearly "
+            "every scan has some.",
+            actual=f"Of {len(numbers)} such scans the driver published {passed}, and the consumer "
+            f"handed on none{rig.raised()}.",
+        )
 
 
 def lost(number: int, of: int = 0) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -10,6 +11,7 @@ from autograder.rigs.camera import PERIOD, SETTLE, CameraRig
 from course.runtime.waiting import Deadline
 
 STEPS = 10  # at least, in which a rate is counted
+LONGEST_STEP = 0.4  # s: a timer that is too fast would come just once in a longer one
 KEEP_UP = 0.25  # s of wall time that a picture which is due is waited for before time moves on
 STANDSTILL = 0.5  # s of wall time without two pictures: they stand still
 BACKLOG = 3.0  # s of wall time in which pictures may come that had been ordered before
@@ -75,7 +77,7 @@ def _count(rig: CameraRig, device: str, rate: float, seconds: int, pace: float) 
     may keep one order at a time and drop the next one while it is busy.
     """
     wanted = rate * seconds
-    steps = max(STEPS, round(wanted))
+    steps = max(STEPS, round(wanted), math.ceil(seconds / LONGEST_STEP))
     before, late, most, last = len(rig.pictures(device)), 0, 0, 0
     deadline = Deadline(SETTLE if pace == PACES[-1] else AGAIN)
 

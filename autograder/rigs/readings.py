@@ -1,11 +1,13 @@
 """The readings of the QoS exam: four sensors, and the tags by which their readings are told apart.
 
 A tag stands in several places of a reading: a driver may set the header, and a consumer may change
-it, or clean a scan, before it hands on what it acts on.
+it, and clean the content, before it hands on what it acts on. Every other scan has beams that hit
+nothing, or failed, as nearly every scan in a warehouse.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -16,6 +18,15 @@ from std_msgs.msg import String
 
 FAR = 2.0**30
 """The range of the LIDAR: what is cleaned by it still has the numbers of its tag."""
+
+
+OPEN, CLOSED = (math.inf, math.nan), (1.0, 1.0)
+"""The last two ranges of a scan in metres: two beams that have no echo, or have one."""
+
+
+def is_open(number: int) -> bool:
+    """Whether the scan of that number has beams without an echo."""
+    return number % 2 == 1
 
 
 class Tag(NamedTuple):
@@ -62,17 +73,21 @@ class Sensor:
             message.height, message.width, message.step = 1, len(message.data), len(message.data)
             message.encoding = "mono8"
         elif self.type is LaserScan:
-            message.angle_min, message.angle_max, message.angle_increment = -0.5, 0.5, 0.5
+            message.angle_min, message.angle_max, message.angle_increment = -0.5, 1.5, 0.5
             message.range_min, message.range_max = 0.0, FAR
-            message.ranges = message.intensities = numbers
+            message.ranges = [*numbers, *(OPEN if is_open(tag.number) else CLOSED)]
+            message.intensities = [*numbers, 0.0, 0.0]
         else:
             for vector in _vectors(message):
                 vector.x, vector.y, vector.z = numbers
         return message
 
-    def tag(self, message: Any) -> Tag | None:
-        """Return the tag of a reading, or None if it has none."""
-        return next(filter(None, map(Tag.read, self._places(message))), None)
+    def tags(self, message: Any) -> list[Tag]:
+        """Return all that looks like a tag of a reading.
+
+        What was cleaned may do so, too: a rotation that was brought to length 1, say.
+        """
+        return list(filter(None, map(Tag.read, self._places(message))))
 
     def _places(self, message: Any) -> list[str]:
         """Return what stands where a tag may stand."""
@@ -99,7 +114,8 @@ class Sensor:
         delivered = self.message(tag, Time())
         if self.type is not String:
             delivered.header = message.header
-        return bool(message == delivered)
+        # As text: a range that is not a number does not equal itself.
+        return repr(message) == repr(delivered)
 
 
 def _vectors(imu: Imu) -> tuple[Any, Any, Any]:

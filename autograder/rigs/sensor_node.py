@@ -127,9 +127,14 @@ class ExaminerNode(QuietNode):
         self.hardware[sensor.name].publish(sensor.message(tag, now))
 
     def _tag(self, sensor: Sensor, message: Any) -> Tag | None:
-        """Return the tag of a reading, by its stamp if nothing else is left of it."""
-        if (tag := sensor.tag(message)) is not None or sensor is STOP:
-            return tag
+        """Return the tag of a reading, by its stamp if nothing else is left of it.
+
+        A stop event may be one of an earlier run, whose nonce is another.
+        """
+        tags = sensor.tags(message)
+        own = next((tag for tag in tags if tag.nonce == self.nonce), None)
+        if own is not None or sensor is STOP:
+            return own or next(iter(tags), None)
         return self._stamps.get((sensor.name, Time.from_msg(message.header.stamp).nanoseconds))
 
 

@@ -198,6 +198,11 @@ class SensorRig:
         ends = [*self.offered(sensor.topic), *self.requested(sensor.topic)]
         return any(0 < end.qos_profile.lifespan.nanoseconds < ENDLESS for end in ends)
 
+    def raised(self) -> str:
+        """Return which error a callback raised last, as a phrase in brackets, or nothing."""
+        raised = self.subject.errors()
+        return f" (a callback raised an error, in {raised[-1].rstrip('.')})" if raised else ""
+
     def comes_again(self) -> int:
         """Return how many stop events the consumer has handed on more than once so far.
 

@@ -3,7 +3,8 @@
 Python runs a signal handler only between two steps of the main thread, and `rclpy.spin(node)` waits
 in C until something wakes it: without a timer, perhaps for ever. `rclpy.init()` installs handlers
 in C for this, which end every context of the process. A session must outlive an interrupt, so it
-wakes those executors every now and then instead, as long as there are any.
+wakes those executors every now and then instead, as long as there are any. The thread that does so
+is there from beginning to end: whoever counts threads must not find it now and then.
 """
 
 # mypy: allow-untyped-calls
@@ -15,6 +16,7 @@ import threading
 import time
 import weakref
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
@@ -41,8 +43,16 @@ class SessionContext(Context):
         self._ours: weakref.WeakSet[BackgroundExecutor] = weakref.WeakSet()
         self._guests: weakref.WeakSet[Executor] = weakref.WeakSet()
         self._guests_lock = threading.Lock()
-        self._waker: threading.Thread | None = None
+        self._waker = threading.Thread(
+            target=self._wake_guests, name="ROS interrupts", daemon=True
+        )
+        self._wanted = threading.Event()
         self._over = threading.Event()
+
+    def init(self, *arguments: Any, **options: Any) -> None:
+        """Initialize the context."""
+        super().init(*arguments, **options)
+        self._waker.start()
 
     def on_shutdown(self, callback: Callable[[], None]) -> None:
         """Call `callback` when the context is shut down."""
@@ -53,27 +63,23 @@ class SessionContext(Context):
         elif isinstance(owner, Executor):
             with self._guests_lock:
                 self._guests.add(owner)
-                if self._waker is None and not self._over.is_set():
-                    self._waker = threading.Thread(
-                        target=self._wake_guests, name="ROS interrupts", daemon=True
-                    )
-                    self._waker.start()
+                self._wanted.set()
 
     def shutdown(self) -> None:
         """Shut the context down."""
-        self._over.set()
+        self._end_waking()
         with self._at_rest(), rcutils_tap.staying():
             super().shutdown()
 
     def try_shutdown(self) -> None:
         """Shut the context down, if that has not been done."""
-        self._over.set()
+        self._end_waking()
         with self._at_rest(), rcutils_tap.staying():
             super().try_shutdown()
 
     def join(self, timeout: float) -> None:
         """Wait until no thread of this context is left, after it has been shut down."""
-        if self._waker is not None:
+        if self._waker.is_alive():
             self._waker.join(timeout)
 
     @contextlib.contextmanager
@@ -93,12 +99,15 @@ class SessionContext(Context):
                     executor.wait_for_a_job(_NAP)
             yield
 
+    def _end_waking(self) -> None:
+        self._over.set()
+        self._wanted.set()
+
     def _wake_guests(self) -> None:
-        while not self._over.wait(_PERIOD):
+        while self._wanted.wait() and not self._over.wait(_PERIOD):
             with self._guests_lock:
                 if not self._guests:
-                    self._waker = None
-                    return
+                    self._wanted.clear()
             self._wake_each()
 
     def _wake_each(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import subprocess
+import threading
 from collections.abc import Callable
 
 import pytest
@@ -75,13 +76,21 @@ def test_nobody_is_woken_unless_there_is_somebody_to_wake(session: course.Sessio
     session.run(Node, "one")
     session.until(lambda: True)
     assert isinstance(context, SessionContext)
-    assert context._waker is None
+    assert not context._wanted.is_set()
     executor = SingleThreadedExecutor(context=context)
-    assert context._waker is not None
-    waker = context._waker
+    assert context._wanted.is_set()
     executor.shutdown()
     del executor
-    session.until(lambda: not waker.is_alive(), timeout=30.0, what="the end of waking")
+    session.until(lambda: not context._wanted.is_set(), timeout=30.0, what="the end of waking")
+
+
+def test_an_executor_adds_no_thread_to_a_session(session: course.Session) -> None:
+    """Who looks whether a node's threads have ended must not find one of the session's."""
+    session.run(Node, "one")
+    before = set(threading.enumerate())
+    executor = SingleThreadedExecutor(context=session.context)
+    assert set(threading.enumerate()) == before
+    executor.shutdown()
 
 
 def test_waking_is_no_work(session: course.Session) -> None:
@@ -99,7 +108,6 @@ def test_waking_ends_with_the_session() -> None:
     holder = SingleThreadedExecutor(context=session.context)
     holder.add_node(node)
     waker = session.context._waker
-    assert waker is not None
     assert waker.is_alive()
     session.close()
     assert not waker.is_alive()
