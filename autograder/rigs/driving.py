@@ -25,8 +25,12 @@ FEEDBACK = f"{NAME}/_action/feedback"
 SPEED_MARGIN = 0.011  # m/s
 PART_OF_THE_WAY = 0.7
 """Of the metre between two stations: who rounds a position is at the next one too early."""
+CLOSE = 0.15
+"""Metres before a station from which on a place is told by its distance."""
 BEYOND = 0.04
 """Metres past a station where the robot says that it is there: it rarely says so just in time."""
+STOOD = 1.0
+"""Seconds of the node's clock without a new position, after which the aisle counts as blocked."""
 HALTS = 3
 """Times that a robot may be found halting where it had been driving a moment before."""
 CLEARING = 2.0
@@ -37,7 +41,8 @@ class Drive:
     """A goal that was accepted, and what the one who sent it heard of it.
 
     ``station`` is the last one that the robot has come to: what is reported before it has moved
-    there is made up. ``position`` is where the robot is (m).
+    there is made up. ``position`` is where the robot is (m), ``since`` the node's time (s) at which
+    it has come there.
     """
 
     def __init__(self, rig: RobotRig, position: float, goal: int) -> None:
@@ -98,9 +103,27 @@ class Drive:
     @property
     def place(self) -> str:
         """The robot's place, between the stations or at one, as a phrase."""
-        if self.position - self.station >= PART_OF_THE_WAY:
-            return f"between stations {self.station} and {self.station + 1}"
-        return f"at station {self.station}"
+        if not self.between:
+            return f"at station {self.station}"
+        if (left := self.station + 1 - self.position) < CLOSE:
+            return f"{left:.2g} m before station {self.station + 1}"
+        return f"between stations {self.station} and {self.station + 1}"
+
+    @property
+    def between(self) -> bool:
+        """Whether the robot is between two stations."""
+        return self.position - self.station >= PART_OF_THE_WAY
+
+    @property
+    def stood(self) -> str:
+        """For how long a blocked aisle has held the robot up by now, as a sentence; or nothing."""
+        seconds = self.rig.elapsed - self.since
+        if not self.between or seconds < STOOD:
+            return ""
+        return (
+            f" The robot had stood there for {seconds:.0f} s of the node's time, as in a blocked "
+            "aisle."
+        )
 
     def require_driving(self) -> None:
         """Wait until the robot is commanded to drive.
@@ -110,7 +133,7 @@ class Drive:
         Raises:
             Failed: it is not, or the goal has ended.
         """
-        rig = self.rig
+        rig, stood = self.rig, self.stood  # from now on it stands if it is not told to drive
         for _ in range(HALTS):
             drives = rig.wait_stepping(lambda: rig.speed > 0 or self.run.done)
             rig.step(0.01)
@@ -123,7 +146,7 @@ class Drive:
         speeds = f"said {rig.speed:g} m/s" if rig.node.speeds else "said nothing"
         raise Failed(
             expected="The robot drives until it is there: hardware/speed is more than 0.",
-            actual=f"Speed {self.where}: hardware/speed {speeds}{rig.because()}.",
+            actual=f"Speed {self.where}: hardware/speed {speeds}{rig.because()}.{stood}",
         )
 
     def top_speed(self, limit: float) -> float:
@@ -146,9 +169,11 @@ class Drive:
     def require_going_on(self) -> None:
         """Fail if the goal has ended."""
         if self.run.done:
+            waits = " While the aisle is blocked, the robot waits." if self.stood else ""
+            how = ended(self.run.status.name)
             raise Failed(
-                expected="The goal ends when the robot is there.",
-                actual=f"It {ended(self.run.status.name)} {self.where}{self.rig.because()}.",
+                expected=f"The goal ends when the robot is there.{waits}",
+                actual=f"It {how} {self.where}{self.rig.because()}.{self.stood}",
             )
 
     def roll_on(self) -> None:
@@ -163,13 +188,14 @@ class Drive:
 
     def move(self, position: float) -> None:
         """Have the hardware report a ``position`` (m)."""
-        self.position = position
+        self.position, self.since = position, self.rig.elapsed
         self.rig.report("position", position)
 
     def go_by(self, seconds: float, grain: float = GRAIN) -> None:
         """Let so many seconds of the node's clock go by, and hear what is said in them."""
-        for _ in range(round(seconds / STEP)):
-            self.rig.step(STEP, grain)
+        step = max(STEP, grain)
+        for _ in range(round(seconds / step)):
+            self.rig.step(step, grain)
         hear_out(self.rig)
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from concurrent.futures import Future
 
 from autograder.exam import Failed
-from autograder.rigs.blocked_aisle import hold
+from autograder.rigs.blocked_aisle import hold, hold_before_goal
 from autograder.rigs.driving import Drive
 from autograder.rigs.listening import acquaint
 from autograder.rigs.phrases import ended
@@ -25,13 +25,16 @@ def to_the_end(drive: Drive, *, blocked: bool = False) -> None:
 
     Args:
         drive: the drive.
-        blocked: whether the aisle is blocked for a while after the first station.
+        blocked: whether the aisle is blocked for a while after the first station, and for a
+            moment just before the goal.
 
     Raises:
         Failed: it does not drive, does not report, or does not end as it should.
     """
     while drive.station < drive.goal:
         drive.require_driving()
+        if blocked and drive.station == drive.goal - 1:
+            hold_before_goal(drive)
         drive.roll_on()
         if drive.station < drive.goal:
             require_report(drive)
@@ -59,7 +62,7 @@ def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool 
         how = ended(drive.run.status.name) if drive.run.done else "went on and on"
         raise Failed(
             expected=f"{expected} The goal ends as {state.name}.",
-            actual=f"The goal {how}, with the robot {drive.place}{rig.because()}.",
+            actual=f"The goal {how}, with the robot {drive.place}{rig.because()}.{drive.stood}",
         )
     # Which of two messages comes first is the transport's affair: a stop may be under way.
     late = stopped and not rig.wait(lambda: rig.speed == 0, UNDER_WAY)

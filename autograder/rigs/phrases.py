@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-LEFT_OPEN = (
-    "rclpy aborts a goal whose execute callback raises, or returns without succeed(), canceled() "
-    "or abort()"
+ABORTED = (
+    "by a call of abort(), or because the execute callback raised, or returned without succeed() "
+    "or canceled()"
 )
 
 
@@ -26,4 +26,4 @@ def with_reason(reason: str) -> str:
 def ended(word: str) -> str:
     """Return how a goal ended, in rclpy's ``word`` for it, as a phrase: "ended as aborted …"."""
     aborted = word.lower() == "aborted"
-    return f"ended as {word}" + (f" ({LEFT_OPEN})" if aborted else "")
+    return f"ended as {word}" + (f" ({ABORTED})" if aborted else "")
