@@ -110,8 +110,10 @@ class Operator(Player):
         """Create the operator's client and ends of topics."""
         super().__init__("operator")
         self.limits: list[tuple[float, float]] = []
+        self.commands: list[Twist] = []
         self._jam = self.speak(Bool, "hardware/jammed")
         self.hear(Twist, "wheels/limits", self._note)
+        self.hear(Twist, "cmd_vel", lambda message: self.commands.append(message))
         self._client = self.create_client(SetParametersAtomically, "speed/set")
         self.uses("speed/set")
 
@@ -124,7 +126,7 @@ class Operator(Player):
 
     def ask(self, parameters: list[Parameter]) -> Future:
         """Send a request; return the future of its answer. Forgets what was before."""
-        self.limits = []
+        self.limits, self.commands = [], []
         request = SetParametersAtomically.Request(parameters=parameters)
         return self._client.call_async(request)
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 
 from rclpy.action.server import ServerGoalHandle
 
@@ -27,7 +28,9 @@ TOLERANCE = ALLOWED + STRIDE  # s: what the task allows, and a node that looks b
 AFTER = 2.5  # s in which a second outcome would show
 METRES = 3  # of a drive whose length does not matter; others differ, lest one be remembered
 FAR = 40  # m
-BREATHS = 8  # feedbacks of a slow drive, which takes longer than anyone would wait for the whole
+# Marks in the feedbacks of a slow drive, which takes longer than anyone would wait for the whole.
+# Once it stands still in between: the same feedback again is a sign of life, too.
+BREATHS = (1, 2, 3, 3, 4, 5, 6, 7)
 HESITATION = 0.7  # s that an answer takes which is slow, but in time whatever the tolerance
 
 
@@ -126,22 +129,14 @@ def _ends(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
 def stalled(rig: RobotRig) -> None:
     """A slow drive that goes on, then one whose feedback ceases."""
     with _user(rig) as (robot, user):
-        _accepted(robot, user, BREATHS)
-        for metre in range(1, BREATHS + 1):
-            robot.spend(BREATH, COARSE)
-            if user.cancels or user.outcomes:
-                raise Failed(
-                    expected=f"A drive with feedback every {BREATH:g} s is left alone.",
-                    actual="It was canceled." if user.cancels else f"It said “{user.outcomes[0]}”.",
-                )
-            user.feedback(metre)
+        _slowly_drives(robot, user)
         user.end(ServerGoalHandle.succeed)
         _outcome(robot, user, "When a slow drive succeeded", "arrived")
 
         _accepted(robot, user)
         robot.spend(1.0)
         user.feedback(1)
-        _canceled(robot, user)
+        _canceled(robot, user, "the last feedback")
         when = f"When feedback ceased for {SILENCE:g} s, and the cancel was accepted"
         _outcome(robot, user, when, "stalled")
         user.end(ServerGoalHandle.canceled)
@@ -149,21 +144,44 @@ def stalled(rig: RobotRig) -> None:
         robot.require_no_errors()
 
 
-def _canceled(robot: Robot, user: NavigatorUser) -> None:
-    """Wait in silence until the goal is canceled, neither too early nor too late."""
+def _slowly_drives(robot: Robot, user: NavigatorUser) -> None:
+    """Ask for a drive, and give it feedback so often that it must be left alone."""
+    _accepted(robot, user, BREATHS[-1] + 1)
+    for before, passed in pairwise((-1, 0, *BREATHS)):
+        if passed:
+            user.feedback(passed)
+        robot.spend(BREATH, COARSE)
+        if user.cancels or user.outcomes:
+            did = "It was canceled" if user.cancels else f"It said “{user.outcomes[0]}”"
+            same = " The last feedback had the same marks as the one before: it counts, too."
+            raise Failed(
+                expected=f"A drive with feedback every {BREATH:g} s is left alone.",
+                actual=f"{did}.{same if passed == before else ''}",
+            )
+
+
+def _canceled(robot: Robot, user: NavigatorUser, event: str = "its acceptance") -> None:
+    """Wait in silence until the goal is canceled, neither too early nor too late.
+
+    ``event`` is what has just happened, and begins the silence.
+    """
     robot.rest()
     user.speeds.clear()  # what came before the silence does not answer it
     since = user.now
     robot.run(lambda: user.cancels, SILENCE + TOLERANCE)
-    expected = f"{SILENCE:g} s after its acceptance or the last feedback the goal is canceled."
+    expected = f"The goal is canceled {SILENCE:g} s after {event}, with no feedback since then."
     if not user.cancels:
         said = f" It said “{user.outcomes[0]}”." if user.outcomes else ""
         raise Failed(
             expected=expected,
-            actual=f"After {SILENCE + TOLERANCE:g} s no request to cancel had come.{said}",
+            actual=f"{SILENCE + TOLERANCE:g} s after {event} no request to cancel had come.{said}",
         )
-    if user.cancels[0] - since < SILENCE - TOLERANCE:
-        raise Failed(expected=expected, actual=f"It came after {user.cancels[0] - since:.1f} s.")
+    waited = user.cancels[0] - since
+    if waited < SILENCE - TOLERANCE:
+        raise Failed(
+            expected=expected,
+            actual=f"The request to cancel came {waited:.1f} s after {event}.",
+        )
 
 
 def _slowly_refused(robot: Robot, user: NavigatorUser) -> None:

@@ -27,6 +27,8 @@ FIRST_GAP = 1.5  # s between the first two tries: 1 s without an answer, 0.5 s o
 GROWTH = 0.5  # s by which the second pause is longer, at least
 IDLE = 2.0  # s in which a node that has not been asked for anything shows its heartbeat
 BACK = 1.8  # s after a request in which the gripper comes back: a third try is still to come
+GIVEN_UP = "After three tries without an answer"
+SECOND = " That was at the second request in a row that got no answer; at the first all was right."
 SHORTEST = 4.5 - 5 * ALLOWED - STRIDE  # s: three tries and two pauses, each as short as may be
 
 
@@ -80,38 +82,49 @@ def _refuses(robot: Robot, user: GripUser, when: str) -> None:
 
 
 def unanswered(rig: RobotRig) -> None:
-    """The gripper takes every request and answers none: its callback hangs, and once it raises."""
+    """The gripper takes every request and answers none: its callback hangs, and once it raises.
+
+    So it does with the next request, too: the tries and pauses of that one begin anew.
+    """
     with client(rig) as (robot, user):
-        tried(robot, user, True)
-        began = user.now
-        # In half strides: they blur how short the first pause is.
-        robot.run(lambda: len(user.tries) > 1 or user.outcomes, DEADLINE, STRIDE / 2)
-        if len(user.tries) > 1:
-            user.tries[1].crash()
-        robot.run(lambda: len(user.tries) > 2 or user.outcomes, DEADLINE + began - user.now)
-        if not user.outcomes:
-            user.holds = 0  # one that came with a try says nothing about the outcome
-        if not robot.run(lambda: user.outcomes, DEADLINE + began - user.now):
-            raise Failed(
-                expected=f"A gripper that never answers is given up within {LONGEST:g} s.",
-                actual=f"After {DEADLINE:.1f} s of simulated time there {_tries(len(user.tries))} "
-                f"and no outcome.{_hint_of_clock(user)}{robot.complaint()}",
-            )
-        said_at = user.now
-        when = "After three tries without an answer"
-        times = [attempt.at for attempt in user.tries]
-        if len(times) != 3:
-            raise Failed(
-                expected="A gripper that never answers is tried three times.",
-                actual=f"There {_tries(len(times))} before the outcome “{user.outcomes[0]}”.",
-            )
-        require_data(user, True)
-        outcome(robot, user, when, "failed")
-        _require_pauses(times[1] - times[0], times[2] - times[1])
-        _require_clear(said_at - times[2])
+        _given_up(robot, user, True)
         user.tries[2].reply(True)
-        once(robot, user, f"{when}, and a late answer to the third")
+        once(robot, user, f"{GIVEN_UP}, and a late answer to the third")
+        try:
+            _given_up(robot, user, False)
+        except Failed as failed:
+            raise Failed(expected=failed.expected, actual=f"{failed.actual}{SECOND}") from None
         robot.require_no_errors()
+
+
+def _given_up(robot: Robot, user: GripUser, close: bool) -> None:
+    """Ask for a grip, answer no try, and require three of them, their pauses and the outcome."""
+    tried(robot, user, close)
+    began = user.now
+    # In half strides: they blur how short the first pause is.
+    robot.run(lambda: len(user.tries) > 1 or user.outcomes, DEADLINE, STRIDE / 2)
+    if len(user.tries) > 1:
+        user.tries[1].crash()
+    robot.run(lambda: len(user.tries) > 2 or user.outcomes, DEADLINE + began - user.now)
+    if not user.outcomes:
+        user.holds = 0  # one that came with a try says nothing about the outcome
+    if not robot.run(lambda: user.outcomes, DEADLINE + began - user.now):
+        raise Failed(
+            expected=f"A gripper that never answers is given up within {LONGEST:g} s.",
+            actual=f"After {DEADLINE:.1f} s of simulated time there {_tries(len(user.tries))} "
+            f"and no outcome.{_hint_of_clock(user)}{robot.complaint()}",
+        )
+    said_at = user.now
+    times = [attempt.at for attempt in user.tries]
+    if len(times) != 3:
+        raise Failed(
+            expected="A gripper that never answers is tried three times.",
+            actual=f"There {_tries(len(times))} before the outcome “{user.outcomes[0]}”.",
+        )
+    require_data(user, close)
+    outcome(robot, user, GIVEN_UP, "failed")
+    _require_pauses(times[1] - times[0], times[2] - times[1])
+    _require_clear(said_at - times[2])
 
 
 def _hint_of_clock(user: GripUser) -> str:

@@ -21,6 +21,7 @@ from autograder.rigs.gripper import (
     unset,
     whole,
 )
+from autograder.rigs.navigation import moves
 from autograder.rigs.phrases import with_reason
 from autograder.rigs.safety import RobotRig
 from autograder.rigs.safety_robot import COARSE, Robot
@@ -60,16 +61,15 @@ NONSENSE: tuple[tuple[str, list[Parameter]], ...] = (
 
 
 def good(rig: RobotRig) -> None:
-    """Good requests: the first one, both limits, then one at a time, at its bounds."""
+    """Good requests: the first one, both limits, one at a time, at its bounds, the same again."""
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
-        _accepted(robot, operator, "angular = 0.8 alone, the first one,", (0.5, 0.8), angular=0.8)
-        _accepted(
-            robot, operator, "linear = 0.33, angular = 0.66", (0.33, 0.66),
-            linear=0.33, angular=0.66,
-        )  # fmt: skip
-        _accepted(robot, operator, "angular = 2.0 alone", (0.33, 2.0), angular=2.0)
-        _accepted(robot, operator, "linear = 0.0 alone", (0.0, 2.0), linear=0.0)
-        _accepted(robot, operator, "linear = 1.0 alone", (1.0, 2.0), linear=1.0)
+        _accepted(robot, operator, "At first", (0.5, 0.8), angular=0.8)
+        _accepted(robot, operator, "Then", (0.33, 0.66), linear=0.33, angular=0.66)
+        _accepted(robot, operator, "Then", (0.33, 2.0), angular=2.0)
+        _accepted(robot, operator, "Then", (0.0, 2.0), linear=0.0)
+        _accepted(robot, operator, "Then", (1.0, 2.0), linear=1.0)
+        when = "When linear and angular have these values already,"
+        _accepted(robot, operator, when, (1.0, 2.0), linear=1.0, angular=2.0)
 
 
 def bad(rig: RobotRig) -> None:
@@ -77,10 +77,7 @@ def bad(rig: RobotRig) -> None:
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
         for what, parameters in NONSENSE:
             _refused(robot, operator, what, parameters)
-        _accepted(
-            robot, operator, "linear = 0.4, angular = 0.8, after nonsense", (0.4, 0.8),
-            linear=0.4, angular=0.8,
-        )  # fmt: skip
+        _accepted(robot, operator, "After nonsense", (0.4, 0.8), linear=0.4, angular=0.8)
         robot.require_no_errors()
 
 
@@ -88,20 +85,15 @@ def atomic(rig: RobotRig) -> None:
     """Requests that are good in part, and wheels that raise."""
     rig.renew()
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
-        _accepted(robot, operator, "linear = 0.4 alone, the first one,", (0.4, 1.0), linear=0.4)
+        _accepted(robot, operator, "At first", (0.4, 1.0), linear=0.4)
         halves = [double("linear", 0.2), double("angular", math.nan)]
         _refused(robot, operator, "linear = 0.2 together with angular = NaN", halves)
         _refused(robot, operator, "angular = NaN together with linear = 0.2", halves[::-1])
-        _accepted(
-            robot,
-            operator,
-            "angular = 1.5 alone, after a half-good request",
-            (0.4, 1.5),
-            angular=1.5,
-        )
+        _accepted(robot, operator, "After a half-good request", (0.4, 1.5), angular=1.5)
         operator.jam(True)
         robot.rest()
-        _refused(robot, operator, "linear = 0.9 with jammed wheels", [double("linear", 0.9)])
+        what = "linear = 0.9 with jammed wheels"
+        _refused(robot, operator, what, [double("linear", 0.9)], may_command=True)
         operator.jam(False)
         robot.spend(LATER, COARSE)
         if operator.limits:
@@ -111,15 +103,15 @@ def atomic(rig: RobotRig) -> None:
                 actual=f"Within {LATER:g} s after the jam, what reached the wheels: "
                 f"{_limits(operator.limits)}.",
             )
-        _accepted(robot, operator, "angular = 1.1, after the jam", (0.4, 1.1), angular=1.1)
+        _accepted(robot, operator, "After the jam", (0.4, 1.1), angular=1.1)
         robot.require_no_errors()
 
 
-def _answer(robot: Robot, operator: Operator, what: str, parameters: list[Parameter]) -> Any:
+def _answer(robot: Robot, operator: Operator, request: str, parameters: list[Parameter]) -> Any:
     future = operator.ask(parameters)
     if not robot.run(ready(future), PATIENCE):
         raise Failed(
-            expected=f"A request with {what} is answered.",
+            expected=f"{request} is answered.",
             actual=f"No answer came.{robot.complaint()}",
         )
     robot.rest()
@@ -127,13 +119,16 @@ def _answer(robot: Robot, operator: Operator, what: str, parameters: list[Parame
 
 
 def _accepted(
-    robot: Robot, operator: Operator, what: str, due: tuple[float, float], **values: float
+    robot: Robot, operator: Operator, when: str, due: tuple[float, float], **values: float
 ) -> None:
+    """Require that a request for the limits of ``values`` is good, and sets those that are due."""
     parameters = [double(name, value) for name, value in values.items()]
-    result = _answer(robot, operator, what, parameters)
+    named = " and ".join(f"{name} = {value}" for name, value in values.items())
+    request = f"{when} a request with {named}"
+    result = _answer(robot, operator, request, parameters)
     if not result.successful:
         raise Failed(
-            expected=f"A request with {what} is good, and answered successful=True.",
+            expected=f"{request} is good, and answered successful=True.",
             actual=f"It was answered successful=False, {with_reason(result.reason)}.",
         )
     wanted = _limits([due])
@@ -143,17 +138,35 @@ def _accepted(
     )
     if not fits:
         raise Failed(
-            expected=f"A request with {what} hands {wanted} to the wheels, once.",
+            expected=f"{request} hands both limits to the wheels, once: {wanted}.",
             actual=f"What reached the wheels: {_limits(reached)}.",
         )
 
 
-def _refused(robot: Robot, operator: Operator, what: str, parameters: list[Parameter]) -> None:
-    result = _answer(robot, operator, what, parameters)
+def _refused(
+    robot: Robot,
+    operator: Operator,
+    what: str,
+    parameters: list[Parameter],
+    *,
+    may_command: bool = False,
+) -> None:
+    """Require that a request is answered with a reason, and that nothing reaches the wheels.
+
+    Where wheels raise, the task does not say that nothing else is asked of them: a server that
+    stops them then ``may_command`` it.
+    """
+    result = _answer(robot, operator, f"A request with {what}", parameters)
     if operator.limits:
         raise Failed(
             expected=f"Nothing of a request with {what} reaches the wheels.",
             actual=f"What reached the wheels: {_limits(operator.limits)}.",
+        )
+    if operator.commands and not may_command:
+        told = "drive" if any(map(moves, operator.commands)) else "stop"
+        raise Failed(
+            expected=f"Nothing at all reaches the wheels at a request with {what}.",
+            actual=f"On cmd_vel they were told to {told}.",
         )
     if result.successful:
         raise Failed(
