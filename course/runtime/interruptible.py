@@ -43,9 +43,7 @@ class SessionContext(Context):
         self._ours: weakref.WeakSet[BackgroundExecutor] = weakref.WeakSet()
         self._guests: weakref.WeakSet[Executor] = weakref.WeakSet()
         self._guests_lock = threading.Lock()
-        self._waker = threading.Thread(
-            target=self._wake_guests, name="ROS interrupts", daemon=True
-        )
+        self._waker = threading.Thread(target=self._wake_guests, name="ROS interrupts", daemon=True)
         self._wanted = threading.Event()
         self._over = threading.Event()
 
