@@ -1,9 +1,13 @@
-"""One name, two types, in one process: what DDS refuses, and rclpy has no words for."""
+"""One name for two things: what DDS or rclpy refuses, and rclpy has no words for.
+
+A topic or a service of two types in one process, or a node whose class uses a name of rclpy's.
+"""
 
 # mypy: allow-untyped-calls
 
 from __future__ import annotations
 
+import inspect
 import traceback
 from typing import Any
 
@@ -20,20 +24,47 @@ _KINDS = {
 """Methods of a node: what they make an endpoint of, and their arguments for its type and name."""
 
 
-def explain(error: BaseException) -> None:
-    """Say in ``error`` that a name has another type already, if that is why rclpy raised it.
+_OF_NODES = {
+    name for name, _ in inspect.getmembers(Node, lambda member: isinstance(member, property))
+}
+"""What rclpy keeps in a node, such as its ``handle``: a class that calls a method so breaks it."""
 
-    Between two processes such endpoints are made, and DDS does not connect them: then a diagnosis
-    says so. In one, rclpy raises "invalid allocator".
+
+def explain(error: BaseException) -> None:
+    """Say in ``error`` that a name is something else already, if that may be why rclpy raised it.
+
+    Between two processes endpoints of two types are made, and DDS does not connect them: then a
+    diagnosis says so. In one, rclpy raises "invalid allocator".
     """
     for frame, _ in traceback.walk_tb(error.__traceback__):
-        kind = _KINDS.get(frame.f_code.co_name)
-        if kind is not None and frame.f_globals.get("__name__") == "rclpy.node":
+        given, found = frame.f_locals, ""
+        node = given.get("self")
+        if frame.f_globals.get("__name__") != "rclpy.node" or not isinstance(node, Node):
+            continue
+        if isinstance(error, (AttributeError, TypeError)):
+            found = _taken(type(node))
+        if not found and (kind := _KINDS.get(frame.f_code.co_name)) is not None:
             what, type_of, name_of = kind
-            given = frame.f_locals
-            if found := _clash(given["self"], what, given[type_of], given[name_of]):
-                error.args = (f"{found} ({error})",)
+            found = _clash(node, what, given[type_of], given[name_of])
+        if found:
+            error.args = (f"{found} ({error})",)
             return
+
+
+def _taken(kind: type[Node]) -> str:
+    """Return a sentence about names of rclpy's that a class of nodes uses; empty without any."""
+    own = [name for name in sorted(_OF_NODES) if not _is_property(kind, name)]
+    if not own:
+        return ""
+    names = ", ".join(f"'{name}'" for name in own)
+    return (
+        f"{kind.__qualname__} has its own {names}, a name under which rclpy keeps something in "
+        "every Node: call it something else."
+    )
+
+
+def _is_property(kind: type[Node], name: str) -> bool:
+    return isinstance(inspect.getattr_static(kind, name), property)
 
 
 def _clash(node: Node, what: str, ros_type: Any, name: str) -> str:

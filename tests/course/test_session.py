@@ -169,6 +169,21 @@ def test_a_constructor_that_raises_leaves_no_ghost(session):
     assert names_seen_from_outside(session) == ["watcher"]
 
 
+def test_a_method_with_a_name_of_rclpys_is_named(session):
+    """rclpy only says that a 'method' object does not support the context manager protocol."""
+
+    class SpeedServer(Node):
+        def __init__(self):
+            super().__init__("speed_server")
+            self.create_service(SetBool, "speed", self.handle)
+
+        def handle(self, request, response):
+            return response
+
+    with pytest.raises(TypeError, match=r"SpeedServer has its own 'handle', a name under which"):
+        session.run(SpeedServer)
+
+
 def test_a_factory_that_returns_no_node_is_one_sentence(session):
     with pytest.raises(SessionError, match=r"returns a node; .*returned str"):
         session.run(lambda: "camera")
