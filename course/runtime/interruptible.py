@@ -102,7 +102,12 @@ class SessionContext(Context):
         self._wanted.set()
 
     def _wake_guests(self) -> None:
-        while self._wanted.wait() and not self._over.wait(_PERIOD):
+        # Whoever ends this says so first and wakes second: what is cleared here, it sets again, or
+        # it has said so before this looks.
+        while not self._over.is_set():
+            self._wanted.wait()
+            if self._over.wait(_PERIOD):
+                return
             with self._guests_lock:
                 if not self._guests:
                     self._wanted.clear()

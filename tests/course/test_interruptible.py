@@ -112,3 +112,19 @@ def test_waking_ends_with_the_session() -> None:
     session.close()
     assert not waker.is_alive()
     holder.shutdown()
+
+
+def test_waking_ends_though_the_session_ends_while_it_falls_asleep(
+    session: course.Session, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = session.context
+    fall_asleep = context._wanted.clear
+
+    def end_first() -> None:
+        context._end_waking()
+        fall_asleep()
+
+    monkeypatch.setattr(context._wanted, "clear", end_first)
+    SingleThreadedExecutor(context=context).shutdown()  # nobody is left to be woken
+    context._waker.join(30.0)
+    assert not context._waker.is_alive()
