@@ -27,3 +27,8 @@ def ended(word: str) -> str:
     """Return how a goal ended, in rclpy's ``word`` for it, as a phrase: "ended as aborted …"."""
     aborted = word.lower() == "aborted"
     return f"ended as {word}" + (f" ({ABORTED})" if aborted else "")
+
+
+def callback_raised(error: str) -> str:
+    """Return that a callback raised an ``error``, which says where, as a part of a sentence."""
+    return f"a callback raised an error, in {error.rstrip('.')}"

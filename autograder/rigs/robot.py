@@ -24,6 +24,7 @@ from std_msgs.msg import Float64
 from autograder.bench import Bench, StudentError
 from autograder.exam import Failed
 from autograder.rigs.hardware import ExaminerNode
+from autograder.rigs.phrases import callback_raised
 from course import WaitTimeout
 
 T = TypeVar("T")
@@ -248,7 +249,7 @@ class RobotRig:
         except StudentError:
             return ""
         self._told.update(raised)
-        return f" (a callback raised an error, in {raised[-1]})" if raised else ""
+        return f" ({callback_raised(raised[-1])})" if raised else ""
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from autograder.exam import Failed
 from autograder.rigs.architecture import ArchitectureRig
+from autograder.rigs.phrases import callback_raised
 from autograder.rigs.pouring import Poured
 from autograder.rigs.robot_graph import Topic
 from autograder.rigs.robot_jobs import MOTORS
@@ -32,7 +33,7 @@ def stranded(rig: ArchitectureRig, poured: Poured, wanted: Iterable[str]) -> str
 def raised(rig: ArchitectureRig) -> str:
     """Return what the student's callbacks raised, as the end of a sentence."""
     errors = rig.subject.errors()
-    return f"; a callback raised an error, in {errors[-1].rstrip('.')}" if errors else ""
+    return f"; {callback_raised(errors[-1])}" if errors else ""
 
 
 def see_scan_arrive(rig: ArchitectureRig, topics: dict[str, Topic]) -> None:

@@ -21,6 +21,7 @@ from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import Bench
+from autograder.rigs.phrases import callback_raised
 from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor
 from autograder.rigs.sensor_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
 from autograder.rigs.stillness import HANGS, RESTLESS, Stillness
@@ -201,7 +202,7 @@ class SensorRig:
     def raised(self) -> str:
         """Return which error a callback raised last, as a phrase in brackets, or nothing."""
         raised = self.subject.errors()
-        return f" (a callback raised an error, in {raised[-1].rstrip('.')})" if raised else ""
+        return f" ({callback_raised(raised[-1])})" if raised else ""
 
     def comes_again(self) -> int:
         """Return how many stop events the consumer has handed on more than once so far.
