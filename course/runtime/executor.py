@@ -59,6 +59,8 @@ class BackgroundExecutor(Executor):
     Attributes:
         running: the callbacks that run, or wait for a free worker.
         given_up: those that ran too long, in threads that have been replaced.
+        finished: how many callbacks have ended.
+        endless: when (s, monotonic) callbacks were last found to follow each other without end.
     """
 
     def __init__(
@@ -83,7 +85,8 @@ class BackgroundExecutor(Executor):
         self.given_up: set[Job] = set()
         self.pulse = pulse
         self.gate = Gate(self.wake)
-        self.finished = 0  # callbacks; told apart only from what it was
+        self.finished = 0
+        self.endless = float("-inf")
         self._families = Families()
         self._created = CreatedTasks()
         self._awaiting: weakref.WeakSet[Task] = weakref.WeakSet()

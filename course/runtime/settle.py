@@ -10,6 +10,14 @@ from collections.abc import Iterator, Sequence
 from course.runtime.executor import BackgroundExecutor
 
 _NAP = 0.0005  # s between looks at callbacks that run in other threads
+_ENDLESS = (2.5, 10)
+"""Seconds, and callbacks that have ended in them, after which more will follow for ever: somebody
+polls in many short callbacks, as a coroutine does that sleeps a little between two awaits."""
+_TURN = ((0.03, 8), (0.1, 2), (0.5, 1))
+"""The same, where callbacks have been found to follow each other without end a moment ago: then
+each of them has had its turn, and so has everything else."""
+_MOMENT = 5.0  # s
+_AGE = 1.0  # s that a callback may run, and be one of many
 
 
 @contextlib.contextmanager
@@ -33,8 +41,13 @@ def settle(executors: Sequence[BackgroundExecutor], timeout: float = 5.0) -> boo
 
 
 def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> bool:
-    """Do the work of `settle` on executors that are held already."""
+    """Do the work of `settle` on executors that are held already.
+
+    Callbacks that go on setting each other off, as a coroutine that polls does, are left behind
+    once each has had its turn.
+    """
     deadline = time.monotonic() + timeout
+    chain = _Chain(executors)
     idle = 0
     while True:
         if running := [executor for executor in executors if executor.busy()]:
@@ -46,8 +59,37 @@ def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> boo
             # A coroutine that goes on may let another one go on, which only a further round shows.
             if idle > sum(executor.awaiting for executor in executors) and _nothing_runs(executors):
                 return True
+        if chain.is_endless():
+            return True
         if time.monotonic() >= deadline:
             return False
+
+
+class _Chain:
+    """Callbacks that follow each other, looked at from now on."""
+
+    def __init__(self, executors: Sequence[BackgroundExecutor]) -> None:
+        self._executors = executors
+        self._began = time.monotonic()
+        self._ended_before = self._ended()
+        recently = any(self._began - executor.endless < _MOMENT for executor in executors)
+        self._signs = _TURN if recently else (_ENDLESS,)
+
+    def _ended(self) -> int:
+        return sum(executor.finished for executor in self._executors)
+
+    def is_endless(self) -> bool:
+        """Return whether they go on and on, and none of them does so alone."""
+        now = time.monotonic()
+        ended = self._ended() - self._ended_before
+        if not any(now - self._began >= s and ended >= number for s, number in self._signs):
+            return False
+        running = [job for executor in self._executors for job in executor.running.copy()]
+        if any(now - job.since > _AGE for job in running):
+            return False
+        for executor in self._executors:
+            executor.endless = now
+        return True
 
 
 def _nothing_runs(executors: Sequence[BackgroundExecutor]) -> bool:

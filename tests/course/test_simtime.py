@@ -233,6 +233,47 @@ def test_a_coroutine_that_awaits_for_ever_does_not_hold_up_time(lab):
     assert len(node.fired[10.0]) == 10
 
 
+class Poller(Sensors):
+    """Looks again and again, in short callbacks, whether it is late enough."""
+
+    def __init__(self, how):
+        super().__init__()
+        self.group = ReentrantCallbackGroup()
+        self.nap = threading.Event().wait
+        self.naps, self.late = 0, None
+        self.executor_known = self.create_timer(0.1, getattr(self, how), callback_group=self.group)
+
+    def is_late(self):
+        self.naps += 1
+        now = self.get_clock().now().nanoseconds / 1e9
+        if now < 0.5:
+            return False
+        self.late = now
+        return True
+
+    async def by_await(self):
+        self.executor_known.cancel()
+        while not self.is_late():
+            done = Future(executor=self.executor)
+            self.executor.create_task(lambda done=done: (self.nap(0.01), done.set_result(None)))
+            await done
+
+    def by_tasks(self):
+        self.executor_known.cancel()
+        self.nap(0.01)
+        if not self.is_late():
+            self.executor.create_task(self.by_tasks)
+
+
+@pytest.mark.parametrize("how", ["by_await", "by_tasks"])
+def test_callbacks_that_follow_each_other_without_end_do_not_stop_time(lab, how):
+    poller = lab.run(Poller, how)
+    lab.sim.advance(0.8)
+    assert len(poller.fired[10.0]) == 8
+    assert poller.naps > 10
+    assert 0.5 <= poller.late < 0.6
+
+
 def test_a_nudge_is_heard_and_waits_for_no_callback(lab):
     node = lab.run(Sensors)
     lab.sim.advance(1.0)
