@@ -8,6 +8,7 @@ comes from the hidden cell.
 
 from __future__ import annotations
 
+import math
 import secrets
 import time
 from collections.abc import Iterator
@@ -29,7 +30,7 @@ EXAM: Exam[RobotRig] = Exam("patterns", robot_rig)
 
 RATE, RATE_WINDOW = (9.0, 11.0), 2.0  # Hz, s
 FROZEN = 0.6  # s on the wall
-POSITION, FURTHER = 2.5, 90  # m, and how many tenths of a metre there are to draw from
+POSITION, FURTHER = 0.3, range(4, 10)  # m before the first drive; tenths of it to draw from
 LEVEL_AGE, TICK = 1.0, 0.05  # s
 SPEEDS = ((0.3, 5.0), (0.8, 0.05))  # m/s: a limit, and one that is refused after it
 SPEED_AT_START = 0.5  # m/s
@@ -37,7 +38,7 @@ GOOD_SPEEDS = (1.0, 0.1, 0.37, 0.3)  # m/s, the bounds among them, and one that 
 MISTYPED = 5.0  # m/s
 BAD_SPEEDS = (-0.5, 0.0, 0.05, MISTYPED, 1.1)  # m/s
 LEVELS = (0.6, 0.4, 0.38, 0.8)  # great changes and a small one, falling and rising
-START, GOAL, FAR = 0, 3, 50  # stations
+START, WAY, FAR = 1, 3, 50  # the station from which it drives first; stations to drive
 STOPS, PASSING = 0.5, 0.3  # s
 QUIET, COARSE = 8.0, 0.5
 """Seconds of the node's clock after which a change is long past, and between two moments of it."""
@@ -161,7 +162,8 @@ def position_answered(rig: RobotRig) -> str:
         raise Failed(expected=needed, actual="Your node does not listen to hardware/position.")
     asker = odometry.asker_by(rig, pattern)
     # Nobody can know the later ones beforehand.
-    for position in (POSITION, *(3 + secrets.randbelow(FURTHER) / 10 for _ in range(2))):
+    later = sorted(secrets.SystemRandom().sample(FURTHER, 2))  # the robot never goes back
+    for position in (POSITION, *(tenths / 10 for tenths in later)):
         rig.report("position", position)
         if answer := odometry.fault(rig, asker, position):
             raise Failed(
@@ -355,7 +357,8 @@ def navigation_drives(rig: RobotRig) -> None:
     """
     needed = "Somebody names a station, hears of each one that is passed, and learns how it ended."
     offers.require(rig, "navigation", WORKING["navigation"], needed)
-    with Drive(rig, START, GOAL) as drive:
+    start = _next_start(rig)
+    with Drive(rig, start, start + WAY) as drive:
         if rig.untouched:
             rig.first_top = drive.top_speed(SPEED_AT_START)
         # An earlier part of the exam may have found already what is found in a blocked aisle.
@@ -363,6 +366,11 @@ def navigation_drives(rig: RobotRig) -> None:
         stations.require_result(drive)
     rig.memory["waits"] = True
     _drive_again(rig, drive.position, "a drive")
+
+
+def _next_start(rig: RobotRig) -> int:
+    """Return the station from which a drive begins: the robot is never carried back."""
+    return max(START, math.ceil(rig.position))
 
 
 def _drive_again(rig: RobotRig, position: float, before: str) -> None:
@@ -409,7 +417,7 @@ def speed_takes_effect(rig: RobotRig) -> None:
             actual=f"On the first drive, before anybody had changed max_speed, hardware/speed went "
             f"up to {first:g} m/s.",
         )
-    position = float(START)
+    position = float(_next_start(rig))
     for limit, refused in SPEEDS:
         offers.set_speed_limit(rig, limit)
         offers.set_speed_limit(rig, refused)  # the good one stays
@@ -441,7 +449,8 @@ def navigation_cancel(rig: RobotRig) -> None:
     Somebody steps into the aisle and the goal is cancelled: a robot that drives on to the next
     station first has not understood.
     """
-    with Drive(rig, START, FAR) as drive:
+    start = _next_start(rig)
+    with Drive(rig, start, start + FAR) as drive:
         drive.require_driving()
         drive.roll_on()
         stations.require_report(drive)
@@ -450,7 +459,7 @@ def navigation_cancel(rig: RobotRig) -> None:
         _call_off(drive)
     before = "a drive that was called off"
     meanwhile.require_the_same_after(rig, drive.position, before)
-    with _told_of_next(before), Drive(rig, drive.position, FAR) as drive:
+    with _told_of_next(before), Drive(rig, drive.position, drive.goal) as drive:
         drive.require_driving()  # and not yet at any station
         _call_off(drive)
     _drive_again(rig, drive.position, before)

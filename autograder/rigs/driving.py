@@ -29,6 +29,7 @@ CLOSE = 0.15
 """Metres before a station from which on a place is told by its distance."""
 BEYOND = 0.04
 """Metres past a station where the robot says that it is there: it rarely says so just in time."""
+ROUNDING = 1e-6  # m
 STOOD = 1.0
 """Seconds of the node's clock without a new position, after which the aisle counts as blocked."""
 HALTS = 3
@@ -41,8 +42,9 @@ class Drive:
     """A goal that was accepted, and what the one who sent it heard of it.
 
     ``station`` is the last one that the robot has come to: what is reported before it has moved
-    there is made up. ``position`` is where the robot is (m), ``since`` the node's time (s) at which
-    it has come there.
+    there is made up. ``began_at_station`` tells a drive that begins at the station ``start`` from
+    one that begins beyond it. ``position`` is where the robot is (m), ``since`` the node's time (s)
+    at which it has come there.
     """
 
     def __init__(self, rig: RobotRig, position: float, goal: int) -> None:
@@ -52,6 +54,7 @@ class Drive:
             Failed: the goal was not accepted.
         """
         self.station = self.start = int(position)
+        self.began_at_station = position - self.start < BEYOND + ROUNDING
         self.goal = goal
         self.heard: list[list[int]] = []
         self.rig = rig
@@ -112,7 +115,7 @@ class Drive:
     @property
     def between(self) -> bool:
         """Whether the robot is between two stations."""
-        return self.position - self.station >= PART_OF_THE_WAY
+        return self.position - self.station > PART_OF_THE_WAY - ROUNDING
 
     @property
     def stood(self) -> str:

@@ -60,9 +60,15 @@ def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool 
     rig.wait_stepping(lambda: drive.run.done)
     if not drive.run.done or drive.run.status != state:
         how = ended(drive.run.status.name) if drive.run.done else "went on and on"
+        stood = drive.stood
+        if stood and not drive.run.done and state == GoalState.CANCELED:
+            stood = (
+                " It stood there all the time: does your node look whether a drive is called off "
+                "only at the next station, or once the robot has moved?"
+            )
         raise Failed(
             expected=f"{expected} The goal ends as {state.name}.",
-            actual=f"The goal {how}, with the robot {drive.place}{rig.because()}.{drive.stood}",
+            actual=f"The goal {how}, with the robot {drive.place}{rig.because()}.{stood}",
         )
     # Which of two messages comes first is the transport's affair: a stop may be under way.
     late = stopped and not rig.wait(lambda: rig.speed == 0, UNDER_WAY)

@@ -50,6 +50,7 @@ class RobotRig:
     Attributes:
         still: since when (ns, as messages are stamped) the student's clock stands still.
         elapsed: seconds of simulated time so far.
+        position: where the hardware said last that the robot is (m).
         untouched: whether the speed limit is still what it was at the start.
         first_top: the highest speed of the first drive, if the limit was untouched until then.
         films: whether the camera has been found to stream.
@@ -70,6 +71,7 @@ class RobotRig:
         self.node = node
         self.still = 0
         self.elapsed = 0.0
+        self.position = 0.0
         self.untouched = True
         self.first_top: float | None = None
         self.films = False
@@ -217,6 +219,8 @@ class RobotRig:
 
     def publish(self, what: str, value: float) -> None:
         """Have the hardware report a value, and let it find its way."""
+        if what == "position":
+            self.position = value
         self.node.hardware[what].publish(Float64(data=value))
 
     def listens_to(self, what: str) -> bool:
