@@ -14,10 +14,10 @@ from typing import Any
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from autograder.bench import Bench, StudentError
-from autograder.rigs.errands import SETTLE
+from autograder.rigs.errands import SETTLE, WAYPOINT, marked
 from autograder.rigs.pouring import Poured, Pours
 from autograder.rigs.quiet import QuietNode
-from autograder.rigs.robot_graph import RobotGraph, Topic, read_graph
+from autograder.rigs.robot_graph import Offer, RobotGraph, Topic, read_graph
 from autograder.rigs.robot_jobs import ACTION, MOTORS, SENSORS, WHEELS, Jobs
 from autograder.rigs.robot_reasons import every, link_faults
 from autograder.rigs.robot_types import UnknownTypeError, load_type
@@ -112,6 +112,17 @@ class ArchitectureRig:
             self._session.until(condition, timeout, "an observation")
             return True
         return False
+
+    def answers(self, offer: Offer) -> bool:
+        """Whether a service answers a lifelike request; one of a type unknown here is not asked."""
+        with suppress(UnknownTypeError):
+            kind = load_type(offer.type)
+            request = marked(kind.Request, dye.fresh_tag(), WAYPOINT)
+            try:
+                self._session.call(kind, offer.name, request, SETTLE)
+            except WaitTimeout:
+                return False
+        return True
 
     # Dye.
 

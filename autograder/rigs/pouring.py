@@ -19,7 +19,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
-from autograder.rigs.errands import SETTLE, Errands, marked
+from autograder.rigs.errands import NEARER, SETTLE, WAYPOINT, Errands, marked
 from autograder.rigs.robot_graph import Topic
 from autograder.rigs.robot_jobs import EYES
 from autograder.rigs.robot_types import load_type
@@ -67,6 +67,11 @@ class Poured:
     turned_away: int = 0
     """Goals that were rejected although one had been taken before, and was over."""
 
+    def then(self, later: Poured) -> Poured:
+        """Return what became of both this and ``later``, of which enough must have arrived, too."""
+        marks, arrived = self.marks + later.marks, self.arrived + later.arrived
+        return replace(later, marks=marks, arrived=arrived, tags=self.tags | later.tags)
+
 
 class Pours:
     """Pours dye into one design."""
@@ -103,8 +108,9 @@ class Pours:
         A node may have to be woken by a reading before it asks for what a goal has changed, or
         before it takes one: a robot that does not know where it is may reject a goal. Scans and
         images come late: they show something in the way, which may stop a robot. Where a goal goes
-        on though it was cancelled (a queue, say), the mark of the first is enough. Where goals end,
-        one more than needed is sent: whoever has been at one waypoint has to take the next.
+        on though it was cancelled (a queue, say), the mark of the first is enough, unless it soon
+        ends by itself: then that of the next is needed, too. Where goals end, one more than needed
+        is sent: whoever has been at one waypoint has to take the next.
 
         Raises:
             WaitTimeout: the action server did not answer; says why.
@@ -116,14 +122,14 @@ class Pours:
         every = list(sensors)
         blind = self._waking(topic for topic in every if topic.name not in EYES)
         seeing = self._waking(every)
-        sent = 0
+        sent, ahead = 0, WAYPOINT
         wake = _Every(WAKE, lambda: blind() if sent <= BLIND else seeing())
 
         def send(tag: int) -> bool:
             nonlocal sent
             sent += 1
             errands.end()
-            taken = errands.send(tag)
+            taken = errands.send(tag, ahead)
             # A controller may look at the newest ten times a second: readings wait until it has.
             wake.put_off()
             return taken
@@ -131,13 +137,21 @@ class Pours:
         poured = self._pour(send, wake, arrived_on, lambda: errands.outlasts, PLANNING)
         if poured.enough:
             errands.end()
-            if not errands.outlasts:
+            if errands.outlasts and not errands.cancelled:
+                errands.wait()
+            if poured.arrived < ARRIVALS and errands.answers and not errands.outlasts:
+                sent, ahead = 0, NEARER
+                with suppress(GoalRejectedError):  # it is told how many were turned away
+                    poured = poured.then(self._pour(send, wake, arrived_on, needed=1))
+            elif not errands.outlasts:
                 errands.send(self._fresh())
         aside = errands.aside
+        if not poured.arrived:
+            aside = aside or errands.aborted
         if errands.cancelled and not poured.arrived:
             aside = aside or (
-                f"goals of which nothing had come within {SETTLE / POURS:g} s, and later "
-                f"{PLANNING:g} s, were cancelled"
+                f"nothing came of the first goals within {SETTLE / POURS:g} s, nor of the last "
+                f"within {PLANNING:g} s, and then each was cancelled"
             )
         return replace(poured, aside=aside, turned_away=errands.turned_away)
 
@@ -211,6 +225,7 @@ class Pours:
         arrived_on: Collection[str],
         goes_on: Callable[[], bool] = lambda: False,
         patience: float = SETTLE / POURS,
+        needed: int = ARRIVALS,
     ) -> Poured:
         # A link may still be about to connect: what it loses does not come back, so pour again.
         tags: set[int] = set()
@@ -227,7 +242,7 @@ class Pours:
                     patience if slow else SETTLE / POURS,
                 )
             arrived = self._at(arrived_on, tags)
-            if len(arrived) >= ARRIVALS or (slow >= ARRIVALS and not arrived):
+            if len(arrived) >= needed or (slow >= ARRIVALS and not arrived):
                 break
             if arrived and goes_on() and not self._made_up(arrived_on):
                 return Poured(True, len(tags), len(arrived), [], frozenset(arrived))
@@ -236,7 +251,7 @@ class Pours:
         lost = tags - arrived
         seen = list(self._seen.items())  # at once: another thread adds to it
         lost_on = sorted(name for name, those in seen if those & lost)
-        enough = len(arrived) >= ARRIVALS
+        enough = len(arrived) >= needed
         return Poured(enough, len(tags), len(arrived), lost_on, frozenset(arrived))
 
     def _wait(

@@ -104,14 +104,17 @@ class Jobs:
     def informed(self) -> set[str]:
         """The navigation nodes to which topics bring what a sensor sees.
 
-        The last of these topics must be able to say it: that somebody is alive is no reading.
+        The last of these topics must be able to say it: that somebody is alive is no reading. Where
+        no pose is estimated, one that another node makes up stands in: that node is at fault.
         """
         read = {node for name in self.readings for node in self.graph.topic(name).read_by}
         aware = self.graph.reached(read | self.sensing - self.navigators, ("topic",))
         return {
             node
             for topic in self.graph.topics.values()
-            if (topic.written_by - self.navigators) & aware and set(topic.types) - NO_PLACE
+            if (others := topic.written_by - self.navigators)
+            and (others & aware or (set(topic.types) & POSES and not self.pose_topics))
+            and set(topic.types) - NO_PLACE
             for node in topic.read_by & self.navigators
         } | (read & self.navigators)
 

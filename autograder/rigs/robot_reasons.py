@@ -18,6 +18,7 @@ from autograder.rigs.robot_jobs import (
     MOTORS,
     NO_PLACE,
     NOT_OBSTACLES,
+    ONWARD,
     POSES,
     SENSORS,
     WHEELS,
@@ -65,7 +66,8 @@ def why_no_obstacles(jobs: Jobs) -> str:
     tried = [t for t in outputs.values() if t.name not in SENSORS and not set(t.types) & POSES]
     if tried:
         reasons = [f"{topic.name} {_why_no_obstacle(topic, jobs)}" for topic in tried[:3]]
-        return f"{does(jobs.detectors, 'read')} the sensors, but {'; '.join(reasons)}."
+        asked = _asked_for(jobs) if all(_ends(topic, jobs) for topic in tried) else ""
+        return f"{does(jobs.detectors, 'read')} the sensors, but {'; '.join(reasons)}.{asked}"
     for offer in graph.services.values():
         if (
             offer.servers & jobs.detectors
@@ -79,7 +81,44 @@ def why_no_obstacles(jobs: Jobs) -> str:
     reading = f"{does(jobs.detectors, 'read')} the sensors, but"
     if found := [f"{t.name} ({listed(t.types)})" for t in outputs.values() if set(t.types) & POSES]:
         return f"{reading} all that comes of it is a pose: {listed(found)}."
+    if busy := [t for t in graph.topics.values() if _of_busy(t, jobs)]:
+        return (
+            f"{nodes(busy[0].written_by)}, not {nodes(jobs.detectors)}, publishes {busy[0].name}: "
+            "navigation and control do not do the detection."
+        )
     return f"{reading} nothing of the kind is published."
+
+
+def _of_busy(topic: Topic, jobs: Jobs) -> bool:
+    """Whether a topic would be obstacle information if navigation or control did not write it."""
+    return bool(
+        topic.written_by
+        and topic.written_by <= jobs.seeing - jobs.detectors
+        and topic.name not in {*SENSORS, MAP, MOTORS}
+        and not set(topic.types) & NOT_OBSTACLES
+        and topic.read_by - topic.written_by
+    )
+
+
+def _asked_for(jobs: Jobs) -> str:
+    """Return, as a sentence, by which service of a detector's its findings may get to the motors.
+
+    What the services of std_srvs answer is no obstacle information.
+    """
+    for offer in jobs.graph.services.values():
+        askers = offer.clients - jobs.detectors
+        onward = jobs.graph.reached(askers, ("topic", "request", "goal"))
+        if (
+            offer.servers & jobs.detectors
+            and onward & jobs.controllers
+            and not offer.servers & jobs.knowing_map
+            and not offer.type.startswith("std_srvs/")
+        ):
+            return (
+                f" It gets to {MOTORS} only by way of the service {offer.name}, which "
+                f"{does(askers, 'call')}: it has to come as a stream, over topics or action goals."
+            )
+    return ""
 
 
 def _why_no_obstacle(topic: Topic, jobs: Jobs) -> str:
@@ -96,6 +135,11 @@ def _why_no_obstacle(topic: Topic, jobs: Jobs) -> str:
     if not topic.read_by - topic.written_by:
         return "is read by no other node"
     return f"ends at {nodes(topic.read_by)}, from where nothing leads to {MOTORS}"
+
+
+def _ends(topic: Topic, jobs: Jobs) -> bool:
+    """Whether nothing leads from a topic to the motors."""
+    return not jobs.leads_to_motors(topic, ONWARD)
 
 
 def why_no_pose(jobs: Jobs) -> str:

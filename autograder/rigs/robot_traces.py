@@ -36,6 +36,24 @@ def raised(rig: ArchitectureRig) -> str:
     return f"; {callback_raised(errors[-1])}" if errors else ""
 
 
+def require_plans(rig: ArchitectureRig) -> None:
+    """Fail if path planning never answers because its node raises errors.
+
+    Whoever has a node of the library ask does not notice. No planner is asked of which nothing was
+    raised, and one that raised before it had a map, say, may answer by now.
+    """
+    services = rig.jobs.planning_services
+    errors = rig.subject.errors()
+    faults = [e for e in errors for o in services for n in o.servers if f" of {n}: " in e]
+    if faults and not any(rig.answers(offer) for offer in services):
+        raise Failed(
+            expected="Path planning answers each request: its callback returns the response that "
+            "it was given.",
+            actual=f"{listed([offer.name for offer in services])} did not answer a request; "
+            f"{callback_raised(faults[-1])}.",
+        )
+
+
 def see_scan_arrive(rig: ArchitectureRig, topics: dict[str, Topic]) -> None:
     """Follow the mark of a scan to obstacle information, and from just there to the motors.
 

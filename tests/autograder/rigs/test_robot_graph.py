@@ -17,7 +17,7 @@ from test_msgs.action import Fibonacci
 from autograder.harness import Harness
 from autograder.rigs.robot_graph import End, Offer, RobotGraph, Topic, read_graph
 from autograder.rigs.robot_jobs import Jobs
-from autograder.rigs.robot_reasons import link_faults
+from autograder.rigs.robot_reasons import link_faults, why_no_obstacles
 from course import Design, Session
 
 QOS = QoSProfile(depth=1)
@@ -170,6 +170,44 @@ def test_only_services_on_the_way_to_the_motors_are_named() -> None:
     )
     assert jobs.services_on_the_way() == ["/set_velocity"]
     assert not jobs.leads_to_motors(jobs.obstacle_topics[0], ("topic", "goal"))
+
+
+def test_obstacle_information_that_is_asked_for_beside_a_log_is_told_so() -> None:
+    topics = [
+        topic("/scan", SCAN, "lidar", "detector"),
+        topic("/obstacles", ARRAY, "detector", "log"),
+        topic("/motors/command", TWIST, "controller", ""),
+    ]
+    asked = Offer("/nearest", "nav_msgs/srv/GetPlan", {"/detector"}, {"/controller"})
+    told = why_no_obstacles(Jobs(graph(*topics, services=[asked])))
+    assert "only by way of the service /nearest, which controller calls" in told
+    asked.type = "std_srvs/srv/Trigger"
+    told = why_no_obstacles(Jobs(graph(*topics, services=[asked])))
+    assert told.endswith("/obstacles ends at log, from where nothing leads to /motors/command.")
+
+
+def test_navigation_that_detects_beside_a_node_that_only_reads_is_named() -> None:
+    jobs = Jobs(
+        graph(
+            topic("/scan", SCAN, "lidar", "navigation log"),
+            topic("/obstacles", ARRAY, "navigation", "controller"),
+            topic("/motors/command", TWIST, "controller", ""),
+            actions=[Offer("/navigate_to", "", {"/navigation"})],
+        )
+    )
+    assert why_no_obstacles(jobs).startswith("navigation, not log, publishes /obstacles: ")
+
+
+def test_a_pose_that_comes_from_no_sensor_is_not_held_against_navigation() -> None:
+    pose = "geometry_msgs/msg/PoseStamped"
+    made_up = topic("/pose", pose, "estimator", "navigation")
+    actions = [Offer("/navigate_to", "", {"/navigation"})]
+    assert Jobs(graph(made_up, actions=actions)).informed == {"/navigation"}
+    estimated = [
+        topic("/wheel/odometry", "nav_msgs/msg/Odometry", "wheels", "odometer"),
+        topic("/odometry", "nav_msgs/msg/Odometry", "odometer", "display"),
+    ]
+    assert not Jobs(graph(made_up, *estimated, actions=actions)).informed
 
 
 def test_a_debugging_pose_is_not_held_against_a_busy_node() -> None:
