@@ -170,9 +170,12 @@ def _jammed_from_the_start(robot: Robot, dispatcher: Dispatcher) -> None:
 def _require_reason(robot: Robot, dispatcher: Dispatcher, what: str) -> None:
     """Require that whoever looks at drive/fault learns why the goal was aborted."""
     if not any(fault.strip() for fault in dispatcher.faults):
+        came = "what came on drive/fault was empty"
+        if not dispatcher.faults:
+            came = "nothing came on drive/fault"
         raise Failed(
             expected="The reason is published on drive/fault, in words.",
-            actual=f"{what} was aborted, and nothing came on drive/fault.{robot.complaint()}",
+            actual=f"{what} was aborted, and {came}.{robot.complaint()}",
         )
 
 

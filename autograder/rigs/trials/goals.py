@@ -32,6 +32,7 @@ FAR = 40  # m
 # Once it stands still in between: the same feedback again is a sign of life, too.
 BREATHS = (1, 2, 3, 3, 4, 5, 6, 7)
 HESITATION = 0.7  # s that an answer takes which is slow, but in time whatever the tolerance
+APART = 0.5  # s from one goal to another, whose answer takes so long that the first's 1 s is over
 
 
 @contextmanager
@@ -180,7 +181,10 @@ def _canceled(robot: Robot, user: NavigatorUser, event: str = "its acceptance") 
     if waited < SILENCE - TOLERANCE:
         raise Failed(
             expected=expected,
-            actual=f"The request to cancel came {waited:.1f} s after {event}.",
+            actual=f"The request to cancel came {waited:.1f} s after {event}."
+            if waited >= 0.0
+            else "The request to cancel came while feedback was still coming, "
+            f"{-waited:.1f} s before {event}.",
         )
 
 
@@ -194,12 +198,13 @@ def _slowly_refused(robot: Robot, user: NavigatorUser) -> None:
     _answers_slowly(robot, user, "the request to cancel")
 
 
-def _answers_slowly(robot: Robot, user: NavigatorUser, what: str) -> None:
+def _answers_slowly(robot: Robot, user: NavigatorUser, what: str, aside: str = "") -> None:
+    """Let an answer come late, but in time; ``aside`` is a sentence to add if it was given up."""
     robot.spend(HESITATION)
     if user.outcomes:
         raise Failed(
             expected=f"An answer to {what} after {HESITATION:g} s is in time.",
-            actual=f"Before that it said “{user.outcomes[0]}”.",
+            actual=f"Before that it said “{user.outcomes[0]}”.{aside}",
         )
     user.decide()
 
@@ -254,4 +259,20 @@ def lost(rig: RobotRig) -> None:
         _accepted(robot, user)
         user.end(ServerGoalHandle.succeed)
         _outcome(robot, user, "When the navigator had come back, and the goal succeeded", "arrived")
+        _soon_after(robot, user)
         robot.require_no_errors()
+
+
+def _soon_after(robot: Robot, user: NavigatorUser) -> None:
+    """Ask for a drive that is accepted late, but in time, while a time-out of the last may run."""
+    robot.spend(APART)
+    user.request(METRES - 1, hesitates=True)
+    _sent(robot, user)
+    aside = (
+        f" The goal before was sent {APART:g} s before this one, and answered at once: is its "
+        "time-out called off?"
+    )
+    _answers_slowly(robot, user, "the goal", aside)
+    robot.run(lambda: user.goals, PROMPT)
+    user.end(ServerGoalHandle.succeed)
+    _outcome(robot, user, "When the goal was accepted late, but in time, and succeeded", "arrived")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 from autograder.exam import Failed
 from autograder.rigs.gripper import GripUser
 from autograder.rigs.safety import RobotRig
@@ -22,6 +24,7 @@ from autograder.rigs.trials.gripping import (
 )
 
 SLOW = 0.7  # s that an answer takes which is slow, but in time whatever the tolerance
+APART = 0.5  # s from one try to another's, whose answer takes so long that the first's 1 s is over
 ANSWER = 1.0  # s after which a try without an answer has failed
 FIRST_GAP = 1.5  # s between the first two tries: 1 s without an answer, 0.5 s of pause
 GROWTH = 0.5  # s by which the second pause is longer, at least
@@ -29,26 +32,39 @@ IDLE = 2.0  # s in which a node that has not been asked for anything shows its h
 BACK = 1.8  # s after a request in which the gripper comes back: a third try is still to come
 GIVEN_UP = "After three tries without an answer"
 SECOND = " That was at the second request in a row that got no answer; at the first all was right."
+LEFT = (
+    f" The try for the request before, {APART:g} s earlier, had been answered at once: is its "
+    "time-out called off then?"
+)
 SHORTEST = 4.5 - 5 * ALLOWED - STRIDE  # s: three tries and two pauses, each as short as may be
 
 
 def carried_out(rig: RobotRig) -> None:
     """The gripper answers, at once and within the time of a try."""
     with client(rig) as (robot, user):
-        for close, delay in ((True, 0.0), (False, SLOW)):
-            tried(robot, user, close)
-            robot.spend(delay)
-            if not user.outcomes:
-                user.tries[0].reply(True)
-            robot.run(lambda: user.outcomes or len(user.tries) > 1, PROMPT)
-            if len(user.tries) > 1:
-                raise Failed(
-                    expected=f"An answer after {delay:g} s is in time: one try is enough.",
-                    actual=f"The gripper was called {len(user.tries)} times.",
-                )
-            when = f"When the gripper answered success=True after {delay:g} s"
-            outcome(robot, user, when, "done")
-        once(robot, user, when)
+        _carries_out(robot, user, True, 0.0)
+        once(robot, user, _carries_out(robot, user, False, SLOW))
+
+
+def _carries_out(robot: Robot, user: GripUser, close: bool, delay: float, aside: str = "") -> str:
+    """Answer a first try with success after ``delay`` s, and require that it counts.
+
+    ``aside`` is a sentence to add if the gripper was called again. Returns what happened in words,
+    as the beginning of a sentence.
+    """
+    tried(robot, user, close)
+    robot.spend(delay)
+    if not user.outcomes:
+        user.tries[0].reply(True)
+    robot.run(lambda: user.outcomes or len(user.tries) > 1, PROMPT)
+    if len(user.tries) > 1:
+        raise Failed(
+            expected=f"An answer after {delay:g} s is in time: one try is enough.",
+            actual=f"The gripper was called {len(user.tries)} times.{aside}",
+        )
+    when = f"When the gripper answered success=True after {delay:g} s"
+    outcome(robot, user, when, "done")
+    return when
 
 
 def refused(rig: RobotRig) -> None:
@@ -72,8 +88,15 @@ def _refuses(robot: Robot, user: GripUser, when: str) -> None:
     user.holds = 0  # one that came with the request says nothing about the outcome
     tries = len(user.tries)
     user.tries[-1].reply(False)
+    robot.run(lambda: user.outcomes or len(user.tries) > tries, PROMPT)
+    _require_no_more(user, tries, when)
     outcome(robot, user, when, "refused")
     once(robot, user, when)
+    _require_no_more(user, tries, when)
+
+
+def _require_no_more(user: GripUser, tries: int, when: str) -> None:
+    """Require that a refusal is the end of it: there were so many tries, and are no more."""
     if len(user.tries) > tries:
         raise Failed(
             expected=f"{when}: a refusal is an answer, so the gripper is not asked again.",
@@ -94,7 +117,15 @@ def unanswered(rig: RobotRig) -> None:
             _given_up(robot, user, False)
         except Failed as failed:
             raise Failed(expected=failed.expected, actual=f"{failed.actual}{SECOND}") from None
+        _soon_after(robot, user)
         robot.require_no_errors()
+
+
+def _soon_after(robot: Robot, user: GripUser) -> None:
+    """Have a try answered late, but in time, when the time of one that was answered runs out."""
+    _carries_out(robot, user, True, 0.0)
+    robot.spend(APART)
+    _carries_out(robot, user, False, SLOW, LEFT)
 
 
 def _given_up(robot: Robot, user: GripUser, close: bool) -> None:
@@ -168,8 +199,10 @@ def absent(rig: RobotRig) -> None:
     rig.begin_anew()
     with client(rig) as (robot, user):
         began = user.now
+        began_on_the_wall = time.monotonic()
         robot.spend(IDLE)
-        heart.beats(user.beats, began, user.now, "Before the first request", heart.BY_THE_WALL)
+        watched = time.monotonic() - began_on_the_wall
+        heart.beats(user.beats, began, user.now, "Before the first request", watched)
         tried(robot, user, True)
     with client(rig, gripper=False) as (robot, user):
         began = user.now

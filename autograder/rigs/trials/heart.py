@@ -20,7 +20,7 @@ HELD_UP = (
 
 
 def beats(
-    seen: Sequence[float], since: float, until: float, when: str, guess: str = HELD_UP
+    seen: Sequence[float], since: float, until: float, when: str, watched: float | None = None
 ) -> None:
     """Require a heartbeat every 0.5 s from ``since`` to ``until``, by the times of those seen.
 
@@ -33,13 +33,13 @@ def beats(
         since: from when on.
         until: until when.
         when: that time in words, as the beginning of a sentence.
-        guess: what a student is asked for whom there were hardly any.
+        watched: how long it was in s of wall time, if nothing else went on in the node.
     """
     there = [beat for beat in seen if since < beat <= until]
     lasted = until - since
     silence = max(after - before for before, after in pairwise([since, *there, until]))
     if silence > BEAT + ALLOWED + BLUR:
-        hint = f" {guess}" if len(there) <= lasted / BEAT / 2 else ""
+        hint = _guess(len(there), watched) if len(there) <= lasted / BEAT / 2 else ""
         raise Failed(
             expected=f"{when}, the heartbeat goes on at one every {BEAT:g} s: no silence is longer "
             f"than {BEAT + ALLOWED:g} s.",
@@ -53,6 +53,14 @@ def beats(
             f"{lasted:.1f} s.",
             actual=f"In {lasted:.1f} s there {_heartbeats(len(there))}.",
         )
+
+
+def _guess(count: int, watched: float | None) -> str:
+    """Return what a student is asked for whom there were hardly any, to add; empty if nothing."""
+    if watched is None:
+        return f" {HELD_UP}"
+    # By the wall clock there would be no more than these.
+    return f" {BY_THE_WALL}" if count <= watched / BEAT + 1 else ""
 
 
 def _heartbeats(count: int) -> str:

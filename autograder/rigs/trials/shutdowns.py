@@ -13,7 +13,7 @@ from autograder.rigs.trials import sending
 
 AT_ONCE = 1.0  # s of wall time that shutdown() may take where it does not wait; 0.01 s as a rule
 EXPECTED = "shutdown() does not wait: it tells the loop, and returns at once."
-AFTERWARDS = 2  # m of a goal that comes after shutdown(), and s in which it would drive
+AFTERWARDS = 2  # m of a goal that comes after shutdown(), and s in which it would drive, at most
 LOOKS = 3  # calls of it, if need be, of which the fastest counts: any may be held up by the machine
 
 
@@ -40,18 +40,26 @@ def shutdown(rig: RobotRig) -> None:
                 actual="Nothing came on cmd_vel.",
             )
         robot.require_no_errors()
-        _goal_afterwards(robot, dispatcher)
+        _goal_afterwards(robot, dispatcher, "")
 
 
-def _goal_afterwards(robot: Robot, dispatcher: Dispatcher) -> None:
-    """Send a goal to a node that is about to be taken down: whatever it answers, nothing moves."""
-    dispatcher.send(AFTERWARDS)
-    robot.spend(AFTERWARDS)
+def _goal_afterwards(robot: Robot, dispatcher: Dispatcher, last: str) -> None:
+    """Send a goal to a node that is about to be taken down: whatever it answers, nothing moves.
+
+    ``last`` says what became of the goal before, as the end of a sentence.
+    """
+    drive = dispatcher.send(AFTERWARDS)
+
+    def over() -> bool:
+        rejected = drive.handle is not None and not drive.handle.accepted
+        return rejected or drive.status is not None or any(dispatcher.speeds)
+
+    robot.run(over, AFTERWARDS)
     if any(dispatcher.speeds):
         raise Failed(
             expected="After shutdown() the wheels are told nothing any more but to stop, whoever "
             "sends a goal then.",
-            actual=f"A goal of {AFTERWARDS} m that came after shutdown() drove the robot.",
+            actual=f"A goal of {AFTERWARDS} m that came after shutdown(){last} drove the robot.",
         )
 
 
@@ -76,6 +84,7 @@ def _shutdown_on_the_way(rig: RobotRig) -> float:
                 actual="The goal was aborted, but before that the wheels were told to drive again.",
             )
         robot.require_no_errors()
+        _goal_afterwards(robot, dispatcher, ", when the one under way had been aborted,")
     return took
 
 

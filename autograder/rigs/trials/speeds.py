@@ -66,7 +66,10 @@ def good(rig: RobotRig) -> None:
         _accepted(robot, operator, "At first", (0.5, 0.8), angular=0.8)
         _accepted(robot, operator, "Then", (0.33, 0.66), linear=0.33, angular=0.66)
         _accepted(robot, operator, "Then", (0.33, 2.0), angular=2.0)
-        _accepted(robot, operator, "Then", (0.0, 2.0), linear=0.0)
+        # Of a request that names both, each has to be kept: only one might be.
+        _accepted(robot, operator, "Then", (0.21, 1.3), linear=0.21, angular=1.3)
+        _accepted(robot, operator, "Then", (0.0, 1.3), linear=0.0)
+        _accepted(robot, operator, "Then", (0.0, 2.0), angular=2.0)
         _accepted(robot, operator, "Then", (1.0, 2.0), linear=1.0)
         when = "When linear and angular have these values already,"
         _accepted(robot, operator, when, (1.0, 2.0), linear=1.0, angular=2.0)

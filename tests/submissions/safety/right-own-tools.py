@@ -152,7 +152,8 @@ class NavigationServer(Waiter):
         elif self.trouble:
             self.reason.publish(String(data=self.trouble))
             gh.abort()
-            self.trouble = ''
+            if self.trouble != 'shutdown':
+                self.trouble = ''
         else:
             gh.succeed()
         result = Drive.Result()
