@@ -41,6 +41,7 @@ from autograder.rigs.camera_rate import (
 from autograder.rigs.lives import LIVES, MEMORY, growth
 from autograder.rigs.managed import Managed
 from autograder.rigs.managed_holdings import (
+    require_no_helper_finalized,
     require_no_publisher_yet,
     require_nothing_held,
     require_off_graph,
@@ -235,6 +236,8 @@ def cleanup_twice(rig: CameraRig) -> None:
         require_closed(rig, device, "After destroy_node()")
         # The program still refers to the node: no thread ends because Python collects it.
         require_threads_ended(rig, threads, "After destroy_node()")
+    with rig.life(DRIVER, device := rig.device()):
+        require_picture(rig, device, "When the driver is started again after two cleanups,")
 
 
 @EXAM.check(
@@ -462,6 +465,8 @@ def managed_shutdown(rig: CameraRig) -> None:
     An emergency does not wait for deactivate and cleanup: whoever ends the node in the middle of
     its work must find the camera closed.
     """
+    with rig.life(MANAGED) as name:
+        require_no_helper_finalized(rig, Managed(rig, name))
     paths = {"unconfigured": (), "inactive": ("configure",), "active": ("configure", "activate")}
     for end in ("shutdown", "destroy_node()"):
         for state, path in paths.items():

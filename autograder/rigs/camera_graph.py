@@ -17,11 +17,28 @@ SERVICE = f"a service {SNAPSHOT}"
 NODE = "the node "
 GUID_PREFIX = 12
 """Bytes of an endpoint's GUID that name its participant (DDSI-RTPS 2.3, 9.3.1)."""
+GUID_PROCESS = 8
+"""Of these, the bytes that all participants of one process share, as Fast DDS makes them."""
+NAMELESS = "_NODE_NAME_UNKNOWN_"
+"""How the graph calls the node of an endpoint that no node is known to have (rmw_dds_common)."""
 TYPES = {
     PUBLISHER: "sensor_msgs/msg/Image",
     SUBSCRIPTION: "std_msgs/msg/Int32",
     SERVICE: "std_srvs/srv/Trigger",
 }
+
+
+def told(name: str) -> str:
+    """Return one of the nodes that a graph gives for a reader.
+
+    Of two that have one name, one is forgotten with the other, and its endpoints may stay.
+    """
+    if name.endswith(NAMELESS):
+        return (
+            "an endpoint of a node whose name is no longer known (its publisher on "
+            "/parameter_events, which every node has)"
+        )
+    return f"{NODE}{name}"
 
 
 class CameraGraph:
@@ -52,24 +69,26 @@ class CameraGraph:
         there = {what for what, end in self._endpoints() if end not in self._ghosts}
         return [what for what in ours if what in there]
 
-    def nodes(self) -> list[str]:
+    def nodes(self, *, process: bool = False) -> list[str]:
         """Return the nodes that were made since this check began, in the driver's participant.
 
-        Not those of ours, and none that the ROS tools hide.
+        Not those of ours, and none that the ROS tools hide. With ``process`` also those of other
+        contexts in the driver's process: there is a node that a callback makes without a context.
         """
+        size = GUID_PROCESS if process else GUID_PREFIX
         there = [
             what.removeprefix(NODE)
             for what, end in self._endpoints()
             if what.startswith(NODE)
             and end not in self._ghosts
-            and end[:GUID_PREFIX] in self._participants
+            and end[:size] in {ours[:size] for ours in self._participants}
         ]
         return [name for name in there if not re.match(r"/(_|mark_[0-9a-f]{8}$)", name)]
 
     def left(self, node: str) -> list[str]:
         """Return what is left of the driver on the graph: endpoints, ``node``, helper nodes."""
         there = self.endpoints(node)
-        helpers = dict.fromkeys(f"{NODE}{name}" for name in self.nodes())
+        helpers = dict.fromkeys(told(name) for name in self.nodes())
         return [*there, *(what for what in helpers if what not in there)]
 
     def missing(self, node: str) -> list[str]:

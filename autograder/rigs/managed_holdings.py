@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from autograder.exam import Failed
-from autograder.rigs.camera import SETTLE, CameraRig
+from autograder.rigs.camera import GHOSTS, SETTLE, CameraRig
 from autograder.rigs.camera_duties import require_closed
-from autograder.rigs.camera_graph import NODE, SERVICE, SUBSCRIPTION
+from autograder.rigs.camera_graph import NODE, SERVICE, SUBSCRIPTION, told
 from autograder.rigs.camera_node import IMAGE
+from autograder.rigs.managed import Managed
 from autograder.rigs.phrases import phrase
+
+FOUND = 3.0  # s in which a node in another context is found, as a participant of its own
 
 
 def require_only_pictures(rig: CameraRig) -> None:
@@ -62,8 +67,58 @@ def require_off_graph(rig: CameraRig, node: str, when: str) -> None:
             actual=f"{SETTLE:.0f} s later {name} was still there: only the inherited "
             "destroy_node() takes it down.",
         )
-    made = phrase([NODE + name for name in rig.graph.nodes()])
+    made = phrase([told(name) for name in rig.graph.nodes()])
     raise Failed(
         expected=f"{when} nothing that your node made is on the graph.",
         actual=f"{SETTLE:.0f} s later there still was {made}.",
     )
+
+
+def require_no_helper_finalized(rig: CameraRig, node: Managed) -> None:
+    """Fail if a node that was made for a state, and goes with it, stays after a shutdown.
+
+    One that is made once and for all is there in the state unconfigured, too: it may stay until
+    destroy_node().
+    """
+    device = rig.device()
+    node.require(device=device)
+    rig.subject.collect()  # an earlier life may have left a node in a context that goes on
+    at_first = len(_made(rig))
+    node.go("configure", "activate", "deactivate", "cleanup")
+    # Nodes go off the graph in their own time.
+    rig.wait(lambda: len(rig.graph.nodes(process=True)) <= at_first, GHOSTS)
+    idle, threads = _made(rig), rig.process.thread_ids()
+    node.go("configure", "activate")
+    started = rig.process.thread_ids() - threads
+    node.go("shutdown")
+
+    def left() -> list[str]:
+        """Return the nodes that came since.
+
+        A node alone in another context has threads, and they end with it: it need not be seen off.
+        """
+        ended = bool(started) and not started & rig.process.thread_ids()
+        now = rig.graph.nodes(process=not ended)
+        return list((Counter(now) - Counter(idle)).elements()) if len(now) > len(idle) else []
+
+    _made(rig)
+    # One with threads of its own may be found later than a mark.
+    rig.wait(lambda: left() or not started & rig.process.thread_ids(), FOUND)
+    if not left():
+        return
+    rig.subject.collect()  # who shuts a helper's context down leaves the rest to Python
+    rig.see(device, lambda: not left())
+    if still := left():
+        raise Failed(
+            expected="After shutdown in the state active your node holds nothing, no other node "
+            "that it has made for this state either.",
+            actual=f"{SETTLE:.0f} s later there still was {phrase([told(name) for name in still])}"
+            ": on_shutdown() runs then, and neither on_deactivate() nor on_cleanup() before it.",
+        )
+
+
+def _made(rig: CameraRig) -> list[str]:
+    """Return the managed node, and the nodes that it has by now made beside itself."""
+    rig.catch_up()
+    rig.rest()  # the mark is in one context; what others have told is here when all is at rest
+    return rig.graph.nodes(process=True)

@@ -33,7 +33,7 @@ def require_still(rig: CameraRig, device: str, transition: str) -> None:
     asked = sum(rig.cameras(device)) - before
     if asked:
         raise Failed(
-            expected="An inactive node asks its camera for no picture: it has no timer.",
+            expected="An inactive node asks its camera for no picture.",
             actual=f"In one second after “{transition}” it asked for {pictures(asked)}.",
         )
 
