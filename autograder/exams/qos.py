@@ -17,6 +17,7 @@ from autograder.rigs.backlogs import (
     require_burst,
     require_fresh,
     require_open_scans,
+    require_whole,
 )
 from autograder.rigs.gap import Aftermath, radio_gap
 from autograder.rigs.joining import require_no_past
@@ -107,7 +108,7 @@ def readings_flow(rig: SensorRig) -> None:
     if silent:
         raise Failed(
             expected="Each of the four sensors' readings comes out at the consumer.",
-            actual=" ".join(_why_silent(rig, sensor) for sensor in silent),
+            actual=_silence(rig, silent),
         )
     require_each_at_once(rig)
     for sensor in SENSORS:
@@ -131,6 +132,13 @@ def _refusals(rig: SensorRig, sensor: Sensor) -> list[Refusal]:
     return reasons if len(reasons) == len(found) else []
 
 
+def _silence(rig: SensorRig, silent: list[Sensor]) -> str:
+    """Return why these are silent. What a callback raised is told once, at the end."""
+    refused_first = sorted(silent, key=lambda sensor: not _refusals(rig, sensor))
+    told = " ".join(_why_silent(rig, sensor) for sensor in refused_first)
+    return f"{told.removesuffix('.')}{rig.raised()}."
+
+
 def _why_silent(rig: SensorRig, sensor: Sensor) -> str:
     if reasons := _refusals(rig, sensor):
         why = reasons[0].told("your publisher", "your subscription", sensor.topic)
@@ -141,7 +149,7 @@ def _why_silent(rig: SensorRig, sensor: Sensor) -> str:
         return f"Nothing of {sensor.name} is published on {sensor.topic}."
     if (target := f"consumer/{sensor.name}") in rig.node.foreign:
         return _changed(target, f"{sensor.topic} carried")
-    return f"{sensor.topic} carries readings, but none comes out on {target}{rig.raised()}."
+    return f"{sensor.topic} carries readings, but none comes out on {target}."
 
 
 def _changed(topic: str, what: str) -> str:
@@ -254,6 +262,7 @@ def imu_burst(rig: SensorRig) -> str:
         require_burst(rig, expected)  # what it does lose is seen on a busy machine, too
         raise
     require_burst(rig, expected)
+    require_whole(rig)
     return _practice(rig, IMU)
 
 

@@ -36,9 +36,9 @@ def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
     if found.altered or sensor.topic in rig.node.altered:
         raise altered(sensor)
     if found.published < (found.count if sensor is STOP else (found.count - 1) * THINNED):
-        raise _withheld(sensor, found.count, found.published)
+        raise _withheld(rig, sensor, found.count, found.published)
     if fewer := thinned(rig, sensor):
-        raise _withheld(sensor, *fewer)
+        raise _withheld(rig, sensor, *fewer)
     if sensor is STOP and found.count < EVENTS:
         raise NotExaminable(
             f"In {LONGEST} s only {found.count} stop events got through the driver, each sent when "
@@ -57,10 +57,10 @@ def altered(sensor: Sensor) -> Failed:
     )
 
 
-def _withheld(sensor: Sensor, came: int, went: int) -> Failed:
+def _withheld(rig: SensorRig, sensor: Sensor, came: int, went: int) -> Failed:
     return Failed(
         expected=f"The driver publishes each {sensor.name} reading as it comes in.",
-        actual=f"Of {came} that came in, {went} went over {sensor.topic}.",
+        actual=f"Of {came} that came in, {went} went over {sensor.topic}{rig.raised()}.",
     )
 
 
@@ -69,7 +69,10 @@ def require_fresh(rig: SensorRig, sensor: Sensor, expected: str) -> None:
     found = backlog(rig, sensor)
     count, kept, most, behind = found.count, found.kept, sensor.most, found.behind
     if max(kept, default=-1) < count - 1:
-        actual = f"Of {count} readings in a pause the newest never came out: it got {few(kept)}."
+        actual = (
+            f"Of {count} readings in a pause the newest never came out: it got "
+            f"{few(kept)}{rig.raised()}."
+        )
     elif found.replayed > most and found.oldest > most / sensor.rate:
         actual = f"It then worked through the last {found.replayed} of {found.published} readings."
     elif kept != sorted(kept):
@@ -91,7 +94,7 @@ def require_burst(rig: SensorRig, expected: str) -> None:
     """Fail unless the consumer passes on every IMU reading of a short pause, in order."""
     found: Burst = rig.once(short_pause)
     if found.missing and found.published < BURST:
-        raise _withheld(IMU, BURST, found.published)
+        raise _withheld(rig, IMU, BURST, found.published)
     if found.missing and found.aged:
         raise NotExaminable(
             "This machine was too busy to tell a short queue from readings that had grown old. "
@@ -99,9 +102,11 @@ def require_burst(rig: SensorRig, expected: str) -> None:
         )
     if found.missing:
         passed = BURST - found.missing
+        oldest = bool(passed) and set(found.kept) == set(range(found.missing, BURST))
         actual = (
-            f"Of {BURST} readings that came in while it was busy {lost(found.missing)}, "
-            f"{passed or 'none'} {'were' if passed > 1 else 'was'} passed on."
+            f"Of {BURST} readings that came in while it was busy "
+            f"{lost(found.missing, oldest=oldest)}, {passed or 'none'} "
+            f"{'were' if passed > 1 else 'was'} passed on{rig.raised()}."
         )
     elif len(found.kept) > BURST:
         actual = (
@@ -113,6 +118,15 @@ def require_burst(rig: SensorRig, expected: str) -> None:
     else:
         return
     raise Failed(expected=expected, actual=actual)
+
+
+def require_whole(rig: SensorRig) -> None:
+    """Fail if the consumer leaves out IMU readings again and again while they come in."""
+    if (omits := backlog(rig, IMU).omits) is not None:
+        raise Failed(
+            expected="While readings come in, the consumer hands on each of them, once.",
+            actual=omits.told(),
+        )
 
 
 def require_open_scans(rig: SensorRig) -> None:
@@ -137,9 +151,15 @@ def require_open_scans(rig: SensorRig) -> None:
         )
 
 
-def lost(number: int, of: int = 0) -> str:
-    """Return a phrase such as "1 was lost", or "2 of 7 were lost"."""
-    return f"{number}{f' of {of}' if of else ''} {'was' if number == 1 else 'were'} lost"
+def lost(number: int, of: int = 0, *, oldest: bool = False) -> str:
+    """Return a phrase such as "1 was lost", or "2 of 7 were lost".
+
+    ``oldest`` says that these were the ones that had waited longest.
+    """
+    was = "was" if number == 1 else "were"
+    if oldest:
+        return f"the {'one' if number == 1 else number} that had waited longest {was} lost"
+    return f"{number}{f' of {of}' if of else ''} {was} lost"
 
 
 def few(numbers: list[int]) -> str:

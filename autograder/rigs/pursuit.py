@@ -10,6 +10,10 @@ A busy machine brings fewer readings than the sensor has, and a consumer that is
 sensor then seems to keep up. So a fresh reading counts if they had come at their rate until then;
 or else the consumer has to have shown that it can be quicker than the sensor, and to have handed on
 one that was not too old: a delay line is quick, too.
+
+A list that drops its oldest readings, and is emptied too slowly, hands on none that is too old, but
+not all of them. Of the IMU each one counts: such a list leaves out one here and one there, all the
+time. What a queue loses in a busy moment stands together, and many come out before the next.
 """
 
 from __future__ import annotations
@@ -19,7 +23,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from autograder.rigs.readings import SENSORS, STOP, Sensor
+from autograder.rigs.readings import IMU, SENSORS, STOP, Sensor
 from autograder.rigs.sensors import SensorRig
 
 WATCHED = 0.8  # s after a pause; from then on a fresh reading shows that a consumer keeps up
@@ -33,6 +37,7 @@ EVENLY = 0.8  # the share in either half of it: a slow consumer may be given all
 PATIENCE = 8.0  # s for those that are neither fresh nor far behind
 STAMINA = 30.0  # s until a machine on which readings never came at their rate has proved too busy
 SPURT = 5  # readings that were handed on twice as fast as they come: their consumer can catch up
+GAPS, BETWEEN = 10, 5  # gaps in what was handed on, and readings at most between one and the next
 LOOKS = 0.05  # s between two looks at all that was published and handed on
 SELDOM = 10  # times what the last look took: the more there is to see, and the busier the machine
 
@@ -60,11 +65,12 @@ class Handing:
         if self.freshest:
             return (
                 f"Afterwards, {while_they_came}, even the freshest that it handed on was "
-                f"{self.age:.1f} s old, and {self.waiting} newer ones were waiting."
+                f"{self.age:.2f} s old, which is more than {sensor.most / sensor.rate:g} s, and "
+                f"{self.waiting} newer ones were waiting."
             )
         return (
             f"Afterwards it fell further and further behind: {while_they_came}, it handed on one "
-            f"that was {self.age:.1f} s old, and {self.waiting} newer ones were waiting."
+            f"that was {self.age:.2f} s old, and {self.waiting} newer ones were waiting."
         )
 
 
@@ -72,8 +78,24 @@ UNKNOWN = Handing(0, 0.0, 0)
 """Stands for what a machine was too busy to tell."""
 
 
-def left_behind(rig: SensorRig, phase: str, resumed: int) -> dict[str, Handing]:
-    """Watch what is handed on since ``resumed`` (ns); return where each that falls behind was.
+@dataclass(frozen=True)
+class Share:
+    """How many readings were published in some time, and how many of these were handed on."""
+
+    published: int
+    handed: int
+
+    def told(self) -> str:
+        """Return in a sentence what a consumer left out."""
+        return (
+            f"While readings came in, it handed on {self.handed} of {self.published}, and left out "
+            "one or a few again and again: is there a list that drops what it does not hand on in "
+            "time?"
+        )
+
+
+def pursue(rig: SensorRig, phase: str, resumed: int) -> dict[str, Pursuit]:
+    """Watch what is handed on since ``resumed`` (ns); return what was seen, by sensor name.
 
     To be called while readings go on coming in.
     """
@@ -83,12 +105,14 @@ def left_behind(rig: SensorRig, phase: str, resumed: int) -> dict[str, Handing]:
     for pursuit in pursuits:
         if not (pursuit.settled() or pursuit.able):
             pursuit.behind = UNKNOWN
-    return {p.sensor.name: p.behind for p in pursuits if p.behind is not None}
+    return {pursuit.sensor.name: pursuit for pursuit in pursuits}
 
 
 class Pursuit:
     """One sensor's consumer, and whether it keeps up.
 
+    ``behind`` is where it was if it falls behind, ``omits`` the share that it handed on if it has
+    to see each reading, and left many out.
     ``able`` says of one that is neither fresh nor far behind that it has had to keep up, or could,
     and that some reading that it handed on was not too old to act on.
     """
@@ -97,6 +121,7 @@ class Pursuit:
         """Watch what was handed on since ``resumed`` (ns)."""
         self.sensor = sensor
         self.behind: Handing | None = None
+        self.omits: Share | None = None
         self._rig, self._phase, self._resumed = rig, phase, resumed
         self.able = False
         self._quick = False
@@ -120,6 +145,9 @@ class Pursuit:
             return True
         if not handings:
             return False
+        if self.sensor is IMU and (omits := self._omission(published)) is not None:
+            self.omits = omits
+            return True
         self._quick = self._quick or self._at_rate(moments, moments[-1]) or self._spurts(handings)
         self.able = self._quick and any(map(self._young, handings))
         if self._fresh(handings[-1]) and self._at_rate(moments, handings[-1].when):
@@ -165,6 +193,25 @@ class Pursuit:
         expected = RATED * self.sensor.rate
         evenly = min(at[1] - at[0], at[2] - at[1]) >= EVENLY * expected / 2
         return evenly and at[2] - at[0] >= ENOUGH * expected
+
+    def _omission(self, published: Mapping[int, int]) -> Share | None:
+        """Return what is handed on of readings of which some are left out again and again."""
+        handed = {number for number, _ in self._rig.handed(self.sensor, self._phase)}
+        since = {number: when for number, when in published.items() if when > self._resumed}
+        order = sorted(since, key=lambda number: since[number])
+        begin, gaps, last = 0, 0, -1  # last: where the gap before was, in that order
+        for at, number in enumerate(order):
+            if number in handed:
+                continue
+            if last < 0 or at - last > BETWEEN + 1:
+                begin, gaps = at, 0
+            if gaps == 0 or at > last + 1:
+                gaps += 1
+            last = at
+            if gaps > GAPS:
+                some = order[begin:at]
+                return Share(len(some), len(handed.intersection(some)))
+        return None
 
     def _spurts(self, handings: list[Handing]) -> bool:
         when = [handing.when for handing in handings]

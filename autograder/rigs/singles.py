@@ -36,10 +36,12 @@ def require_each_at_once(rig: SensorRig) -> None:
         if not _send(rig, [r for r in open_ones if len(r.missed) <= FORGIVEN], index):
             break
     for sensor in _held_for_the_next(rig, records):
+        raised = rig.raised()
+        why = f"{raised}." if raised else ": does the driver wait for the next one?"
         raise Failed(
             expected="The drivers publish each reading as soon as the hardware delivers it.",
             actual=f"One more {sensor.name} reading came in, and it was not published on "
-            f"{sensor.topic}: does the driver wait for the next one?",
+            f"{sensor.topic}{why}",
         )
     for sensor, record in records.items():
         if record.is_slow():

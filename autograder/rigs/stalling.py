@@ -14,7 +14,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 
-from autograder.rigs.pursuit import Handing, left_behind
+from autograder.rigs.pursuit import Handing, Share, pursue
 from autograder.rigs.readings import IMU, SENSORS, STOP, Sensor
 from autograder.rigs.sensor_node import LAG, Stream
 from autograder.rigs.sensors import CONSUMERS, SETTLE, SensorRig
@@ -42,8 +42,9 @@ class Backlog:
     may have lost some of its own, which nobody can have kept.
     ``oldest`` is how old the first of them was at the end of the pause, in s since its publication.
     ``early`` says that some came out while the consumer was held back, ``behind`` what it handed on
-    when it had fallen far behind later on, if it did. ``altered`` says that the driver changed some
-    reading, ``again`` how many stop events have been handed on more than once.
+    when it had fallen far behind later on, if it did, ``omits`` what share it handed on then, if it
+    left out some again and again. ``altered`` says that the driver changed some reading, ``again``
+    how many stop events have been handed on more than once.
     """
 
     count: int
@@ -53,6 +54,7 @@ class Backlog:
     oldest: float
     early: bool
     behind: Handing | None
+    omits: Share | None
     altered: bool
     again: int
 
@@ -104,7 +106,7 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     for sensor in SENSORS:
         if sensor is not STOP:
             streams[sensor.name].insist()
-    behind = left_behind(rig, phase, resumed)
+    pursuits = pursue(rig, phase, resumed)
     for stream in streams.values():
         stream.stop()
     found = {}
@@ -118,7 +120,8 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
             replayed=sum(number >= min(kept, default=0) for number in published[s.name]),
             oldest=oldest,
             early=s.name in early,
-            behind=behind.get(s.name),
+            behind=None if s is STOP else pursuits[s.name].behind,
+            omits=None if s is STOP else pursuits[s.name].omits,
             altered=s.topic in rig.node.altered,
             again=rig.comes_again() if s is STOP else 0,
         )

@@ -30,7 +30,7 @@ def require_all_heard(rig: SensorRig, *, give_up: bool) -> Sequence[Heard]:
             raise Failed(
                 expected="A consumer that asks for RELIABLE and one for BEST_EFFORT both hear it.",
                 actual=f"A consumer that asks for {who} heard nothing on {STOP.topic}, "
-                f"{rig.probed(STOP)}.",
+                f"{rig.probed(STOP)}{rig.raised()}.",
             )
         listeners.append(found)
     took = _press(rig)
@@ -125,7 +125,7 @@ def require_told_apart(rig: SensorRig) -> None:
             "press of the button does of another.",
             actual=f"{len(WORDS)} events came in, the last two with the words of the first two. "
             f"The driver published {len(rig.witnessed(STOP, PRESSES))} of them, and your "
-            f"consumer handed on {len(got)}.",
+            f"consumer handed on {len(got)}{rig.raised()}.",
         )
 
 
@@ -144,7 +144,8 @@ def require_all_handled(rig: SensorRig) -> None:
     if kept != list(range(count)):
         raise Failed(
             expected=f"All {count} events of the pause are handled, once and in order.",
-            actual=f"{amiss(kept, count)}: the consumer handled {around(kept, count)}.",
+            actual=f"{amiss(kept, count)}: the consumer handled "
+            f"{around(kept, count)}{rig.raised()}.",
         )
 
 

@@ -87,6 +87,43 @@ def test_a_list_that_fills_faster_than_it_is_emptied_falls_behind() -> None:
     assert "newer ones were waiting" in watched.behind.told(IMU)
 
 
+def every_second(published: list[int]) -> list[tuple[int, int]]:
+    # As a list of 20 does that is always full, and of which a timer of 50 Hz takes the oldest.
+    return [(number, when + S // 5) for number, when in enumerate(published)][::2]
+
+
+def test_a_list_that_drops_each_second_reading_leaves_them_out() -> None:
+    resumed = time.time_ns() - 4 * S
+    published = at_rate(resumed, 4)
+    watched = pursuit(published, every_second(published), resumed)
+    assert watched.settled()
+    assert watched.omits is not None
+    assert watched.omits.published == 2 * watched.omits.handed
+
+
+def test_what_is_left_out_shows_however_few_readings_a_busy_machine_brings() -> None:
+    # At 60 Hz a list that is emptied at 50 Hz leaves out every sixth.
+    resumed = time.time_ns() - 4 * S
+    published = list(range(resumed + S // 60, resumed + 4 * S, S // 60))
+    handed = [(n, when + S // 5) for n, when in enumerate(published) if n % 6]
+    watched = pursuit(published, handed, resumed)
+    assert watched.settled()
+    assert watched.omits is not None
+
+
+@pytest.mark.parametrize("busy", [30, 60])
+def test_what_a_busy_moment_costs_is_not_left_out(busy: int) -> None:
+    # The drivers' process stands still for that many periods; what came in is caught up with, and a
+    # list of the last 50 drops some of it.
+    resumed = time.time_ns() - 4 * S
+    published = at_rate(resumed, 4)
+    start = 350 - busy
+    for n in range(start, 350):
+        published[n] = resumed + 350 * PERIOD + n * S // 5000
+    handed = [(n, when) for n, when in prompt(published) if not start - 30 <= n < 330]
+    assert pursuit(published, handed, resumed).omits is None
+
+
 @pytest.mark.parametrize(("delay", "able"), [(0.75, False), (0.4, True)])
 def test_a_quick_consumer_is_able_only_if_something_it_hands_on_is_not_too_old(
     delay: float, able: bool
