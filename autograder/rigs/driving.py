@@ -42,9 +42,8 @@ class Drive:
     """A goal that was accepted, and what the one who sent it heard of it.
 
     ``station`` is the last one that the robot has come to: what is reported before it has moved
-    there is made up. ``began_at_station`` tells a drive that begins at the station ``start`` from
-    one that begins beyond it. ``position`` is where the robot is (m), ``since`` the node's time (s)
-    at which it has come there.
+    there is made up. ``position`` is where the robot is (m), ``since`` the node's time (s) at which
+    it has come there.
     """
 
     def __init__(self, rig: RobotRig, position: float, goal: int) -> None:
@@ -54,7 +53,6 @@ class Drive:
             Failed: the goal was not accepted.
         """
         self.station = self.start = int(position)
-        self.began_at_station = position - self.start < BEYOND + ROUNDING
         self.goal = goal
         self.heard: list[list[int]] = []
         self.rig = rig

@@ -55,11 +55,10 @@ def _complain(drive: Drive) -> NoReturn:
 def _are_passed(drive: Drive, stations: list[int], last: int) -> bool:
     """Return whether ``stations`` are all up to the ``last``.
 
-    Whether the one where the drive began counts as passed is a matter of taste. One that was left
-    behind by an earlier drive does not.
+    Whether the one where the drive began counts as passed is a matter of taste.
     """
     passed = list(range(drive.start + 1, last + 1))
-    return stations == passed or (drive.began_at_station and stations == [drive.start, *passed])
+    return stations in (passed, [drive.start, *passed])
 
 
 def _last(stations: list[int]) -> int:

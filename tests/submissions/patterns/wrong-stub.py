@@ -4,5 +4,5 @@
 # says: navigation_drives: On the ROS graph robot/navigate is a topic. Whoever sends the robot off
 # says: parameter_changes: would never hear whether it holds
 # says: camera_streams: They came at 1 a second
-# says: position_answered: With the robot at 2.5 m, no message came
+# says: position_answered: With the robot at 0.3 m, no message came
 # in: the stub
