@@ -35,7 +35,7 @@ Root = Annotated[
     Path | None,
     typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
 ]
-IN_FLIGHT = 4 * (os.cpu_count() or 1)
+IN_FLIGHT = 3 * (os.cpu_count() or 1)
 """Notebooks that `grade` runs at a time: most of its time a subject waits, for DDS or a timer."""
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Notebooks run at a time.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]

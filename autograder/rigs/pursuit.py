@@ -127,7 +127,8 @@ class Pursuit:
         self._quick = False
         self._settled = False
         self._look_at = resumed + WATCHED * 1e9
-        self._heard, self._heard_at = 0, time.time_ns()
+        # Of readings that were published, and of those handed on: how many, and when (ns) the last.
+        self._heard, self._heard_at = [0, 0], [time.time_ns()] * 2
 
     def settled(self) -> bool:
         """Whether it has been seen that the consumer keeps up, or that it does not."""
@@ -148,7 +149,10 @@ class Pursuit:
         if self.sensor is IMU and (omits := self._omission(published)) is not None:
             self.omits = omits
             return True
-        self._quick = self._quick or self._at_rate(moments, moments[-1]) or self._spurts(handings)
+        # A list of IMU readings that is emptied slowly bears their rate for a second, until it is
+        # full: here only a spurt counts.
+        rated = self.sensor is not IMU and self._at_rate(moments, moments[-1])
+        self._quick = self._quick or rated or self._spurts(handings)
         self.able = self._quick and any(map(self._young, handings))
         if self._fresh(handings[-1]) and self._at_rate(moments, handings[-1].when):
             return True
@@ -174,14 +178,18 @@ class Pursuit:
     def _is_quiet(self, moments: list[int], handings: list[Handing]) -> bool:
         """Whether nothing is handed on though readings are published, or nothing heard at all.
 
-        An examiner that is late itself hears of both late, and goes on hearing.
+        An examiner that is late itself hears of both late, of one more than of the other, and goes
+        on hearing.
         """
-        heard = len(moments) + len(handings)
-        if heard != self._heard:
-            self._heard, self._heard_at = heard, time.time_ns()
+        now = time.time_ns()
+        for kind, heard in enumerate((len(moments), len(handings))):
+            if heard != self._heard[kind]:
+                self._heard[kind], self._heard_at[kind] = heard, now
+        published_at, handed_at = self._heard_at
         last = handings[-1].when if handings else self._resumed
         goes_on = bool(moments) and moments[-1] > last + QUIET * 1e9
-        return goes_on or time.time_ns() > self._heard_at + QUIET * 1e9
+        quiet = now > handed_at + QUIET * 1e9
+        return quiet and (goes_on or now > published_at + QUIET * 1e9)
 
     def _at_rate(self, moments: list[int], end: int) -> bool:
         """Whether readings came at the sensor's rate until ``end`` (ns since 1970).
