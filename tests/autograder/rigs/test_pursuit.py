@@ -10,6 +10,7 @@ import pytest
 from autograder.rigs.pursuit import QUIET, WATCHED, Pursuit
 from autograder.rigs.readings import IMU, Sensor
 from autograder.rigs.sensors import SensorRig
+from course.runtime.waiting import Pulse, poll
 
 S = 10**9  # ns
 PERIOD = S // 100
@@ -49,6 +50,25 @@ def test_a_consumer_that_hands_on_fresh_readings_keeps_up(late: int) -> None:
     published = at_rate(resumed, 2)
     watched = pursuit(published, prompt(published), resumed)
     assert watched.settled()
+    assert watched.behind is None
+
+
+class Late(Recorded):
+    """Hears of readings that were handed on one by one, long after those that were published."""
+
+    looks = 0
+
+    def handed(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
+        """Return one more than the last time."""
+        self.looks += 1
+        return self._handed[: self.looks]
+
+
+def test_a_consumer_of_which_the_examiner_hears_late_is_not_silent() -> None:
+    resumed = time.time_ns() - 8 * S
+    published = at_rate(resumed, 5)[::2]
+    watched = Pursuit(cast(SensorRig, Late(published, prompt(published))), IMU, "phase", resumed)
+    assert not poll(watched.settled, QUIET + 0.5, Pulse())
     assert watched.behind is None
 
 
