@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import time
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from autograder.rigs.readings import IMU, SENSORS, STOP, Sensor
@@ -35,7 +35,7 @@ QUIET = 2.0  # s without a reading after which there is nothing more to see
 RATED, ENOUGH = 1.0, 0.9  # s before, and the share of what is to come in then, for that to count
 EVENLY = 0.8  # the share in either half of it: a slow consumer may be given all at the last moment
 PATIENCE = 8.0  # s for those that are neither fresh nor far behind
-STAMINA = 30.0  # s until a machine on which readings never came at their rate has proved too busy
+STAMINA = 60.0  # s until a machine on which readings never came at their rate has proved too busy
 SPURT = 5  # readings that were handed on twice as fast as they come: their consumer can catch up
 GAPS, BETWEEN = 10, 5  # gaps in what was handed on, and readings at most between one and the next
 LOOKS = 0.05  # s between two looks at all that was published and handed on
@@ -94,17 +94,27 @@ class Share:
         )
 
 
-def pursue(rig: SensorRig, phase: str, resumed: int) -> dict[str, Pursuit]:
+def pursue(
+    rig: SensorRig, phase: str, resumed: int, stop: Callable[[Sensor], None]
+) -> dict[str, Pursuit]:
     """Watch what is handed on since ``resumed`` (ns); return what was seen, by sensor name.
 
-    To be called while readings go on coming in.
+    To be called while readings go on coming in, which it lets ``stop`` where all has been seen: on
+    a busy machine the others then come at their rate sooner.
     """
     pursuits = [Pursuit(rig, sensor, phase, resumed) for sensor in SENSORS if sensor is not STOP]
-    rig.wait(lambda: all(pursuit.settled() for pursuit in pursuits), WATCHED + PATIENCE)
-    rig.wait(lambda: all(pursuit.settled() or pursuit.able for pursuit in pursuits), STAMINA)
-    for pursuit in pursuits:
-        if not (pursuit.settled() or pursuit.able):
-            pursuit.behind = UNKNOWN
+    watched = list(pursuits)
+
+    def over(enough: Callable[[Pursuit], bool]) -> bool:
+        for pursuit in filter(enough, watched.copy()):
+            stop(pursuit.sensor)
+            watched.remove(pursuit)
+        return not watched
+
+    rig.wait(lambda: over(lambda pursuit: pursuit.settled()), WATCHED + PATIENCE)
+    rig.wait(lambda: over(lambda pursuit: pursuit.settled() or pursuit.able), STAMINA)
+    for pursuit in watched:
+        pursuit.behind = UNKNOWN
     return {pursuit.sensor.name: pursuit for pursuit in pursuits}
 
 

@@ -106,7 +106,7 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     for sensor in SENSORS:
         if sensor is not STOP:
             streams[sensor.name].insist()
-    pursuits = pursue(rig, phase, resumed)
+    pursuits = pursue(rig, phase, resumed, lambda sensor: streams[sensor.name].stop())
     for stream in streams.values():
         stream.stop()
     found = {}
