@@ -36,7 +36,10 @@ Root = Annotated[
     typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
 ]
 IN_FLIGHT = 3 * (os.cpu_count() or 1)
-"""Notebooks that `grade` runs at a time: most of its time a subject waits, for DDS or a timer."""
+"""Notebooks run at a time: most of its time a subject waits, for DDS or a timer.
+
+With more than three a processor, readings come less often at their rate.
+"""
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Notebooks run at a time.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 

@@ -58,10 +58,7 @@ def design_runs(rig: ArchitectureRig) -> str:
     except StudentError as error:
         raise Failed(
             expected="The notebook has a `design` whose nodes all come up.",
-            # The session says it of its run(); here a node is handed over as a factory.
-            actual=error.told.replace(
-                "pass its class to run()", "name its class, as factory=TheClass"
-            ),
+            actual=error.told,
         ) from None
     if not rig.graph.nodes:
         raise Failed(

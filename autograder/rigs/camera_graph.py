@@ -76,12 +76,11 @@ class CameraGraph:
         contexts in the driver's process: there is a node that a callback makes without a context.
         """
         size = GUID_PROCESS if process else GUID_PREFIX
+        ours = {participant[:size] for participant in self._participants}
         there = [
             what.removeprefix(NODE)
             for what, end in self._endpoints()
-            if what.startswith(NODE)
-            and end not in self._ghosts
-            and end[:size] in {ours[:size] for ours in self._participants}
+            if what.startswith(NODE) and end not in self._ghosts and end[:size] in ours
         ]
         return [name for name in there if not re.match(r"/(_|mark_[0-9a-f]{8}$)", name)]
 

@@ -111,7 +111,7 @@ def pursue(
             watched.remove(pursuit)
         return not watched
 
-    rig.wait(lambda: over(lambda pursuit: pursuit.settled()), WATCHED + PATIENCE)
+    rig.wait(lambda: over(Pursuit.settled), WATCHED + PATIENCE)
     rig.wait(lambda: over(lambda pursuit: pursuit.settled() or pursuit.able), STAMINA)
     for pursuit in watched:
         pursuit.behind = UNKNOWN

@@ -58,6 +58,15 @@ ONWARD = ("topic", "request", "response", "goal")
 """The ways in which a goal can get from the action server to the motors."""
 
 
+def is_told_others(topic: Topic) -> bool:
+    """Whether a topic's name and type allow for obstacle information, and another node reads it."""
+    return bool(
+        topic.name not in {*SENSORS, MAP, MOTORS}
+        and not set(topic.types) & NOT_OBSTACLES
+        and topic.read_by - topic.written_by
+    )
+
+
 class Jobs:
     """The robot's jobs in one graph."""
 
@@ -144,10 +153,8 @@ class Jobs:
             topic
             for topic in self.graph.topics.values()
             if topic.written_by & self.detectors
-            and topic.name not in {*SENSORS, MAP, MOTORS}
-            and not set(topic.types) & NOT_OBSTACLES
+            and is_told_others(topic)
             and bears_marks(topic.types)
-            and topic.read_by - topic.written_by
             and self.leads_to_motors(topic, ONWARD)
         ]
 

@@ -23,6 +23,7 @@ from autograder.rigs.robot_jobs import (
     SENSORS,
     WHEELS,
     Jobs,
+    is_told_others,
 )
 from autograder.rigs.robot_types import UnknownTypeError, bears_marks, load_type
 from course.design import dye
@@ -66,18 +67,14 @@ def why_no_obstacles(jobs: Jobs) -> str:
     tried = [t for t in outputs.values() if t.name not in SENSORS and not set(t.types) & POSES]
     if tried:
         reasons = [f"{topic.name} {_why_no_obstacle(topic, jobs)}" for topic in tried[:3]]
-        asked = _asked_for(jobs) if all(_ends(topic, jobs) for topic in tried) else ""
+        arrives = any(jobs.leads_to_motors(topic, ONWARD) for topic in tried)
+        asked = "" if arrives else _asked_for(jobs)
         return f"{does(jobs.detectors, 'read')} the sensors, but {'; '.join(reasons)}.{asked}"
-    for offer in graph.services.values():
-        if (
-            offer.servers & jobs.detectors
-            and offer.clients
-            and not offer.servers & jobs.knowing_map
-        ):
-            return (
-                f"{nodes(offer.servers)} hands it out by the service {offer.name} to "
-                f"{nodes(offer.clients)}: it comes all the time, so it is a stream, not an answer."
-            )
+    for offer in _handed_out(jobs):
+        return (
+            f"{nodes(offer.servers)} hands it out by the service {offer.name} to "
+            f"{nodes(offer.clients)}: it comes all the time, so it is a stream, not an answer."
+        )
     reading = f"{does(jobs.detectors, 'read')} the sensors, but"
     if found := [f"{t.name} ({listed(t.types)})" for t in outputs.values() if set(t.types) & POSES]:
         return f"{reading} all that comes of it is a pose: {listed(found)}."
@@ -89,14 +86,21 @@ def why_no_obstacles(jobs: Jobs) -> str:
     return f"{reading} nothing of the kind is published."
 
 
+def _handed_out(jobs: Jobs) -> list[Offer]:
+    """Return the services by which detectors may hand out what they have found."""
+    return [
+        offer
+        for offer in jobs.graph.services.values()
+        if offer.servers & jobs.detectors and offer.clients and not offer.servers & jobs.knowing_map
+    ]
+
+
 def _of_busy(topic: Topic, jobs: Jobs) -> bool:
     """Whether a topic would be obstacle information if navigation or control did not write it."""
     return bool(
         topic.written_by
         and topic.written_by <= jobs.seeing - jobs.detectors
-        and topic.name not in {*SENSORS, MAP, MOTORS}
-        and not set(topic.types) & NOT_OBSTACLES
-        and topic.read_by - topic.written_by
+        and is_told_others(topic)
     )
 
 
@@ -105,15 +109,10 @@ def _asked_for(jobs: Jobs) -> str:
 
     What the services of std_srvs answer is no obstacle information.
     """
-    for offer in jobs.graph.services.values():
+    for offer in _handed_out(jobs):
         askers = offer.clients - jobs.detectors
         onward = jobs.graph.reached(askers, ("topic", "request", "goal"))
-        if (
-            offer.servers & jobs.detectors
-            and onward & jobs.controllers
-            and not offer.servers & jobs.knowing_map
-            and not offer.type.startswith("std_srvs/")
-        ):
+        if onward & jobs.controllers and not offer.type.startswith("std_srvs/"):
             return (
                 f" It gets to {MOTORS} only by way of the service {offer.name}, which "
                 f"{does(askers, 'call')}: it has to come as a stream, over topics or action goals."
@@ -135,11 +134,6 @@ def _why_no_obstacle(topic: Topic, jobs: Jobs) -> str:
     if not topic.read_by - topic.written_by:
         return "is read by no other node"
     return f"ends at {nodes(topic.read_by)}, from where nothing leads to {MOTORS}"
-
-
-def _ends(topic: Topic, jobs: Jobs) -> bool:
-    """Whether nothing leads from a topic to the motors."""
-    return not jobs.leads_to_motors(topic, ONWARD)
 
 
 def why_no_pose(jobs: Jobs) -> str:

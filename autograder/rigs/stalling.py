@@ -112,6 +112,7 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     found = {}
     for s in SENSORS:
         kept = rig.consumed(s, phase)
+        pursuit = pursuits.get(s.name)  # of stop events there is none
         oldest = (resumed - rig.published(s, phase, min(kept))) / 1e9 if kept else 0.0
         found[s.name] = Backlog(
             count=counts[s.name],
@@ -120,8 +121,8 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
             replayed=sum(number >= min(kept, default=0) for number in published[s.name]),
             oldest=oldest,
             early=s.name in early,
-            behind=None if s is STOP else pursuits[s.name].behind,
-            omits=None if s is STOP else pursuits[s.name].omits,
+            behind=pursuit.behind if pursuit else None,
+            omits=pursuit.omits if pursuit else None,
             altered=s.topic in rig.node.altered,
             again=rig.comes_again() if s is STOP else 0,
         )

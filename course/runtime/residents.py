@@ -100,9 +100,12 @@ class Residents:
                 self.stop(resident.node)
         node = factory if isinstance(factory, Node) else self._make(factory, args, kwargs)
         if node.context is not self._context:
+            instead = "pass its class to run()"
+            if node is not factory:
+                instead = "name its class, as factory=TheClass"
             raise SessionError(
-                f"{node_name(node)} was made in another rclpy context: "
-                "pass its class to run(), and let the session make the node."
+                f"{node_name(node)} was made in another rclpy context: {instead}, and let the "
+                "session make the node."
             )
         name = node_name(node)
         for resident in self.all():

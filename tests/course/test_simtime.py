@@ -241,7 +241,7 @@ class Poller(Sensors):
         self.group = ReentrantCallbackGroup()
         self.nap = threading.Event().wait
         self.naps, self.late = 0, None
-        self.executor_known = self.create_timer(0.1, getattr(self, how), callback_group=self.group)
+        self.starter = self.create_timer(0.1, getattr(self, how), callback_group=self.group)
 
     def is_late(self):
         self.naps += 1
@@ -252,14 +252,14 @@ class Poller(Sensors):
         return True
 
     async def by_await(self):
-        self.executor_known.cancel()
+        self.starter.cancel()
         while not self.is_late():
             done = Future(executor=self.executor)
             self.executor.create_task(lambda done=done: (self.nap(0.01), done.set_result(None)))
             await done
 
     def by_tasks(self):
-        self.executor_known.cancel()
+        self.starter.cancel()
         self.nap(0.01)
         if not self.is_late():
             self.executor.create_task(self.by_tasks)
