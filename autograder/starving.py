@@ -7,9 +7,9 @@ not being kept: whoever sleeps for too long is found after the same time on any 
 
 from __future__ import annotations
 
+import os
 import time
 from contextlib import suppress
-from pathlib import Path
 
 _LONGEST = 2  # times its length by which a deadline can be put off
 
@@ -20,7 +20,11 @@ def kept_waiting(pid: int) -> float:
     0 if the process has ended, and where the kernel does not count (CONFIG_SCHED_INFO).
     """
     with suppress(OSError, IndexError):
-        return int(Path(f"/proc/{pid}/schedstat").read_bytes().split()[1]) / 1e9
+        file = os.open(f"/proc/{pid}/schedstat", os.O_RDONLY)  # pathlib takes ten times as long
+        try:
+            return int(os.read(file, 64).split()[1]) / 1e9
+        finally:
+            os.close(file)
     return 0.0
 
 

@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -89,12 +89,13 @@ def warm_up() -> None:
     Whoever needs one of them waits for it, and hears what is wrong with it.
     """
 
-    def begin(step: Callable[[], object]) -> None:
-        with suppress(Exception):
-            step()
+    def begin() -> None:
+        # One after the other: of two processors, one is left to whoever goes on meanwhile.
+        for step in (abilities, warmth.examiners):
+            with suppress(Exception):
+                step()
 
-    for step in (abilities, warmth.examiners):
-        threading.Thread(target=begin, args=(step,)).start()
+    threading.Thread(target=begin).start()
 
 
 def place(*, trust: bool = False, hidden: Iterable[Path] = ()) -> Place:

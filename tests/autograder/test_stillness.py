@@ -8,7 +8,10 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+import pytest
+
 from autograder.descriptors import readable
+from autograder.rigs import stillness
 from autograder.rigs.stillness import ENDLESS, RESTLESS, Stillness
 
 BUSY = "import sys; print(flush=True)\nwhile True: pass"
@@ -77,6 +80,47 @@ def test_a_thread_of_the_examiners_own_counts() -> None:
     finally:
         stop.set()
         thread.join()
+
+
+def test_a_thread_that_takes_the_place_of_an_ended_one_counts() -> None:
+    stop = threading.Event()
+
+    def compute() -> None:
+        while not stop.is_set():
+            pass
+
+    first = threading.Thread(target=stop.wait)
+    first.start()
+    with process(ASLEEP) as other:
+        still = Stillness(other.pid)
+        assert still.reached(timeout=30.0)
+        stop.set()
+        first.join()
+        stop.clear()
+        second = threading.Thread(target=compute)
+        second.start()
+        try:
+            assert not still.reached(timeout=0.2)
+        finally:
+            stop.set()
+            second.join()
+        assert still.reached(timeout=30.0)
+
+
+def test_a_kernel_that_keeps_no_account_of_run_times_tells_enough(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(stillness, "_COUNTS", "status")
+    with process(BESIDE) as other:
+        assert other.stdout is not None
+        still = Stillness(other.pid)
+        for _ in range(10):
+            tell(other, "?")
+            assert still.reached(timeout=30.0)
+            assert readable([other.stdout], 0.0)
+            assert other.stdout.readline() == b"!\n"
+        tell(other, "compute")
+        assert rests_not_reached(still) > 0
 
 
 def test_a_process_that_has_ended_leaves_the_examiners_own() -> None:
