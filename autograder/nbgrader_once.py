@@ -104,8 +104,6 @@ def _is_rich(output: NotebookNode) -> bool:
 class _AsItIs(str):
     """A page in place of its parsed form, in which nothing is to be changed."""
 
-    __slots__ = ()
-
     def __new__(cls, page: str, **_: Any) -> _AsItIs:
         return super().__new__(cls, page)
 

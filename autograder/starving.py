@@ -19,13 +19,27 @@ def kept_waiting(pid: int) -> float:
 
     0 if the process has ended, and where the kernel does not count (CONFIG_SCHED_INFO).
     """
-    with suppress(OSError, IndexError):
-        file = os.open(f"/proc/{pid}/schedstat", os.O_RDONLY)  # pathlib takes ten times as long
-        try:
-            return int(os.read(file, 64).split()[1]) / 1e9
-        finally:
-            os.close(file)
+    with suppress(OSError, ValueError):
+        return run_times(f"/proc/{pid}")[1]
     return 0.0
+
+
+def run_times(folder: str) -> tuple[float, float]:
+    """Return for how many s a thread has computed, and was ready and got no processor.
+
+    Args:
+        folder: the thread's in proc(5), or a process's, for its first thread.
+
+    Raises:
+        OSError: it has ended.
+        ValueError: the kernel does not say.
+    """
+    file = os.open(f"{folder}/schedstat", os.O_RDONLY)  # asked often, and pathlib takes far longer
+    try:
+        worked, kept, _ = map(int, os.read(file, 64).split())
+    finally:
+        os.close(file)
+    return worked / 1e9, kept / 1e9
 
 
 class FairDeadline:

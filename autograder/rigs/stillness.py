@@ -14,8 +14,11 @@ import os
 import threading
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
+
+from autograder.starving import run_times
 
 RESTLESS = 0.25
 """Seconds of activity after which a subject counts as one that is never still: a thread polls."""
@@ -27,6 +30,7 @@ to compute for ever. A callback that takes as long has failed the exam by then."
 QUIET = 0.02
 """Seconds for which all others must have slept beside such a thread: one that waits for the
 interpreter's lock, which it holds, also sleeps, but wakes up to ask for it every 5 ms."""
+_ASLEEP = (b"S", b"I")  # states of proc(5)
 _NAP = 0.0005  # s between two looks
 _CLIP = 0.005  # s that one look may count for
 
@@ -167,7 +171,7 @@ class _Thread:
 
     def __init__(self, task: Task) -> None:
         folder = "/proc/{}/task/{}".format(*task)
-        self._files = [os.open(f"{folder}/stat", os.O_RDONLY)]
+        self._files = [os.open(f"{folder}/stat", os.O_RDONLY)]  # closed if the next one fails
         self._files.append(os.open(f"{folder}/{_COUNTS}", os.O_RDONLY))
 
     def __del__(self) -> None:
@@ -184,20 +188,16 @@ class _Thread:
         return found if _COUNTS == "schedstat" else found[found.index(b"voluntary_ctxt") :]
 
 
-_ASLEEP = (b"S", b"I")
-
-
 def _counts() -> str:
     """Return the file of proc(5) that counts a thread's runs.
 
     A tenth of the text of ``status``, schedstat tells to the nanosecond for how long it has run,
     if the kernel keeps account of it (CONFIG_SCHED_INFO).
     """
-    try:
-        told = Path("/proc/thread-self/schedstat").read_bytes()
-        return "schedstat" if int(told.split()[0]) else "status"
-    except (OSError, ValueError, IndexError):
-        return "status"
+    with suppress(OSError, ValueError):
+        if run_times("/proc/thread-self")[0]:
+            return "schedstat"
+    return "status"
 
 
 _COUNTS = _counts()
@@ -210,10 +210,6 @@ def _worked(task: Task) -> float | None:
     """
     folder = "/proc/{}/task/{}".format(*task)
     try:
-        file = os.open(f"{folder}/schedstat", os.O_RDONLY)
-        try:
-            return int(os.read(file, 64).split()[0]) / 1e9
-        finally:
-            os.close(file)
+        return run_times(folder)[0]
     except (OSError, ValueError):
         return time.monotonic() if Path(folder).exists() else None

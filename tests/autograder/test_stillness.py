@@ -112,13 +112,8 @@ def test_a_kernel_that_keeps_no_account_of_run_times_tells_enough(
 ) -> None:
     monkeypatch.setattr(stillness, "_COUNTS", "status")
     with process(BESIDE) as other:
-        assert other.stdout is not None
         still = Stillness(other.pid)
-        for _ in range(10):
-            tell(other, "?")
-            assert still.reached(timeout=30.0)
-            assert readable([other.stdout], 0.0)
-            assert other.stdout.readline() == b"!\n"
+        require_that_answers_are_waited_for(still, other)
         tell(other, "compute")
         assert rests_not_reached(still) > 0
 
@@ -139,6 +134,15 @@ def rests_not_reached(still: Stillness) -> int:
     return next(n for n in range(100) if still.reached(timeout=30.0))
 
 
+def require_that_answers_are_waited_for(still: Stillness, other: subprocess.Popen[bytes]) -> None:
+    assert other.stdout is not None
+    for _ in range(10):
+        tell(other, "?")
+        assert still.reached(timeout=30.0)
+        assert readable([other.stdout], 0.0)
+        assert other.stdout.readline() == b"!\n"
+
+
 def test_a_thread_that_computes_for_ever_costs_the_patience_but_once() -> None:
     with process(BUSY) as other:
         still = Stillness(other.pid)
@@ -148,15 +152,10 @@ def test_a_thread_that_computes_for_ever_costs_the_patience_but_once() -> None:
 
 def test_beside_a_thread_that_computes_for_ever_others_are_waited_for() -> None:
     with process(BESIDE) as other:
-        assert other.stdout is not None
         tell(other, "compute")
         still = Stillness(other.pid)
         rests_not_reached(still)
-        for _ in range(10):
-            tell(other, "?")
-            assert still.reached(timeout=30.0)
-            assert readable([other.stdout], 0.0)
-            assert other.stdout.readline() == b"!\n"
+        require_that_answers_are_waited_for(still, other)
 
 
 def test_a_thread_that_has_fallen_asleep_counts_again() -> None:
