@@ -334,7 +334,7 @@ class BackgroundExecutor(Executor):
         """Run a callback; return whether this thread is to go on with others."""
         job.thread_id = threading.get_ident()
         newest_end = self._newest_end
-        self.gate.notify_watchers()
+        self.gate.notify()
         streams.install()
         failure = job()
         # rclpy resumes each coroutine once before it waits, and leaves out those that run at that
@@ -367,7 +367,7 @@ class BackgroundExecutor(Executor):
         if look_again if done else self._newest_end is not newest_end:
             self.wake()
         self.pulse.beat()
-        self.gate.notify_watchers()
+        self.gate.notify()
         return goes_on
 
     def _drop_what_never_began(self) -> None:

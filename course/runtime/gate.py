@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import threading
 from collections.abc import Callable, Iterator
 
 from rclpy.executors import ShutdownException
+
+from course.runtime.waiting import Pulse, poll
 
 _TIMEOUT = 5.0  # s; waking an executor takes microseconds, so this bounds what cannot happen
 
@@ -14,8 +15,9 @@ _TIMEOUT = 5.0  # s; waking an executor takes microseconds, so this bounds what 
 class Gate:
     """Keeps track of whether the spinning thread looks at, or waits on, its nodes' entities.
 
-    `enter` and `leave` are on the path of every callback: they take no lock unless somebody holds
-    the gate. That is safe because each side writes its own flag before it reads the other's.
+    `enter` and `leave` are on the path of every callback: they do next to nothing unless somebody
+    holds the gate. That is safe because each side writes its own flag before it reads the other's.
+    There is no lock: Ctrl-C may end a step of whoever holds the gate anywhere.
 
     Attributes:
         stale: True if nodes may have changed under a wait that rclpy has suspended.
@@ -27,30 +29,28 @@ class Gate:
         self.stale = False
         self.stopping = False
         self._wake = wake
-        self._holds = 0
+        self._holders: list[object] = []
         self._waiting = False
-        self._watchers = 0
-        self._condition = threading.Condition()
+        self._changes = Pulse()
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
         """Keep the spinning thread out for the length of the block."""
-        with self._condition:
-            self._holds += 1
-            self.stale = True
-        self._wake()
+        holder = object()
         try:
-            with self._condition:
-                self._condition.wait_for(lambda: not self._waiting, _TIMEOUT)
+            self._holders.append(holder)
+            self.stale = True
+            self._wake()
+            poll(lambda: not self._waiting, _TIMEOUT, self._changes)
             yield
         finally:
-            with self._condition:
-                self._holds -= 1
-                self._condition.notify_all()
+            if holder in self._holders:  # else an interrupt came before that
+                self._holders.remove(holder)
+            self.notify()
 
     def new_interrupt(self) -> Callable[[], bool]:
         """Return a condition, equal to no other, that is true while a wait should end."""
-        return lambda: bool(self._holds or self.stopping)
+        return lambda: bool(self._holders or self.stopping)
 
     def enter(self) -> bool:
         """Begin to wait on the nodes; first let those finish who hold the gate.
@@ -62,22 +62,25 @@ class Gate:
             ShutdownException: the executor is to end.
         """
         self._waiting = True
-        if not (self._holds or self.stale or self.stopping):
+        if not (self._holders or self.stale or self.stopping):
             return False
-        with self._condition:
+        while self._holders or self.stale:
             self._waiting = False
-            self._condition.notify_all()
-            self._condition.wait_for(lambda: not self._holds or self.stopping)
+            self.notify()
+            poll(lambda: not self._holders or self.stopping, float("inf"), self._changes)
             if self.stopping:
-                raise ShutdownException
+                break
             self.stale = False
             self._waiting = True
+        if self.stopping:
+            self._waiting = False
+            raise ShutdownException
         return True
 
     def leave(self) -> None:
         """End waiting on the nodes."""
         self._waiting = False
-        if self._holds:
+        if self._holders:
             self.notify()
 
     def stop(self) -> None:
@@ -88,24 +91,12 @@ class Gate:
 
     def notify(self) -> None:
         """Wake those who wait here for a callback to begin or to end."""
-        with self._condition:
-            self._condition.notify_all()
-
-    def notify_watchers(self) -> None:
-        """Do `notify`, if there is anybody to notify."""
-        if self._holds or self._watchers:
-            self.notify()
+        self._changes.beat()
 
     def wait(self, timeout: float) -> None:
         """Return after the next `notify`, or after `timeout` s."""
-        with self._condition:
-            self._condition.wait(timeout)
+        self._changes.wait(self._changes.count, timeout)
 
     def watch(self, condition: Callable[[], object]) -> None:
         """Return when `condition` holds, somebody holds the gate, or the executor is to end."""
-        with self._condition:
-            self._watchers += 1
-            self._condition.wait_for(
-                lambda: condition() or self._holds or self.stopping, timeout=_TIMEOUT
-            )
-            self._watchers -= 1
+        poll(lambda: condition() or self._holders or self.stopping, _TIMEOUT, self._changes)

@@ -19,6 +19,7 @@ from course.runtime.jobs import current_job
 from course.runtime.log_store import store
 from course.runtime.showing import Showing
 from course.runtime.simtime import SimulatedTime
+from course.runtime.waiting import Pulse
 
 
 class Session(Showing):
@@ -69,8 +70,8 @@ class Session(Showing):
             raise
         super().__init__(context, threads)
         self._lock = threading.RLock()
-        self._ended = threading.Event()
-        self.context.on_shutdown(self._ended.set)
+        self._endings = Pulse()
+        self.context.on_shutdown(self._endings.beat)
         self._report = CloseReport()
         self._closing = False
         self._closed = False
@@ -107,11 +108,10 @@ class Session(Showing):
 
         Returns normally in each case: close the session afterwards, or leave its `with` block.
         """
+        seen = self._endings.count
         self._require_open()
-        with signals.ending(self._ended):
-            self._ended.wait()
-        if not self.closed:
-            self._ended.clear()
+        with signals.ending(self._endings.beat):
+            self._endings.wait(seen)
 
     def close(self, timeout: float = 5.0) -> CloseReport:
         """Stop every node and thread, shut the context down, give the domain back. Idempotent.
@@ -169,7 +169,7 @@ class Session(Showing):
 
         Repeatable: Ctrl-C may have cut the first attempt short.
         """
-        self._ended.set()
+        self._endings.beat()
         if self._answering is not None:
             self._answering.stop()
         leaked = self._crew.stop(deadline)

@@ -5,20 +5,22 @@ from __future__ import annotations
 import contextlib
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 
 @contextlib.contextmanager
-def ending(event: threading.Event) -> Iterator[None]:
-    """Set `event` on SIGINT and SIGTERM inside the block; the handlers before are put back.
+def ending(wake: Callable[[], None]) -> Iterator[None]:
+    """Call `wake` on SIGINT and SIGTERM inside the block; the handlers before are put back.
 
-    Python lets only the main thread handle signals: elsewhere this does nothing.
+    The main thread calls it between two steps of whatever it does: it must take no lock that this
+    thread may hold just then. Python lets only the main thread handle signals: elsewhere this does
+    nothing.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     before = {
-        number: signal.signal(number, lambda *_: event.set())
+        number: signal.signal(number, lambda *_: wake())
         for number in (signal.SIGINT, signal.SIGTERM)
     }
     try:

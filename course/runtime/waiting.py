@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-import threading
+import contextlib
+import itertools
+import queue
 import time
 from collections.abc import Callable
 from typing import TypeVar
@@ -13,33 +15,40 @@ _LONGEST_NAP = 0.02  # s. Not every condition changes in a callback: look at it 
 
 
 class Pulse:
-    """Counts finished callbacks and wakes those who wait for the next one.
+    """Wakes those who wait for the next change: mostly, for a callback to end.
 
-    `beat` is on the path of every callback, so it takes no lock unless somebody waits.
+    `beat` is on the path of every callback, so it does next to nothing unless somebody waits. Each
+    who waits has a queue: that may be interrupted anywhere. A `threading.Condition` may not; Ctrl-C
+    at the wrong moment makes it release a lock that it does not hold, and raise for that.
+
+    Attributes:
+        count: another number after each beat, and never an earlier one again.
     """
 
     def __init__(self) -> None:
         """Start at 0."""
         self.count = 0
-        self._waiting = 0
-        self._condition = threading.Condition()
+        self._numbers = itertools.count(1)
+        self._waiting: list[queue.SimpleQueue[None]] = []
 
     def beat(self) -> None:
-        """Tell everyone who waits that something may have changed."""
-        self.count += 1
-        if self._waiting:
-            with self._condition:
-                self._condition.notify_all()
+        """Tell everyone who waits that something may have changed; from a signal handler, too."""
+        self.count = next(self._numbers)  # in one step, where += would lose some
+        while self._waiting:
+            with contextlib.suppress(IndexError):  # another thread has woken the last of them
+                self._waiting.pop().put(None)
 
-    def wait(self, seen: int, timeout: float) -> None:
-        """Return when `count` is no longer `seen`, or after `timeout` seconds."""
-        with self._condition:
-            self._waiting += 1
-            try:
-                if self.count == seen:
-                    self._condition.wait(timeout)
-            finally:
-                self._waiting -= 1
+    def wait(self, seen: int, timeout: float | None = None) -> None:
+        """Return when `count` is no longer `seen`, or after `timeout` seconds (None: no limit)."""
+        mine: queue.SimpleQueue[None] = queue.SimpleQueue()
+        try:
+            self._waiting.append(mine)
+            if self.count == seen:
+                with contextlib.suppress(queue.Empty):
+                    mine.get(timeout=timeout)
+        finally:
+            with contextlib.suppress(ValueError):  # a beat has taken it off
+                self._waiting.remove(mine)
 
 
 def poll(condition: Callable[[], T], timeout: float, pulse: Pulse) -> T | None:
