@@ -163,20 +163,23 @@ class BackgroundExecutor(Executor):
         """How many callbacks have begun, and await something."""
         return len(self._awaiting)
 
-    def busy(self) -> bool:
-        """Return whether callbacks run that are neither done nor blocked; look once at each.
+    def working(self) -> set[Job]:
+        """Return the callbacks that run and are neither done nor blocked; look once at each.
 
         With one thread there is nobody to go on without a blocked callback, so there it counts,
         too. Call it in a row, with `wait_for_a_job` in between: see `Idleness`.
         """
         running = self.running.copy()
         if self._workers is None:
-            return bool(running)
-        begun = [job for job in running if job.thread_id]
+            return running
+        begun = {job for job in running if job.thread_id}
         if len(begun) < len(running) and len({job.thread_id for job in begun}) < self.threads:
-            return True  # a worker is free, and has not come to it yet
-        blocked = [self._blocked(job) for job in begun]  # each is looked at
-        return not all(blocked)
+            return running - begun  # a worker is free, and has not come to it yet
+        return {job for job in begun if not self._blocked(job)}  # each is looked at
+
+    def resumes(self, job: Job) -> bool:
+        """Return whether a callback that runs has begun before, and awaited something."""
+        return job.task in self._awaiting
 
     @staticmethod
     def _blocked(job: Job) -> bool:

@@ -50,9 +50,11 @@ def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> boo
     chain = _Chain(executors)
     idle = 0
     while True:
-        if running := [executor for executor in executors if executor.busy()]:
-            running[0].wait_for_a_job(_NAP)
-            idle = 0
+        working = [(executor, job) for executor in executors for job in executor.working()]
+        if working:
+            # One that only looks again whether what it awaits has come is no sign of life.
+            idle = idle if all(executor.resumes(job) for executor, job in working) else 0
+            working[0][0].wait_for_a_job(_NAP)
         else:
             progress = [executor.run_ready() for executor in executors]
             idle = 0 if any(progress) else idle + 1
@@ -98,4 +100,4 @@ def _nothing_runs(executors: Sequence[BackgroundExecutor]) -> bool:
         return True
     # What this round has set off may have woken it: let it show.
     executors[0].wait_for_a_job(_NAP)
-    return not any(executor.busy() for executor in executors)
+    return not any(executor.working() for executor in executors)
