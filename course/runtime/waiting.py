@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import queue
+import threading
 import time
 from collections.abc import Callable
 from typing import TypeVar
@@ -18,8 +18,10 @@ class Pulse:
     """Wakes those who wait for the next change: mostly, for a callback to end.
 
     `beat` is on the path of every callback, so it does next to nothing unless somebody waits. Each
-    who waits has a queue: that may be interrupted anywhere. A `threading.Condition` may not; Ctrl-C
-    at the wrong moment makes it release a lock that it does not hold, and raise for that.
+    who waits has a lock that a beat opens: that may be interrupted anywhere. A Condition may not:
+    Ctrl-C at the wrong moment makes it release a lock that it does not hold, and raise for that.
+    (Nor does a SimpleQueue serve: in Python 3.11, its `get` never returns if a short timeout is
+    over before it has begun to wait.)
 
     Attributes:
         count: another number after each beat, and never an earlier one again.
@@ -29,23 +31,23 @@ class Pulse:
         """Start at 0."""
         self.count = 0
         self._numbers = itertools.count(1)
-        self._waiting: list[queue.SimpleQueue[None]] = []
+        self._waiting: list[threading.Lock] = []  # of each who waits, closed
 
     def beat(self) -> None:
         """Tell everyone who waits that something may have changed; from a signal handler, too."""
         self.count = next(self._numbers)  # in one step, where += would lose some
         while self._waiting:
             with contextlib.suppress(IndexError):  # another thread has woken the last of them
-                self._waiting.pop().put(None)
+                self._waiting.pop().release()
 
-    def wait(self, seen: int, timeout: float | None = None) -> None:
-        """Return when `count` is no longer `seen`, or after `timeout` seconds (None: no limit)."""
-        mine: queue.SimpleQueue[None] = queue.SimpleQueue()
+    def wait(self, seen: int, timeout: float = -1.0) -> None:
+        """Return when `count` is no longer `seen`, or after `timeout` seconds (-1: no limit)."""
+        mine = threading.Lock()
+        mine.acquire()
         try:
             self._waiting.append(mine)
             if self.count == seen:
-                with contextlib.suppress(queue.Empty):
-                    mine.get(timeout=timeout)
+                mine.acquire(timeout=timeout)
         finally:
             with contextlib.suppress(ValueError):  # a beat has taken it off
                 self._waiting.remove(mine)

@@ -110,3 +110,23 @@ def test_a_beat_from_a_signal_handler_ends_the_wait() -> None:
             assert ended.wait(PATIENCE)
             break
     assert step > 1
+
+
+def test_the_shortest_wait_ends_however_busy_other_threads_are() -> None:
+    pulse, over = Pulse(), threading.Event()
+
+    def burn() -> None:
+        while not over.is_set():
+            pass
+
+    def wait() -> None:
+        for _ in range(300):
+            pulse.wait(0, 1e-6)
+
+    others = [threading.Thread(target=burn, daemon=True) for _ in range(4)]
+    waiter = threading.Thread(target=wait, daemon=True)
+    for thread in [*others, waiter]:
+        thread.start()
+    waiter.join(2 * PATIENCE)
+    over.set()
+    assert not waiter.is_alive()
