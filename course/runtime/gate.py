@@ -62,20 +62,16 @@ class Gate:
             ShutdownException: the executor is to end.
         """
         self._waiting = True
-        if not (self._holders or self.stale or self.stopping):
-            return False
-        while self._holders or self.stale:
+        changed = False
+        while self._holders or self.stale or self.stopping:
             self._waiting = False
             self.notify()
             poll(lambda: not self._holders or self.stopping, float("inf"), self._changes)
             if self.stopping:
-                break
+                raise ShutdownException
             self.stale = False
-            self._waiting = True
-        if self.stopping:
-            self._waiting = False
-            raise ShutdownException
-        return True
+            self._waiting = changed = True
+        return changed
 
     def leave(self) -> None:
         """End waiting on the nodes."""

@@ -18,8 +18,6 @@ from course.runtime.waiting import Pulse
 
 FILES = {course.runtime.gate.__file__, course.runtime.waiting.__file__, threading.__file__}
 PATIENCE = 30.0
-
-
 INTERRUPTIBLE = ("RESUME", "CALL", "JUMP_BACKWARD", "POP_JUMP_BACKWARD")
 
 
@@ -55,14 +53,14 @@ def interrupt() -> None:
     raise KeyboardInterrupt
 
 
-def interrupted(call: Callable[[], object]) -> Iterator[KeyboardInterrupt]:
+def interrupted(call: Callable[[], object]) -> Iterator[None]:
     """Interrupt `call` at its first step, then at its second, and so on until it ends untouched."""
     for step in range(10_000):
         with Interrupting(step, interrupt) as interrupting:
             try:
                 call()
-            except KeyboardInterrupt as error:
-                yield error
+            except KeyboardInterrupt:
+                yield
         if interrupting.left >= 0:
             assert step > 5
             return
