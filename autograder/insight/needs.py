@@ -53,7 +53,7 @@ def _reasons(data: ClassData, grade: Grade) -> Iterator[tuple[bool, str]]:
         for cell in waiting:
             if cell not in examined:
                 explained = True
-                yield False, f"The written answer '{cell}' of {notebook} waits for its marks."
+                yield False, f"Written answers of {notebook} wait for their marks."
             elif not reasons:
                 explained = True
                 yield True, f"The cell '{cell}' of {notebook} was flagged for a manual grade."

@@ -10,7 +10,7 @@ from typing import Any
 
 MAX_FILE = 64 * 1024 * 1024  # bytes; outputs and pictures are in the file, too
 STUB = "Your answer goes here"
-"""Words of the text that stands where an explanation is to be written."""
+"""Words of the text that stands where an answer is to be written."""
 
 BEGINNING = "The beginning"
 """Title of the cells before a chapter's first section."""
@@ -38,7 +38,8 @@ class Notebook:
         sections: those with cells to run, in order.
         exam: name of the exam whose check cell it has; empty if none.
         quiz: name of the quiz that it shows; empty if none.
-        written: whether its explanation has been written; None if it asks for none.
+        written: how many of its answers in words have been written.
+        to_write: how many answers in words it asks for.
         problem: why it cannot be read; empty if it can.
     """
 
@@ -47,7 +48,8 @@ class Notebook:
     sections: tuple[Section, ...] = ()
     exam: str = ""
     quiz: str = ""
-    written: bool | None = None
+    written: int = 0
+    to_write: int = 0
     problem: str = ""
 
 
@@ -66,9 +68,11 @@ def read(folder: Path, path: Path) -> Notebook:
         return Notebook(path, path.stem, problem="it is damaged")
     code = "\n".join(cell.source for cell in cells if cell.code)
     titles = [title for cell in cells for _, title in cell.headings]
+    answers = [cell.source for cell in cells if cell.by_hand and not cell.code]
     return Notebook(
         path, titles[0] if titles else path.stem, _sections(cells),
-        _first(_CHECK, code), _first(_QUIZ, code), _written(cells),
+        _first(_CHECK, code), _first(_QUIZ, code),
+        sum(bool(answer.strip()) and STUB not in answer for answer in answers), len(answers),
     )  # fmt: skip
 
 
@@ -99,13 +103,6 @@ def _sections(cells: list[_Cell]) -> tuple[Section, ...]:
                 sections.append((BEGINNING, []))
             sections[-1][1].append(cell.id)
     return tuple(Section(title, tuple(ids)) for title, ids in sections if ids)
-
-
-def _written(cells: list[_Cell]) -> bool | None:
-    texts = [cell.source for cell in cells if cell.by_hand and not cell.code]
-    if not texts:
-        return None
-    return all(text.strip() and STUB not in text for text in texts)
 
 
 def _first(pattern: re.Pattern[str], text: str) -> str:

@@ -78,8 +78,8 @@ def _next(progress: Progress) -> tuple[Notebook, str] | None:
             return exercise.notebook, "do the task, then run its check cell"
         if exercise.checked.open:
             return exercise.notebook, f"“{exercise.checked.open[0]}” is still open"
-        if exercise.notebook.written is False:
-            return exercise.notebook, "write the explanation, and save"
+        if exercise.notebook.written < exercise.notebook.to_write:
+            return exercise.notebook, "write the explanations, and save"
     for quiz in progress.quizzes:
         if not quiz.passed:
             return quiz.notebook, "take the quiz"
@@ -91,7 +91,7 @@ def _tables(progress: Progress) -> Iterator[tuple[Row, list[tuple[Notebook, Row]
         head: Row = ("Chapter", "Cells run", "Still to run")
         yield head, [(chapter.notebook, _chapter(chapter)) for chapter in progress.chapters]
     if progress.exercises:
-        head = ("Exercise", "Visible checks", "Still open", "Explanation")
+        head = ("Exercise", "Visible checks", "Still open", "Explanations")
         yield head, [(e.notebook, _exercise(e, progress.moment)) for e in progress.exercises]
     if progress.quizzes:
         head = ("Quiz", "Passed", "Best attempt", "Attempts")
@@ -104,14 +104,14 @@ def _chapter(chapter: Chapter) -> Row:
 
 
 def _exercise(exercise: Exercise, now: datetime.datetime) -> Row:
-    written = {True: "written", False: "to be written", None: "none asked for"}
-    explanation = written[exercise.notebook.written]
+    written, to_write = exercise.notebook.written, exercise.notebook.to_write
+    explanations = f"{written} of {to_write} written" if to_write else "none asked for"
     found = exercise.checked
     if found is None:
-        return "not checked yet", "all", explanation
+        return "not checked yet", "all", explanations
     best = f", best {found.best:g}" if found.best > found.score else ""
     points = f"{found.score:g} of {found.max_score:g} points"
-    return f"{points} ({_when(found.when, now)}{best})", _named(found.open), explanation
+    return f"{points} ({_when(found.when, now)}{best})", _named(found.open), explanations
 
 
 def _quiz(quiz: QuizTaken) -> Row:
@@ -137,7 +137,7 @@ def _foot(progress: Progress) -> str:
     return (
         f"As of {progress.moment.day} {progress.moment:%b %Y, %H:%M}, from your saved notebooks "
         "and the files beside them. Nothing of it leaves this machine. The visible checks are not "
-        "your grade: hidden checks and the explanation are graded when you hand in. Run this cell "
+        "your grade: hidden checks and the explanations are graded when you hand in. Run this cell "
         "again to see what has changed."
     )
 

@@ -58,7 +58,7 @@ class Exercise:
     def done(self) -> bool:
         """Whether nothing is left that a student can do."""
         passed = self.checked is not None and not self.checked.open
-        return passed and self.notebook.written is not False
+        return passed and self.notebook.written == self.notebook.to_write
 
 
 @dataclass(frozen=True)

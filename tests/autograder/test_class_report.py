@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import json
 import random
 import re
@@ -16,7 +17,7 @@ import numpy as np
 import pytest
 from nbgrader.api import Gradebook
 
-from autograder import engine, exams
+from autograder import engine, exams, points
 from autograder.corpus import Case
 from autograder.database import GradebookUnusable
 from autograder.gradebook import Grade
@@ -72,7 +73,7 @@ def result(name: str, status: Status, points: float = 1.0, actual: str = "") -> 
 
 
 def grade(student: str, score: float = 1.0, waits: bool = False) -> Grade:
-    cells = {NOTEBOOK: {"qos-visible": score, "qos-explanation": None if waits else 0.0}}
+    cells = {NOTEBOOK: {"qos-visible": score, "qos-explanation-depth": None if waits else 0.0}}
     return Grade(student, score, 20.0, waits, cells)
 
 
@@ -102,9 +103,9 @@ def class_of_skill(count: int, worth: Sequence[float], seed: int = 1) -> ClassDa
 
 def mark_written_answers(course: Course, *students: str) -> None:
     with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
-        for student in students:
-            entry = book.find_grade("qos-explanation", NOTEBOOK, ASSIGNMENT, student)
-            entry.manual_score, entry.needs_manual_grade = 4, False
+        for student, cell in itertools.product(students, points.table()["qos"].manual):
+            entry = book.find_grade(cell, NOTEBOOK, ASSIGNMENT, student)
+            entry.manual_score, entry.needs_manual_grade = 0.5, False
         book.db.commit()
 
 
@@ -422,11 +423,12 @@ def test_the_report_of_a_graded_class(graded: Path) -> None:
     assert "autograder grade ch05" in urgent[("late",)]
     [waiting] = [need for need in report.needs if not need.urgent]
     assert waiting.students == ("bob", "cy")
+    assert waiting.why == "Written answers of qos-design wait for their marks."
     alike = {(pair.left, pair.right): pair.similarity for pair in report.likeness.pairs}
     assert alike == {("-dan", "ann"): 1.0, ("bob", "cy"): 1.0}
     assert rows_of(canvas.read_text())[2:] == [
-        ["'-dan", "", "", "'-dan", "", "19"],
-        ["ann", "", "", "ann", "", "19"],
+        ["'-dan", "", "", "'-dan", "", "17.5"],
+        ["ann", "", "", "ann", "", "17.5"],
     ]
     assert len(rows_of(moodle.read_text())) == 3
     assert Links(page.read_text()).loads == []

@@ -15,7 +15,7 @@ import pytest
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 
-from autograder import engine, nbgrader_once, runner, submission
+from autograder import engine, nbgrader_once, points, runner, submission
 from autograder.corpus import Case
 from autograder.engine import AssignmentError
 from autograder.gradebook import CourseGradebook, Grade, GradebookError
@@ -75,7 +75,7 @@ def test_a_class_is_graded_whatever_state_its_files_are_in(course: Course, cases
     graded = {g.student: g for g in engine.grade(course.root, ASSIGNMENT)}
     found = grades(course)
 
-    full = {"qos-visible": 10.0, "qos-hidden": 5.0, "qos-explanation": None}
+    full = {"qos-visible": 10.0, "qos-hidden": 5.0, **dict.fromkeys(points.table()["qos"].manual)}
     for student in ("right", "deleted", "edited", "twice"):
         assert cells(found[student]) == full, student
     assert cells(found["wrong"]) == {**full, "qos-hidden": 4.0}
@@ -189,12 +189,12 @@ def test_manual_marks_survive_a_regrade(course: Course, cases: Cases) -> None:
     grade(course)
     database = f"sqlite:///{course.root / 'gradebook.db'}"
     with Gradebook(database) as book:
-        entry = book.find_grade("qos-explanation", NOTEBOOK, ASSIGNMENT, "right")
-        entry.manual_score = 4
+        entry = book.find_grade("qos-explanation-depth", NOTEBOOK, ASSIGNMENT, "right")
+        entry.manual_score = 0.5
         entry.needs_manual_grade = False
         book.db.commit()
     again = grade(course)["right"]
-    assert (again.score, cells(again)["qos-explanation"]) == (19.0, 4.0)
+    assert (again.score, cells(again)["qos-explanation-depth"]) == (15.5, 0.5)
 
 
 def test_what_did_not_change_is_not_run_again(

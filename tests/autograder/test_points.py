@@ -19,9 +19,10 @@ def test_the_five_exercises_total_100() -> None:
 
 
 @pytest.mark.parametrize("exam", EXERCISES)
-def test_each_exercise_has_a_written_answer_and_its_own_notebook(exam: str) -> None:
+def test_each_exercise_has_five_written_answers_and_its_own_notebook(exam: str) -> None:
     entry = EXERCISES[exam]
-    assert set(entry.manual) == {f"{exam}-explanation"}
+    assert list(entry.manual.values()) == [1.0] * 5
+    assert all(cell.startswith(f"{exam}-explanation-") for cell in entry.manual)
     assert [other.notebook for other in EXERCISES.values()].count(entry.notebook) == 1
 
 

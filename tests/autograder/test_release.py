@@ -48,7 +48,7 @@ def test_the_release_holds_no_solution_hidden_test_or_authoring_file(root: Path)
     assert "BEGIN" not in text
     source = read(root / "source" / "ch05" / "qos-design.ipynb")
     hidden = [found for cell in source.cells for found in REGION.findall(cell.source)]
-    assert len(hidden) == 3  # the solution, the hidden tests, the exemplary explanation
+    assert len(hidden) == 7  # the solution, the hidden tests, five exemplary answers
     for region in hidden:
         assert region.strip() not in text
 
@@ -59,7 +59,7 @@ def test_the_release_keeps_what_students_need(root: Path) -> None:
     assert "camera_qos = QoSProfile(depth=10)" in cells["qos-solution"].source
     assert 'check("qos")' in cells["qos-visible"].source
     assert cells["qos-visible"].metadata.editable is False
-    assert cells["qos-explanation"].source == "*Your answer goes here.*"
+    assert cells["qos-explanation-depth"].source == "*Your answer goes here.*"
 
 
 def test_a_working_copy_gets_byte_for_byte_what_nbgrader_releases(root: Path) -> None:
@@ -73,7 +73,11 @@ def test_a_working_copy_gets_byte_for_byte_what_nbgrader_releases(root: Path) ->
         ("qos-given", "\ndepth=5,", None),  # the solution has this line, indented or not
         ("qos-visible", '\ncheck("qos", part="hidden")', "qos-visible"),
         ("qos-solution", "\n### BEGIN SOLUTION", "still marks"),
-        ("qos-explanation", "\ntoo little to steer by the past.", "qos-explanation"),
+        (
+            "qos-explanation-depth",
+            "\nestimator, too little to steer by the past.",
+            "qos-explanation-depth",
+        ),
     ],
 )
 def test_a_leak_is_found_wherever_it_is(

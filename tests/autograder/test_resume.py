@@ -16,7 +16,7 @@ import pytest
 from filelock import FileLock
 from nbgrader.api import Gradebook
 
-from autograder import engine, runner
+from autograder import engine, points, runner
 from autograder.engine import BusyError, Graded
 from autograder.gradebook import CourseGradebook
 from autograder.progress import Progress
@@ -146,9 +146,10 @@ def test_marks_that_a_person_gives_get_into_the_feedback(
 ) -> None:
     course = course_of(class_, tmp_path)
     with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
-        grade = book.find_grade("qos-explanation", NOTEBOOK, ASSIGNMENT, "right")
-        grade.manual_score, grade.needs_manual_grade = 4, False
-        comment = book.find_comment("qos-explanation", NOTEBOOK, ASSIGNMENT, "right")
+        for cell in points.table()["qos"].manual:
+            grade = book.find_grade(cell, NOTEBOOK, ASSIGNMENT, "right")
+            grade.manual_score, grade.needs_manual_grade = 0.5, False
+        comment = book.find_comment("qos-explanation-depth", NOTEBOOK, ASSIGNMENT, "right")
         comment.manual_comment = "Well argued, Countess."
         book.db.commit()
     seen = again(course)
@@ -158,7 +159,7 @@ def test_marks_that_a_person_gives_get_into_the_feedback(
     seen = again(course, fresh=True)
     assert seen.run == 3
     found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
-    assert found["right"].score == class_.grades["right"].score + 4
+    assert found["right"].score == class_.grades["right"].score + 2.5
     assert not found["right"].needs_manual_grade, "the work is the same"
     course.submit("right", course.released)
     again(course)

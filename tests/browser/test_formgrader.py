@@ -1,4 +1,4 @@
-"""The formgrader on our assignment: listed, graded, opened, and given a point by hand."""
+"""The formgrader on our assignment: listed, graded, opened, and given points by hand."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from urllib.parse import urlsplit
 import nbformat
 import pytest
 from nbgrader.api import Gradebook
-from playwright.sync_api import Browser, FrameLocator, expect
+from playwright.sync_api import Browser, FrameLocator, Locator, expect
 
-from autograder import corpus, submission
+from autograder import corpus, points, submission
 from autograder.build import build
 from autograder.corpus.trials import one_notebook
 from autograder.release import release
@@ -27,7 +27,8 @@ pytestmark = [
     needs_sandbox,
 ]  # fmt: skip
 
-ASSIGNMENT, NOTEBOOK, EXPLANATION = "ch05", "qos-design", "qos-explanation"
+ASSIGNMENT, NOTEBOOK = "ch05", "qos-design"
+EXPLANATIONS = list(points.table()["qos"].manual)
 
 
 @pytest.fixture
@@ -66,7 +67,12 @@ def formgrader(instructor: NotebookPage) -> FrameLocator:
     return instructor.page.frame_locator("iframe")
 
 
-def points(root: Path) -> dict[str, float | None]:
+def answer(frame: FrameLocator, cell: str) -> Locator:
+    """Return the bar of a written answer, with its buttons."""
+    return frame.locator(".panel-heading", has=frame.locator(f"#{cell}"))
+
+
+def marks(root: Path) -> dict[str, float | None]:
     with Gradebook(f"sqlite:///{root / 'gradebook.db'}") as book:
         handed_in = book.find_submission_notebook(NOTEBOOK, ASSIGNMENT, "ada")
         return {grade.name: grade.manual_score for grade in handed_in.grades}
@@ -91,14 +97,19 @@ def test_an_instructor_grades_our_assignment_in_the_formgrader(
     for link in (ASSIGNMENT, NOTEBOOK, "Submission #1"):
         frame.get_by_role("link", name=link, exact=True).click()
     expect(frame.locator("body")).to_contain_text("qos: 8 of 10 points")
-    score = frame.locator(f"#{EXPLANATION}")
-    # The page asks for the marks after it was drawn; what is typed before they came is lost.
-    expect(score).to_have_class(re.compile("needs_manual_grade"))
-    score.fill("4")
-    score.press("Tab")
+    *clicked, missed, half = EXPLANATIONS
+    for cell in EXPLANATIONS:
+        # The page asks for the marks after it was drawn; what is given before they came is lost.
+        expect(frame.locator(f"#{cell}")).to_have_class(re.compile("needs_manual_grade"))
+    for cell in clicked:
+        answer(frame, cell).get_by_role("button", name="Full credit").click()
+    answer(frame, missed).get_by_role("button", name="No credit").click()
+    frame.locator(f"#{half}").fill("0.5")
+    frame.locator(f"#{half}").press("Tab")
+    given = {**dict.fromkeys(clicked, 1.0), missed: 0.0, half: 0.5}
     until(
-        lambda: points(course_root)[EXPLANATION] == 4,
-        60, lambda: f"the point did not reach the gradebook: {points(course_root)}",
+        lambda: marks(course_root).items() >= given.items(),
+        60, lambda: f"the points did not reach the gradebook: {marks(course_root)}",
     )  # fmt: skip
     # nbgrader's own page asks for MathJax; nothing else leaves the machine, and it works without.
     hosts = {urlsplit(url).hostname for url in instructor.foreign_requests()}

@@ -55,9 +55,9 @@ def edit(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
     path.write_text(json.dumps(notebook), encoding="utf-8")
 
 
-def write_explanation(path: Path) -> None:
+def write_explanations(path: Path, which: str = "-explanation-") -> None:
     def change(cell: dict[str, Any]) -> None:
-        if cell["id"].endswith("-explanation"):
+        if which in cell["id"]:
             cell["source"] = "Because a late frame is worse than a lost one."
 
     edit(path, change)
@@ -94,13 +94,17 @@ def test_what_was_run_checked_written_and_passed_counts(folder: Path) -> None:
     journal.checked("qos", 8.0, 10.0, ["It starts."], ["The newest comes first."])
     progress = course.progress(folder / "ch05")
     assert progress.chapters[0].done == 3
-    assert progress.exercises[0].notebook.written is False
+    exercise = progress.exercises[0].notebook
+    assert (exercise.written, exercise.to_write) == (0, 5)
     text = repr(progress)
     assert "8 of 10 points (today, " in text
     assert "Still open: The newest comes first\n" in text
-    assert "Explanation: to be written" in text
+    assert "Explanations: 0 of 5 written" in text
     journal.checked("qos", 10.0, 10.0, ["It starts.", "The newest comes first."], [])
-    write_explanation(folder / EXERCISE)
+    write_explanations(folder / EXERCISE, "-explanation-stop")
+    assert course.progress().exercises[0].done is False
+    assert "Explanations: 1 of 5 written" in repr(course.progress())
+    write_explanations(folder / EXERCISE)
     take_quiz(folder / QUIZ)
     progress = course.progress()
     assert [exercise.done for exercise in progress.exercises] == [True, *[False] * 4]
@@ -127,8 +131,8 @@ def test_next_leads_through_everything_and_ends(folder: Path) -> None:
         journal.checked(exercise.notebook.exam, 1.0, 10.0, ["a"], ["It moves."])
         assert next_() == f"Next: {where}: “It moves.” is still open."
         journal.checked(exercise.notebook.exam, 10.0, 10.0, ["a", "It moves."], [])
-        assert next_() == f"Next: {where}: write the explanation, and save."
-        write_explanation(folder / exercise.notebook.path)
+        assert next_() == f"Next: {where}: write the explanations, and save."
+        write_explanations(folder / exercise.notebook.path)
     assert next_() == "Next: ch05-quiz/quiz.ipynb: take the quiz."
     take_quiz(folder / QUIZ)
     assert next_() == ""

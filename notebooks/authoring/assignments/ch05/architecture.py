@@ -76,7 +76,7 @@
 # yours makes for itself counts as one more node: what the two hand each other in Python is no link.
 #
 # **20 points:** 10 for the visible checks, 5 for checks that run when your work is graded, 5 for
-# your explanation.
+# your explanations.
 
 # %% nbgrader={"grade": false, "grade_id": "architecture-given", "locked": true, "schema_version": 3, "solution": false}
 # %load_ext course
@@ -211,36 +211,66 @@ check("architecture")
 check("architecture", part="hidden")
 ### END HIDDEN TESTS
 
-# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-rubric", "locked": true, "schema_version": 3, "solution": false}
+# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-question-nodes", "locked": true, "schema_version": 3, "solution": false}
 # ## Explain your design
 #
-# In eight to ten sentences: why these nodes, why these patterns, and what happens when something
-# goes wrong. An instructor reads this; the five points are given as follows.
+# Defend your design in two or three sentences each. An instructor reads this: each answer gives one
+# point, or half a point if only a part of the question is answered.
 #
-# | Points | For |
-# |---|---|
-# | 1 | Nodes: why the work is divided where it is, with one case in which that pays (a new sensor, a crash, a test) |
-# | 1 | Action: why navigation is one, and what it would lose as a service or as a topic |
-# | 1 | Service: why planning is one, and what the caller does while it waits |
-# | 1 | Topics: how obstacle information gets to the motors, and why nobody asks for it |
-# | 1 | QoS or failure: one link whose QoS you chose and why, or what the robot does when a node of yours is gone |
+# ### Nodes
+#
+# Why is the work divided where it is? Name one case in which that pays (a new sensor, a crash, a
+# test).
 
-# %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation-nodes", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
-# **Nodes.** Each sensor has a driver, so that a new LIDAR means one new node. State estimation and
-# obstacle detection turn readings into a pose and obstacles; both can be tested with recordings.
-# Navigation decides, the controller only turns its decision into wheel speeds, so that there is one
-# place that commands the motors.
+# Each sensor has a driver, so that a new LIDAR means one new node. State estimation and obstacle
+# detection turn readings into a pose and obstacles; both can be tested with recordings. Navigation
+# decides, the controller only turns its decision into wheel speeds, so that there is one place that
+# commands the motors.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-question-action", "locked": true, "schema_version": 3, "solution": false}
+# ### Action
 #
-# **Action.** Driving takes minutes: the person who sent the goal wants to see progress and to
-# cancel. A service would keep the caller waiting without a word; a topic would have no result.
+# Why is navigation an action, and what would it lose as a service or as a topic?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation-action", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# Driving takes minutes: the person who sent the goal wants to see progress and to cancel. A service
+# would keep the caller waiting without a word; a topic would have no result.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-question-service", "locked": true, "schema_version": 3, "solution": false}
+# ### Service
 #
-# **Service.** A path is needed once a goal, or when the way is blocked: one question, one answer.
-# Navigation calls asynchronously and goes on reading obstacles meanwhile.
+# Why is planning a service, and what does the caller do while it waits?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation-service", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# A path is needed once a goal, or when the way is blocked: one question, one answer. Navigation
+# calls asynchronously and goes on reading obstacles meanwhile.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-question-topics", "locked": true, "schema_version": 3, "solution": false}
+# ### Topics
 #
-# **Topics.** Scans become obstacles ten times a second, and navigation slows down or turns with each
-# of them. If it had to ask, an obstacle would be as old as the last question.
+# How does obstacle information get to the motors, and why does nobody ask for it?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation-topics", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# Scans become obstacles ten times a second, and navigation slows down or turns with each of them.
+# If it had to ask, an obstacle would be as old as the last question.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "architecture-question-links", "locked": true, "schema_version": 3, "solution": false}
+# ### QoS or failure
 #
-# **QoS.** The map is transient local: it is published once, and a planner that restarts still gets
-# it. Scans are best effort, because the next one is better than a late one.
+# Name one link whose QoS you chose and say why, or say what the robot does when one of your nodes
+# is gone, and why that is safe.
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "architecture-explanation-links", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# The map is transient local: it is published once, and a planner that restarts still gets it. Scans
+# are best effort, because the next one is better than a late one.
 # ### END SOLUTION

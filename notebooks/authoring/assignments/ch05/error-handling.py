@@ -44,7 +44,7 @@
 # 3. **Nothing leaves a callback as an exception.**
 #
 # **20 points:** 10 for the visible checks, 5 for checks that run when your work is graded, 5 for
-# your explanation.
+# your explanations.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "safety-tools", "locked": true, "schema_version": 3, "solution": false}
 # ## Given: tools and hardware
@@ -460,37 +460,68 @@ check("safety")
 check("safety", part="hidden")
 ### END HIDDEN TESTS
 
-# %% [markdown] nbgrader={"grade": false, "grade_id": "safety-rubric", "locked": true, "schema_version": 3, "solution": false}
+# %% [markdown] nbgrader={"grade": false, "grade_id": "safety-question-timeouts", "locked": true, "schema_version": 3, "solution": false}
 # ## Explain your choices
 #
-# Say in a few sentences for each row what you did and why. An instructor reads this; each row gives
-# one point.
+# Say in two or three sentences each what you did, and why. An instructor reads this: each answer
+# gives one point, or half a point if only a part of the question is answered.
 #
-# | Points | For |
-# |---|---|
-# | 1 | Time-outs: how your client waits for an answer without blocking, and what would stand still if it did |
-# | 1 | Retries: why three and not for ever, why the pauses grow, and why a refusal is not tried again |
-# | 1 | Stale answers: how your client keeps a late answer apart from the present one, and what could happen otherwise |
-# | 1 | Errors as answers: what the operator sees if your service callback raises instead, and why a bad request changes nothing at all |
-# | 1 | Stopping: by which mechanism the last command is a stop on every way out, and which failure it does not cover (who would have to stop the robot then?) |
+# ### Time-outs
+#
+# How does your client wait for an answer without blocking, and what would stand still if it did?
 
-# %% [markdown] nbgrader={"grade": true, "grade_id": "safety-explanation", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# %% [markdown] nbgrader={"grade": true, "grade_id": "safety-explanation-timeouts", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
-# **Time-outs:** the answer is a future that the callback awaits, and a timer cancels it after 1 s. A
-# blocking call would hold a thread, and in the default group also the heartbeat and the clock.
+# The answer is a future that the callback awaits, and a timer cancels it after 1 s. A blocking call
+# would hold a thread, and in the default group also the heartbeat and the clock.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "safety-question-retries", "locked": true, "schema_version": 3, "solution": false}
+# ### Retries
 #
-# **Retries:** a hiccup is over after a try or two; a gripper that is gone does not come back because
-# we ask more often, and somebody has to know in time. Growing pauses leave a busy server room to
-# recover. A refusal is an answer: the gripper is well and has decided.
+# Why three tries and not for ever, with pauses that grow, and why is a refusal not tried again?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "safety-explanation-retries", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# A hiccup is over after a try or two; a gripper that is gone does not come back because we ask more
+# often, and somebody has to know in time. Growing pauses leave a busy server room to recover. A
+# refusal is an answer: the gripper is well and has decided.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "safety-question-stale", "locked": true, "schema_version": 3, "solution": false}
+# ### Stale answers
 #
-# **Stale answers:** each try has a future of its own, and the cancelled one is forgotten, so that
-# rclpy drops its answer. Otherwise the old answer "open" could count for the new command "close",
-# and the parcel falls.
+# How does your client keep a late answer apart from the present one, and what could happen
+# otherwise?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "safety-explanation-stale", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# Each try has a future of its own, and the cancelled one is forgotten, so that rclpy drops its
+# answer. Otherwise the old answer "open" could count for the new command "close", and the parcel
+# falls.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "safety-question-errors", "locked": true, "schema_version": 3, "solution": false}
+# ### Errors as answers
 #
-# **Errors as answers:** if the callback raises, no response is sent: the operator waits for ever, and
-# under a plain `spin` the node dies. A half-applied request leaves limits that nobody asked for.
+# What does the operator see if your service callback raises instead, and why does a bad request
+# change nothing at all?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "safety-explanation-errors", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# If the callback raises, no response is sent: the operator waits for ever, and under a plain `spin`
+# the node dies. A half-applied request leaves limits that nobody asked for.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "safety-question-stopping", "locked": true, "schema_version": 3, "solution": false}
+# ### Stopping
 #
-# **Stopping:** `finally` in the execute callback covers each end of a goal, the flag that the loop
-# looks at covers the shutdown. A process that is killed says nothing any more: the motor controller itself needs a
-# watchdog that stops the wheels when commands cease.
+# By which mechanism is the last command a stop on every way out, and which failure does it not
+# cover (who would have to stop the robot then)?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "safety-explanation-stopping", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# `finally` in the execute callback covers each end of a goal, the flag that the loop looks at
+# covers the shutdown. A process that is killed says nothing any more: the motor controller itself
+# needs a watchdog that stops the wheels when commands cease.
 # ### END SOLUTION

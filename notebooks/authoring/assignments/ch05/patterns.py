@@ -30,7 +30,7 @@
 # system: it looks up in the ROS graph which pattern each of the five really is, and then uses it.
 #
 # **20 points:** 10 for the visible checks, 5 for what is examined when your work is graded (your
-# five choices, and three more checks of your node), 5 for your explanation.
+# five choices, and three more checks of your node), 5 for your explanations.
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-choose", "locked": true, "schema_version": 3, "solution": false}
 # ## First half: choose
@@ -288,39 +288,65 @@ check(
 )
 ### END HIDDEN TESTS
 
-# %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-rubric", "locked": true, "schema_version": 3, "solution": false}
+# %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-question-position", "locked": true, "schema_version": 3, "solution": false}
 # ## Explain your choices
 #
 # For each of the five scenarios say in one or two sentences why you chose this pattern, and what
-# would go wrong on the robot with another one. An instructor reads this; the five points are given
-# as follows.
+# would go wrong on the robot with another one. An instructor reads this: each answer gives one
+# point, or half a point if only a part of the question is answered.
 #
-# | Points | For |
-# |---|---|
-# | 1 | Position: who asks, how often, and what an asker may do with the answer |
-# | 1 | Camera: who waits for whom, with several subscribers and with none |
-# | 1 | Navigation: how long it takes, and what feedback and cancelling are needed for |
-# | 1 | Parameters: what whoever changes a value has to hear back |
-# | 1 | Battery: how everybody learns the level, also whoever joins late |
+# ### Position
+#
+# Who asks, and how often? What may an asker do with the answer?
 
-# %% [markdown] nbgrader={"grade": true, "grade_id": "patterns-explanation", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# %% [markdown] nbgrader={"grade": true, "grade_id": "patterns-explanation-position", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
-# **Position: service.** One node asks now and then and goes on with the one answer, which is as
-# fresh as the question. As a topic, which most robots have as well, the newest message answers the
-# same question without asking; an action would need a goal handle for an answer that is there at
-# once.
+# A service: one node asks now and then and goes on with the one answer, which is as fresh as the
+# question. As a topic, which most robots have as well, the newest message answers the same question
+# without asking; an action would need a goal handle for an answer that is there at once.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-question-camera", "locked": true, "schema_version": 3, "solution": false}
+# ### Camera
 #
-# **Camera: topic.** Pictures come all the time and any number of nodes looks at them. The driver
-# must wait for none of them; with a service each viewer would have to ask ten times a second.
+# Who waits for whom? Think of several subscribers, and of none.
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "patterns-explanation-camera", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# A topic: pictures come all the time and any number of nodes looks at them. The driver must wait
+# for none of them; with a service each viewer would have to ask ten times a second.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-question-navigation", "locked": true, "schema_version": 3, "solution": false}
+# ### Navigation
 #
-# **Navigation: action.** The drive takes minutes. Whoever sent the robot wants to see how far it is
-# and must be able to call it off; a service call would hang until the end, a message on a topic
-# would tell nobody whether the robot ever arrived.
+# How long does it take? What are feedback and cancelling needed for?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "patterns-explanation-navigation", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# An action: the drive takes minutes. Whoever sent the robot wants to see how far it is and must be
+# able to call it off; a service call would hang until the end, a message on a topic would tell
+# nobody whether the robot ever arrived.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-question-parameters", "locked": true, "schema_version": 3, "solution": false}
+# ### Parameters
 #
-# **Parameters: service.** Quick, and the answer matters: the value is taken, or refused with a
-# reason. ROS 2's own parameter services are made for this. On a topic a bad value would be dropped
-# without a word.
+# What does whoever changes a value have to hear back? What if nobody said it?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "patterns-explanation-parameters", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# A service: quick, and the answer matters, as the value is taken, or refused with a reason. ROS 2's
+# own parameter services are made for this. On a topic a bad value would be dropped without a word.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "patterns-question-battery", "locked": true, "schema_version": 3, "solution": false}
+# ### Battery
 #
-# **Battery: topic.** Everyone may listen and nobody needs to ask. The last level stays available
-# for those who join late: transient local, or published again every second.
+# How does everybody learn the level? How does one who joins late?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "patterns-explanation-battery", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# A topic: everyone may listen and nobody needs to ask. The last level stays available for those who
+# join late: transient local, or published again every second.
 # ### END SOLUTION

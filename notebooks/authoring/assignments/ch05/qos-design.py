@@ -46,7 +46,7 @@
 # that does what the table says gets full marks.
 #
 # **20 points:** 10 for the visible checks, 5 for checks that run when your work is graded, 5 for
-# your explanation.
+# your explanations.
 
 # %% nbgrader={"grade": false, "grade_id": "qos-given", "locked": true, "schema_version": 3, "solution": false}
 # %load_ext course
@@ -167,33 +167,70 @@ check("qos")
 check("qos", part="hidden")
 ### END HIDDEN TESTS
 
-# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-rubric", "locked": true, "schema_version": 3, "solution": false}
+# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-question-loss", "locked": true, "schema_version": 3, "solution": false}
 # ## Explain your choices
 #
-# For each sensor say in one or two sentences which reliability, durability, and history with which
-# depth you chose, and what would happen on the robot with the opposite choice. An instructor reads
-# this; the five points are given as follows.
+# Say in two or three sentences each what you chose, why, and what would happen on the robot with
+# the opposite choice. An instructor reads this: each answer gives one point, or half a point if
+# only a part of the question is answered.
 #
-# | Points | For |
-# |---|---|
-# | 1 | Reliability: who re-sends, and why a late camera frame is worse than a lost one |
-# | 1 | Reliability of the emergency stop: what may never happen, and which policy prevents it |
-# | 1 | Durability: what a node that starts late gets, and why old sensor data is a danger |
-# | 1 | History and depth: what a busy consumer finds in its queue, for LIDAR against IMU |
-# | 1 | Compatibility: what happens if a consumer asks for more than the driver offers |
+# ### A lost camera frame
+#
+# Who re-sends it, if anybody does, and why is a late frame worse than a lost one?
 
-# %% [markdown] nbgrader={"grade": true, "grade_id": "qos-explanation", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# %% [markdown] nbgrader={"grade": true, "grade_id": "qos-explanation-loss", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
-# **Camera:** best effort, volatile, keep last 5. A lost frame is replaced by the next one 100 ms
-# later; re-sending it would hold up newer frames and freeze the picture.
+# Nobody: the camera is best effort, volatile, keep last 5. A lost frame is replaced by the next one
+# 100 ms later. A reliable writer would send it again until it is acknowledged, which holds up newer
+# frames and freezes the picture.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-question-stop", "locked": true, "schema_version": 3, "solution": false}
+# ### A lost stop event
 #
-# **LIDAR:** reliable, volatile, keep last 1. Only the latest scan counts. Best effort, as many
-# drivers offer it, would do as well; then no consumer may request RELIABLE.
+# What may never happen, and which policies prevent it?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "qos-explanation-stop", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# No event may get lost on the way or in a queue, or the robot drives on. Reliable sends it again
+# until it has arrived, and keep all holds each one until a busy consumer has handled it; with a
+# short queue a later event would push the stop out.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-question-durability", "locked": true, "schema_version": 3, "solution": false}
+# ### Durability
 #
-# **IMU:** reliable, volatile, keep last 10. Ten readings are 100 ms: enough for a busy estimator,
-# too little to steer by the past.
+# What does a node that starts late get, and why is old sensor data a danger?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "qos-explanation-durability", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# Nothing that was sent before: all four are volatile, and it begins with the next reading. A scan
+# of a minute ago shows free way where somebody stands by now. For the stop, transient local is
+# right as well: the state counts, and who starts late should know it.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-question-depth", "locked": true, "schema_version": 3, "solution": false}
+# ### History and depth
 #
-# **Emergency stop:** reliable, volatile, keep all. No event may get lost on the way or in a queue.
-# A RELIABLE offer also serves consumers that ask for BEST_EFFORT; the other way round DDS refuses
-# the connection and the stop would never arrive.
+# What does a busy consumer find in its queue, for the LIDAR and for the IMU, and why the
+# difference?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "qos-explanation-depth", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# LIDAR, keep last 1: the newest scan and no other, because only the present obstacles count. IMU,
+# keep last 10: the readings of 100 ms, each of which is a part of the angle; enough for a busy
+# estimator, too little to steer by the past.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "qos-question-compatibility", "locked": true, "schema_version": 3, "solution": false}
+# ### Compatibility
+#
+# What happens if a consumer asks for more than the driver offers, and where did you have to think
+# of that?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "qos-explanation-compatibility", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# DDS refuses the connection, and nothing arrives at all. A driver that offers RELIABLE also serves
+# consumers that ask for BEST_EFFORT, so stop, IMU and LIDAR offer it; the camera is best effort, so
+# no consumer may insist on RELIABLE there.
 # ### END SOLUTION

@@ -65,7 +65,7 @@
 # files and memory of your process. How you write it is your choice.
 #
 # **20 points:** 10 for the visible checks, 5 for checks that run when your work is graded, 5 for
-# your explanation.
+# your explanations.
 
 # %% nbgrader={"grade": false, "grade_id": "resources-given", "locked": true, "schema_version": 3, "solution": false}
 # %load_ext course
@@ -389,41 +389,73 @@ check("resources")
 check("resources", part="hidden")
 ### END HIDDEN TESTS
 
-# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-rubric", "locked": true, "schema_version": 3, "solution": false}
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-initialization", "locked": true, "schema_version": 3, "solution": false}
 # ## Explain your choices
 #
-# Explain in about ten sentences how a node manages its resources: what happens in initialization,
-# while it runs, and in cleanup, and what a managed node adds. Name places in your own code. An
-# instructor reads this; the five points are given as follows.
+# Explain in two or three sentences each how your nodes manage their resources, and name places in
+# your own code. An instructor reads this: each answer gives one point, or half a point if only a
+# part of the question is answered.
 #
-# | Points | For |
-# |---|---|
-# | 1 | Initialization: what is created there, and what the constructor does if a step in its middle fails |
-# | 1 | Running: who may use the camera at which moment, and what a callback that raises must not leave behind |
-# | 1 | Cleanup: in which order thread, camera and endpoints end in your code, and what could happen in another order |
-# | 1 | Leaks: how a leak that one life does not show stops the robot after some hundred lives, with an example |
-# | 1 | Lifecycle: what each state of your managed node holds, and what a supervisor gains by that |
+# ### Initialization
+#
+# What is created there, and what does the constructor do if a step in its middle fails?
 
-# %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-initialization", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
-# **Initialization** creates the endpoints, the worker thread and the camera's stream in `open()`.
-# If a step raises, the constructor calls `destroy_node()`, which works on half a node because
-# `camera` and `worker` exist (as `None`) before anything can fail, and then raises again: a process
-# must learn that it has no camera.
+# The endpoints, the worker thread and the camera's stream are made in `open()`. If a step raises,
+# the constructor calls `destroy_node()`, which works on half a node because `camera` and `worker`
+# exist (as `None`) before anything can fail, and then raises again: a process must learn that it
+# has no camera.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-running", "locked": true, "schema_version": 3, "solution": false}
+# ### Running
 #
-# **Running:** the timer only orders a picture, the worker reads it, so a slow camera never blocks
-# the executor. The camera may be used from several threads. A refused zoom raises in its callback;
-# no lock is held there and nothing is half changed, so the next message is handled as usual.
+# Who may use the camera at which moment, and what must a callback that raises not leave behind?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-running", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# The timer only orders a picture, the worker reads it, so a slow camera never blocks the executor;
+# a snapshot reads beside it, as the camera may be used from several threads. A refused zoom raises
+# in its callback; no lock is held there and nothing is half changed, so the next message is handled
+# as usual.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-cleanup", "locked": true, "schema_version": 3, "solution": false}
+# ### Cleanup
 #
-# **Cleanup** goes from the users to the used: first the worker ends and is waited for, then the
-# camera is closed, then rclpy destroys the endpoints. The other way round the worker would read
-# from a closed camera or publish with a destroyed publisher.
+# In which order do thread, camera and endpoints end in your code, and what could happen in another
+# order?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-cleanup", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# From the users to the used: first the worker ends and is waited for, then the camera is closed,
+# then rclpy destroys the endpoints. The other way round the worker would read from a closed camera
+# or publish with a destroyed publisher.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-leaks", "locked": true, "schema_version": 3, "solution": false}
+# ### Leaks
 #
-# **Leaks:** a thread that nobody ends costs little, and one life does not show it. A robot that
-# restarts its driver every ten minutes has a thousand of them in a week; at some point a thread or
-# a file cannot be made any more, in a node that did nothing wrong.
+# How does a leak that one life does not show stop the robot after some hundred lives? Give an
+# example, and say where your code prevents it.
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-leaks", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# A thread that nobody ends costs little, and one life does not show it. A robot that restarts its
+# driver every ten minutes has a thousand of them in a week; at some point a thread or a file cannot
+# be made any more, in a node that did nothing wrong. `destroy_node()` puts `END` into the queue and
+# joins the worker.
+# ### END SOLUTION
+
+# %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-lifecycle", "locked": true, "schema_version": 3, "solution": false}
+# ### Lifecycle
 #
-# **Lifecycle:** unconfigured holds nothing, inactive has the camera open with its stream stopped,
-# active streams. A supervisor can open all devices first, see that each is there, and let the robot
-# drive only then; and it can bring back a failed driver without ending its process.
+# What does each state of your managed node hold, and what does a supervisor gain by that?
+
+# %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-lifecycle", "locked": false, "points": 0, "schema_version": 3, "solution": true}
+# ### BEGIN SOLUTION
+# Unconfigured holds nothing, inactive has the camera open with its stream stopped, active streams.
+# A supervisor can open all devices first, see that each is there, and let the robot drive only
+# then; and it can bring back a failed driver without ending its process.
 # ### END SOLUTION
