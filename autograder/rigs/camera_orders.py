@@ -81,7 +81,7 @@ def require_one_picture_each(rig: CameraRig, device: str, when: str) -> None:
 def require_snapshots_under_way(rig: CameraRig, device: str) -> Callable[[], int]:
     """Ask for some snapshots; fail unless one is answered. A callback waits for the next one then.
 
-    Return a function that says how many of them succeeded by the time of its call.
+    Return a function that says how many of them have not succeeded by the time of its call.
 
     rclpy 7.1 resumes a callback that awaits a future when its executor has something else to do: on
     a robot, at the next tick. Here time stands still, so that ticks ask the camera for no picture;
@@ -105,7 +105,7 @@ def require_snapshots_under_way(rig: CameraRig, device: str) -> Callable[[], int
             expected=f"The service {SNAPSHOT} answers when the picture is there.",
             actual=f"No answer came within {SETTLE:.0f} s{rig.raised()}.",
         )
-    return lambda: sum(reply.done() and reply.result().success for reply in replies)
+    return lambda: sum(not (reply.done() and reply.result().success) for reply in replies)
 
 
 def require_no_queue(rig: CameraRig, device: str, destroy: Callable[[], object]) -> None:

@@ -416,9 +416,9 @@ check("resources", part="hidden")
 # %% [markdown] nbgrader={"grade": true, "grade_id": "resources-explanation-running", "locked": false, "points": 0, "schema_version": 3, "solution": true}
 # ### BEGIN SOLUTION
 # The timer only orders a picture, the worker reads it, so a slow camera never blocks the executor;
-# a snapshot reads beside it, as the camera may be used from several threads. A refused zoom raises
-# in its callback; no lock is held there and nothing is half changed, so the next message is handled
-# as usual.
+# a snapshot reads beside it, as the camera may be used from several threads. A refused zoom is
+# caught in its callback; no lock is held there and nothing is half changed, so the next message is
+# handled as usual.
 # ### END SOLUTION
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "resources-question-cleanup", "locked": true, "schema_version": 3, "solution": false}
