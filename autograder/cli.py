@@ -187,6 +187,8 @@ def report(
 ) -> None:
     """Show the grades of an assignment, what still needs a person, and how its checks went.
 
+    A quiz's name stands for the assignment that it is in.
+
     Writes into reports/ASSIGNMENT of the course root: class-report.html, which opens in any
     browser and needs no network, and two exports.
 
@@ -206,6 +208,7 @@ def report(
     from autograder.insight import command
 
     where = _root(root)
+    assignment = quiz_report.assignment_of(where, assignment)
     made = command.run(
         where, assignment, column=column, provisional=provisional, threshold=similarity
     )

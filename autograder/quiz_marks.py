@@ -47,7 +47,7 @@ def find_bank(root: Path, name: str) -> Bank:
     """
     own = root / BANKS
     try:
-        found = loader.load_bank(name, own if name in loader.names(own) else loader.BANKS)
+        found = loader.find_bank(name, own)
     except QuizError as error:
         raise QuizMarksError(str(error)) from error
     if found.keyless:
@@ -146,7 +146,7 @@ def _check(mark: Mark) -> CheckResult:
     return CheckResult(
         mark.item.variant.id, rendering.plain(mark.item.concept.objective),
         "passed" if mark.right else "failed", round(mark.credit, 2), 1.0,
-        rationale=" ".join(rendering.plain(remark.feedback) for remark in wrong),
+        rationale=" ".join(rendering.plain(r.feedback) for r in wrong if r.feedback),
         actual=f"The answer was: {answer}",
     )  # fmt: skip
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from autograder import quiz_marks
-from autograder.quiz_cli import as_course_errors
+from autograder import quiz_marks, submission
+from autograder.quiz_cli import QuizCommandError, as_course_errors
 from quizzes import record
 
 if TYPE_CHECKING:
@@ -56,6 +56,26 @@ class QuizReport:
                 held = f"{figures.holders} of {figures.met}"
                 beliefs.add_row(figures.belief, held, f"{100 * figures.share:.0f} %")
         return items, beliefs
+
+
+def assignment_of(root: Path, name: str) -> str:
+    """Return the assignment that ``name`` means: an assignment, or the one that has such a quiz.
+
+    Raises:
+        QuizCommandError: several assignments have the quiz.
+    """
+    source = root / "source"
+    if (source / name).is_dir() or name not in quiz_marks.names(root):
+        return name
+    having = sorted({
+        path.parent.name for path in source.glob("*/*.ipynb")
+        if name in quiz_marks.in_cells(submission.read(path))
+    })  # fmt: skip
+    if len(having) > 1:
+        raise QuizCommandError(
+            f"The quiz '{name}' is in the assignments {', '.join(having)}: name one of them."
+        )
+    return having[0] if having else name
 
 
 def of_assignment(root: Path, assignment: str) -> list[QuizReport]:

@@ -8,21 +8,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    PrivateAttr,
-    StringConstraints,
-    model_validator,
-)
+from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
+
+from quizzes import fields
+from quizzes.fields import Code, Finite, Id, Part, Proofs, Text, ToTeach
 
 MIN_VARIANTS = 4
-"""Variants a concept has at least: with fewer, a retry is too soon the same quiz again."""
+"""Variants a concept of a teaching bank has at least: with fewer, a retry is too soon the same."""
 
 COUNTED = 20
 """How many attempts of a quiz count unless its bank says it; later ones are practice."""
@@ -30,66 +26,49 @@ COUNTED = 20
 DEAL = 2
 """How `quizzes.model` deals letters: answers saved under another number mean nothing."""
 
-Text = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1)]
-Code = Annotated[str, StringConstraints(min_length=1)]
-Id = Annotated[str, StringConstraints(pattern=r"^[a-z0-9]+(-[a-z0-9]+)*$", max_length=60)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
-
-def _as_list(value: object) -> object:
-    return [value] if isinstance(value, str) else value
-
-
-Proofs = Annotated[list[Text], Field(min_length=1), BeforeValidator(_as_list)]
-"""Names of tests; a single one may stand alone."""
-
-
-class FieldError(ValueError):
-    """What is wrong with one field of a part that does not hold together."""
-
-    def __init__(self, field: str, problem: str) -> None:
-        """Say ``problem`` of ``field``, whose parts are parted by spaces: "options 2 text"."""
-        super().__init__(problem)
-        self.field = field
-
-
-class Part(BaseModel):
-    """Base of all parts of a bank: nothing is converted, nothing unknown is passed over."""
-
-    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
-
 
 class Option(Part):
-    """One option of a choice. A wrong one names the belief that makes it tempting.
-
-    ``show`` is Python that demonstrates on live nodes what really happens.
-    """
+    """One option of a choice. A wrong one names the belief that makes it tempting."""
 
     text: Text
+    """What there is to choose."""
     correct: bool = False
-    feedback: Text
-    misconception: Id | None = None
+    """Whether it is right to choose it."""
+    feedback: ToTeach[Text]
+    """Why it is right or wrong, for who chose it."""
+    misconception: Id | None = Field(
+        default=None, validate_default=True, json_schema_extra={fields.TO_TEACH: True}
+    )
+    """The belief that a wrong option shows, from the bank's table. Teaching quizzes name one with
+    each wrong option; a right one has none."""
     show: Code | None = None
+    """Python that demonstrates on live nodes what really happens."""
 
-    @model_validator(mode="after")
-    def _wrong_ones_have_a_reason(self) -> Self:
-        if not self.correct and self.misconception is None:
-            raise FieldError("misconception", "a wrong option needs a misconception")
-        if self.correct and self.misconception is not None:
-            raise FieldError("misconception", "a right option has no misconception")
-        return self
+    @field_validator("misconception")
+    @classmethod
+    def _wrong_ones_have_a_reason(cls, value: str | None, info: ValidationInfo) -> str | None:
+        correct = info.data.get("correct")
+        if correct is False and value is None and fields.teaches():
+            fields.require([("", "a wrong option needs a misconception in a quiz that teaches")])
+        if correct is True and value is not None:
+            fields.require([("", "a right option has no misconception")])
+        return value
 
 
 class _Variant(Part):
     id: Id
+    """Its name, used once in the bank: lower-case words joined by hyphens."""
     stem: Text
+    """The question."""
     code: Code | None = None
-    proof: Proofs
-    """The names of the tests that prove the key on real endpoints."""
+    """Python that the question is about, shown below it."""
+    proof: ToTeach[Proofs]
+    """The names of the tests that prove the key on real endpoints; one may stand alone."""
 
 
 class _Choice(_Variant):
     options: list[Option] = Field(min_length=2, max_length=10)
+    """What there is to choose from; each learner sees it in another order."""
 
     @property
     def texts(self) -> list[str]:
@@ -103,47 +82,59 @@ class _Choice(_Variant):
 
 
 class _OneRight(_Choice):
-    @model_validator(mode="after")
-    def _one_key(self) -> Self:
-        if len(self.right) != 1:
-            problem = f"exactly one option must be correct, not {len(self.right)}"
-            raise FieldError("options", problem)
-        return self
+    @field_validator("options")
+    @classmethod
+    def _one_key(cls, options: list[Option]) -> list[Option]:
+        count = sum(option.correct for option in options)
+        problem = f"exactly one option must be correct, not {count}"
+        fields.require([("", problem)] if count != 1 else [])
+        return options
 
 
 class Single(_OneRight):
     """Choose the one right option."""
 
     kind: Literal["single"]
+    """The kind of question."""
 
 
 class Predict(_OneRight):
-    """Say what a cell will show, then run it: ``code`` is that cell."""
+    """Say what a cell will show, then run it."""
 
     kind: Literal["predict"]
+    """The kind of question."""
     code: Code
+    """The cell."""
 
 
 class Multiple(_Choice):
-    """Choose every right option."""
+    """Choose every right option. Each one earns its share, and each wrong one loses as much."""
 
     kind: Literal["multiple"]
+    """The kind of question."""
 
-    @model_validator(mode="after")
-    def _some_right_some_wrong(self) -> Self:
-        if not 0 < len(self.right) < len(self.options):
-            raise FieldError("options", "at least one option must be correct and one wrong")
-        return self
+    @field_validator("options")
+    @classmethod
+    def _some_right_some_wrong(cls, options: list[Option]) -> list[Option]:
+        problem = "at least one option must be correct and one wrong"
+        some = 0 < sum(option.correct for option in options) < len(options)
+        fields.require([] if some else [("", problem)])
+        return options
 
 
 class Trap(Part):
     """A wrong number that a known misconception leads to."""
 
     value: Finite
+    """The number."""
     tolerance: Finite = Field(default=0.0, ge=0)
-    misconception: Id
-    feedback: Text
+    """How far from it an answer still counts as it."""
+    misconception: ToTeach[Id]
+    """The belief that leads to it, from the bank's table."""
+    feedback: ToTeach[Text]
+    """Why it is wrong."""
     show: Code | None = None
+    """Python that demonstrates on live nodes what really happens."""
 
     def holds(self, number: float) -> bool:
         """Whether ``number`` is the one this trap is about."""
@@ -153,24 +144,37 @@ class Trap(Part):
 class _Built(_Variant):
     """A question whose answer is made rather than chosen: one feedback for every wrong one."""
 
-    feedback: Text
-    wrong_feedback: Text
-    misconception: Id
+    feedback: ToTeach[Text]
+    """Why the right answer is right."""
+    wrong_feedback: ToTeach[Text]
+    """What to say to any other answer."""
+    misconception: ToTeach[Id]
+    """The belief that a wrong answer shows, from the bank's table."""
     show: Code | None = None
+    """Python that demonstrates on live nodes what really happens."""
 
 
 class Numeric(_Variant):
-    """Give a number: right within ``tolerance`` of ``answer``, both in ``unit``."""
+    """Give a number: right within the tolerance of the answer, both in the unit."""
 
     kind: Literal["numeric"]
+    """The kind of question."""
     answer: Finite
+    """The right number."""
     tolerance: Finite = Field(default=0.0, ge=0)
+    """How far from it an answer is still right."""
     unit: str = ""
+    """The unit of the answer, such as s or Hz, which stands behind the box."""
     traps: list[Trap] = Field(default_factory=list)
-    feedback: Text
+    """Wrong numbers that are expected."""
+    feedback: ToTeach[Text]
+    """Why the right number is right."""
     wrong_feedback: Text | None = None
+    """What to say to a wrong number that no trap expects."""
     misconception: Id | None = None
+    """The belief that such a number shows, from the bank's table."""
     show: Code | None = None
+    """Python that demonstrates on live nodes what really happens."""
 
     @property
     def texts(self) -> list[str]:
@@ -181,20 +185,27 @@ class Numeric(_Variant):
         """Whether ``number`` is right."""
         return near(number, self.answer, self.tolerance)
 
-    @model_validator(mode="after")
-    def _traps_are_wrong(self) -> Self:
-        for number, trap in enumerate(self.traps, start=1):
-            if self.holds(trap.value):
-                problem = f"the trap {trap.value:g} lies within the tolerance of the answer"
-                raise FieldError(f"traps {number} value", problem)
-        return self
+    @field_validator("traps")
+    @classmethod
+    def _traps_are_wrong(cls, traps: list[Trap], info: ValidationInfo) -> list[Trap]:
+        answer, tolerance = info.data.get("answer"), info.data.get("tolerance")
+        if answer is not None and tolerance is not None:
+            fields.require([
+                (f"{number} value",
+                 f"the trap {trap.value:g} lies within the tolerance of the answer")
+                for number, trap in enumerate(traps, start=1)
+                if near(trap.value, answer, tolerance)
+            ])  # fmt: skip
+        return traps
 
 
 class Ordering(_Built):
-    """Put ``items`` (given in the right order) in order."""
+    """Put items in order. Each one in its place earns its share."""
 
     kind: Literal["ordering"]
+    """The kind of question."""
     items: list[Text] = Field(min_length=3, max_length=8)
+    """The items in the right order."""
 
     @property
     def texts(self) -> list[str]:
@@ -206,35 +217,50 @@ class Pair(Part):
     """Two things that belong together."""
 
     left: Text
+    """What is given."""
     right: Text
+    """What is to be found for it; several pairs may have the same."""
 
 
 class Matching(_Built):
-    """Find for each left side its right one; ``extras`` are right sides without a left."""
+    """Find for each left side its right one. Each pair earns its share."""
 
     kind: Literal["matching"]
+    """The kind of question."""
     pairs: list[Pair] = Field(min_length=2, max_length=8)
+    """What belongs together."""
     extras: list[Text] = Field(default_factory=list, max_length=6)
+    """Right sides that belong to nothing."""
 
     @property
     def texts(self) -> list[str]:
         """The right sides that letters stand for, each once; those of the pairs come first."""
         return list(dict.fromkeys([*(pair.right for pair in self.pairs), *self.extras]))
 
-    @model_validator(mode="after")
-    def _something_to_choose(self) -> Self:
-        lefts = [pair.left for pair in self.pairs]
-        rights = {pair.right for pair in self.pairs}
-        for number, left in enumerate(lefts, start=1):
-            if left in lefts[: number - 1]:
-                raise FieldError(f"pairs {number} left", f"the left side {left!r} is there twice")
-        for number, extra in enumerate(self.extras, start=1):
-            if extra in rights:
-                problem = "an extra is the right side of a pair, too"
-                raise FieldError(f"extras {number}", problem)
-        if len(rights) < 2:
-            raise FieldError("pairs", "all have the same right side, so there is nothing to match")
-        return self
+    @field_validator("pairs")
+    @classmethod
+    def _something_to_choose(cls, pairs: list[Pair]) -> list[Pair]:
+        lefts = [pair.left for pair in pairs]
+        problems = [
+            (f"{number} left", f"the left side {left!r} is there twice")
+            for number, left in enumerate(lefts, start=1)
+            if left in lefts[: number - 1]
+        ]
+        if len({pair.right for pair in pairs}) < 2:
+            problems.append(("", "all have the same right side, so there is nothing to match"))
+        fields.require(problems)
+        return pairs
+
+    @field_validator("extras")
+    @classmethod
+    def _extras_belong_to_nothing(cls, extras: list[str], info: ValidationInfo) -> list[str]:
+        rights = {pair.right for pair in info.data.get("pairs", [])}
+        fields.require([
+            (f"{number}", "an extra is the right side of a pair, too")
+            for number, extra in enumerate(extras, start=1)
+            if extra in rights
+        ])  # fmt: skip
+        return extras
 
 
 Variant = Annotated[
@@ -246,8 +272,12 @@ class Concept(Part):
     """One thing to understand, with interchangeable questions about it."""
 
     id: Id
+    """Its name, used once in the bank: lower-case words joined by hyphens."""
     objective: Text
-    variants: list[Variant] = Field(min_length=MIN_VARIANTS)
+    """What a learner can do who understands it; the class report calls it by this."""
+    variants: list[Variant] = Field(min_length=1)
+    """Questions that can stand in for one another: each attempt gets one of them. At least 4 in a
+    quiz that teaches, so that a retry is another quiz; one is enough for a closed quiz."""
 
     def variant(self, name: str) -> Variant | None:
         """Return the variant with the id ``name``, if there is one."""
@@ -255,25 +285,40 @@ class Concept(Part):
 
 
 class Bank(Part):
-    """A quiz: its concepts in order, and what learners may wrongly believe about them.
-
-    ``pass_mark`` is how many concepts must be fully right, ``attempts`` how many attempts count
-    (see ``counted``).
+    """A quiz: its concepts in order, one question of each to every learner.
 
     A ``closed`` quiz is marked by the instructor alone: learners get it ``keyless``, without keys
     and feedback (see `quizzes.closing`), and hand their answers in.
     """
 
     quiz: Id
+    """What it is called: the file's name without .yaml."""
     title: Text
+    """The heading that learners see."""
     chapter: Text
+    """What it is about; stands below the title."""
     pass_mark: int = Field(ge=1)
+    """How many concepts must be fully right to pass; at most as many as there are."""
     attempts: int | None = Field(default=None, ge=1, le=100)
+    """How many attempts count; if left out, 20, or 1 of a closed quiz."""
     closed: bool = False
+    """true: the quiz examines. Keys and feedback stay with you, answers are handed in."""
     keyless: bool = False
-    misconceptions: dict[Id, Text]
+    """Written by the program into the questions that students get; never write it yourself."""
+    misconceptions: dict[Id, Text] = Field(
+        default_factory=dict, json_schema_extra={fields.TO_TEACH: True}
+    )
+    """What learners may wrongly believe: an id for each belief, and the belief in a sentence."""
     concepts: list[Concept] = Field(min_length=1)
+    """What is to be understood, in the order of the questions; one point each."""
     _folder: Path = PrivateAttr(default=Path())
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _needs_more_to_teach(cls, data: Any, handler: Callable[[Any], Bank]) -> Bank:
+        closed = data.get("closed") if isinstance(data, dict) else None
+        with fields.validating(teaches=closed is not True):
+            return handler(data)
 
     @property
     def folder(self) -> Path:

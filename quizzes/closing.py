@@ -3,7 +3,7 @@
 A question sheet is a bank in which nothing but questions stands: what every learner may see. It
 deals the same letters as the bank that it was made of and has the same edition, so answers given to
 the one are marked with the other. The schema wants keys; those of a sheet are alike in every sheet,
-and `Bank.keyless` keeps anything from being marked by them.
+and `Bank.keyless` keeps anything from being marked by them. What only teaching needs is not in it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from quizzes import loader, rendering
 from quizzes.bank import Bank, Matching, Numeric, Ordering, Variant
 from quizzes.errors import BankError
 
-NOTHING = "not-said"
 SAYS = "Your instructor marks this."
 PREFIX, SUFFIX = "quiz-", ".questions.yaml"
 
@@ -47,7 +46,6 @@ def sheet(bank: Bank) -> str:
     data: dict[str, Any] = {
         "quiz": bank.quiz, "title": bank.title, "chapter": bank.chapter,
         "pass_mark": bank.pass_mark, "attempts": bank.counted, "closed": True, "keyless": True,
-        "misconceptions": {NOTHING: SAYS},
         "concepts": [
             {"id": concept.id, "objective": SAYS,
              "variants": [_questions(variant) for variant in concept.variants]}
@@ -92,16 +90,12 @@ def read(path: Path, quiz: str) -> Bank:
 
 
 def _questions(variant: Variant) -> dict[str, Any]:
-    data: dict[str, Any] = {
-        "id": variant.id, "kind": variant.kind, "stem": variant.stem, "proof": NOTHING,
-    }  # fmt: skip
+    data: dict[str, Any] = {"id": variant.id, "kind": variant.kind, "stem": variant.stem}
     if variant.code:
         data["code"] = variant.code
     if isinstance(variant, Numeric):
-        return {**data, "answer": 0.0, "unit": variant.unit, "feedback": SAYS}
+        return {**data, "answer": 0.0, "unit": variant.unit}
     texts = sorted(variant.texts)
-    if isinstance(variant, Ordering | Matching):
-        data |= {"feedback": SAYS, "wrong_feedback": SAYS, "misconception": NOTHING}
     if isinstance(variant, Ordering):
         return {**data, "items": texts}
     if isinstance(variant, Matching):
@@ -112,5 +106,4 @@ def _questions(variant: Variant) -> dict[str, Any]:
             "extras": texts[len(lefts) :],
         }  # fmt: skip
     first, *others = texts
-    wrong = [{"text": text, "feedback": SAYS, "misconception": NOTHING} for text in others]
-    return {**data, "options": [{"text": first, "correct": True, "feedback": SAYS}, *wrong]}
+    return {**data, "options": [{"text": first, "correct": True}, *({"text": o} for o in others)]}

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
+
 
 class QuizError(Exception):
     """Base of every error of a quiz that a person reads; a notebook shows it without traceback."""
@@ -14,7 +17,15 @@ class QuizError(Exception):
 
 
 class BankError(QuizError):
-    """A bank that is not there or not sound; the message names file, item and field."""
+    """A bank that is not there or not sound; the message names file, line, item and field.
+
+    ``faults`` are all that is wrong with it, a sentence each; the message has the first.
+    """
+
+    def __init__(self, message: str, faults: Iterable[str] = ()) -> None:
+        """Say ``message``; without ``faults`` it is the one fault."""
+        super().__init__(message)
+        self.faults = tuple(faults) or (message,)
 
 
 class AnswerError(QuizError):
@@ -27,3 +38,10 @@ class AttemptsError(QuizError):
 
 class UnwritableError(AttemptsError):
     """Nothing can be saved in the folder; the quiz itself goes on."""
+
+
+def guess(name: object, known: Iterable[str]) -> str:
+    """Return a question that names what was meant, with a blank before it; or nothing."""
+    by_lower = {one.lower(): one for one in known}
+    close = difflib.get_close_matches(str(name).lower(), by_lower, n=1)
+    return f" Did you mean '{by_lower[close[0]]}'?" if close else ""

@@ -27,6 +27,8 @@ LEARNERS = 400
 """How many quizzes are dealt to see where the keys come to stand."""
 BALANCE = 0.35
 """How far a place may be from its fair share of the keys, as a part of that share."""
+FEWEST_KEYS = 8
+"""Questions below which nothing can be said of habits: two of three are soon alike."""
 MIN_FEEDBACK = 25
 """Letters and digits below which a feedback cannot say why."""
 
@@ -80,12 +82,16 @@ def wrong_answers(bank: Bank) -> Iterator[WrongAnswer]:
 
 
 def findings(bank: Bank) -> list[Finding]:
-    """Return all that should be mended in a bank; an empty list is a clean one."""
+    """Return all that should be mended in a bank; an empty list is a clean one.
+
+    A closed quiz does not teach, so what is there to teach is not looked for in it.
+    """
     found: list[Finding] = []
     for concept in bank.concepts:
         for variant in concept.variants:
-            found += _of_variant(variant)
-    found += _of_misconceptions(bank)
+            found += _of_question(variant)
+            found += () if bank.closed else _of_lesson(variant)
+    found += () if bank.closed else _of_misconceptions(bank)
     found += _of_repeated_texts(bank)
     found += _of_key_lengths(bank)
     found += _of_key_places(bank)
@@ -111,7 +117,9 @@ def _wrong_answers(variant: Variant) -> Iterator[WrongAnswer]:
                 )
 
 
-def _of_variant(variant: Variant) -> Iterator[Finding]:
+def _of_question(variant: Variant) -> Iterator[Finding]:
+    """Find what makes a question unclear, or easy to guess."""
+
     def finding(field: str, problem: str) -> Finding:
         return Finding(variant.id, field, problem)
 
@@ -126,6 +134,14 @@ def _of_variant(variant: Variant) -> Iterator[Finding]:
             yield finding("options", f"{text!r} refers to other options, which are shuffled")
     if isinstance(variant, Single | Predict | Multiple):
         yield from (finding("options", problem) for problem in _option_lengths(variant))
+
+
+def _of_lesson(variant: Variant) -> Iterator[Finding]:
+    """Find what a wrong answer teaches nothing by."""
+
+    def finding(field: str, problem: str) -> Finding:
+        return Finding(variant.id, field, problem)
+
     if isinstance(variant, Numeric) and variant.wrong_feedback is None:
         yield finding("wrong_feedback", "a number that no trap expects gets no hint")
     for answer in _wrong_answers(variant):
@@ -141,14 +157,14 @@ def _feedback(variant: Variant) -> Iterator[tuple[str, str]]:
     """Yield (where, text) for every feedback that a learner may get."""
     if isinstance(variant, Single | Predict | Multiple):
         for number, option in enumerate(variant.options, start=1):
-            yield f"option {number}", option.feedback
+            yield f"option {number}", option.feedback or ""
         return
-    yield "feedback", variant.feedback
+    yield "feedback", variant.feedback or ""
     if variant.wrong_feedback is not None:
         yield "wrong_feedback", variant.wrong_feedback
     if isinstance(variant, Numeric):
         for number, trap in enumerate(variant.traps, start=1):
-            yield f"trap {number}", trap.feedback
+            yield f"trap {number}", trap.feedback or ""
 
 
 def _option_lengths(variant: Single | Predict | Multiple) -> Iterator[str]:
@@ -167,7 +183,7 @@ def _of_misconceptions(bank: Bank) -> Iterator[Finding]:
 def _of_repeated_texts(bank: Bank) -> Iterator[Finding]:
     """Find stems, options and feedback that are the same in two variants, but for typography.
 
-    Outcomes of a cell and the pairs of a matching are short by nature, and may recur.
+    Outcomes of a cell, the pairs of a matching and short options (`yes`) may recur.
     """
     places: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
     for concept in bank.concepts:
@@ -175,11 +191,13 @@ def _of_repeated_texts(bank: Bank) -> Iterator[Finding]:
             places[_plain(variant.stem)].append((variant.id, "stem"))
             if isinstance(variant, Single | Multiple):
                 for option in variant.options:
+                    if len(option.text) < FEW_CHARACTERS:
+                        continue
                     places[_plain(option.text)].append((variant.id, "options"))
     for answer in wrong_answers(bank):
         places[_plain(answer.feedback or "")].append((answer.variant.id, "feedback"))
-    for (item, field), *others in places.values():
-        if others:
+    for text, ((item, field), *others) in places.items():
+        if text and others:
             elsewhere = ", ".join(sorted({name for name, _ in others}))
             yield Finding(item, field, f"the same text stands in {elsewhere}")
 
@@ -198,7 +216,7 @@ def _of_key_lengths(bank: Bank) -> Iterator[Finding]:
                 extremes["longest"] += lengths[key] > max(others)
                 extremes["shortest"] += lengths[key] < min(others)
     for name, times in extremes.items():
-        if times > HABIT * count:
+        if count >= FEWEST_KEYS and times > HABIT * count:
             problem = f"the key is the {name} option in {times} of {count} questions"
             yield Finding(bank.quiz, "options", problem)
 
@@ -215,7 +233,7 @@ def _of_key_places(bank: Bank) -> Iterator[Finding]:
             written[len(variant.options)][variant.right[0]] += 1
     for count, seen in sorted(written.items()):
         for place, times in sorted(seen.items()):
-            if seen.total() > count and times > HABIT * seen.total():
+            if seen.total() >= FEWEST_KEYS and times > HABIT * seen.total():
                 problem = (
                     f"the key is option {place + 1} of {count} in {times} of {seen.total()} "
                     "questions, as they stand in the bank"

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from quizzes import model, text
 from quizzes.answers import NOTHING, OPEN, Answer, complete
-from quizzes.bank import Matching, Multiple, Numeric, Ordering, Predict, Single
+from quizzes.bank import Matching, Multiple, Numeric, Option, Ordering, Predict, Single
 from quizzes.model import Item, Paper
 
 
@@ -15,7 +15,8 @@ from quizzes.model import Item, Paper
 class Remark:
     """Something to tell about an answer: Markdown, and Python that shows it on live nodes.
 
-    ``letter`` is the option that it is about, or "" if it is about the whole answer.
+    ``feedback`` may be empty in a closed quiz. ``letter`` is the option that it is about, or "" if
+    it is about the whole answer.
     """
 
     right: bool
@@ -120,19 +121,23 @@ def mark(item: Item, answer: Answer) -> Mark:
         return _multiple(item, variant, letters)
     if isinstance(variant, Single | Predict):
         option = variant.options[item.place(letters)]
-        remark = Remark(option.correct, option.feedback, letters, option.misconception, option.show)
+        remark = _remark(option, letters, right=option.correct)
         return Mark(item, answer, float(option.correct), (remark,))
     return _built(item, variant, letters)
 
 
+def _remark(option: Option, letter: str, *, right: bool) -> Remark:
+    return Remark(right, option.feedback or "", letter, option.misconception, option.show)
+
+
 def _numeric(item: Item, variant: Numeric, number: float) -> Mark:
     if variant.holds(number):
-        return Mark(item, number, 1.0, (Remark(True, variant.feedback),))
+        return Mark(item, number, 1.0, (Remark(True, variant.feedback or ""),))
     for trap in variant.traps:
         if trap.holds(number):
-            remark = Remark(False, trap.feedback, "", trap.misconception, trap.show)
+            remark = Remark(False, trap.feedback or "", "", trap.misconception, trap.show)
             return Mark(item, number, 0.0, (remark,))
-    general = variant.wrong_feedback or variant.feedback
+    general = variant.wrong_feedback or variant.feedback or ""
     remark = Remark(False, general, "", variant.misconception, variant.show)
     return Mark(item, number, 0.0, (remark,))
 
@@ -145,7 +150,7 @@ def _multiple(item: Item, variant: Multiple, letters: str) -> Mark:
         option = variant.options[item.place(letter)]
         if option.correct or letter in letters:
             well = option.correct and letter in letters
-            remarks.append(Remark(well, option.feedback, letter, option.misconception, option.show))
+            remarks.append(_remark(option, letter, right=well))
     return Mark(item, letters, max(0.0, share), tuple(remarks))
 
 
@@ -154,6 +159,6 @@ def _built(item: Item, variant: Ordering | Matching, letters: str) -> Mark:
     given = letters or OPEN * len(wanted)
     share = sum(a == b for a, b in zip(given, wanted, strict=True)) / len(wanted)
     if share == 1.0:
-        return Mark(item, letters, 1.0, (Remark(True, variant.feedback),))
-    remark = Remark(False, variant.wrong_feedback, "", variant.misconception, variant.show)
+        return Mark(item, letters, 1.0, (Remark(True, variant.feedback or ""),))
+    remark = Remark(False, variant.wrong_feedback or "", "", variant.misconception, variant.show)
     return Mark(item, letters, share, (remark,))

@@ -82,7 +82,8 @@ def of_mark(mark: Mark) -> str:
     several = isinstance(mark.item.variant, Multiple)
     for remark in mark.remarks:
         label = f"{remark.letter}) " if several and remark.letter else ""
-        lines.append(f"{label}{remark.feedback}")
+        if remark.feedback:
+            lines.append(f"{label}{remark.feedback}")
         if remark.show and not remark.right:
             lines.append(f"See it happen:\n\n```python\n{remark.show.strip()}\n```")
     return "\n\n".join(lines)

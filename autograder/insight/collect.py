@@ -13,6 +13,7 @@ from autograder.gradebook import CourseGradebook, Grade
 from autograder.insight import InsightError, records
 from autograder.insight.records import Record, RecordError
 from autograder.nbgrader_bridge import WORK_FOLDER
+from quizzes.errors import guess
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def _require(gradebook: CourseGradebook, assignment: str) -> None:
     if assignment not in known:
         raise InsightError(
             f"There is no assignment '{assignment}' in the gradebook of {gradebook.root}: there "
-            f"are {', '.join(known) or 'none yet'}."
+            f"are {', '.join(known) or 'none yet'}.{guess(assignment, known)}"
         )
 
 

@@ -7,26 +7,32 @@ from pathlib import Path
 from quizzes import closing, loader
 from quizzes.bank import Bank
 from quizzes.errors import BankError
-from quizzes.exchange import gift, merge, questions
+from quizzes.exchange import gift, limits, merge, questions
 from quizzes.exchange.questions import ExchangeError
 
 FORMATS = {"gift": ".gift", "qti": ".qti.zip"}
 """What a bank can be exported as, and how such a file's name ends."""
 
 
-def open_bank(name: str) -> Bank:
-    """Return the bank of an installed quiz, or the one in the YAML file called ``name``.
+def open_bank(name: str, own: Path | None = None) -> Bank:
+    """Return the bank of a quiz, or the one in the YAML file called ``name``.
+
+    Args:
+        name: a quiz, or a file whose name ends in .yaml.
+        own: a course's own banks, which go before those of the package.
 
     Raises:
         BankError: there is none, it is not sound, or it has no keys.
     """
     if not name.endswith((".yaml", ".yml")):
-        return loader.load_bank(name)
-    path = Path(name)
-    sheet = closing.quiz_of(path)
-    bank = closing.read(path, sheet) if sheet else loader.read_bank(path)
+        bank, source = loader.find_bank(name, own), f"{name}.yaml"
+    else:
+        path = Path(name)
+        sheet = closing.quiz_of(path)
+        bank = closing.read(path, sheet) if sheet else loader.read_bank(path)
+        source = path.name
     if bank.keyless:
-        raise BankError(f"{path.name} holds questions without keys: take the bank they come from.")
+        raise BankError(f"{source} holds questions without keys: take the bank they come from.")
     return bank
 
 
@@ -48,8 +54,8 @@ def export_bank(bank: Bank, format_name: str, to: Path | None = None) -> tuple[P
         )
     path = to or Path(f"{bank.quiz}{FORMATS[format_name]}")
     if format_name == "gift":
-        found, notes = questions.of_bank(bank)
-        content = gift.write(found, bank.title).encode()
+        content = gift.write(questions.of_bank(bank), bank.title).encode()
+        notes = limits.of_gift(bank)
     else:
         from quizzes.exchange import qti  # text2qti takes a moment to import
 

@@ -2,7 +2,9 @@
 
 A question that a bank has under the same name is compared with what the bank would export. What is
 equal stays as the bank has it, with its picture and its formulas; what is not takes the new text,
-and keeps the misconceptions, cells and proofs of the answers that it can recognize.
+and keeps the misconceptions, cells and proofs of the answers that it can recognize. What a bank
+that teaches needs, and a question comes without, is filled in for its author to find; a closed bank
+goes without.
 """
 
 from __future__ import annotations
@@ -73,16 +75,18 @@ def merge(bank: Bank, questions: Sequence[Question], source: str) -> Merged:
         place = _place(data, question, concept, source)
         if concept is None or variant is None:
             changed += 1
-            place.append(_built(question, None, {}))
-            notes.append(f"'{question.name}' is new: name its proofs, misconceptions and cells.")
+            place.append(_built(question, None, {}, teaches=not bank.closed))
+            lacks = "" if bank.closed else ": name its proofs, misconceptions and cells"
+            notes.append(f"'{question.name}' is new{lacks}.")
             continue
         before = of_variant(bank.quiz, concept, variant)
         if _same(before, question):
             continue
         changed += 1
         index = next(i for i, old in enumerate(place) if old["id"] == variant.id)
-        place[index] = _built(question, before, place[index])
-        notes.append(f"'{question.name}' has changed: see that its proofs still prove its key.")
+        place[index] = _built(question, before, place[index], teaches=not bank.closed)
+        proven = ": see that its proofs still prove its key" if variant.proof else ""
+        notes.append(f"'{question.name}' has changed{proven}.")
     missing = known.keys() - {question.name for question in questions}
     if missing:
         notes.append(f"{source} does not have {', '.join(sorted(missing))}: kept as they are.")
@@ -140,7 +144,9 @@ def _same(before: Question, question: Question) -> bool:
     return {**vars(before), "category": ""} == {**vars(question), "category": ""}
 
 
-def _built(question: Question, before: Question | None, old: dict[str, Any]) -> dict[str, Any]:
+def _built(
+    question: Question, before: Question | None, old: dict[str, Any], *, teaches: bool
+) -> dict[str, Any]:
     """Return a variant's fields from a question, with all that can be kept of the old ones."""
     data: dict[str, Any] = {"id": question.name}
     if isinstance(question, ChoiceQuestion):
@@ -151,14 +157,24 @@ def _built(question: Question, before: Question | None, old: dict[str, Any]) -> 
     else:
         data["kind"] = "ordering" if _is_ordering(question) else "matching"
     data |= _texts(question, before, old)
+    data["proof"] = old.get("proof", [UNPROVEN])
     if isinstance(question, ChoiceQuestion):
         data |= _options(question, old)
     elif isinstance(question, NumberQuestion):
         data |= _numbers(question, old)
     else:
         data |= _pairs(question, old)
-    data["proof"] = old.get("proof", [UNPROVEN])
-    return data
+    return data if teaches else _without_fillers(data)
+
+
+def _without_fillers(data: dict[str, Any]) -> dict[str, Any]:
+    """Return a variant without what only stands in for something that teaching needs."""
+    fillers = (UNNAMED, NO_FEEDBACK, [UNPROVEN])
+    kept = {name: value for name, value in data.items() if value not in fillers}
+    for name in ("options", "traps"):
+        if name in kept:
+            kept[name] = [_without_fillers(part) for part in kept[name]]
+    return kept
 
 
 def _texts(question: Question, before: Question | None, old: dict[str, Any]) -> dict[str, Any]:
@@ -209,7 +225,7 @@ def _twin(left: list[dict[str, Any]], text: str, feedback: str, *, correct: bool
     mine = [option for option in left if bool(option.get("correct")) is correct]
     for field, wanted in (("text", text), ("feedback", feedback)):
         for option in mine:
-            if plain(option[field]) == wanted:
+            if plain(option.get(field)) == wanted:
                 return option
     return {}
 

@@ -11,9 +11,10 @@ import re
 from text2qti.config import Config
 from text2qti.err import Text2qtiError
 from text2qti.qti import QTI
-from text2qti.quiz import Quiz
+from text2qti.quiz import GroupStart, Quiz
 
 from quizzes.bank import Bank, Matching, Multiple, Numeric, Ordering, Variant
+from quizzes.exchange import limits
 from quizzes.exchange.questions import ExchangeError, code_block, unit_line
 
 POINTS = 1
@@ -36,7 +37,34 @@ def package(bank: Bank) -> tuple[bytes, list[str]]:
                 raise ExchangeError(
                     f"{bank.quiz}.yaml, item '{variant.id}' cannot be written as QTI: {reason}."
                 ) from None
-    return bytes(QTI(_parsed(plain_text(bank))).zip_bytes()), _notes(bank)
+    return _zip(bank), limits.of_qti(bank)
+
+
+def _zip(bank: Bank) -> bytes:
+    quiz = _parsed(plain_text(bank))
+    groups = [part.group for part in quiz.questions_and_delims if isinstance(part, GroupStart)]
+    for group, concept in zip(groups, bank.concepts, strict=True):
+        group.title_xml = concept.id
+    # text2qti 0.8 adds the points of every question in a group to what the group is worth, and
+    # Canvas shows that sum (`Quiz.__init__`, where `points_possible` is counted).
+    quiz.points_possible = sum(group.pick * group.points_per_question for group in groups)
+    package = QTI(quiz)
+    # text2qti has no word for the number of attempts, and writes 1.
+    package.assessment_meta = _replaced(
+        package.assessment_meta, "<allowed_attempts>1<", f"<allowed_attempts>{bank.counted}<"
+    )
+    field = "<fieldlabel>cc_maxattempts</fieldlabel>\n        <fieldentry>{}<"
+    package.assessment = _replaced(package.assessment, field.format(1), field.format(bank.counted))
+    return bytes(package.zip_bytes())
+
+
+def _replaced(xml: str, old: str, new: str) -> str:
+    if xml.count(old) != 1:
+        raise ExchangeError(
+            "This version of text2qti writes another package than the one that is known: install "
+            "text2qti 0.8."
+        )
+    return xml.replace(old, new)
 
 
 def plain_text(bank: Bank) -> str:
@@ -45,6 +73,7 @@ def plain_text(bank: Bank) -> str:
         f"Quiz title: {' '.join(bank.title.split())}",
         f"Quiz description: {' '.join(bank.chapter.split())}. {bank.pass_text} to pass.",
         "shuffle answers: true",
+        f"show correct answers: {'false' if bank.closed else 'true'}",
         "",
     ]
     for concept in bank.concepts:
@@ -129,8 +158,10 @@ def _letter(number: int) -> str:
     return "ABCDEFGHIJKLMNOP"[number]
 
 
-def _item(bank: Bank, mark: str, text: str) -> list[str]:
+def _item(bank: Bank, mark: str, text: str | None) -> list[str]:
     """Return a text behind its mark, its further lines indented as text2qti wants it."""
+    if text is None:
+        return []
     first, *rest = _pictures(bank, text.strip()).split("\n")
     indent = " " * (len(mark) + 1)
     return [f"{mark} {first}", *(f"{indent}{line}" if line.strip() else "" for line in rest)]
@@ -144,26 +175,3 @@ def _pictures(bank: Bank, text: str) -> str:
 
     parts = _TEXT_BLOCK.split(text)
     return "".join(p if n % 2 else _PICTURE.sub(located, p) for n, p in enumerate(parts))
-
-
-def _notes(bank: Bank) -> list[str]:
-    variants = [variant for concept in bank.concepts for variant in concept.variants]
-    arranged = [v.id for v in variants if isinstance(v, Ordering | Matching)]
-    trapped = [v.id for v in variants if isinstance(v, Numeric) and v.traps]
-    notes = [
-        "There is no place for misconceptions, for the cells that show what really happens, and "
-        "for the names of the proofs: they stay in the bank.",
-        f"The pass mark ({bank.pass_text}) is a setting of the quiz in Canvas.",
-        "Canvas gives its own partial credit where several options are right.",
-    ]
-    if arranged:
-        notes.append(
-            f"text2qti has neither ordering nor matching: {', '.join(arranged)} became choices "
-            "between whole arrangements, without partial credit."
-        )
-    if trapped:
-        notes.append(
-            f"A number has one feedback for all wrong answers: {', '.join(trapped)} lost the "
-            "feedback for particular wrong numbers."
-        )
-    return notes

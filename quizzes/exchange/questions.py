@@ -1,28 +1,25 @@
 """Questions as learning platforms know them: what GIFT can hold of a bank, and what it cannot.
 
 A platform has choices with a share of the points, numbers with a tolerance, and pairs. Everything
-else of a bank (misconceptions, cells that show what happens, proofs) has no place there; `of_bank`
-says so, and `quizzes.exchange.merge` finds it again in the bank.
+else of a bank (misconceptions, cells that show what happens, proofs) has no place there;
+`quizzes.exchange.limits` says so, and `quizzes.exchange.merge` finds it again in the bank.
 """
 
 from __future__ import annotations
 
 import re
-from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from quizzes.bank import Bank, Concept, Matching, Multiple, Numeric, Ordering, Variant
 from quizzes.errors import QuizError
+from quizzes.exchange.limits import CODE, LATEX, PICTURE
 
 POSITION = "Position {number}"
 """The left side of an ordering's n-th item, when it is written as a matching."""
 BOTH = "\n\n---\n\n"
 """Stands between the feedback for a right and for a wrong answer, where there is place for one."""
 
-_CODE = re.compile(r"(```.*?```|`[^`\n]*`)", re.DOTALL)
-_PICTURE = re.compile(r"!\[([^\]]*)\]\([^)]*\)")
-_LATEX = re.compile(r"(?<![\\$])\$(?![\s$])([^$\n]+?)(?<!\s)\$(?![\d$])")
 _DOUBLE_LATEX = re.compile(r"(?<![\\$])\$\$(?![\s$])([^$\n]+?)(?<!\s)\$\$(?!\$)")
 
 
@@ -88,10 +85,9 @@ class MatchQuestion:
 Question = ChoiceQuestion | NumberQuestion | MatchQuestion
 
 
-def of_bank(bank: Bank) -> tuple[list[Question], list[str]]:
-    """Return a bank's questions, and what the format leaves out, a sentence each."""
-    questions = [of_variant(bank.quiz, c, v) for c in bank.concepts for v in c.variants]
-    return questions, _notes(bank)
+def of_bank(bank: Bank) -> list[Question]:
+    """Return a bank's questions."""
+    return [of_variant(bank.quiz, c, v) for c in bank.concepts for v in c.variants]
 
 
 def of_variant(quiz: str, concept: Concept, variant: Variant) -> Question:
@@ -102,9 +98,11 @@ def of_variant(quiz: str, concept: Concept, variant: Variant) -> Question:
             Number(variant.answer, variant.tolerance, 100.0, plain(variant.feedback)),
             *(Number(t.value, t.tolerance, 0.0, plain(t.feedback)) for t in variant.traps),
         )
-        return NumberQuestion(name, category, text, numbers, plain(variant.wrong_feedback or ""))
+        return NumberQuestion(name, category, text, numbers, plain(variant.wrong_feedback))
     if isinstance(variant, Ordering | Matching):
-        feedback = plain(variant.feedback) + BOTH + plain(variant.wrong_feedback)
+        feedback = plain(variant.feedback)
+        if variant.wrong_feedback:
+            feedback += BOTH + plain(variant.wrong_feedback)
         if isinstance(variant, Ordering):
             pairs = tuple(
                 (POSITION.format(number=number), plain(item))
@@ -123,14 +121,17 @@ def of_variant(quiz: str, concept: Concept, variant: Variant) -> Question:
     return ChoiceQuestion(name, category, text, choices, not isinstance(variant, Multiple))
 
 
-def plain(text: str) -> str:
-    """Return a bank's Markdown as a platform takes it: no pictures, LaTeX in double dollars."""
+def plain(text: str | None) -> str:
+    """Return a bank's Markdown as a platform takes it: no pictures, LaTeX in double dollars.
+
+    What a bank does not have is an empty text.
+    """
 
     def convert(prose: str) -> str:
-        described = _PICTURE.sub(lambda found: f"*Picture: {found[1]}*", prose)
-        return _LATEX.sub(lambda found: f"$${found[1]}$$", described)
+        described = PICTURE.sub(lambda found: f"*Picture: {found[1]}*", prose)
+        return LATEX.sub(lambda found: f"$${found[1]}$$", described)
 
-    return _outside_code(text.strip(), convert)
+    return _outside_code((text or "").strip(), convert)
 
 
 def from_plain(text: str) -> str:
@@ -162,34 +163,5 @@ def _left(text: str) -> str:
 
 
 def _outside_code(text: str, convert: Callable[[str], str]) -> str:
-    parts = _CODE.split(text)
+    parts = CODE.split(text)
     return "".join(part if index % 2 else convert(part) for index, part in enumerate(parts))
-
-
-def _notes(bank: Bank) -> list[str]:
-    found: defaultdict[str, list[str]] = defaultdict(list)
-    for concept in bank.concepts:
-        for variant in concept.variants:
-            prose = _CODE.sub("", variant.stem)
-            if isinstance(variant, Ordering):
-                found["ordering"].append(variant.id)
-            if isinstance(variant, Ordering | Matching):
-                found["feedback"].append(variant.id)
-            if _PICTURE.search(prose):
-                found["picture"].append(variant.id)
-            if _LATEX.search(prose):
-                found["latex"].append(variant.id)
-    sentences = {
-        "ordering": "There is no ordering: {} became a matching of positions and items.",
-        "feedback": "A matching has one feedback, shown to everybody: in {} it holds both, that "
-        "for a right and that for a wrong answer.",
-        "picture": "There are no pictures: in {} the picture's description stands in its place.",
-        "latex": "Formulas are in double dollars, which Moodle shows with its MathJax filter: {}.",
-    }
-    return [
-        "There is no place for misconceptions, for the cells that show what really happens, and "
-        "for the names of the proofs: they stay in the bank, where an import finds them again.",
-        f"The pass mark ({bank.pass_text}) and that a learner gets one question of each concept "
-        "are settings of the platform's quiz: add one random question from each category.",
-        *(text.format(", ".join(found[kind])) for kind, text in sentences.items() if found[kind]),
-    ]

@@ -37,6 +37,8 @@ class ReportError(QuizError):
 def write(analysis: Analysis, folder: Path) -> list[Path]:
     """Write ``quiz-NAME-report.html``, ``-items.csv`` and ``-misconceptions.csv``; return them.
 
+    The last one only if the bank names misconceptions.
+
     Raises:
         ReportError: the folder cannot be written.
     """
@@ -44,8 +46,10 @@ def write(analysis: Analysis, folder: Path) -> list[Path]:
     contents = {
         folder / f"{name}-report.html": page(analysis),
         folder / f"{name}-items.csv": _csv(ITEM_COLUMNS, item_rows(analysis)),
-        folder / f"{name}-misconceptions.csv": _csv(BELIEF_COLUMNS, belief_rows(analysis)),
     }
+    if analysis.beliefs:
+        rows = belief_rows(analysis)
+        contents[folder / f"{name}-misconceptions.csv"] = _csv(BELIEF_COLUMNS, rows)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for path, content in contents.items():
@@ -95,12 +99,7 @@ def page(analysis: Analysis) -> str:
         parts.append(_figure(plots.items(analysis), caption))
     parts.append(_table("Figures of each concept and of its variants", ITEM_COLUMNS,
                         item_rows(analysis), numbers=(2, 3, 4)))  # fmt: skip
-    parts += ["<h2>What the class believes</h2>"]
-    if drawn := plots.beliefs(analysis):
-        caption = "The most common misconceptions among those whom a question tempted with them."
-        parts.append(_figure(drawn, caption))
-    parts.append(_table("All misconceptions of the bank", BELIEF_COLUMNS,
-                        belief_rows(analysis), numbers=(2, 3, 4)))  # fmt: skip
+    parts += _beliefs(analysis) if analysis.beliefs else []
     if analysis.notes:
         items = "".join(f"<li>{escape(note)}</li>" for note in analysis.notes)
         parts.append(f"<h2>Left out</h2><ul>{items}</ul>")
@@ -110,6 +109,16 @@ def page(analysis: Analysis) -> str:
         f"<title>{escape(bank.title)}</title><style>{_STYLE}</style></head>\n"
         f"<body><main>{''.join(parts)}</main></body></html>\n"
     )
+
+
+def _beliefs(analysis: Analysis) -> list[str]:
+    parts = ["<h2>What the class believes</h2>"]
+    if drawn := plots.beliefs(analysis):
+        caption = "The most common misconceptions among those whom a question tempted with them."
+        parts.append(_figure(drawn, caption))
+    parts.append(_table("All misconceptions of the bank", BELIEF_COLUMNS,
+                        belief_rows(analysis), numbers=(2, 3, 4)))  # fmt: skip
+    return parts
 
 
 _EXPLAINED = (
