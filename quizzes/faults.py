@@ -197,7 +197,8 @@ def _of_another_kind(wanted: str, given: Any, written: str | None) -> str:
         return f"it must be {wanted}, but it is {have}{quotes}"
     shown = (written or str(given))[:_LONGEST]
     if isinstance(given, bool) and written is None:
-        return f"it must be {wanted}: put it in quotes, or YAML reads yes, no, on and off as true or false"
+        read_as = "without quotes YAML reads yes, no, on and off as true or false"
+        return f"it must be {wanted}, and {read_as}: write them in quotes"
     if wanted == "text" or wanted.startswith("text,"):
         read_as = next(name for types, name in _READ_AS if isinstance(given, types))
         quoted = f"write '{shown}', in quotes"

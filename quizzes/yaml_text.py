@@ -21,7 +21,7 @@ _PARSER_SAYS = {
     "something named before with &)",
     "could not determine a constructor": "a text that begins with ! must stand in quotes",
     "found unexpected end of stream": "a quote that opens before is never closed",
-    "expected a single document": "'---' begins a second document here, and a bank is one",
+    "but found another document": "'---' begins a second document here, and a bank is one",
     "expected <block end>": "this does not fit what stands above it: look at the indentation, and "
     "at quotes that end too early",
     "could not find expected ':'": "there is no ':' behind a field's name, or the text above is "

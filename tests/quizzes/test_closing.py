@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 import quizzes
-from quizzes import closing, model, record, regrade
+from quizzes import closing, lint, loader, model, record, regrade
 from quizzes.bank import Bank, Matching
 from quizzes.errors import BankError, QuizError
 from quizzes.exchange import files
@@ -172,6 +172,60 @@ def test_an_attempt_too_many_does_not_count_and_is_for_a_person(bank: Bank, work
     found = marked(bank, work)
     assert [result.right for result in found.results] == [1]
     assert "of 2 attempts 1 are beyond the first 1" in found.doubt
+
+
+EXAM = loader.BANKS.parent / "examples" / "exam.yaml"
+
+
+def test_three_questions_with_one_variant_each_are_a_closed_quiz(tmp_path: Path) -> None:
+    bank = read_bank(EXAM)
+    assert [len(concept.variants) for concept in bank.concepts] == [1, 1, 1]
+    assert lint.findings(bank) == []
+    folder = tmp_path / "work"
+    folder.mkdir()
+    (folder / closing.filename("exam")).write_text(closing.sheet(bank), encoding="utf-8")
+    quiz = quizzes.load("exam", student="ada", folder=folder)
+    answer(quiz, bank, right=2)
+    quiz.submit()
+    best = marked(bank, folder).best
+    assert best is not None
+    assert best.right == 2
+    assert "None" not in repr(best)
+
+
+def test_without_closed_it_would_have_to_teach(tmp_path: Path) -> None:
+    path = tmp_path / "exam.yaml"
+    path.write_text(EXAM.read_text().replace("closed: true\n", ""))
+    with pytest.raises(BankError) as caught:
+        read_bank(path)
+    said = "\n".join(caught.value.faults)
+    for missing in (
+        "variants: it must have at least 4",
+        "proof: it is required",
+        "options 1 feedback: it is required",
+        "misconception: a wrong option needs",
+    ):
+        assert missing in said  # fmt: skip
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_few_variants_are_dealt_by_turns(count: int) -> None:
+    data = closed()
+    for concept in data["concepts"]:
+        del concept["variants"][count:]
+    bank = Bank.model_validate(data)
+    for student in (f"student-{n}" for n in range(30)):
+        dealt = [[item.variant.id for item in model.draw(bank, student, attempt).items]
+                 for attempt in range(1, 4 * count + 1)]  # fmt: skip
+        for place in range(len(bank.concepts)):
+            ids = [items[place] for items in dealt]
+            assert all(len(set(ids[n : n + count])) == count for n in range(0, len(ids), count))
+            assert count == 1 or all(a != b for a, b in zip(ids, ids[1:], strict=False))
+
+
+def test_the_questions_hold_nothing_that_only_teaching_needs(bank: Bank) -> None:
+    for field in ("proof", "misconception", "feedback", "show"):
+        assert f"{field}:" not in closing.sheet(bank)
 
 
 def test_an_open_quiz_has_no_question_sheet() -> None:

@@ -134,6 +134,52 @@ def test_each_concept_is_a_group_that_picks_one_variant(assessment: ElementTree.
     assert {text(group.find(f".//{NS}selection_number")) for group in groups} == {"1"}
 
 
+def test_the_package_is_worth_what_is_drawn(package: zipfile.ZipFile) -> None:
+    assert meta(package, "points_possible") == ["5.0", "5.0"], "of the quiz and its assignment"
+    assert points_of_groups(package) == [(1, 1)] * 5, "one question of each group, one point"
+
+
+def test_attempts_and_how_they_count_are_in_the_package(package: zipfile.ZipFile) -> None:
+    assert meta(package, "allowed_attempts") == ["20"]
+    assert meta(package, "scoring_policy") == ["keep_highest"]
+    assert meta(package, "show_correct_answers") == ["true"]
+
+
+def test_a_closed_quiz_shows_no_results_in_canvas() -> None:
+    bank = loader.read_bank(loader.BANKS.parent / "examples" / "exam.yaml")
+    archive = zipfile.ZipFile(io.BytesIO(qti.package(bank)[0]))
+    assert meta(archive, "points_possible") == ["3.0", "3.0"]
+    assert meta(archive, "allowed_attempts") == ["1"]
+    assert meta(archive, "show_correct_answers") == ["false"]
+    assert meta(archive, "hide_results") == ["always"]
+    assert points_of_groups(archive) == [(1, 1)] * 3
+
+
+def meta(package: zipfile.ZipFile, name: str) -> list[str]:
+    """The values of a setting of the quiz, as Canvas reads them."""
+    [file] = [n for n in package.namelist() if n.endswith("assessment_meta.xml")]
+    root = ElementTree.fromstring(package.read(file))
+    return [text(e) for e in root.iter() if e.tag.rpartition("}")[2] == name]
+
+
+def points_of_groups(package: zipfile.ZipFile) -> list[tuple[int, int]]:
+    """How many questions each group draws, and the points of each."""
+    [file] = [n for n in package.namelist() if re.search(r"assessment_\w+\.xml$", n)
+              and not n.endswith("_meta.xml")]  # fmt: skip
+    root = ElementTree.fromstring(package.read(file))
+    return [
+        (int(text(s.find(f"{NS}selection_number"))), int(text(s.find(f".//{NS}points_per_item"))))
+        for s in root.iter(f"{NS}selection")
+    ]
+
+
+def test_a_group_has_its_concepts_name(assessment: ElementTree.Element) -> None:
+    root = assessment.find(f".//{NS}section[@ident='root_section']")
+    assert root is not None
+    titles = [group.attrib["title"] for group in root.findall(f"{NS}section")]
+    assert titles == [concept.id for concept in BANK.concepts]
+
+
 def right_texts(item: ElementTree.Element) -> set[str]:
     """The texts of the options that earn the points."""
     [condition] = [c for c in item.iter(f"{NS}respcondition") if c.find(f"{NS}setvar") is not None]
