@@ -28,8 +28,16 @@ def package(bank: Bank) -> tuple[bytes, list[str]]:
     Raises:
         ExchangeError: text2qti does not accept a question; the message names it.
     """
+    asked: dict[str, str] = {}
     for concept in bank.concepts:  # one by one first: text2qti knows lines, people know items
         for variant in concept.variants:
+            text = " ".join(_stem(variant).split())
+            if text in asked:
+                raise ExchangeError(
+                    f"{bank.quiz}.yaml, items '{asked[text]}' and '{variant.id}' ask the same "
+                    "thing in the same words, which QTI cannot hold: change one of the stems."
+                )
+            asked[text] = variant.id
             try:
                 _parsed("\n".join(_question(bank, variant)) + "\n")
             except Text2qtiError as error:
@@ -91,21 +99,18 @@ def _parsed(text: str) -> Quiz:
 
 def _question(bank: Bank, variant: Variant) -> list[str]:
     lines = [f"Title: {variant.id}", f"Points: {POINTS}"]
-    stem = variant.stem + (code_block(variant.code) if variant.code else "")
+    lines += _item(bank, "1.", _stem(variant))
     if isinstance(variant, Numeric):
-        lines += _item(bank, "1.", stem + unit_line(variant.unit))
         lines += _item(bank, "+", variant.feedback)
         lines += _item(bank, "-", variant.wrong_feedback or variant.feedback)
         return [*lines, f"= {variant.answer!r} +- {variant.tolerance!r}"]
     if isinstance(variant, Ordering | Matching):
         options = _arrangements(variant)
-        lines += _item(bank, "1.", stem + _to_arrange(variant))
         lines += _item(bank, "+", variant.feedback)
         lines += _item(bank, "-", variant.wrong_feedback)
         for letter, option in zip("abcdefgh", options, strict=False):
             lines += _item(bank, f"{'*' if option == options[0] else ''}{letter})", option)
         return lines
-    lines += _item(bank, "1.", stem)
     for letter, choice in zip("abcdefghij", variant.options, strict=False):
         mark = "*" if choice.correct else ""
         if isinstance(variant, Multiple):
@@ -114,6 +119,14 @@ def _question(bank: Bank, variant: Variant) -> list[str]:
             lines += _item(bank, f"{mark}{letter})", choice.text)
         lines += _item(bank, "...", choice.feedback)
     return lines
+
+
+def _stem(variant: Variant) -> str:
+    """Return all that stands above the answers."""
+    stem = variant.stem + (code_block(variant.code) if variant.code else "")
+    if isinstance(variant, Numeric):
+        return stem + unit_line(variant.unit)
+    return stem + _to_arrange(variant) if isinstance(variant, Ordering | Matching) else stem
 
 
 def _to_arrange(variant: Ordering | Matching) -> str:

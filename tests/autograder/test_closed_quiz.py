@@ -17,12 +17,13 @@ import quizzes
 from autograder import engine, quiz_report
 from autograder.build import build
 from autograder.gradebook import CourseGradebook
+from autograder.quiz_cli import QuizCommandError
 from autograder.quiz_marks import QuizMarksError
 from autograder.quiz_sheets import QuizSheetError
 from autograder.release import ReleaseError, release
 from course.content import content_root, copy_authoring
 from course.lab import make_copy
-from quizzes import closing, loader, model
+from quizzes import closing, loader, model, schema
 from tests.machine import needs_isolation
 from tests.quizzes import sample
 
@@ -54,7 +55,11 @@ def course(folder: Path, **changes: Any) -> Path:
     return root
 
 
-def write_bank(root: Path, **changes: Any) -> None:
+def write_bank(root: Path, text: str = "", **changes: Any) -> None:
+    if text:
+        (root / "authoring" / "banks").mkdir(exist_ok=True)
+        (root / "authoring" / "banks" / f"{QUIZ}.yaml").write_text(text)
+        return
     data = {**sample.data(), "quiz": QUIZ, "closed": True, **changes}
     sample.write(root / "authoring" / "banks", data).rename(
         root / "authoring" / "banks" / f"{QUIZ}.yaml"
@@ -162,3 +167,41 @@ def test_a_bank_in_the_place_of_the_questions_is_not_released(root: Path) -> Non
     with pytest.raises(ReleaseError, match="is not in step with the quiz"):
         release(root, ASSIGNMENT)
     assert yaml.safe_load((root / "release" / ASSIGNMENT / SHEET).read_text())["keyless"]
+
+
+@needs_isolation
+def test_three_questions_with_one_variant_each_are_an_exam(tmp_path: Path) -> None:
+    """From a bank that has nothing to teach to its points, its feedback and its report."""
+    text = (schema.EXAMPLES / "exam.yaml").read_text().replace("quiz: exam", f"quiz: {QUIZ}")
+    root = course(tmp_path / "course", text=text)
+    build(root)
+    release(root, ASSIGNMENT)
+    hand_in(root, "ada", right=3)
+    hand_in(root, "alan", right=1)
+    engine.grade(root, ASSIGNMENT)
+    found = points(root)
+    assert found["ada"] == 3.0
+    assert found["alan"] is not None
+    assert 1 <= found["alan"] < 3
+    page = html.unescape((root / "feedback" / "alan" / ASSIGNMENT / "exam.html").read_text())
+    assert "The answer was:" in page
+    assert "Compute a rate from a period." in page
+    assert ">None<" not in page
+    assert "20 Hz" not in page, "a closed quiz does not give its key away"
+    [report] = quiz_report.of_assignment(root, ASSIGNMENT)
+    assert report.as_data()["learners"] == 2
+    assert report.as_data()["misconceptions"] == []
+    assert sorted(path.name for path in report.files) == [
+        f"quiz-{QUIZ}-items.csv", f"quiz-{QUIZ}-report.html",
+    ]  # fmt: skip
+    assert "believes" not in report.files[0].read_text()
+
+
+def test_a_quizs_name_stands_for_its_assignment(root: Path) -> None:
+    (root / "source" / ASSIGNMENT).rename(root / "source" / "week-7")
+    assert quiz_report.assignment_of(root, QUIZ) == "week-7"
+    assert quiz_report.assignment_of(root, "week-7") == "week-7"
+    assert quiz_report.assignment_of(root, "nothing") == "nothing", "which the report refuses"
+    shutil.copytree(root / "source" / "week-7", root / "source" / "week-8")
+    with pytest.raises(QuizCommandError, match="is in the assignments week-7, week-8: name one"):
+        quiz_report.assignment_of(root, QUIZ)

@@ -12,10 +12,11 @@ from zipfile import ZipFile
 import pytest
 
 from autograder import cli, quiz_report
-from quizzes import loader, marking, model, record
+from quizzes import loader, marking, model, record, schema
 from quizzes.record import Attempt, Given
 
 BANK = loader.load_bank("ch05")
+EXAM = schema.EXAMPLES / "exam.yaml"
 
 
 Run = Callable[..., tuple[str, str]]
@@ -54,7 +55,7 @@ def hand_in(root: Path, student: str) -> None:
 
 def test_there_and_back_again(tmp_path: Path, autograder: Run) -> None:
     said, _ = autograder("quiz", "export", "ch05", "--format", "gift")
-    assert "Written: ch05.gift" in said
+    assert "Written: ch05.gift (5 of 26 questions are drawn, 5 points)" in said
     assert "There is no ordering: pattern-navigation-2 became a matching" in said
     file = tmp_path / "ch05.gift"
     edited = file.read_text(encoding="utf-8").replace("Three nodes have", "Five nodes have")
@@ -71,7 +72,9 @@ def test_there_and_back_again(tmp_path: Path, autograder: Run) -> None:
 
 def test_qti_is_a_zip_file(tmp_path: Path, autograder: Run) -> None:
     said, _ = autograder("quiz", "export", "ch05", "-f", "qti", "--to", "q.zip")
+    assert "Written: q.zip (5 of 26 questions are drawn, 5 points)" in said
     assert "text2qti has neither ordering nor matching" in said
+    assert "The package asks for 20 attempts, of which the best counts" in said
     assert "imsmanifest.xml" in ZipFile(tmp_path / "q.zip").namelist()
 
 
@@ -87,7 +90,10 @@ def test_qti_is_a_zip_file(tmp_path: Path, autograder: Run) -> None:
         ("import bad.gift --into ch05", "bad.gift, line 2, question 'q': it is an essay"),
         ("import twice.gift --into ch05", "field options 3 text: the text 'b' stands there twice."),
         ("import fine.gift --into ch05 --to new.yaml", "so call the file ch05.yaml"),
-        ("lint broken.yaml", "broken.yaml, field quiz: "),
+        ("lint broken.yaml", "broken.yaml, line 1: it must be fields with their values, but it is"),
+        ("lint ch5", "There is no quiz 'ch5': there are ch05. Did you mean 'ch05'?"),
+        ("lint empty.yaml", "empty.yaml is empty"),
+        ("lint tab.yaml", "tab.yaml is not valid YAML: line 2: a tab stands where YAML wants"),
         ("lint none.yaml", "There is no bank none.yaml."),
     ],
 )
@@ -98,7 +104,9 @@ def test_what_is_wrong_is_one_sentence(
     (tmp_path / "bad.gift").write_text("// fine\n::q::Why?{}\n")
     (tmp_path / "fine.gift").write_text("::qos-purpose-1::Why?{=a#f ~b#f}\n")
     (tmp_path / "twice.gift").write_text("::qos-purpose-1::Why?{=a#f ~b#f ~b#f}\n")
-    (tmp_path / "broken.yaml").write_text("quiz: 5\n")
+    (tmp_path / "broken.yaml").write_text("- quiz: 5\n")
+    (tmp_path / "empty.yaml").write_text("")
+    (tmp_path / "tab.yaml").write_text("quiz: a\n\ttitle: b\n")
     before = sorted(tmp_path.iterdir())
     _, error = autograder("quiz", *arguments.split(), code=1)
     assert sentence in error
@@ -113,6 +121,66 @@ def test_a_bank_with_something_to_mend_fails(tmp_path: Path, autograder: Run) ->
     shutil.copytree(BANK.folder / "assets", tmp_path / "assets")
     said, _ = autograder("quiz", "lint", "ch05.yaml", code=1)
     assert "item 'qos-purpose-1', field stem: it asks 2 questions" in said
+
+
+def test_lint_says_all_that_is_wrong_with_several_banks(tmp_path: Path, autograder: Run) -> None:
+    broken = EXAM.read_text().replace("objective", "objektive").replace("tolerance: 0.1", "unti: s")
+    (tmp_path / "exam.yaml").write_text(broken)
+    (tmp_path / "tab.yaml").write_text("quiz: a\n\ttitle: b\n")
+    said, error = autograder("quiz", "lint", "exam.yaml", "tab.yaml", "nobody", "ch05", code=1)
+    assert "exam.yaml: 7 to mend" in said
+    assert said.count("field objektive: there is no such field: did you mean 'objective'?") == 3
+    assert said.count("field objective: it is missing") == 3
+    assert "line 28, item 'timer-rate-1', field unti: there is no such field: did you mean" in said
+    assert "Its questions are read critically once these are mended." in said
+    assert "tab.yaml is not valid YAML: line 2: a tab" in error
+    assert "There is no quiz 'nobody'" in error
+    assert "ch05: 0 to mend" in said, "the others are looked at all the same"
+
+
+@pytest.fixture
+def course(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A course root with a closed quiz of its own; the command is run from a folder inside."""
+    banks = tmp_path / "course" / "authoring" / "banks"
+    banks.mkdir(parents=True)
+    (tmp_path / "course" / "nbgrader_config.py").write_text("")
+    shutil.copy(EXAM, banks / "midterm.yaml")
+    text = (banks / "midterm.yaml").read_text().replace("quiz: exam", "quiz: midterm")
+    (banks / "midterm.yaml").write_text(text)
+    (tmp_path / "course" / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "course" / "work")
+    return tmp_path / "course"
+
+
+def test_a_courses_own_quiz_is_known_by_its_name(
+    autograder: Run, course: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(course / "work")
+    assert "midterm: 0 to mend" in autograder("quiz", "lint", "midterm")[0]
+    said, _ = autograder("quiz", "export", "midterm", "-f", "qti")
+    assert "Written: midterm.qti.zip (3 of 3 questions are drawn, 3 points)" in said
+    said, _ = autograder("quiz", "export", "midterm", "-f", "gift")
+    assert "The quiz is closed, but the file has its keys" in said
+    text = Path("midterm.gift").read_text().replace("Any, whatever", "Each, whatever")
+    Path("midterm.gift").write_text(text)
+    said, _ = autograder("quiz", "import", "midterm.gift", "--into", "midterm")
+    assert "Written: midterm.yaml (1 new or changed)" in said
+    assert "'matching-rule-1' has changed." in said
+    assert "midterm.yaml: 0 to mend" in autograder("quiz", "lint", "midterm.yaml")[0].replace(
+        "midterm: 0", "midterm.yaml: 0"
+    )
+    _, error = autograder("quiz", "lint", "midtrem", code=1)
+    assert "There is no quiz 'midtrem': there are ch05, midterm. Did you mean 'midterm'?" in error
+    monkeypatch.chdir(tmp_path)
+    said, _ = autograder("quiz", "lint", "midterm", "--root", str(course))
+    assert "midterm: 0 to mend" in said
+
+
+def test_the_format_is_printed_for_people_and_for_editors(autograder: Run) -> None:
+    said, _ = autograder("quiz", "schema")
+    assert said == schema.markdown()
+    said, _ = autograder("quiz", "schema", "--json")
+    assert json.loads(said) == schema.json_schema()
 
 
 def test_a_classs_quiz_is_analysed(tmp_path: Path) -> None:

@@ -261,6 +261,17 @@ def test_what_text2qti_refuses_is_one_sentence_that_names_the_item() -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_two_questions_in_the_same_words_are_named() -> None:
+    twin = BANK.concepts[0].variants[0]
+    data = BANK.model_dump()
+    data["concepts"][1]["variants"][0]["stem"] = twin.stem
+    data["concepts"][1]["variants"][0]["code"] = None
+    bank = Bank.model_validate(data)
+    bank._folder = BANK.folder
+    with pytest.raises(ExchangeError, match=rf"items '{twin.id}' and '.*' ask the same thing"):
+        qti.package(bank)
+
+
 @pytest.mark.parametrize(
     "stem",
     [

@@ -42,7 +42,7 @@ def test_each_field_of_each_part_is_on_the_page_with_what_it_means() -> None:
         "whole number, 1 to 100 | none |  |",
         "list of 2 to 10 options |  | always |",
         "number, at least 0 | `0.0` |  |",
-        "text or list of texts | none | to teach |",
+        "text or list of at least 1 texts | none | to teach |",
         "one of `single`, `predict`, `multiple`, `numeric`, `ordering`, `matching` |  | always |",
         "`true` or `false` | `false` |  |",
         "id, at most 60 characters | none | to teach |",
