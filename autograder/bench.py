@@ -85,20 +85,19 @@ class Subject:
         """
         self._ask("open", "a session", threads=threads, sim_time=sim_time)
 
-    def start(self, name: str, *args: Any, bare: bool = False) -> str:
+    def start(self, name: str, *args: Any) -> str:
         """Make a node of a class of the notebook and spin it; return its fully qualified name.
 
         Args:
             name: the class.
-            args: what its constructor is given, as JSON.
-            bare: if the constructor raises, nobody tidies up after it, as in a program without a
-                session: what is then left is the class's own doing.
+            args: what its constructor is given, as JSON. Nobody tidies up after one that raises:
+                what is then left is the class's own doing.
 
         Raises:
             StudentError: the class is missing or its constructor raised.
             SubjectGone: the process ended or hangs.
         """
-        reply = self._ask("start", name, args=args, bare=bare)
+        reply = self._ask("start", name, args=args)
         return self._read(lambda: _text(reply["node"], MAX_NAME))
 
     def start_all(self, name: str) -> dict[str, str]:

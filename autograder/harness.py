@@ -131,13 +131,7 @@ class Harness:
         factory = self._find(name)
         if request["args"]:
             factory = partial(factory, *request["args"])
-        if not request["bare"]:
-            return {"node": self._run(name, factory)}
-        try:
-            return {"node": self._run(name, _unaided(factory))}
-        except _RaisedUnaided as raised:
-            self._raised.append(raised.error)
-            raise raised.error from None
+        return {"node": self._run(name, factory)}
 
     def _declare(self, request: dict[str, Any]) -> dict[str, Any]:
         name = request["name"]
@@ -155,7 +149,11 @@ class Harness:
 
     def _run(self, name: str, factory: Any) -> str:
         # Two classes may share a node name, or come out of one function: both have to run.
-        node = self._hosting.run_beside(factory)
+        try:
+            node = self._hosting.run_beside(factory)
+        except (Exception, SystemExit) as error:
+            self._raised.append(error)
+            raise
         self._nodes[name] = node
         return str(node.get_fully_qualified_name())
 
@@ -284,30 +282,6 @@ def _cell_error(missing: str) -> str:
         return ""
     which = "last" if error is last else "first"
     return f" The {which} error of a cell was {described(error)[:MAX_TOLD].rstrip('.')}."
-
-
-class _RaisedUnaided(Exception):  # noqa: N818 - it wraps an error, and is none itself
-    """Carries what a constructor raised past a session, without the traceback."""
-
-    def __init__(self, error: Exception | SystemExit) -> None:
-        super().__init__(str(error))
-        self.error = error
-
-
-def _unaided(factory: Callable[[], Any]) -> Callable[[], Any]:
-    """Return ``factory`` made such that a session does not tidy up after its constructor.
-
-    A session destroys what it finds in the traceback of a constructor that raised.
-    """
-
-    def make() -> Any:
-        try:
-            return factory()
-        except (Exception, SystemExit) as error:  # noqa: BLE001 - student's code may raise anything
-            raised = _RaisedUnaided(error)
-        raise raised from None
-
-    return make
 
 
 def _close(session: Session) -> None:

@@ -116,9 +116,9 @@ def failing_starts_memory(rig: CameraRig, kind: str, times: int) -> None:
 
 
 def attempt(rig: CameraRig, device: str) -> None:
-    """Start the driver on a ``device`` that has something wrong with it, as bare rclpy would."""
+    """Start the driver on a ``device`` that has something wrong with it."""
     try:
-        rig.subject.start(DRIVER, device, bare=True)
+        rig.subject.start(DRIVER, device)
     except StudentError:
         return
     rig.program.stop(DRIVER)

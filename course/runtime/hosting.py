@@ -61,7 +61,8 @@ class Hosting:
         """Make a node and spin it in the background; return it.
 
         Running the same factory with the same arguments again, or one whose node has the same
-        fully qualified name, replaces the earlier node.
+        fully qualified name, replaces the earlier node; also one whose constructor raised, which
+        rclpy leaves on the graph half made, with all that it began.
 
         Args:
             factory: a Node class, a function that returns a Node, or a node of this session.
@@ -101,6 +102,7 @@ class Hosting:
         """
         for resident in self._residents.find(what):
             self._residents.stop(resident.node)
+        self._residents.stop_half_made(what)
 
     def let_go(self, node: Node) -> None:
         """Stop spinning a node and forget it, without destroying it: that is now up to the caller.

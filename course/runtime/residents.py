@@ -7,7 +7,7 @@ from __future__ import annotations
 import functools
 import threading
 import weakref
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Container, Hashable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -22,15 +22,11 @@ from course.runtime.blocked import describe
 from course.runtime.context import as_default_context
 from course.runtime.crew import Crew
 from course.runtime.executor import BackgroundExecutor
+from course.runtime.half_made import HalfMade, Remains
 from course.runtime.jobs import Job, current_job
 from course.runtime.names import is_name, node_name
 from course.runtime.rcutils_tap import hearing_constructors
-from course.runtime.teardown import (
-    destroy_half_made,
-    destroy_node,
-    is_alive,
-    is_being_destroyed,
-)
+from course.runtime.teardown import destroy_node, is_alive, is_being_destroyed
 from course.runtime.waiting import Pulse, poll
 
 _CALLBACK_GRACE = 2.0  # s that stop() and pause() give a callback that is running
@@ -60,6 +56,7 @@ class Residents:
         """Keep nodes of `context`, spun by `crew`; `tell` passes a sentence on to the learner."""
         self.stopped: weakref.WeakSet[Node] = weakref.WeakSet()
         self.on_made: list[Callable[[Node], None]] = []
+        self.half_made = HalfMade(tell)
         self._context = context
         self._crew = crew
         self._pulse = pulse
@@ -98,7 +95,9 @@ class Residents:
         for resident in self.all():
             if key is not None and resident.key == key:
                 self.stop(resident.node)
-        node = factory if isinstance(factory, Node) else self._make(factory, args, kwargs)
+        if key is not None:
+            self.half_made.clear(lambda remains: remains.key == key)
+        node = factory if isinstance(factory, Node) else self._make(factory, args, kwargs, key)
         if node.context is not self._context:
             instead = "pass its class to run()"
             if node is not factory:
@@ -111,6 +110,8 @@ class Residents:
         for resident in self.all():
             if replace and resident.name == name and resident.node is not node:
                 self.stop(resident.node)
+        if replace:
+            self.half_made.clear(lambda remains: remains.name == name)
         for callback in self.on_made:
             callback(node)
         executor = self._crew.executor(threads)
@@ -126,8 +127,12 @@ class Residents:
 
     def stop(self, node: Node) -> None:
         """Stop spinning `node`, let its running callback end, and destroy it. Idempotent."""
-        if self.let_go(node):
-            destroy_node(node)
+        if self.let_go(node) and destroy_node(node):
+            self._tell(
+                f"The destroy_node() of {node_name(node)} left it on the graph, and the session "
+                "has taken it off; in a program it stays: let the method end with "
+                "super().destroy_node()."
+            )
 
     def let_go(self, node: Node) -> bool:
         """Stop spinning `node`, let its running callback end, and forget it; True if it ran."""
@@ -171,9 +176,17 @@ class Residents:
             resident.executor.add_node(node)
         resident.paused = False
 
+    def stop_half_made(self, what: tuple[Any, ...]) -> None:
+        """Take half-made nodes off the graph that `what` stands for; without any, all."""
+        self.half_made.clear(
+            lambda remains: not what or any(_matches(remains, item) for item in what),
+            replaced=False,
+        )
+
     def forget_all(self) -> list[str]:
         """Destroy every node; no executor may be spinning. Return which cleanups raised what."""
         problems = []
+        self.stop_half_made(())
         residents = self.all()
         nodes = {*(resident.node for resident in residents), *self._crew.nodes()}
         nodes.update(node for resident in residents for node in resident.held)
@@ -243,14 +256,20 @@ class Residents:
 
     # Inside.
 
-    def _make(self, factory: Factory, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Node:
+    def _make(
+        self, factory: Factory, args: tuple[Any, ...], kwargs: dict[str, Any], key: Hashable
+    ) -> Node:
+        # Weakly: what the constructor raises is kept, and with it what this frame refers to.
+        before = weakref.WeakSet(threading.enumerate())
         try:
             with as_default_context(self._context), hearing_constructors():
                 node = factory(*args, **kwargs)
         except BaseException as error:
             with suppress(Exception):  # rclpy's own error, of a name that cannot be, say, is enough
                 clashes.explain(error)
-            destroy_half_made(error.__traceback__)
+            with suppress(Exception):
+                for name in self.half_made.note(error, factory, key, self._is_news(before)):
+                    self._made_by[name] = factory
             raise
         if not isinstance(node, Node):
             name = getattr(factory, "__qualname__", repr(factory))
@@ -259,6 +278,10 @@ class Residents:
                 f"{name} returned {type(node).__name__}."
             )
         return node
+
+    def _is_news(self, before: Container[threading.Thread]) -> Callable[[threading.Thread], bool]:
+        """Return what tells a learner's thread that was not there before."""
+        return lambda thread: thread not in before and not self._crew.owns(thread)
 
     def _elsewhere(self) -> list[Resident]:
         """Return the nodes that should be spinning and are not in the executor they belong to."""
@@ -300,7 +323,7 @@ def _holder(resident: Resident) -> Executor | None:
     return executor if executor is not None and resident.node in executor.get_nodes() else None
 
 
-def _matches(resident: Resident, what: Any) -> bool:
+def _matches(resident: Resident | Remains, what: Any) -> bool:
     if isinstance(what, str):
         return is_name(resident.name, what)
     if isinstance(what, Node):

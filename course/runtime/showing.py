@@ -16,6 +16,7 @@ from rclpy.subscription import Subscription
 from course.errors import SessionError
 from course.runtime import arguments
 from course.runtime.asking import Asking
+from course.runtime.half_made import Remains
 from course.runtime.offers import full_action, full_node, full_service, load_type
 
 if TYPE_CHECKING:
@@ -195,6 +196,10 @@ class Showing(Asking):
     def moved_nodes(self) -> list[str]:
         """Return the names of nodes that are in an executor of the learner's own."""
         return self._residents.moved()
+
+    def half_made(self) -> list[Remains]:
+        """Return what is left of nodes whose constructor raised."""
+        return self._residents.half_made.all()
 
     def paused_nodes(self) -> list[str]:
         """Return the names of paused nodes."""

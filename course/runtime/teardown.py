@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import contextlib
-from types import TracebackType
 
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.action.client import ActionClient
@@ -15,19 +14,25 @@ from rclpy.lifecycle import LifecycleNodeMixin
 from rclpy.node import Node
 
 
-def destroy_node(node: Node) -> None:
+def destroy_node(node: Node) -> bool:
     """Destroy `node` with its action servers and clients. Idempotent.
 
     No executor may be waiting on the node. rclpy's own destroy_node() leaves action entities
     alive, and with them the node's endpoints on the ROS graph.
+
+    Returns:
+        Whether the class's own `destroy_node()` left the node on the graph.
     """
+    left = False
     # The node's own method first: a class that overrides it destroys its action server itself,
     # and rclpy does not take that twice.
     try:
         with contextlib.suppress(InvalidHandle):
             node.destroy_node()
     finally:
+        left = is_alive(node)
         sweep(node)
+    return left
 
 
 def sweep(node: Node) -> None:
@@ -51,21 +56,6 @@ def _destroy_state_machine(node: Node) -> None:
     if isinstance(node, LifecycleNodeMixin) and machine is not None:
         with contextlib.suppress(InvalidHandle):  # destroyed already
             machine.destroy_when_not_in_use()
-
-
-def destroy_half_made(tb: TracebackType | None) -> None:
-    """Destroy nodes whose constructor raised: they would stay on the graph as ghosts.
-
-    The only references to such a node are in the frames of the traceback, which a notebook keeps.
-    """
-    while tb is not None:
-        for value in list(tb.tb_frame.f_locals.values()):
-            # A node with an executor is one that runs: it only happens to be mentioned here.
-            if isinstance(value, Node) and is_alive(value) and value.executor is None:
-                # What the constructor raised is what the learner has to see, not what came of it.
-                with contextlib.suppress(Exception):
-                    destroy_node(value)
-        tb = tb.tb_next
 
 
 def is_alive(node: Node) -> bool:

@@ -207,17 +207,17 @@ def test_a_constructor_is_given_arguments(subject: Subject) -> None:
     assert subject.start("Named") == "/nobody"
 
 
-def test_a_session_tidies_up_after_a_constructor_unless_it_is_asked_not_to(
+def test_nobody_tidies_up_after_a_constructor_that_raised(
     subject: Subject, outside: Session
 ) -> None:
     observer = outside.run(Node, "observer")
-    for bare, left in ((False, 1), (True, 2)):
+    for left in (1, 2):
         with pytest.raises(StudentError, match="RuntimeError: no voice"):
-            subject.start("Named", "mute", False, bare=bare)
-        subject.start("Named", f"talker_{bare}")  # what came before it is known when it is
+            subject.start("Named", "mute", False)
+        subject.collect()
         outside.until(lambda n=left: observer.count_publishers("talk") == n)  # type: ignore[misc]
-        subject.stop("Named")
-        outside.until(lambda n=left: observer.count_publishers("talk") == n - 1)  # type: ignore[misc]
+    subject.start("Named", "talker")  # what came before it is known when it is
+    outside.until(lambda: observer.count_publishers("talk") == 3)
     subject.open()
     outside.until(lambda: not observer.count_publishers("talk"))
 
@@ -242,10 +242,9 @@ def test_without_a_session_a_cleanup_is_called_once(subject: Subject) -> None:
     assert subject.start("OneCleanupOnly") == "/fragile"
 
 
-@pytest.mark.parametrize("bare", [False, True])
-def test_a_constructor_that_exits_has_raised(subject: Subject, bare: bool) -> None:
+def test_a_constructor_that_exits_has_raised(subject: Subject) -> None:
     with pytest.raises(StudentError, match="SystemExit: 1"):
-        subject.start("Exits", bare=bare)
+        subject.start("Exits")
     assert subject.start("Named") == "/nobody"
 
 

@@ -158,17 +158,6 @@ def test_stop_destroys_action_servers_too(session):
         assert not [name for name, _ in watcher.get_service_names_and_types() if "count" in name]
 
 
-def test_a_constructor_that_raises_leaves_no_ghost(session):
-    def half_made():
-        node = Node("ghost")
-        raise ValueError(f"no camera at {node.get_name()}")
-
-    with pytest.raises(ValueError, match="no camera") as caught:
-        session.run(half_made)
-    assert caught.tb is not None  # as a notebook keeps it, and the node with it
-    assert names_seen_from_outside(session) == ["watcher"]
-
-
 def test_a_method_with_a_name_of_rclpys_is_named(session):
     """rclpy only says that a 'method' object does not support the context manager protocol."""
 

@@ -60,6 +60,9 @@ def test_a_stopped_node_is_gone_with_its_action(kind: type[Node]) -> None:
         session.stop(kind)
         session.until(alone(witness), timeout=20, what="the node and its action to be gone")
         assert session.errors == []
+        told = "\n".join(session.notices)
+        left = "The destroy_node() of /worker left it on the graph, and the session has taken"
+        assert (left in told) == (kind is Forgetful)
 
 
 def test_a_stopped_managed_node_is_gone_with_its_services_while_somebody_keeps_it() -> None:
@@ -97,19 +100,6 @@ def test_a_session_closes_whatever_a_cleanup_does(kind: type[Node]) -> None:
     assert session.closed
     mistakes = ["the cleanup of /worker raised RuntimeError: my own mistake"]
     assert report.leaked == (mistakes if kind is Raising else [])
-
-
-def test_what_a_constructor_raised_is_what_is_seen() -> None:
-    class Half(Raising):
-        def __init__(self) -> None:
-            super().__init__()
-            raise ValueError("in the constructor")
-
-    with Session() as session:
-        witness = session.run(Node, "witness")
-        with pytest.raises(ValueError, match="in the constructor"):
-            session.run(Half)
-        session.until(alone(witness), timeout=20, what="the half-made node to be gone")
 
 
 def test_a_cleanup_that_fails_the_second_time_is_told_and_nothing_else_suffers(
