@@ -79,14 +79,22 @@ def from_text(msg_type: Any, text: str) -> Any:
     Raises:
         MisfitError: it is no YAML, or a value does not fit; says which field, and what it takes.
     """
+    return from_data(msg_type, read(msg_type, text))
+
+
+def read(msg_type: Any, text: str) -> Any:
+    """Return the plain data of YAML or JSON that is to be a message of ``msg_type``.
+
+    Raises:
+        MisfitError: it is neither.
+    """
     try:
-        data = plain.read(text) if text.strip() else {}
+        return plain.read(text) if text.strip() else {}
     except ValueError as error:
         raise MisfitError(
             f"{plain.shown(text)} is not YAML ({error}): write the fields as in "
             f"{example(msg_type)}."
         ) from None
-    return from_data(msg_type, data)
 
 
 def from_data(msg_type: Any, data: Any) -> Any:

@@ -2,64 +2,110 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 from course import ambient, plain, values
 from course.errors import SessionError
 from course.graph import reader
+from course.graph.model import Exchange
+from course.ros.arguments import Add, operands, type_and_values
 from course.ros.arguments import timeout as add_timeout
-from course.runtime.offers import load_type
+from course.ros.types import agreed, message
+from course.runtime.offers import full_action
 
 NOUN = "action"
 
 
-def list_(show_types: bool = False) -> str:
+def list_(show_types: bool = False, count: bool = False) -> str:
     """List the actions."""
-    actions = reader.read(ambient.session().observer).actions
+    actions = [action for action in _actions(everything=False) if action.servers]
+    if count:
+        return str(len(actions))
     return (
         "\n".join(
-            f"{action.name} [{action.type}]" if show_types else action.name
-            for action in actions
-            if action.servers
+            f"{action.name} [{action.type}]" if show_types else action.name for action in actions
         )
         or "No actions."
     )
 
 
-def send_goal(action: str, goal: str = "{}", feedback: bool = False, timeout: float = 30.0) -> str:
+def info(action: str, show_types: bool = False, count: bool = False) -> str:
+    """Show which nodes serve an action, and which send it goals."""
+    found = _action(action)
+    lines = [f"Action: {found.name}"]
+    for what, names in (("clients", found.clients), ("servers", found.servers)):
+        lines.append(f"Action {what}: {len(names)}")
+        kind = f" [{found.type}]" if show_types else ""
+        lines += [] if count else [f"    {name}{kind}" for name in names]
+    return "\n".join(lines)
+
+
+def show_type(action: str) -> str:
+    """Show an action's type."""
+    return _action(action).type
+
+
+def send_goal(
+    action: str, asked: str, text: str, named: str, feedback: bool, timeout: float
+) -> str:
     """Send a goal, wait for its result, and show it; -f with the feedback on the way."""
-    action_type = load_type(_type_of(action), kind="action")
-    run = ambient.send_goal(
-        action_type, action, values.from_text(action_type.Goal, goal), timeout=timeout
-    )
+    asked, text = operands(asked, text, named)
+    session = ambient.session()
+    name = full_action(session.observer, action)
+    on_graph = [known.type for known in _actions(everything=True) if known.name == name]
+    if not (asked or on_graph):
+        raise _no_action(name)
+    action_type = agreed("action", name, asked, on_graph)
+    goal = message(action_type.Goal, text, session)
+    run = session.send_goal(action_type, name, goal, timeout=timeout)
     if not run.accepted:
         return "The goal was rejected."
     result = run.wait(timeout)
-    lines = [f"feedback: {values.to_data(message)}" for message in run.feedback] if feedback else []
-    text = plain.lines(values.to_data(result)).strip()
-    return "\n".join([*lines, f"result:\n{text}", f"state: {run.status.name}"])
+    lines = [f"feedback: {values.to_data(one)}" for one in run.feedback] if feedback else []
+    shown = plain.lines(values.to_data(result)).strip()
+    return "\n".join([*lines, f"result:\n{shown}", f"state: {run.status.name}"])
 
 
-def _type_of(action: str) -> str:
-    name = action if action.startswith("/") else f"/{action}"
-    actions = reader.read(ambient.session().observer, everything=True).actions
-    for known in actions:
+def _action(action: str) -> Exchange:
+    name = full_action(ambient.session().observer, action)
+    for known in _actions(everything=True):
         if known.name == name:
-            return known.type
-    shown = ", ".join(known.name for known in actions)
-    raise SessionError(f"There is no action {name}: there are {shown or 'none'}.")
+            return known
+    raise _no_action(name)
 
 
-def _declare_list(add: Callable[..., Any]) -> None:
+def _actions(everything: bool) -> tuple[Exchange, ...]:
+    return reader.read(ambient.session().observer, everything=everything).actions
+
+
+def _no_action(name: str) -> SessionError:
+    shown = ", ".join(known.name for known in _actions(everything=True))
+    return SessionError(f"There is no action {name}: there are {shown or 'none'}.")
+
+
+def _declare_list(add: Add) -> None:
     add("-t", "--show-types", action="store_true", help="with their types")
+    add("-c", "--count-actions", dest="count", action="store_true", help="only how many there are")
 
 
-def _declare_send_goal(add: Callable[..., Any]) -> None:
-    add("action")
-    add("goal", nargs="?", default="{}", help="its fields as YAML, as in '{order: 5}'")
+def _declare_action(add: Add) -> None:
+    add("action", metavar="ACTION")
+
+
+def _declare_info(add: Add) -> None:
+    _declare_action(add)
+    add("-t", "--show-types", action="store_true", help="with the type")
+    add("-c", "--count", action="store_true", help="only how many there are")
+
+
+def _declare_send_goal(add: Add) -> None:
+    _declare_action(add)
+    type_and_values(add, "example_interfaces/action/Fibonacci", "'{order: 5}'")
     add("-f", "--feedback", action="store_true", help="show the feedback, too")
     add_timeout(add, 30.0)
 
 
-VERBS = {"list": (list_, _declare_list), "send_goal": (send_goal, _declare_send_goal)}
+VERBS = {
+    "list": (list_, _declare_list),
+    "info": (info, _declare_info),
+    "type": (show_type, _declare_action),
+    "send_goal": (send_goal, _declare_send_goal),
+}

@@ -1,30 +1,37 @@
-"""What ``%ros`` takes: one parser for all commands, whose complaints are sentences."""
+"""What ``%ros`` takes: a parser for each command, which answers a mistake with its usage."""
 
 from __future__ import annotations
 
 import argparse
+import functools
 import shlex
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import ModuleType
 from typing import Any, NoReturn
 
+from course import plain
 from course.errors import CourseError
+from course.runtime.offers import is_type_name
 
 TIMEOUT = 5.0
+"""Seconds that a command waits at most; what has no end on a command line ends after them here."""
 
-Command = Callable[..., str | None]
+Add = Callable[..., Any]
+"""``argparse.ArgumentParser.add_argument``, with which a command declares what it takes."""
 
 
 class UsageError(CourseError):
-    """A ``%ros`` line that says nothing; the message has the usage."""
+    """A ``%ros`` line that says nothing; the message has a sentence, and the usage below it."""
 
 
 class _Parser(argparse.ArgumentParser):
+    block = ""  # made before parsing: while it parses, argparse holds another usage
+
     def error(self, message: str) -> NoReturn:
-        usage = " ".join(self.format_usage().removeprefix("usage: ").split())
-        raise UsageError(f"{message[0].upper()}{message[1:]}. Usage: {usage}")
+        raise UsageError(f"{message[0].upper()}{message[1:]}.\n{self.block}")
 
     def print_help(self, file: Any = None) -> None:
-        print(self.format_help())  # noqa: T201 - the answer to `%ros -h`
+        print(self.block)  # noqa: T201 - the answer to `%ros topic pub -h`
 
     def exit(self, status: int = 0, message: str | None = None) -> NoReturn:
         raise _Done
@@ -45,33 +52,95 @@ def run(line: str) -> None:
         words = shlex.split(line)
     except ValueError as error:
         raise UsageError(f"%ros {line}: {error}.") from None
+    noun = _one_of(nouns(), words[:1], "%ros", "NOUN VERB ...")
+    verb = noun and _one_of(nouns()[noun].VERBS, words[1:2], f"%ros {noun}", "VERB ...")
+    if not (noun and verb):
+        return
     try:
-        options = vars(parser().parse_args(words))
+        # Intermixed: people write options before, between and after what a command is about.
+        options = vars(parser(noun, verb).parse_intermixed_args(words[2:]))
     except _Done:
         return
-    answer = options.pop("command")(**options)
-    if answer:
+    command, _ = nouns()[noun].VERBS[verb]
+    if answer := command(**options):
         print(answer)  # noqa: T201 - the answer to the learner's line
 
 
-def parser() -> argparse.ArgumentParser:
-    """Return the parser of everything that ``%ros`` can do."""
+@functools.cache
+def nouns() -> Mapping[str, ModuleType]:
+    """Return the modules of all commands, by noun; each has ``VERBS``."""
     from course.ros import actions, interfaces, nodes, parameters, services, topics
 
-    top = _Parser(prog="%ros", description="Look at the ROS graph of this notebook, and use it.")
-    nouns = top.add_subparsers(required=True, metavar="topic|node|service|action|param|interface")
-    for module in (topics, nodes, services, actions, parameters, interfaces):
-        verbs = nouns.add_parser(
-            module.NOUN, help=(module.__doc__ or "").partition("\n")[0]
-        ).add_subparsers(required=True, metavar="|".join(module.VERBS))
-        for verb, (command, declare) in module.VERBS.items():
-            line = (command.__doc__ or "").partition("\n")[0]
-            declared = verbs.add_parser(verb, help=line, description=line)
-            declare(declared.add_argument)
-            declared.set_defaults(command=command)
-    return top
+    return {one.NOUN: one for one in (topics, nodes, services, actions, parameters, interfaces)}
 
 
-def timeout(add: Callable[..., Any], default: float = TIMEOUT) -> None:
+def parser(noun: str, verb: str) -> _Parser:
+    """Return the parser of one command; its ``block`` is the usage, a line an argument."""
+    command, declare = nouns()[noun].VERBS[verb]
+    made = _Parser(
+        prog=f"%ros {noun} {verb}",
+        description=(command.__doc__ or "").partition("\n")[0],
+        formatter_class=functools.partial(argparse.HelpFormatter, max_help_position=30, width=98),
+    )
+    declare(made.add_argument)
+    lines = made.format_help().replace("[-h] ", "").splitlines()
+    left_out = ("", "positional arguments:", "options:")
+    made.block = "\n".join(line for line in lines if line not in left_out and "-h," not in line)
+    return made
+
+
+def valued(noun: str, verb: str) -> set[str]:
+    """Return the options of a command that a value follows."""
+    found: set[str] = set()
+
+    def add(*names: str, action: str = "", **_: Any) -> None:
+        found.update(name for name in names if name.startswith("-") and not action)
+
+    if noun in nouns() and verb in nouns()[noun].VERBS:
+        nouns()[noun].VERBS[verb][1](add)
+    return found
+
+
+def _one_of(known: Mapping[str, Any], words: list[str], so_far: str, rest: str) -> str:
+    """Return the word, if it is known; "" if it has asked for help, which is then shown."""
+    lines = [f"usage: {so_far} {rest}", ""]
+    lines += [f"  {name:<12}{_about(thing)}" for name, thing in known.items()]
+    block = "\n".join(line for line in lines if line)
+    word = words[0] if words else ""
+    if word in known:
+        return word
+    if word in ("-h", "--help"):
+        print(block)  # noqa: T201 - the answer to `%ros -h`
+        return ""
+    missing = f"{plain.shown(word)} is none of its words" if word else "A word is missing"
+    raise UsageError(f"{missing} after {so_far}.\n{block}")
+
+
+def _about(thing: Any) -> str:
+    """Return the first line about a noun's module or a verb's function."""
+    about = thing[0] if isinstance(thing, tuple) else thing
+    return (about.__doc__ or "").partition("\n")[0]
+
+
+def timeout(add: Add, default: float = TIMEOUT) -> None:
     """Declare ``--timeout``."""
-    add("--timeout", type=float, default=default, help="seconds to wait at most")
+    add("--timeout", type=float, default=default, metavar="S", help="seconds to wait at most")
+
+
+def type_and_values(add: Add, example: str, values: str) -> None:
+    """Declare TYPE and VALUES, both of which may be left out; `operands` tells them apart."""
+    add("asked", nargs="?", default="", metavar="TYPE",
+        help=f"as in {example}; may be left out if the graph knows it")  # fmt: skip
+    add("text", nargs="?", default="", metavar="VALUES",
+        help=f"the fields in quotes, as YAML: {values}")  # fmt: skip
+    add("--type", dest="named", default="", metavar="TYPE", help=argparse.SUPPRESS)
+
+
+def operands(asked: str, text: str, named: str) -> tuple[str, str]:
+    """Return (type, values) of what was given for `type_and_values`.
+
+    A lone word is the type if it has the form of one: such a text is no YAML of any message.
+    """
+    if not text and (named or not is_type_name(asked)):
+        asked, text = "", asked
+    return named or asked, text or "{}"

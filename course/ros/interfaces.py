@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from typing import Any
 
 from course import plain, values
 from course.errors import SessionError
 from course.interfaces import installed
+from course.ros.arguments import Add
 from course.runtime.names import type_name
 from course.runtime.offers import load_type
 
 NOUN = "interface"
 
 
-def show(type: str) -> str:  # noqa: A002 - as the command line says
+def show(asked: str, no_comments: bool = True) -> str:
     """Show the definition of an interface; what is nested is indented."""
-    return "\n".join(definition(type))
+    return "\n".join(definition(asked))
 
 
-def list_(package: str = "") -> str:
-    """List the installed interfaces, or those of one package."""
+def list_(package: str = "", only: str = "") -> str:
+    """List the installed interfaces, or those of one package or kind."""
     known = installed.interfaces()
     if package and package not in known:
         raise SessionError(f"There is no package {package} with interfaces here.")
@@ -29,7 +29,19 @@ def list_(package: str = "") -> str:
         f"{name}/{interface}"
         for name in ([package] if package else sorted(known))
         for interface in sorted(known[name])
+        if interface.startswith(only)
     )
+
+
+def packages() -> str:
+    """List the packages that define interfaces."""
+    return "\n".join(sorted(installed.interfaces()))
+
+
+def proto(asked: str) -> str:
+    """Show a message, request or goal with its defaults, to be edited."""
+    cls = _load(asked)
+    return f'"{values.example(getattr(cls, "Request", getattr(cls, "Goal", cls)))}"'
 
 
 def definition(name: str) -> list[str]:
@@ -38,7 +50,7 @@ def definition(name: str) -> list[str]:
     Raises:
         SessionError: there is no such interface here.
     """
-    cls = load_type(name)
+    cls = _load(name)
     kinds = (("Goal", "Result", "Feedback"), ("Request", "Response"))
     named = next((names for names in kinds if hasattr(cls, names[0])), ())
     parts = [getattr(cls, part) for part in named] or [cls]
@@ -47,6 +59,18 @@ def definition(name: str) -> list[str]:
         lines += ["---"] if number else []
         lines += _fields(part, "")
     return lines
+
+
+def _load(name: str) -> Any:
+    """Return the class of an interface; of a kind that is left out, the first that there is.
+
+    Raises:
+        SessionError: there is none.
+    """
+    package, slash, last = name.partition("/")
+    known = installed.interfaces().get(package, ())
+    kinds = [kind for kind in ("msg", "srv", "action") if f"{kind}/{last}" in known]
+    return load_type(f"{package}/{kinds[0]}/{last}" if slash and kinds else name)
 
 
 def _fields(msg_type: Any, indent: str) -> list[str]:
@@ -78,12 +102,34 @@ def _constants(msg_type: Any) -> list[str]:
 _CONSTANT = re.compile(r"^\s*(?P<type>[a-z]\S*)\s+(?P<name>[A-Z]\w*)\s*=", re.MULTILINE)
 
 
-def _declare_show(add: Callable[..., Any]) -> None:
-    add("type", help="as in sensor_msgs/msg/Image")
+def _declare_type(add: Add) -> None:
+    add("asked", metavar="TYPE", help="as in sensor_msgs/msg/Image")
 
 
-def _declare_list(add: Callable[..., Any]) -> None:
-    add("package", nargs="?", default="")
+def _declare_show(add: Add) -> None:
+    _declare_type(add)
+    add("--no-comments", action="store_true", help="as it is shown anyway")
 
 
-VERBS = {"show": (show, _declare_show), "list": (list_, _declare_list)}
+def _declare_list(add: Add) -> None:
+    add("package", metavar="PACKAGE", nargs="?", default="")
+    for letter, kind, what in (
+        ("m", "msg", "msgs"),
+        ("s", "srv", "srvs"),
+        ("a", "action", "actions"),
+    ):
+        add(f"-{letter}", f"--only-{what}", dest="only", action="store_const", const=f"{kind}/",
+            default="", help=f"{what} alone")  # fmt: skip
+
+
+def _declare_package(add: Add) -> None:
+    add("package", metavar="PACKAGE")
+
+
+VERBS = {
+    "show": (show, _declare_show),
+    "list": (list_, _declare_list),
+    "package": (list_, _declare_package),
+    "packages": (packages, lambda _add: None),
+    "proto": (proto, _declare_type),
+}

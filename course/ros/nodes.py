@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import Any
+from collections.abc import Iterable
 
 from course import ambient
 from course.errors import SessionError
 from course.graph import reader
 from course.graph.model import Endpoint, Exchange, Graph
+from course.ros.arguments import Add
 
 NOUN = "node"
 
 
-def list_(everything: bool = False) -> str:
+def list_(everything: bool = False, count: bool = False) -> str:
     """List the nodes."""
-    return "\n".join(_graph(everything).nodes) or "No nodes."
+    nodes = _graph(everything).nodes
+    return str(len(nodes)) if count else "\n".join(nodes) or "No nodes."
 
 
 def info(node: str) -> str:
@@ -53,12 +54,13 @@ def _graph(everything: bool = False) -> Graph:
     return reader.read(session.observer, everything=everything)
 
 
-def _declare_list(add: Callable[..., Any]) -> None:
+def _declare_list(add: Add) -> None:
     add("-a", "--all", dest="everything", action="store_true", help="those that ROS hides, too")
+    add("-c", "--count-nodes", dest="count", action="store_true", help="only how many there are")
 
 
-def _declare_info(add: Callable[..., Any]) -> None:
-    add("node")
+def _declare_info(add: Add) -> None:
+    add("node", metavar="NODE")
 
 
 VERBS = {"list": (list_, _declare_list), "info": (info, _declare_info)}

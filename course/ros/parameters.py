@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from rcl_interfaces.msg import ParameterDescriptor
 
 from course import ambient, plain
 from course.errors import CourseError, SessionError
 from course.graph import reader
+from course.ros.arguments import Add
 from course.runtime.offers import full_node
-from course.watch.parameter_values import RefusedError
+from course.watch.parameter_values import TYPES, RefusedError
 from course.watch.parameters import ParameterSheet
 
 NOUN = "param"
@@ -39,7 +39,27 @@ def names_of(node: str, timeout: float = 5.0) -> list[str]:
     return _sheet(node).names(timeout)
 
 
-def get(node: str, name: str) -> str:
+def describe(node: str, names: list[str]) -> str:
+    """Show what parameters are for, their type and range."""
+    sheet = _sheet(node)
+    return "\n".join(line for name in names for line in _described(name, sheet.describe(name)))
+
+
+def _described(name: str, found: ParameterDescriptor) -> list[str]:
+    kind = TYPES.get(found.type, (0, "any type, or none yet"))[1]
+    lines = [f"Parameter name: {name}", f"  Type: {kind}"]
+    if found.description:
+        lines.append(f"  Description: {found.description}")
+    lines.append("  Constraints: read only" if found.read_only else "  Constraints:")
+    for span in [*found.integer_range, *found.floating_point_range]:
+        lines += [f"    Min value: {span.from_value}", f"    Max value: {span.to_value}"]
+        lines += [f"    Step: {span.step}"] if span.step else []
+    if found.additional_constraints:
+        lines.append(f"    {found.additional_constraints}")
+    return lines if lines[-1] != "  Constraints:" else lines[:-1]
+
+
+def get(node: str, name: str, hide_type: bool = True) -> str:
     """Show a parameter's value."""
     value = _sheet(node).get(name)
     if value is None:
@@ -79,22 +99,33 @@ def _sheet(node: str) -> ParameterSheet:
     return ParameterSheet(session, name)
 
 
-def _declare_list(add: Callable[..., Any]) -> None:
-    add("node", nargs="?", default="")
+def _declare_list(add: Add) -> None:
+    add("node", metavar="NODE", nargs="?", default="")
 
 
-def _declare_get(add: Callable[..., Any]) -> None:
-    add("node")
-    add("name")
+def _declare_name(add: Add) -> None:
+    add("node", metavar="NODE")
+    add("name", metavar="NAME")
 
 
-def _declare_set(add: Callable[..., Any]) -> None:
-    _declare_get(add)
-    add("value", help="as YAML: true, 0.5, fast, [1, 2]")
+def _declare_describe(add: Add) -> None:
+    add("node", metavar="NODE")
+    add("names", metavar="NAME", nargs="+")
+
+
+def _declare_get(add: Add) -> None:
+    _declare_name(add)
+    add("--hide-type", action="store_true", help="the value alone, which is what is shown anyway")
+
+
+def _declare_set(add: Add) -> None:
+    _declare_name(add)
+    add("value", metavar="VALUE", help="as YAML: true, 0.5, fast, [1, 2]")
 
 
 VERBS = {
     "list": (list_, _declare_list),
     "get": (get, _declare_get),
     "set": (set_, _declare_set),
+    "describe": (describe, _declare_describe),
 }

@@ -1,35 +1,70 @@
 """Topics: list them, look at their endpoints, listen, measure their rate, publish."""
 
+# mypy: allow-untyped-calls
+
 from __future__ import annotations
 
+import contextlib
 import itertools
 import statistics
-from collections.abc import Callable
 from typing import Any
+
+from rclpy.qos import QoSProfile
 
 from course import ambient, plain, values
 from course.errors import SessionError, WaitTimeout
 from course.graph import reader, words
 from course.graph.model import Graph, Topic
+from course.ros.arguments import Add, operands, type_and_values
 from course.ros.arguments import timeout as add_timeout
+from course.ros.qos import declare as declare_qos
+from course.ros.qos import profile
+from course.ros.repetitions import declare as add_repetitions
+from course.ros.repetitions import repetitions
+from course.ros.types import agreed, message
 from course.runtime.arguments import seconds, whole
-from course.runtime.offers import full_topic, load_type, type_on
+from course.runtime.names import type_name
+from course.runtime.offers import full_topic, load_type
 from course.runtime.waiting import Deadline
+from course.values import to_data
 
 NOUN = "topic"
 _ENOUGH = 20  # messages for a rate that one late message does not spoil
 
 
-def list_(show_types: bool = False, everything: bool = False) -> str:
+def list_(
+    show_types: bool = False, everything: bool = False, count: bool = False, verbose: bool = False
+) -> str:
     """List the topics."""
     topics = _graph(everything).topics
-    return (
-        "\n".join(
-            f"{topic.name} [{', '.join(topic.types)}]" if show_types else topic.name
-            for topic in topics
-        )
-        or "No topics."
-    )
+    if count:
+        return str(len(topics))
+    if not verbose:
+        return "\n".join(_line(topic, show_types) for topic in topics) or "No topics."
+    lines = []
+    for what, side in (("Published", "publishers"), ("Subscribed", "subscriptions")):
+        lines.append(f"{what} topics:")
+        for topic in topics:
+            if ends := getattr(topic, side):
+                counted = plain.counted(len(ends), side.removesuffix("s"))
+                lines.append(f" * {_line(topic, True)} {counted}")
+    return "\n".join(lines)
+
+
+def _line(topic: Topic, show_types: bool) -> str:
+    return f"{topic.name} [{', '.join(topic.types)}]" if show_types else topic.name
+
+
+def show_type(topic: str) -> str:
+    """Show a topic's type."""
+    return "\n".join(_topic(topic).types)
+
+
+def find(asked: str) -> str:
+    """List the topics of a type."""
+    wanted = type_name(load_type(asked, kind="msg"))
+    found = [topic.name for topic in _graph(everything=True).topics if wanted in topic.types]
+    return "\n".join(found) or f"No topic is of type {wanted}."
 
 
 def info(topic: str, verbose: bool = False) -> str:
@@ -45,28 +80,57 @@ def info(topic: str, verbose: bool = False) -> str:
     return "\n".join(lines)
 
 
-def echo(topic: str, count: int = 1, timeout: float = 5.0) -> str:
-    """Show the next messages of a topic."""
+def echo(
+    topic: str, asked: str, count: int, timeout: float, field: str, longest: int, flow_style: bool,
+    **qos: Any,
+) -> str:  # fmt: skip
+    """Show the next message of a topic; -n for more."""
     whole(count, "-n", least=1, example=1)
+    longest = whole(longest, "-l", least=0, example=128)
+    msg_type = _agreed(topic, asked) if asked else None
     deadline = Deadline(seconds(timeout))
-    with ambient.record(topic, limit=count, timeout=timeout) as recorder:
+    with ambient.record(
+        topic, msg_type, limit=count, timeout=timeout, qos=profile(qos, "sensor_data")
+    ) as recorder:
         try:
             messages = recorder.wait(count, round(deadline.left, 2))
         except WaitTimeout:
             messages = recorder.messages
             if not messages:
                 raise
-    return "---\n".join(
-        plain.lines(values.to_data(stamped.message)) for stamped in messages[:count]
-    )
+    shown = [_part(stamped.message, field) for stamped in messages[:count]]
+    # A longest of 0 keeps all.
+    data = [values.to_plain(part, longest or None) for part in shown]
+    if flow_style:
+        return "\n---\n".join(plain.one_line(one) for one in data)
+    return "---\n".join(plain.lines(one).removesuffix("...\n") for one in data)
 
 
-def hz(topic: str, timeout: float = 5.0) -> str:
+def _part(message: Any, field: str) -> Any:
+    """Return what a path such as ``pose.position.x`` stands for in a message."""
+    part = message
+    for name in field.split(".") if field else ():
+        known = [slot for slot, _ in values.fields(type(part))] if _is_message(part) else []
+        if name not in known:
+            raise SessionError(
+                f"--field {field}: {plain.shown(name)} is no field there, it has "
+                f"{', '.join(known) or 'none'}."
+            )
+        part = getattr(part, name)
+    return part
+
+
+def _is_message(part: Any) -> bool:
+    return hasattr(part, "get_fields_and_field_types")
+
+
+def hz(topic: str, window: int, timeout: float) -> str:
     """Measure the rate at which messages are published."""
+    whole(window, "--window", least=2, example=_ENOUGH)
     deadline = Deadline(seconds(timeout))
-    with ambient.record(topic, timeout=timeout) as recorder:
+    with ambient.record(topic, timeout=timeout, limit=window) as recorder:
         try:
-            recorder.wait(_ENOUGH, round(deadline.left, 2))
+            recorder.wait(window, round(deadline.left, 2))
         except WaitTimeout as error:
             if recorder.count < 2:
                 raise _too_few(error, recorder.count, topic, timeout) from None
@@ -92,22 +156,47 @@ def _too_few(error: WaitTimeout, count: int, topic: str, timeout: float) -> Wait
     )
 
 
-def pub(topic: str, message: str, type: str = "") -> str:  # noqa: A002 - as the command line says
-    """Publish one message, once a subscription is there to get it."""
+def pub(
+    topic: str, asked: str, text: str, named: str, once: bool, times: int | None,
+    rate: float | None, subscriptions: int | None, timeout: float, **qos: Any,
+) -> str:  # fmt: skip
+    """Publish one message, once a subscription is there to get it; -r and -t for more."""
     session = ambient.session()
-    msg_type = (
-        load_type(type, kind="msg")
-        if type
-        else type_on(session.observer, full_topic(session.observer, topic))
-    )
-    if msg_type is None:
+    asked, text = operands(asked, text, named)
+    msg_type = _agreed(topic, asked)
+    number, rate = repetitions(once, times, rate)
+    endless = number > 1 and times is None
+    least = subscriptions if subscriptions is not None else 0 if endless else 1
+    whole(least, "-w", least=0, example=1)
+    offered = profile(qos, "default") or QoSProfile(depth=10)
+    sent = message(msg_type, text, session)
+    if number == least == 1:
+        session.publish(topic, sent, qos=offered, timeout=timeout)
+        return f"Published on {topic}: {to_data(sent)}"
+    done, others = 0, 0
+    with session.publisher(msg_type, topic, qos=offered, timeout=timeout) as publisher:
+        waited = f"{plain.counted(least, 'subscription')} of {topic} with a QoS that fits"
+        session.until(lambda: publisher.get_subscription_count() >= least, timeout, waited)
+        with contextlib.suppress(KeyboardInterrupt):
+            for number_sent in session.paced(number, rate):
+                sent = message(msg_type, text, session)
+                publisher.publish(sent)
+                done, others = number_sent, max(others, publisher.get_subscription_count())
+    heard = plain.counted(others, "subscription") if others else "nobody: no subscription fits"
+    return f"Published {plain.counted(done, 'message')} on {topic}, to {heard}: {to_data(sent)}"
+
+
+def _agreed(topic: str, asked: str) -> Any:
+    """Return the class of a topic's type: as asked for, or as on the graph."""
+    observer = ambient.session().observer
+    name = full_topic(observer, topic)
+    types = dict(observer.get_topic_names_and_types()).get(name, [])
+    if not (asked or types):
         raise SessionError(
-            f"Nobody uses {topic}, so its type is unknown: name it with --type, as in "
-            "--type std_msgs/msg/String."
+            f"Nobody uses {topic}, so its type is unknown: name it behind the topic, as in %ros "
+            f'topic pub {topic} std_msgs/msg/String "data: hello".'
         )
-    sent = values.from_text(msg_type, message)
-    session.publish(topic, sent)
-    return f"Published on {topic}: {values.to_data(sent)}"
+    return agreed("msg", name, asked, types)
 
 
 def _graph(everything: bool = False) -> Graph:
@@ -128,31 +217,55 @@ def _topic(name: str) -> Topic:
     return topics[_full(name)]
 
 
-def _declare_list(add: Callable[..., Any]) -> None:
+def _declare_list(add: Add) -> None:
     add("-t", "--show-types", action="store_true", help="with their types")
-    add("-a", "--all", dest="everything", action="store_true", help="those that ROS hides, too")
+    add("-c", "--count-topics", dest="count", action="store_true", help="only how many there are")
+    add("-v", "--verbose", action="store_true", help="who publishes and who subscribes, counted")
+    add("-a", "--all", "--include-hidden-topics", dest="everything", action="store_true",
+        help="those that ROS hides, too")  # fmt: skip
 
 
-def _declare_info(add: Callable[..., Any]) -> None:
-    add("topic")
+def _declare_topic(add: Add) -> None:
+    add("topic", metavar="TOPIC")
+
+
+def _declare_info(add: Add) -> None:
+    _declare_topic(add)
     add("-v", "--verbose", action="store_true", help="with the QoS of each endpoint")
 
 
-def _declare_echo(add: Callable[..., Any]) -> None:
-    add("topic")
-    add("-n", "--count", type=int, default=1, help="how many messages")
+def _declare_find(add: Add) -> None:
+    add("asked", metavar="TYPE", help="as in std_msgs/msg/String")
+
+
+def _declare_echo(add: Add) -> None:
+    _declare_topic(add)
+    add("asked", metavar="TYPE", nargs="?", default="", help="as in std_msgs/msg/String")
+    add("-n", "--count", type=int, default=1, metavar="N", help="how many messages (1)")
+    add("--once", dest="count", action="store_const", const=1, help="one message")
+    add("--field", default="", metavar="F", help="only this field, as in pose.position.x")
+    add("-l", "--truncate-length", dest="longest", type=int, default=values.LONGEST, metavar="N",
+        help="so many elements of a sequence")  # fmt: skip
+    add("-f", "--full-length", dest="longest", action="store_const", const=0, help="all of them")
+    add("--flow-style", action="store_true", help="each message on one line")
+    add_timeout(add)
+    declare_qos(add)
+
+
+def _declare_hz(add: Add) -> None:
+    _declare_topic(add)
+    add("-w", "--window", type=int, default=_ENOUGH, metavar="N", help="over so many messages")
     add_timeout(add)
 
 
-def _declare_hz(add: Callable[..., Any]) -> None:
-    add("topic")
+def _declare_pub(add: Add) -> None:
+    _declare_topic(add)
+    type_and_values(add, "std_msgs/msg/String", "'{data: hello}'")
+    add_repetitions(add, "publish")
+    add("-w", "--wait-matching-subscriptions", dest="subscriptions", type=int, metavar="N",
+        help="wait for so many (1; 0 with -r)")  # fmt: skip
     add_timeout(add)
-
-
-def _declare_pub(add: Callable[..., Any]) -> None:
-    add("topic")
-    add("message", help="its fields as YAML, as in '{data: hello}'")
-    add("--type", default="", help="its type, if nobody uses the topic yet")
+    declare_qos(add)
 
 
 VERBS = {
@@ -161,4 +274,6 @@ VERBS = {
     "echo": (echo, _declare_echo),
     "hz": (hz, _declare_hz),
     "pub": (pub, _declare_pub),
+    "type": (show_type, _declare_topic),
+    "find": (find, _declare_find),
 }

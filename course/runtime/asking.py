@@ -6,9 +6,11 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
 from course.errors import WaitTimeout
@@ -114,6 +116,32 @@ class Asking(Hosting):
             if profile is None:
                 profile = QoSProfile(depth=10)
             self._probe.publish(topic, message, profile, timeout)
+
+    @contextlib.contextmanager
+    def publisher(
+        self, msg_type: Any, topic: str, *, qos: QoSProfile | int = 10, timeout: float = 5.0
+    ) -> Iterator[Publisher]:
+        """Give a publisher of the session's own for the time of a `with` block.
+
+        At the block's end, `timeout` seconds are given to what is under way to reliable
+        subscriptions.
+
+        Raises:
+            WaitTimeout: the topic has another type.
+        """
+        arguments.ros_type(msg_type, "message")
+        profile = arguments.qos(qos) or QoSProfile(depth=10)
+        with self._probe.publisher(msg_type, topic, profile, arguments.seconds(timeout)) as made:
+            yield made
+
+    def paced(self, times: int, rate: float) -> Iterator[int]:
+        """Yield 1, 2, ..., `times`, `rate` times a second, while the session is open."""
+        begun = time.monotonic()
+        for number in range(times):
+            gap = begun + number / rate - time.monotonic()
+            if poll(lambda: self.closed, max(0.0, gap), self._pulse):
+                return
+            yield number + 1
 
     def wait_for_service(self, srv_type: Any, name: str, timeout: float = 5.0) -> None:
         """Return when a server of `name` is ready.

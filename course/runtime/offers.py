@@ -194,11 +194,17 @@ def _reasons(reason: str) -> list[str]:
     return [p.removeprefix("ERROR:") for p in parts if p.startswith("ERROR:")] or [reason]
 
 
+def is_type_name(text: str) -> bool:
+    """Return whether a text has the form of an interface's name, as ``std_msgs/msg/String`` has."""
+    return _TYPE_NAME.fullmatch(text) is not None
+
+
 def load_type(name: str, who: str = "", kind: str = "") -> Any:
     """Return the class of an interface such as ``std_msgs/msg/String``.
 
     Args:
-        name: package, kind and name; the kind may be left out for a message.
+        name: package, kind and name; the kind may be left out where `kind` says it, or else for
+            a message.
         who: the topic or service that needs it, for the error.
         kind: "msg", "srv" or "action", if nothing else will do.
 
@@ -211,7 +217,7 @@ def load_type(name: str, who: str = "", kind: str = "") -> Any:
             f"{plain.shown(name)} is not the name of an interface: write package/kind/Name, as in "
             f"{_EXAMPLES[kind or 'msg']}."
         )
-    package, actual, cls = found["package"], found["kind"] or "msg", found["name"]
+    package, actual, cls = found["package"], found["kind"] or kind or "msg", found["name"]
     if kind and actual != kind:
         raise SessionError(f"{name} is no {kind} type: name one such as {_EXAMPLES[kind]}.")
     try:

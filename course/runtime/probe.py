@@ -121,16 +121,24 @@ class Probe:
 
     def publish(self, topic: str, message: Any, qos: QoSProfile, timeout: float) -> None:
         """Publish one message as soon as a subscription matches; see `Session.publish`."""
-        topic = full_topic(self.node, topic)
-        require_type(topic, type(message), self.node.get_topic_names_and_types())
-        publisher = self.node.create_publisher(type(message), topic, qos)
-        try:
+        with self.publisher(type(message), topic, qos, timeout) as publisher:
             if not poll(publisher.get_subscription_count, timeout, self.pulse):
                 raise WaitTimeout(
-                    f"Nobody with a QoS that fits subscribes to {topic}, so nothing was published "
-                    f"in {timeout:g} s."
+                    f"Nobody with a QoS that fits subscribes to {publisher.topic_name}, so nothing "
+                    f"was published in {timeout:g} s."
                 )
             publisher.publish(message)
+
+    @contextlib.contextmanager
+    def publisher(
+        self, msg_type: Any, topic: str, qos: QoSProfile, timeout: float
+    ) -> Iterator[Publisher]:
+        """Give a publisher for a block; see `Session.publisher`."""
+        topic = full_topic(self.node, topic)
+        require_type(topic, msg_type, self.node.get_topic_names_and_types())
+        publisher = self.node.create_publisher(msg_type, topic, qos)
+        try:
+            yield publisher
             publisher.wait_for_all_acked(Duration(seconds=min(timeout, _LONGEST)))
         finally:
             with self.executor.held():

@@ -9,8 +9,7 @@ from rcl_interfaces.msg import ParameterType, ParameterValue
 from course import plain, values
 from course.errors import CourseError
 
-# {type: (the field of ParameterValue that holds it, what it takes)}
-_TYPES = {
+TYPES = {
     ParameterType.PARAMETER_BOOL: ("bool_value", "true or false"),
     ParameterType.PARAMETER_INTEGER: ("integer_value", "a whole number"),
     ParameterType.PARAMETER_DOUBLE: ("double_value", "a number"),
@@ -21,6 +20,8 @@ _TYPES = {
     ParameterType.PARAMETER_DOUBLE_ARRAY: ("double_array_value", "a list of numbers"),
     ParameterType.PARAMETER_STRING_ARRAY: ("string_array_value", "a list of texts"),
 }
+"""{type: (the field of ParameterValue that holds it, what it takes)}"""
+
 _GUESSES = (  # in this order: an empty list is one of bytes, as rclpy has it
     ParameterType.PARAMETER_BOOL, ParameterType.PARAMETER_INTEGER, ParameterType.PARAMETER_DOUBLE,
     ParameterType.PARAMETER_STRING, ParameterType.PARAMETER_BOOL_ARRAY,
@@ -40,9 +41,9 @@ class RefusedError(ParameterError):
 
 def to_plain(value: ParameterValue) -> Any:
     """Return a parameter's value as plain data; None if it has none yet."""
-    if value.type not in _TYPES:
+    if value.type not in TYPES:
         return None
-    field, _ = _TYPES[value.type]
+    field, _ = TYPES[value.type]
     return values.to_plain(getattr(value, field), None)
 
 
@@ -57,11 +58,11 @@ def to_value(name: str, typed: Any, declared: int) -> ParameterValue:
     Raises:
         ParameterError: it does not fit; the message says what the parameter takes.
     """
-    takes = _TYPES[declared][1] if declared in _TYPES else "a value, or a list of one kind of value"
+    takes = TYPES[declared][1] if declared in TYPES else "a value, or a list of one kind of value"
     try:
         data = _data(typed, declared)
-        type_ = declared if declared in _TYPES else _guess(data)
-        field, _ = _TYPES[type_]
+        type_ = declared if declared in TYPES else _guess(data)
+        field, _ = TYPES[type_]
         if isinstance(data, float) and data.is_integer() and field == "integer_value":
             data = int(data)  # a slider's 2.0
         held = values.to_field(_SLOTS[field], data, name)
@@ -85,7 +86,7 @@ def _guess(data: Any) -> int:
         return int(ParameterType.PARAMETER_BYTE_ARRAY)
     for type_ in _GUESSES:
         try:
-            values.to_field(_SLOTS[_TYPES[type_][0]], data, "")
+            values.to_field(_SLOTS[TYPES[type_][0]], data, "")
         except values.MisfitError:
             continue
         return int(type_)

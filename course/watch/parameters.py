@@ -80,6 +80,15 @@ class ParameterSheet:
         self._require(name, timeout)
         return to_plain(self._values([name], timeout)[name])
 
+    def describe(self, name: str, timeout: float = 5.0) -> ParameterDescriptor:
+        """Return what the node says of a parameter.
+
+        Raises:
+            ParameterError: there is no such parameter.
+            WaitTimeout: the node does not answer.
+        """
+        return self._require(name, timeout)
+
     def set(self, name: str, typed: Any, timeout: float = 5.0) -> None:
         """Change a parameter to what was typed (text is read as YAML).
 

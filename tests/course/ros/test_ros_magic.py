@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import rclpy
+from geometry_msgs.msg import PoseStamped
 from IPython.core.completer import IPCompleter, provisionalcompleter
 from IPython.core.interactiveshell import InteractiveShell
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.action import ActionServer
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.time import Time
+from sensor_msgs.msg import TimeReference
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 from test_msgs.action import Fibonacci
@@ -21,7 +25,8 @@ from test_msgs.msg import BasicTypes
 
 import course
 from course.errors import CourseError
-from course.ros import magic
+from course.ros import arguments, magic, repetitions
+from course.ros.arguments import UsageError
 
 
 class Robot(Node):
@@ -131,6 +136,192 @@ def test_nodes(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
     assert "  Action servers:\n    /fibonacci: test_msgs/action/Fibonacci" in info
 
 
+# What the pages of docs.ros.org for Jazzy type, with the names of this robot.
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("topic list -t", "/orders [std_msgs/msg/String]"),
+        ("topic list -c", "2\n"),
+        ("topic list -v", "Published topics:\n * /chatter [std_msgs/msg/String] 1 publisher\n"),
+        ("topic list --include-hidden-topics", "/rosout"),
+        ("topic type /chatter", "std_msgs/msg/String\n"),
+        ("topic find std_msgs/msg/String", "/chatter\n/orders\n"),
+        ("topic info /chatter --verbose", "    reliability: RELIABLE"),
+        ("topic echo --once /chatter", "data: hello\n"),
+        ("topic echo /chatter std_msgs/msg/String --once", "data: hello\n"),
+        ("topic echo /chatter std_msgs/String", "data: hello\n"),
+        ("topic echo /chatter --field data", "hello\n"),
+        ("topic echo --flow-style /chatter", "{data: hello}\n"),
+        ("topic echo /chatter --qos-reliability best_effort --qos-depth 5", "data: hello\n"),
+        ("topic echo /chatter --qos-profile sensor_data -f", "data: hello\n"),
+        ("topic hz /chatter --window 5", "over 5 messages"),
+        ("node list -c", "1\n"),
+        ("service list --show-types", "/lamp [std_srvs/srv/SetBool]"),
+        ("service list -c", "1\n"),
+        ("service type /lamp", "std_srvs/srv/SetBool\n"),
+        ("service info /lamp", "Type: std_srvs/srv/SetBool\nClients count: 0\nServices count: 1"),
+        ("service find std_srvs/srv/SetBool", "/lamp\n"),
+        ('service call /lamp std_srvs/srv/SetBool "{data: true}"', "message: lamp True"),
+        ("service call /lamp std_srvs/srv/SetBool '{data: true}'", "message: lamp True"),
+        ('service call lamp std_srvs/SetBool "data: true"', "message: lamp True"),
+        ("service call /lamp std_srvs/srv/SetBool", "message: lamp False"),
+        ("service call /lamp", "message: lamp False"),
+        ('service call /lamp "{data: true}" --type std_srvs/srv/SetBool', "message: lamp True"),
+        ("action list -t", "/fibonacci [test_msgs/action/Fibonacci]"),
+        ("action type /fibonacci", "test_msgs/action/Fibonacci\n"),
+        ("action info /fibonacci -t", "Action servers: 1\n    /robot [test_msgs/action/Fibonacci]"),
+        (
+            'action send_goal /fibonacci test_msgs/action/Fibonacci "{order: 2}" --feedback',
+            "feedback: {'sequence': [0, 1]}",
+        ),
+        ('action send_goal -f /fibonacci test_msgs/action/Fibonacci "{order: 2}"', "SUCCEEDED"),
+        ('action send_goal /fibonacci test_msgs/Fibonacci "order: 2"', "state: SUCCEEDED"),
+        ("action send_goal /fibonacci test_msgs/action/Fibonacci", "state: SUCCEEDED"),
+        ("param get --hide-type /robot speed", "0.5\n"),
+        (
+            "param describe /robot speed",
+            "Parameter name: speed\n  Type: a number\n  Description: m/s\n",
+        ),
+        ("interface show std_srvs/SetBool", "bool data\n---\n"),
+        ("interface list --only-actions", "test_msgs/action/Fibonacci"),
+        ("interface package std_srvs", "std_srvs/srv/Empty\nstd_srvs/srv/SetBool\n"),
+        ("interface packages", "std_srvs\n"),
+        ("interface proto geometry_msgs/msg/Point", '"{x: 0.0, y: 0.0, z: 0.0}"\n'),
+    ],
+)  # fmt: skip
+def test_a_line_of_a_tutorial_is_taken(
+    robot: Robot, capsys: pytest.CaptureFixture[str], line: str, said: str
+) -> None:
+    assert said in answer(capsys, line)
+
+
+@pytest.mark.parametrize(
+    ("line", "orders"),
+    [
+        ('topic pub --once /orders std_msgs/msg/String "{data: go}"', ["go"]),
+        ("topic pub -1 /orders std_msgs/msg/String '{data: go}'", ["go"]),
+        ('topic pub /orders std_msgs/String "data: go" -1', ["go"]),
+        ('topic pub /orders --once std_msgs/msg/String "{data: go}"', ["go"]),
+        ('topic pub --once -w 1 /orders std_msgs/msg/String "data: \'go on\'"', ["go on"]),
+        ("topic pub /orders std_msgs/msg/String", [""]),
+        ("topic pub /orders '{data: go}' --type std_msgs/msg/String", ["go"]),
+        ('topic pub -r 50 -t 3 /orders std_msgs/msg/String "{data: go}"', ["go"] * 3),
+        ('topic pub --rate 50 --times 3 /orders "{data: go}" --timeout 20', ["go"] * 3),
+        (
+            'topic pub /orders std_msgs/msg/String "{data: go}" --qos-reliability reliable '
+            "--qos-durability transient_local --qos-history keep_last --qos-depth 5",
+            ["go"],
+        ),
+    ],
+)  # fmt: skip
+def test_what_a_tutorial_publishes_arrives(
+    robot: Robot, capsys: pytest.CaptureFixture[str], line: str, orders: list[str]
+) -> None:
+    said = answer(capsys, line)
+    course.until(lambda: robot.orders == orders)
+    assert said.startswith("Published ")
+    if len(orders) > 1:
+        assert "Published 3 messages on /orders, to 1 subscription: {'data': 'go'}" in said
+
+
+def test_what_has_a_rate_and_no_end_ends_by_itself(
+    robot: Robot, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(repetitions, "TIMEOUT", 0.5)
+    said = answer(capsys, "topic pub -r 10 /nobody std_msgs/msg/String")
+    assert said == (
+        "Published 5 messages on /nobody, to nobody: no subscription fits: {'data': ''}\n"
+    )
+    said = answer(capsys, 'service call -r 10 /lamp std_srvs/srv/SetBool "{data: true}"')
+    assert said.count("message: lamp True") == 5
+
+
+def test_headers_and_times_are_filled_in(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
+    heard: list[Any] = []
+    robot.create_subscription(PoseStamped, "pose", heard.append, 10)
+    robot.create_subscription(TimeReference, "reference", heard.append, 10)
+    before = time.time_ns()
+    answer(capsys, "topic pub -1 /pose '{header: \"auto\", pose: {position: {x: 1.0}}}'")
+    answer(
+        capsys,
+        "topic pub -1 /reference sensor_msgs/msg/TimeReference "
+        '\'{header: "auto", time_ref: "now", source: "dumper"}\'',
+    )
+    course.until(lambda: len(heard) == 2)
+    pose, reference = sorted(heard, key=lambda one: hasattr(one, "source"))
+    assert pose.pose.position.x == 1.0
+    for stamp in (pose.header.stamp, reference.header.stamp, reference.time_ref):
+        assert before <= Time.from_msg(stamp).nanoseconds <= time.time_ns()
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        (
+            'topic pub --once /orders std_msgs/msg/Int32 "{data: 3}"',
+            "/orders is of type std_msgs/msg/String, not std_msgs/msg/Int32: DDS connects equal",
+        ),
+        ("topic echo /orders std_msgs/msg/Int32", "/orders is of type std_msgs/msg/String, not"),
+        ("service call /lamp std_srvs/srv/Trigger", "/lamp is of type std_srvs/srv/SetBool, not"),
+        (
+            "action send_goal /fibonacci test_msgs/action/NestedMessage",
+            "/fibonacci is of type test_msgs/action/Fibonacci, not test_msgs/action/NestedMessage",
+        ),
+        ("topic echo /chatter --field dat", "--field dat: 'dat' is no field there, it has data."),
+        ("topic echo /chatter --field data.x", "'x' is no field there, it has none."),
+        ("topic pub /orders -r 0", "--rate is above 0 and at most 1000 a second, not 0."),
+        ("topic pub /orders -r nan", "--rate is above 0 and at most 1000 a second, not nan."),
+        ("topic pub /orders -t 0", "--times is a whole number, at least 1, not 0"),
+        ("topic pub /orders -1 -t 2", "--once and --times say different things"),
+        ("topic pub --once -w 2 /orders --timeout 0.1", "in vain for 2 subscriptions of /orders"),
+        ("topic pub /orders std_msgs/msg/String std_msgs/msg/String", "takes fields, as in"),
+        ("topic find std_srvs/srv/SetBool", "is no msg type"),
+        ("service type /light", "There is no service /light: there are /lamp."),
+        ("action info /fly", "There is no action /fly: there are /fibonacci."),
+        ("param describe robot colour", "/robot has no parameter 'colour'"),
+    ],
+)
+def test_what_does_not_fit_is_a_sentence(robot: Robot, line: str, sentence: str) -> None:
+    test_a_mistake_is_a_sentence(robot, line, sentence)
+
+
+COMMANDS = [(noun, verb) for noun, module in arguments.nouns().items() for verb in module.VERBS]
+
+
+@pytest.mark.parametrize(("noun", "verb"), COMMANDS)
+def test_an_unknown_argument_shows_the_usage_of_its_verb(noun: str, verb: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        magic.ros(f"{noun} {verb} a b c d e --nonsense")
+    sentence, usage, *rest = str(caught.value).splitlines()
+    assert sentence.startswith(("Unrecognized arguments:", "The following arguments"))
+    assert "--nonsense" in sentence
+    assert usage.startswith(f"usage: %ros {noun} {verb}")
+    assert len(rest) <= 22
+    assert all(len(line) < 100 for line in rest)
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence", "usage"),
+    [
+        ("", "A word is missing after %ros.", "usage: %ros NOUN VERB"),
+        ("topic", "A word is missing after %ros topic.", "usage: %ros topic VERB"),
+        ("topic shout /x", "'shout' is none of its words after %ros topic.", "  echo   "),
+        ("rostopic list", "'rostopic' is none of its words after %ros.", "  topic   "),
+        ("topic info", "The following arguments are required: TOPIC.", "usage: %ros topic info"),
+        ("topic pub /a -r x", "Argument -r/--rate: invalid float value: 'x'.", "usage: %ros topic"),
+        ("topic pub /a std_msgs/msg/String data: hi", "Unrecognized arguments: hi.", "in quotes"),
+        ("topic bw /x", "'bw' is none of its words after %ros topic.", "  hz   "),
+        ("topic echo /x --qos-durability often", "(choose from", "usage: %ros topic echo"),
+    ],
+)
+def test_a_line_that_says_nothing_shows_the_usage(line: str, sentence: str, usage: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        magic.ros(line)
+    first, *block = str(caught.value).splitlines()
+    assert sentence in first
+    assert usage in "\n".join(block)
+
+
 def test_services_and_actions(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
     assert answer(capsys, "service list") == "/lamp\n"
     assert "message: lamp True" in answer(capsys, "service call /lamp '{data: true}'")
@@ -198,15 +389,11 @@ def test_interfaces(capsys: pytest.CaptureFixture[str], name: str, parts: list[s
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
-        ("", "Usage: %ros"),
-        ("topic", "Usage: %ros topic"),
-        ("topic shout /x", "shout"),
-        ("topic info", "The following arguments are required: topic"),
         ("topic info /nowhere", "There is no topic /nowhere: there are /chatter, /orders."),
         ("topic echo /nowhere --timeout 0.1", "/nowhere"),
         ("topic pub /orders '{dat: go}'", "std_msgs/msg/String has no field 'dat'"),
         ("topic pub /orders '{data: 3}'", "data takes string, not 3"),
-        ("topic pub /new '{data: x}'", "name it with --type"),
+        ("topic pub /new '{data: x}'", "its type is unknown: name it behind the topic"),
         ("node info ghost", "There is no node /ghost: there are /robot."),
         ("service call /lamp '{data: 7}'", "data takes bool, not 7"),
         ("service call /light", "There is no service /light: there are /lamp."),
@@ -298,7 +485,9 @@ def test_a_topic_that_is_not_there_is_waited_for_as_long_as_asked(
 
 
 def test_help_is_shown_and_ends_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "interface" in answer(capsys, "-h")
     assert "echo" in answer(capsys, "topic -h")
+    assert "-r N, --rate N" in answer(capsys, "topic pub --help")
 
 
 @pytest.mark.parametrize(
@@ -312,6 +501,12 @@ def test_help_is_shown_and_ends_nothing(capsys: pytest.CaptureFixture[str]) -> N
         (["topic", "pub", "--type", "std_msgs/msg/String", ""], "/chatter"),
         (["topic", "pub", "/new", "{}", "--type", ""], "std_msgs/msg/String"),
         (["service", "call", ""], "/lamp"),
+        (["service", "call", "/lamp", ""], "std_srvs/srv/SetBool"),
+        (["topic", "pub", "/orders", ""], "std_msgs/msg/String"),
+        (["topic", "pub", "-r", "3", ""], "/orders"),
+        (["topic", "pub", "/new", ""], "std_msgs/msg/Int32"),
+        (["topic", "find", ""], "std_msgs/msg/Int32"),
+        (["interface", "package", ""], "std_msgs"),
         (["action", "send_goal", ""], "/fibonacci"),
         (["param", "get", "/robot", ""], "speed"),
         (["param", "get", "robot", ""], "speed"),
@@ -328,6 +523,7 @@ def test_the_tab_key_offers_what_may_follow(robot: Robot, words: list[str], expe
         ["x", ""],
         ["topic", "x", "y", ""],
         ["topic", "echo", "-n", ""],
+        ["topic", "pub", "-t", ""],
         ["param", "get", "/no", ""],
         ["param", "get", "bad name!", ""],
     ],
@@ -336,6 +532,24 @@ def test_the_tab_key_offers_nothing_where_nothing_can_follow(
     robot: Robot, words: list[str]
 ) -> None:
     assert magic.candidates(words) == []
+
+
+def test_braces_are_yaml_also_where_a_variable_has_the_name_of_a_field(
+    robot: Robot, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shell = InteractiveShell.instance()
+    try:
+        shell.run_line_magic("load_ext", "course")
+        shell.push({"data": "another", "order": 9})
+        shell.run_cell("%ros topic pub /orders std_msgs/msg/String '{data: go}'")
+        shell.run_cell("%ros topic pub /orders '{data: $data}'")
+        course.until(lambda: robot.orders == ["go", "$data"])
+        shell.run_cell("%ros topic pub /orders --nonsense")
+        shown = capsys.readouterr().out
+        assert "UsageError: Unrecognized arguments: --nonsense.\nusage: %ros topic pub" in shown
+        assert "Traceback" not in shown
+    finally:
+        InteractiveShell.clear_instance()
 
 
 def test_the_magic_and_its_completion_are_in_the_shell(robot: Robot) -> None:
