@@ -59,6 +59,7 @@ class _Reported:
 
     def __init__(self) -> None:
         self._errors: weakref.WeakKeyDictionary[Any, dict[int, int]] = weakref.WeakKeyDictionary()
+        self._transitions: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
         self._notices: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
         self._blocked: weakref.WeakKeyDictionary[Any, set[Any]] = weakref.WeakKeyDictionary()
 
@@ -69,6 +70,11 @@ class _Reported:
             if error.count > seen.get(index, 0):
                 news.append(_about(error, again=index in seen))
                 seen[index] = error.count
+        latest = self._transitions.get(session, 0)
+        for failure in session.failed_transitions:
+            if failure.number > latest:
+                self._transitions[session] = failure.number
+                news.append(News(failure.what, failure.traceback))
         known = self._blocked.setdefault(session, set())
         for blocked in session.blocked_callbacks():
             # A goal may well take its time in one of several threads: only what is in the way.

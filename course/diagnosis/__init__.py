@@ -6,7 +6,7 @@ import html
 from collections.abc import Iterator, Sequence
 from typing import overload
 
-from course.diagnosis import domains, graph, nodes
+from course.diagnosis import domains, graph, lifecycle, nodes
 from course.doctor.finding import Finding
 from course.runtime.session import Session
 
@@ -57,9 +57,10 @@ def diagnose(session: Session) -> Diagnosis:
     """Return what is wrong, or may be, with a session's nodes and what they talk to.
 
     Nodes of other processes are asked whether they answer, and other notebooks' sessions whether
-    they have what is missed here; it takes up to two seconds.
+    they have what is missed here; it takes up to three seconds.
     """
-    return Diagnosis([*quick(session), *domains.next_door(session), *nodes.silent(session)])
+    asked = (domains.next_door, nodes.silent, lifecycle.others)
+    return Diagnosis([*quick(session), *(found for check in asked for found in check(session))])
 
 
 def quick(session: Session) -> list[Finding]:
@@ -83,7 +84,7 @@ def likely(session: Session, *, vague: bool, sought: str = "") -> list[Finding]:
     if vague or sought:
         found += domains.next_door(session, sought)
     if not any(finding.status == "problem" for finding in found):
-        found += nodes.silent(session)
+        found += [*nodes.silent(session), *lifecycle.others(session)]
     return sorted(found, key=_rank)
 
 
@@ -91,7 +92,10 @@ _LONELY = ("topic", "service", "action")
 
 
 def _calm(session: Session) -> list[Finding]:
-    checks = (nodes.stolen, nodes.paused, nodes.unspun, domains.on_another_domain, graph.check)
+    checks = (
+        nodes.stolen, nodes.paused, nodes.half_made, nodes.unspun, lifecycle.own,
+        domains.on_another_domain, graph.check,
+    )  # fmt: skip
     return [finding for check in checks for finding in check(session)]
 
 

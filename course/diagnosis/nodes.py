@@ -55,7 +55,8 @@ def paused(session: Session) -> Iterator[Finding]:
 
 def unspun(session: Session) -> Iterator[Finding]:
     """Find nodes of this process that were made and never given to an executor."""
-    own = {id(node) for node in session.nodes.values()}
+    known = [*session.nodes.values(), *(remains.node for remains in session.half_made())]
+    own = {id(node) for node in known}
     alive = set(reader.read(session.observer).nodes)
     for thing in gc.get_objects():
         # By its own type: isinstance asks what a weak proxy stands for, which may be gone.
@@ -69,16 +70,28 @@ def unspun(session: Session) -> Iterator[Finding]:
             )  # fmt: skip
 
 
+def half_made(session: Session) -> Iterator[Finding]:
+    """Find what constructors that raised have left behind."""
+    for remains in session.half_made():
+        yield problem(
+            "constructor", f"{remains} Nobody calls destroy_node() of a node that was never made.",
+            "Let the constructor give back what it has made before it raises. Running the cell "
+            "again replaces the node, and course.stop() takes it away.",
+        )  # fmt: skip
+
+
 def silent(session: Session) -> Iterator[Finding]:
     """Find nodes of other processes that are on the graph and do not answer: all asked at once."""
     services = dict(session.observer.get_service_names_and_types())
+    known = {*session.nodes, *(remains.name for remains in session.half_made())}
     others = {
         f"{name}/list_parameters": name
         for name in reader.read(session.observer).nodes
-        if name not in session.nodes and f"{name}/list_parameters" in services
+        if name not in known and f"{name}/list_parameters" in services
     }
     asked = list(others)[:MOST_ASKED]
-    for service in session.unanswered(ListParameters, asked, ANSWER):
+    answered = session.answers(ListParameters, asked, ANSWER)
+    for service in (service for service in asked if service not in answered):
         yield problem(
             "node", f"{others[service]} is on the graph, but did not answer within {ANSWER:g} s: "
             "its services are dead. Its program hangs, is stopped, or does not spin it; or it has "

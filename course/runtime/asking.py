@@ -166,12 +166,13 @@ class Asking(Hosting):
         with self._explaining():
             return self._probe.call(srv_type, name, request, timeout)
 
-    def unanswered(self, srv_type: Any, names: Sequence[str], timeout: float = 1.0) -> list[str]:
-        """Return which of these services do not answer to an empty request in time.
+    def answers(self, srv_type: Any, names: Sequence[str], timeout: float = 1.0) -> dict[str, Any]:
+        """Return what these services respond to an empty request, by name.
 
-        All are asked at the same time, within `timeout` seconds.
+        All are asked at the same time; those that do not answer within `timeout` seconds are left
+        out.
         """
-        return self._probe.unanswered(srv_type, names, timeout) if names else []
+        return self._probe.answers(srv_type, names, timeout) if names else {}
 
     def send_goal(
         self,

@@ -60,7 +60,7 @@ class ErrorLog:
 
     def record(self, job: Job, exception: BaseException) -> None:
         """Add what `job` raised, or count it up if the same line raised it before."""
-        frames = _learner_frames(exception.__traceback__)
+        frames = learner_frames(exception.__traceback__)
         error = CallbackError(
             node=node_name(job.node),
             callback=callback_name(job, frames),
@@ -101,7 +101,7 @@ def _problem(job: Job, exception: BaseException) -> str:
     return f"raised {type(exception).__name__}: {exception}".rstrip(": ")
 
 
-def _learner_frames(tb: TracebackType | None) -> TracebackType | None:
+def learner_frames(tb: TracebackType | None) -> TracebackType | None:
     """Return the traceback from the first frame that is neither rclpy's nor ours.
 
     Where there is none (rclpy itself rejects what a callback returned), nothing is cut.

@@ -11,7 +11,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
 from course.errors import SessionError
-from course.runtime import arguments, logs
+from course.runtime import arguments, logs, transitions
 from course.runtime.blocked import BlockedCallback, blocked_callbacks
 from course.runtime.callback_errors import CallbackError, ErrorLog
 from course.runtime.clocks import sleeps_in_own_context
@@ -23,6 +23,7 @@ from course.runtime.logs import LogTable
 from course.runtime.names import node_name
 from course.runtime.rcutils_tap import keep_every_level
 from course.runtime.residents import Factory, Residents
+from course.runtime.transitions import FailedTransition
 from course.runtime.waiting import Pulse
 
 _TIMER_CANCELLED = "failed to call timer: timer is canceled"
@@ -49,6 +50,7 @@ class Hosting:
         self._residents = Residents(context, self._crew, self._pulse, self.notices.append)
         self._residents.on_made += [keep_every_level, sleeps_in_own_context, self._claim_log]
         self._opened = time.time()
+        transitions.watch()
 
     @property
     def closed(self) -> bool:
@@ -130,6 +132,12 @@ class Hosting:
     def errors(self) -> list[CallbackError]:
         """What callbacks raised, in order of first occurrence (a snapshot)."""
         return list(self._errors.items)
+
+    @property
+    def failed_transitions(self) -> list[FailedTransition]:
+        """What went wrong in transitions of managed nodes, since the last one that succeeded."""
+        found = [failure for node in self.nodes.values() for failure in transitions.failed(node)]
+        return sorted(found, key=lambda failure: failure.number)
 
     def logs(self, node: Any = None, *, level: str = "INFO", last: int | None = 50) -> LogTable:
         """Return what nodes logged and callbacks printed, as a table.

@@ -173,8 +173,8 @@ class Probe:
                 future, deadline, f"The service {client.service_name} did not answer"
             )
 
-    def unanswered(self, srv_type: Any, names: Sequence[str], timeout: float) -> list[str]:
-        """Return the services that do not answer in time; see `Session.unanswered`."""
+    def answers(self, srv_type: Any, names: Sequence[str], timeout: float) -> dict[str, Any]:
+        """Return the responses that come in time; see `Session.answers`."""
         clients = {name: self.node.create_client(srv_type, name) for name in names}
         futures: dict[str, Future] = {}
 
@@ -187,7 +187,7 @@ class Probe:
 
         try:
             poll(all_answered, timeout, self.pulse)
-            return [name for name in names if name not in futures or not futures[name].done()]
+            return {name: future.result() for name, future in futures.items() if future.done()}
         finally:
             for client in clients.values():
                 self.drop(client)

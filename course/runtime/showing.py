@@ -182,6 +182,7 @@ class Showing(Asking):
         """Return what is wrong, or may be, with the nodes here: in plain words, with the mend.
 
         It looks for callbacks that do not return, nodes that nobody spins or that were taken away,
+        constructors and lifecycle transitions that failed, managed nodes that are not active,
         endpoints that do not fit or have nobody on the other side, names that two nodes bear,
         nodes that do not answer, and domains that differ. A wait that times out says the same.
 

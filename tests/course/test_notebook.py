@@ -42,6 +42,51 @@ def notebook():
     opened.close()
 
 
+MANAGED = """
+from rclpy.lifecycle import LifecycleNode
+class Camera(LifecycleNode):
+    def __init__(self):
+        super().__init__("camera")
+    def on_configure(self, state):
+        raise OSError("no camera")
+"""
+
+DRIVER = """
+class Driver(Node):
+    def __init__(self):
+        super().__init__("driver")
+        {body}
+driver = course.run(Driver)
+sorted(name for name in driver.get_node_names() if not name.startswith("_"))
+"""
+
+
+def test_what_a_transition_raised_is_shown_under_its_cell(notebook):
+    notebook.text(SETUP)
+    notebook.text(MANAGED)
+    status, shown = notebook.text("camera = course.run(Camera); _ = camera.trigger_configure()")
+    assert status == "ok"
+    assert (
+        'Camera.on_configure of /camera raised OSError: no camera (line 7: raise OSError("no '
+        in shown
+    )
+    assert "rclpy hides it and calls on_error()." in shown
+    assert notebook.text("None") == ("ok", "")  # said once
+
+
+def test_a_mended_constructor_runs_and_tells_what_the_first_left(notebook):
+    notebook.text(SETUP)
+    status, shown = notebook.text(DRIVER.format(body="raise OSError('no camera')"))
+    assert status == "error"
+    assert "OSError: no camera" in shown
+    assert "/driver" in notebook.text("course.session().diagnose()")[1]
+    status, shown = notebook.text(DRIVER.format(body="self.create_timer(1, print)"))
+    assert status == "ok"
+    assert "['driver']" in shown
+    assert "The constructor of /driver raised OSError: no camera. It left the node on the" in shown
+    assert "in a program it stays" in shown
+
+
 def test_what_the_learner_sees(notebook):
     assert notebook.text(SETUP) == ("ok", "")
     status, shown = notebook.text("t = course.run(Talker); course.until(lambda: t.count > 5); None")

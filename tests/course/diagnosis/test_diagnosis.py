@@ -181,6 +181,24 @@ def test_a_node_that_nobody_spins(session: Session) -> None:
     assert about(session.diagnose(), "executor") == ""
 
 
+def test_what_a_constructor_left_behind(session: Session) -> None:
+    def half() -> Node:
+        node = Node("half")
+        raise OSError(f"no camera at {node.get_name()}")
+
+    with pytest.raises(OSError, match="no camera") as caught:
+        session.run(half)
+    found = session.diagnose()
+    text = about(found, "constructor")
+    assert "The constructor of /half raised OSError: no camera at half. It left the node on" in text
+    assert "Nobody calls destroy_node() of a node that was never made." in text
+    assert about(found, "executor") == about(found, "node") == ""
+    assert "The constructor of /half raised OSError" in in_vain(session)
+    session.stop("half")
+    assert caught.tb is not None
+    assert about(session.diagnose(), "constructor") == ""
+
+
 def test_a_stolen_node_is_taken_back_and_explained(session: Session) -> None:
     node = session.run(listener)
     rclpy.spin_once(node, timeout_sec=0, executor=SingleThreadedExecutor(context=session.context))
