@@ -67,7 +67,7 @@ def test_what_a_transition_raised_is_shown_under_its_cell(notebook):
     status, shown = notebook.text("camera = course.run(Camera); _ = camera.trigger_configure()")
     assert status == "ok"
     assert (
-        'Camera.on_configure of /camera raised OSError: no camera (line 7: raise OSError("no '
+        'Camera.on_configure of /camera raised OSError: no camera (line 6: raise OSError("no '
         in shown
     )
     assert "rclpy hides it and calls on_error()." in shown
@@ -78,7 +78,7 @@ def test_a_mended_constructor_runs_and_tells_what_the_first_left(notebook):
     notebook.text(SETUP)
     status, shown = notebook.text(DRIVER.format(body="raise OSError('no camera')"))
     assert status == "error"
-    assert "OSError: no camera" in shown
+    assert "no camera" in shown
     assert "/driver" in notebook.text("course.session().diagnose()")[1]
     status, shown = notebook.text(DRIVER.format(body="self.create_timer(1, print)"))
     assert status == "ok"
