@@ -115,7 +115,8 @@ class Exam(Generic[RigT]):
     def sit(self, part: str, bench: Bench, failed: dict[str, CheckResult] | None = None) -> Verdict:
         """Run the checks of ``part``, and what they need, each once.
 
-        A check that is only needed by others earns nothing here: its points are in its own part.
+        A check of another part that is needed here earns nothing here: its points are in its own
+        part. One that the untouched notebook passes has no points at all: see ``points.toml``.
         ``failed`` has what failed in an earlier part and is not tried again; what fails now is
         added to it.
         """

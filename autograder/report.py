@@ -14,6 +14,9 @@ WORDS = {
     "not_examined": "not examined here",
     "grader_error": "the grader failed",
 }
+NEEDED = "needed for others, earns nothing by itself"
+"""What stands in place of the points of a check that has none: why it was made all the same."""
+
 COLOURS = {
     "passed": "#1a7f37",
     "failed": "#b35900",
@@ -37,8 +40,7 @@ class Report:
         lines = [f"{verdict.exam}: {_points(verdict.score)} of {_points(verdict.max_score)} points"]
         lines += [f"  note: {note}" for note in verdict.notes]
         for check in verdict.checks:
-            earned = f"{_points(check.points)}/{_points(check.max_points)}"
-            lines.append(f"{MARKS[check.status]} {check.title} ({WORDS[check.status]}, {earned})")
+            lines.append(f"{MARKS[check.status]} {check.title} ({_outcome(check)})")
             lines += [f"    {label}: {text}" for label, text in self._details(check)]
         return "\n".join(lines)
 
@@ -62,8 +64,7 @@ class Report:
             f'<li style="margin:.4em 0"><span style="color:{COLOURS[check.status]}" '
             f'aria-hidden="true">{MARKS[check.status]}</span> '
             f"<strong>{escape(check.title)}</strong> "
-            f"({WORDS[check.status]}, {_points(check.points)}/{_points(check.max_points)})"
-            f"{details}</li>"
+            f"({_outcome(check)}){details}</li>"
         )
 
     def _details(self, check: CheckResult) -> list[tuple[str, str]]:
@@ -83,6 +84,11 @@ class Report:
                 details.append(("more help", more))
             details.append(("read", check.read))
         return [(label, text) for label, text in details if text]
+
+
+def _outcome(check: CheckResult) -> str:
+    earned = f"{_points(check.points)}/{_points(check.max_points)}" if check.max_points else NEEDED
+    return f"{WORDS[check.status]}, {earned}"
 
 
 def _points(value: float) -> str:

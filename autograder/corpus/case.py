@@ -47,6 +47,7 @@ class Case:
         splices: {grade id: (old, new) texts}, applied to the exemplar's cell.
         blank: empty the other cells in which a solution is asked for.
         cell_timeout: seconds that one of its cells may run.
+        points: what all parts together must earn; None if that goes without saying.
     """
 
     exam: str
@@ -59,6 +60,7 @@ class Case:
     splices: Mapping[str, tuple[Splice, ...]] = field(default_factory=dict)
     blank: bool = False
     cell_timeout: float = CELL_TIMEOUT
+    points: float | None = None
 
     @property
     def must_fail(self) -> frozenset[str]:
@@ -136,6 +138,9 @@ class Case:
             )
             if names
         ]
+        earned = sum(verdict.score for verdict in outcome.verdicts.values())
+        if self.points is not None and earned != self.points:
+            differences.append(f"earned {earned:g} points, not {self.points:g}")
         for name in sorted(unexamined - unknown):
             differences.append(f"{name} was not examined: {checks[name].actual!r}")
         if spoilt:

@@ -4,10 +4,12 @@
 
     # title: one line that says what is special about it
     # fails: the checks that must fail, by name; "nothing" for a correct design, "the first" for
-    #        every check that needs no other, "everything" for what cannot be examined at all
+    #        every check that needs no other, "everything" for what cannot be examined at all,
+    #        "as the stub" for what must come out as ``wrong-stub`` does
     # says: check: a fragment that its result must hold        (any number of them)
     # in: the stub                                             (the text replaces the stub's mark)
     # seconds: 5                                               (what one of its cells may take)
+    # points: 0                                                (what all parts together must earn)
 
 The text is that of the cell ``<exam>-solution``. A line ``# %% <grade id>`` begins that of another.
 
@@ -16,7 +18,7 @@ and ``splices``: a list of {cell, old, new}, applied to the exemplar's cells, so
 the exemplar. ``cell`` is ``<exam>-solution`` if it is left out. Without splices it is the exemplar.
 
 ``every/<name>.py`` are cases for every exam: their text replaces the solution cell, and the other
-solution cells are emptied.
+solution cells are emptied; with "in: the stub" the text replaces the stub's mark.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -32,8 +35,9 @@ from autograder.runner import CELL_TIMEOUT
 
 EVERY = "every"
 MUTANTS = "mutants.toml"
+STUB, AS_STUB = "wrong-stub", "as the stub"
 
-_HEADER = re.compile(r"(?:# (?:title|fails|says|in|seconds): .*\n)+")
+_HEADER = re.compile(r"(?:# (?:title|fails|says|in|seconds|points): .*\n)+")
 _LINE = re.compile(r"# (\w+): (.*)\n")
 _CELL = re.compile(r"^# %% ([\w-]+)\n", re.MULTILINE)
 
@@ -57,7 +61,21 @@ def load(folder: Path, exam: str) -> list[Case]:
     for name in names:
         if names.count(name) > 1:
             raise CorpusError(f"The corpus of '{exam}' has two cases called '{name}'.")
-    return sorted(cases, key=lambda case: case.name)
+    return sorted(_like_the_stub(exam, cases), key=lambda case: case.name)
+
+
+def _like_the_stub(exam: str, cases: list[Case]) -> Iterator[Case]:
+    stub = next((case for case in cases if case.name == STUB), None)
+    for case in cases:
+        if case.fails != {AS_STUB}:
+            yield case
+        elif stub is None:
+            raise CorpusError(
+                f"'{case.name}' must come out as the stub does, but the corpus of '{exam}' has no "
+                f"{STUB}.py: write one, as notebooks/authoring/README.md says."
+            )
+        else:
+            yield replace(case, fails=stub.fails, says=stub.says, points=stub.points)
 
 
 def _case(exam: str, file: Path, *, every: bool = False) -> Case:
@@ -76,13 +94,14 @@ def _case(exam: str, file: Path, *, every: bool = False) -> Case:
     return Case(
         exam, file.stem, fields["title"][0], _fails(fields["fails"][0]),
         says={check: fragment for check, _, fragment in says},
-        cells={} if in_stub else texts, stub=texts if in_stub else {}, blank=every,
-        cell_timeout=float(fields.get("seconds", [CELL_TIMEOUT])[0]),
+        cells={} if in_stub else texts, stub=texts if in_stub else {},
+        blank=every and not in_stub, cell_timeout=float(fields.get("seconds", [CELL_TIMEOUT])[0]),
+        points=float(fields["points"][0]) if "points" in fields else None,
     )  # fmt: skip
 
 
 def _fails(text: str) -> frozenset[str]:
-    if text in (EVERYTHING, ROOTS):
+    if text in (EVERYTHING, ROOTS, AS_STUB):
         return frozenset({text})
     return frozenset() if text == "nothing" else frozenset(re.findall(r"\w+", text))
 

@@ -294,7 +294,7 @@ def stop_reaches_all(rig: SensorRig) -> None:
 
 
 @EXAM.check(
-    needs=("readings_flow",),
+    needs=("stop_reaches_all",),
     hints=(
         "Which stop events are left if the consumer was busy while many came in?",
         "KEEP_LAST(depth) throws the oldest away as soon as more than `depth` are waiting.",

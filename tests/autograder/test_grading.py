@@ -128,9 +128,9 @@ def test_what_one_student_hands_in_never_stops_the_others(course: Course, cases:
     course.submit("e-time", right)
     (course.folder("e-time") / "timestamp.txt").write_text("19.11.2026 um 14 Uhr")
     course.submit("f[1]", right)
-    helper = right.replace(
-        "camera_qos = QoSProfile(depth=10)", "from my_profiles import camera_qos"
-    )
+    given = "camera_qos = QoSProfile(depth=80, durability=DurabilityPolicy.TRANSIENT_LOCAL)"
+    helper = right.replace(given, "from my_profiles import camera_qos")
+    assert helper != right
     course.submit("g-helper", helper)
     (course.folder("g-helper") / "my_profiles.py").write_text("camera_qos = 10\n")
     course.submit("h last Müller", right)

@@ -56,7 +56,7 @@ def test_the_release_holds_no_solution_hidden_test_or_authoring_file(root: Path)
 def test_the_release_keeps_what_students_need(root: Path) -> None:
     cells = {cell.id: cell for cell in read(released(root)).cells}
     assert "# Your work goes here." in cells["qos-solution"].source
-    assert "camera_qos = QoSProfile(depth=10)" in cells["qos-solution"].source
+    assert "camera_qos = QoSProfile(depth=80, " in cells["qos-solution"].source
     assert 'check("qos")' in cells["qos-visible"].source
     assert cells["qos-visible"].metadata.editable is False
     assert cells["qos-explanation-depth"].source == "*Your answer goes here.*"

@@ -7,4 +7,5 @@
 # says: planner_service: No node reads /map.
 # says: motors_driven: Nobody publishes on /motors/command.
 # says: links_connect: lidar_driver publishes /scan, but nobody reads it.
+# points: 0
 # in: the stub

@@ -4,5 +4,6 @@
 # says: speed_serves: It was answered successful=False
 # says: goals_end: the navigator got no goal
 # says: drive_arrives: A goal of 0 m is rejected
+# points: 0
 # in: the stub
 

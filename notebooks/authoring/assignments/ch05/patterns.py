@@ -177,7 +177,7 @@ class RobotInterface(Robot):
         self.levels = self.create_publisher(BatteryState, 'robot/battery', 10)
         self.create_subscription(Int32, 'robot/navigate', self.on_goal, 10)
         self.create_subscription(Float64, 'robot/max_speed', self.on_max_speed, 10)
-        self.create_timer(1.0, self.publish_all)
+        self.create_timer(2.0, self.publish_all)
 
     def publish_all(self):
         self.positions.publish(Float64(data=self.position))

@@ -78,18 +78,19 @@ class Relay(Node):
 # %% [markdown] nbgrader={"grade": false, "grade_id": "qos-your-work", "locked": true, "schema_version": 3, "solution": false}
 # ## Your design
 #
-# The cell below runs as it is, but its profiles are all the same: depth 10 and everything else by
-# default. Give each sensor what it needs. The drivers offer a profile, the consumers request one;
-# they may be equal or differ, as long as DDS connects them.
+# The cell below runs as it is, but its profiles are all the same: every loss is repaired, the last
+# 80 are kept, and who comes late is handed them. That is too much for some sensors, and too little
+# for another. Give each what it needs. The drivers offer a profile, the consumers request one; they
+# may be equal or differ, as long as DDS connects them.
 #
 # Keep the two class names and the topic names. Everything else may change: you can drop `Relay`
 # and write both nodes from scratch.
 
 # %% nbgrader={"grade": false, "grade_id": "qos-solution", "locked": false, "schema_version": 3, "solution": true}
-camera_qos = QoSProfile(depth=10)
-lidar_qos = QoSProfile(depth=10)
-imu_qos = QoSProfile(depth=10)
-stop_qos = QoSProfile(depth=10)
+camera_qos = QoSProfile(depth=80, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+lidar_qos = QoSProfile(depth=80, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+imu_qos = QoSProfile(depth=80, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+stop_qos = QoSProfile(depth=80, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 ### BEGIN SOLUTION
 camera_qos = QoSProfile(
     reliability=ReliabilityPolicy.BEST_EFFORT,
@@ -158,8 +159,7 @@ check("qos")
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "qos-about-hidden", "locked": true, "schema_version": 3, "solution": false}
 # The next cell is empty for you. When your work is graded, it examines the rest of the table: the
-# IMU's burst, the complete sequence of stop events, a gap in the radio link, in which every packet
-# is lost, and the node that starts late.
+# IMU's burst, a gap in the radio link, in which every packet is lost, and the node that starts late.
 
 # %% nbgrader={"grade": true, "grade_id": "qos-hidden", "locked": true, "points": 0, "schema_version": 3, "solution": false}
 # Filled in when your work is graded.
