@@ -96,8 +96,15 @@ def _case(exam: str, file: Path, *, every: bool = False) -> Case:
         says={check: fragment for check, _, fragment in says},
         cells={} if in_stub else texts, stub=texts if in_stub else {},
         blank=every and not in_stub, cell_timeout=float(fields.get("seconds", [CELL_TIMEOUT])[0]),
-        points=float(fields["points"][0]) if "points" in fields else None,
+        points=_points(file, fields["points"][0]) if "points" in fields else None,
     )  # fmt: skip
+
+
+def _points(file: Path, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise CorpusError(f"{file}: '# points:' is a number, not '{text}'.") from None
 
 
 def _fails(text: str) -> frozenset[str]:

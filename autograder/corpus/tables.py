@@ -63,9 +63,9 @@ def matrix(cases: dict[str, list[Case]]) -> str:
         "# Checks and the mutants that prove them",
         "",
         "Written by `autograder corpus --table`; a test keeps it in step with the corpus.",
-        "A check that no mutant needs would not be a check; one with 0 points is passed by the stub,",
-        "and needed for others. `every` stands for the cases in `every/`, which each exercise gets:",
-        "an empty cell, a syntax error, an endless loop, …",
+        "A check that no mutant needs would not be a check. One with 0 points is passed by the",
+        "untouched notebook, and needed for others. The cases in `every/` each exercise gets: an",
+        "empty cell, a syntax error, an endless loop, …",
         "",
     ]
     for exam, own in cases.items():

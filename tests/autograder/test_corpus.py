@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -32,7 +33,10 @@ def notebooks(exam: str) -> Notebooks:
 WHOLE = "qos"
 """The exam whose corpus is always run whole."""
 
-SAMPLE = ("right-exemplar", "right-chapter", "wrong-stub", "broken-syntax", "broken-says-passed")
+SAMPLE = (
+    "right-exemplar", "right-chapter", "wrong-stub", "wrong-emptied", "broken-syntax",
+    "broken-says-passed",
+)  # fmt: skip
 """What is run of the other corpora: together they are 500 runs of some seconds each, for which
 `autograder corpus` is there. With AUTOGRADER_WHOLE_CORPUS=1 they are run whole here, too."""
 
@@ -74,6 +78,36 @@ def test_the_case_gets_its_verdict(case: Case) -> None:
     assert trial.difference == "", trial.outcome.verdicts
 
 
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize(
+    "exam", [pytest.param(exam, marks=pytest.mark.xdist_group(f"corpus-{exam}")) for exam in CASES]
+)
+def test_no_check_that_the_untouched_notebook_passes_earns_a_point(exam: str) -> None:
+    verdicts = results(exam)["wrong-stub"].outcome.verdicts.values()
+    passed = {c.name: c.max_points for verdict in verdicts for c in verdict.checks if c.passed}
+    assert {name for name, points in passed.items() if points} == set()
+    assert sum(verdict.score for verdict in verdicts) == 0
+    assert sum(verdict.max_score for verdict in verdicts) == 15
+
+
+@EXAMS
+def test_the_stub_and_what_is_no_more_than_the_stub_are_held_at_no_points(exam: str) -> None:
+    cases = {case.name: case for case in CASES[exam]}
+    stub = cases["wrong-stub"]
+    assert stub.points == 0
+    assert set(stub.stub.values()) == {"\n"}, "it is the notebook as it was handed out"
+    printed = cases["wrong-stub-with-a-print"]
+    assert (printed.fails, printed.says, printed.points) == (stub.fails, stub.says, stub.points)
+    assert "print(" in printed.submission(*notebooks(exam)).cells[_solution(exam)].source
+    assert cases["wrong-emptied"].points == 0
+
+
+def _solution(exam: str) -> int:
+    source, _ = notebooks(exam)
+    ids = [submission.grade_id(cell) for cell in source.cells]
+    return ids.index(f"{exam}-solution")
+
+
 @EXAMS
 def test_a_check_that_no_mutant_needs_is_not_a_check(exam: str) -> None:
     assert tables.without_mutant(exam, CASES[exam]) == []
@@ -104,6 +138,14 @@ def test_a_difference_is_reported() -> None:
     claimed = Case("qos", "claimed", "t", frozenset({"imu_burst"}), stub=right.stub)
     (trial,) = run([claimed])
     assert trial.difference == "did not fail but must: imu_burst"
+
+
+def test_other_points_than_a_case_must_earn_are_reported() -> None:
+    case = CASES["qos"][0]
+    program = submission.program(case.submission(*notebooks("qos")))
+    outcome = runner.refuse(program, "this machine was too busy", "not_examined")
+    assert "earned 0 points, not 3" in replace(case, points=3.0).verdict_of(outcome)
+    assert "earned" not in replace(case, points=0.0).verdict_of(outcome)
 
 
 def test_a_message_without_its_fragment_is_reported() -> None:
@@ -159,6 +201,8 @@ def test_a_flip_between_repeats_is_found() -> None:
     [
         ("case.py", "x = 1\n", r"case\.py must begin with"),
         ("case.py", "# title: t\n# fails: x\n# in: the exemplar\n", "'# in:' can be 'the stub'"),
+        ("case.py", "# title: t\n# fails: as the stub\n", r"corpus of 'qos' has no wrong-stub\.py"),
+        ("case.py", "# title: t\n# fails: x\n# points: no\n", "'# points:' is a number, not 'no'"),
         ("mutants.toml", "[broken\n", r"mutants\.toml is not TOML"),
         ("mutants.toml", "[mutant]\ntitle = 'x'\n", r"'mutant' needs .*: 'fails' is missing"),
     ],

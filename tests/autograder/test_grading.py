@@ -78,7 +78,7 @@ def test_a_class_is_graded_whatever_state_its_files_are_in(course: Course, cases
     full = {"qos-visible": 10.0, "qos-hidden": 5.0, **dict.fromkeys(points.table()["qos"].manual)}
     for student in ("right", "deleted", "edited", "twice"):
         assert cells(found[student]) == full, student
-    assert cells(found["wrong"]) == {**full, "qos-hidden": 4.0}
+    assert cells(found["wrong"]) == {**full, "qos-hidden": 3.0}
     for student, reason in {"cut-off": "not valid JSON", "empty": "There is no"}.items():
         assert found[student].score == 0
         assert found[student].needs_manual_grade, "a person decides about an unreadable file"

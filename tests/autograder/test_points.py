@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from autograder import points
+from autograder import exams, points
 
 EXERCISES = {exam: entry for exam, entry in points.table().items() if entry.assignment == "ch05"}
 
@@ -24,6 +24,28 @@ def test_each_exercise_has_five_written_answers_and_its_own_notebook(exam: str) 
     assert list(entry.manual.values()) == [1.0] * 5
     assert all(cell.startswith(f"{exam}-explanation-") for cell in entry.manual)
     assert [other.notebook for other in EXERCISES.values()].count(entry.notebook) == 1
+
+
+@pytest.mark.parametrize("exam", EXERCISES)
+def test_an_exercise_has_10_visible_points_5_hidden_ones_and_5_for_explanations(exam: str) -> None:
+    entry = EXERCISES[exam]
+    hidden = sum(sum(part.values()) for name, part in entry.parts.items() if name != "visible")
+    assert sum(entry.parts["visible"].values()) == 10
+    assert hidden == pytest.approx(5)
+    assert sum(entry.manual.values()) == 5
+
+
+@pytest.mark.parametrize("exam", EXERCISES)
+def test_who_breaks_a_check_without_points_loses_those_of_another_beside_it(exam: str) -> None:
+    checks = exams.load(exam).checks
+
+    def needs(name: str) -> set[str]:
+        direct = checks[name].needs
+        return {*direct, *(need for other in direct for need in needs(other))}
+
+    for part in EXERCISES[exam].parts.values():
+        lost_with = {need for name, points in part.items() if points for need in needs(name)}
+        assert {name for name, points in part.items() if not points} <= lost_with
 
 
 def test_grade_cells_are_named_by_exam_and_part() -> None:

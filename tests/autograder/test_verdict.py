@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -64,6 +65,15 @@ def test_the_report_escapes_what_came_from_a_subject() -> None:
     html = Report(VERDICT)._repr_html_()
     assert "<script>" not in html
     assert "&lt;script&gt;" in html
+
+
+def test_a_check_without_points_says_why_it_was_made_all_the_same() -> None:
+    start = replace(PASSED, points=0.0, max_points=0.0)
+    report = Report(Verdict("qos", "visible", (start, FAILED)))
+    assert "✔ Nodes start (passed, needed for others, earns nothing by itself)" in repr(report)
+    assert "(passed, needed for others, earns nothing by itself)" in report._repr_html_()
+    assert "0/0" not in repr(report) + report._repr_html_()
+    assert "(not yet, 0/2)" in repr(report)
 
 
 def test_hints_are_given_one_by_one() -> None:
