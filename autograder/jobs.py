@@ -12,13 +12,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from autograder import descriptors, digests, runner, sandbox
+from autograder import descriptors, digests, outputs, runner, sandbox
 from autograder.runner import Outcome
 from autograder.submission import Cell, Program, digest
 from course.errors import CourseError
 
 MAX_OUTCOME = 16 * 1024 * 1024
-"""Largest outcome in characters; the 64 kB a cell that a subject may print add up to far less."""
+"""Largest outcome in characters; what is kept of all its cells is half of that."""
 
 
 class JobError(CourseError):
@@ -111,5 +111,5 @@ def bounded(outcome: Outcome) -> Outcome:
     """Return an outcome that is small enough to keep and to send: verdicts before outputs."""
     if len(outcome.to_json()) <= MAX_OUTCOME:
         return outcome
-    outputs = [runner.shortened(of_cell) for of_cell in outcome.outputs]
-    return replace(outcome, outputs=outputs, notes=[*outcome.notes, runner.TOO_MUCH])
+    short = [outputs.only_error(of_cell) for of_cell in outcome.outputs]
+    return replace(outcome, outputs=short, notes=[*outcome.notes, runner.TOO_MUCH])

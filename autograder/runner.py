@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from autograder import sandbox, stuck
+from autograder import outputs, sandbox, stuck
 from autograder.processes import ExaminerError, ExaminerProcess
 from autograder.sandbox import Place, RunningSubject
 from autograder.submission import Cell, Program
@@ -29,9 +29,6 @@ NOT_RUN = {
     "traceback": ["NotRun: this cell was not run to its end"],
 }  # fmt: skip
 """The output of a cell with a grade id that was not reached: nbgrader takes none for right."""
-
-MAX_OUTPUTS = 8 * 1024 * 1024
-"""Characters of outputs, as JSON, that are kept of a notebook; a subject sends 64 kB of a cell."""
 
 TOO_MUCH = "The notebook printed more than is kept, so some of its outputs were left out."
 
@@ -135,12 +132,15 @@ def _follow(
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
     status: Status
-    moved_on, number, room = True, 0, MAX_OUTPUTS
+    moved_on, number, shown = True, 0, outputs.Notebook(outcome.outputs)
     try:
         _await(channel, subject)
         channel.send({"cells": [_shown(cell) for cell in program]})
         for number, cell in enumerate(program):
-            message = channel.receive_fairly(cell_timeout, subject.pid)
+            was_cut = shown.cut
+            _await_cell(channel, subject, program, number, shown, cell_timeout)
+            if shown.cut and not was_cut:
+                outcome.notes.append(TOO_MUCH)
             if cell.exam:
                 examiner.request(
                     cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key
@@ -153,12 +153,7 @@ def _follow(
                     return
             else:
                 moved_on = True
-                outcome.outputs[number] = outputs = _outputs(message, number)
                 _note_error(outcome, number)
-                before, room = room, room - len(json.dumps(outputs))
-                if room < 0:
-                    outcome.outputs[number] = shortened(outputs)
-                    outcome.notes += [TOO_MUCH] if before >= 0 else []
     except ChannelTimeout:
         frames = stuck.ask(subject.pid, channel)
         reason, status = _stuck(program, number, cell_timeout, frames)
@@ -219,46 +214,33 @@ def _shown(cell: Cell) -> dict[str, str]:
     return {"source": "" if cell.exam else cell.source, "exam": cell.exam}
 
 
-def _outputs(message: dict[str, Any], number: int) -> list[dict[str, Any]]:
-    outputs = message.get("outputs")
-    if message.get("ran") != number or not isinstance(outputs, list):
-        raise ChannelBroken("it is no answer to what was asked")
-    if not all(_is_output(output) for output in outputs):
-        raise ChannelBroken("what it says of a cell's outputs is none")
-    return outputs
+def _await_cell(
+    channel: Channel,
+    subject: RunningSubject,
+    program: Program,
+    number: int,
+    shown: outputs.Notebook,
+    timeout: float,
+) -> None:
+    """Wait until the subject has come to an exam, or has run a cell; keep what is shown by then.
 
-
-def _is_output(output: Any) -> bool:
-    """Whether something is an output as `autograder.shell` makes them, which nbgrader can take."""
-    match output:
-        case {"output_type": "stream", "name": "stdout" | "stderr", "text": str(), **more}:
-            return not more
-        case {
-            "output_type": "display_data",
-            "data": dict() as data,
-            "metadata": dict() as about,
-            **more,
-        }:
-            return not more and not about and all(isinstance(shown, str) for shown in data.values())
-        case {
-            "output_type": "error",
-            "ename": str(),
-            "evalue": str(),
-            "traceback": list() as lines,
-            **more,
-        }:
-            return not more and all(isinstance(line, str) for line in lines)
-    return False
-
-
-def shortened(outputs: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Return what is kept of a cell's outputs if there are too many: why nbgrader fails a test."""
-    kept = []
-    for output in outputs:
-        if output["output_type"] == "error" or output.get("name") == "stderr":
-            cut = {name: text[:200] for name, text in output.items() if isinstance(text, str)}
-            kept.append({**output, **cut, **({"traceback": []} if "traceback" in output else {})})
-    return kept[-1:]
+    What a cell shows can change later: a display is updated, a task goes on. But what nbgrader
+    takes for a score is what a test showed when it ran.
+    """
+    reached = {"exam" if program[number].exam else "ran": number}
+    seen: set[int] = set()
+    while (message := channel.receive_fairly(timeout, subject.pid)) != reached:
+        match message:
+            case {"shows": int() as place, "outputs": list() as given} if (
+                0 <= place <= number and place not in seen
+            ):
+                if not all(map(outputs.is_output, given)):
+                    raise ChannelBroken("what it says of a cell's outputs is none")
+                seen.add(place)
+                if place == number or not program[place].grade_id:
+                    shown.put(place, given)
+            case _:
+                raise ChannelBroken("it is no answer to what was asked")
 
 
 def _note_error(outcome: Outcome, number: int) -> None:

@@ -1,118 +1,84 @@
-"""Runs a notebook's code cells in this process, as a kernel would, and collects their outputs."""
+"""Runs a notebook's code cells in this process: in ipykernel's own kernel, without its sockets.
+
+What a student tried in their kernel behaves the same here: the shell and its magics, the event loop
+that runs in and between cells, plots, displays, widgets. Only nobody listens and nobody types: what
+the kernel publishes goes into a recording, and comms go nowhere.
+"""
 
 # mypy: allow-untyped-calls
-# IPython leaves most of its functions untyped.
+# ipykernel and IPython leave most of their functions untyped.
 
 from __future__ import annotations
 
-import io
-from collections.abc import Iterator
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+import asyncio
+import contextvars
+import logging
+import sys
+import threading
+from collections.abc import Coroutine, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
-from IPython.core.displayhook import DisplayHook
-from IPython.core.displaypub import DisplayPublisher
-from IPython.core.interactiveshell import InteractiveShell
-from traitlets import Type
+from IPython.core.error import StdinNotImplementedError
+from jupyter_client.session import Session
+from traitlets import Instance, Type
 from traitlets.config import Config
 
-MAX_OUTPUT = 64 * 1024
-"""Characters kept of one stream of one cell, and of what it displays; a flood is cut, and says so.
+from autograder.recording import Message, Recording
+from autograder.streams import Publisher, streams
 
-The rest is dropped as it comes: a cell that prints for ever is not one that needs too much memory.
+# Nobody debugs at grading. ipykernel would import debugpy: 30 MB, and half a second.
+sys.modules.setdefault("debugpy", None)  # type: ignore[arg-type]  # what Python takes for missing
+import ipykernel.debugger  # noqa: E402, F401
+
+if sys.modules["debugpy"] is None:
+    del sys.modules["debugpy"]
+
+from ipykernel import zmqshell  # noqa: E402
+from ipykernel.compiler import XCachingCompiler  # noqa: E402
+from ipykernel.ipkernel import IPythonKernel  # noqa: E402
+from ipykernel.kernelapp import IPKernelApp  # noqa: E402
+
+BETWEEN_CELLS_S = 0.005
+"""How long the tasks of earlier cells have the event loop to themselves before the next cell.
+
+It is about what passes in a kernel that is told to run all cells.
 """
-_DISPLAY = 100  # characters that a display counts as, beside what is in it
-
-Output = dict[str, Any]
 
 
-class _Stream(io.TextIOBase):
-    """Keeps the beginning of what is written to it."""
+class _NobodyTypesError(StdinNotImplementedError):
+    """What a cell that waits for input raises."""
 
-    def __init__(self) -> None:
-        self._kept: list[str] = []
-        self._room = MAX_OUTPUT
-        self._dropped = 0
+    def __init__(self, function: str) -> None:
+        super().__init__(
+            f"{function}() waits for somebody to type, and nobody does while a notebook is graded: "
+            "write the value into the cell instead."
+        )
 
-    def writable(self) -> bool:
-        return True
-
-    def write(self, text: str) -> int:
-        if not isinstance(text, str):
-            raise TypeError(f"write() argument must be str, not {type(text).__name__}")
-        kept = text[: max(self._room, 0)]  # less than nothing if threads write at once
-        self._room -= len(kept)
-        self._dropped += len(text) - len(kept)
-        if kept:
-            self._kept.append(kept)
-        return len(text)
-
-    def text(self) -> str:
-        return _shortened("".join(self._kept), self._dropped)
+    def _render_traceback_(self) -> list[str]:
+        """Return what IPython shows: the sentence alone."""
+        return [f"{StdinNotImplementedError.__name__}: {self}"]
 
 
-class _Shown:
-    """Keeps the first displays of a cell."""
-
-    def __init__(self) -> None:
-        self.outputs: list[Output] = []
-        self._room = MAX_OUTPUT
-
-    def add(self, formats: dict[str, Any]) -> None:
-        """Keep one display: its text by MIME type."""
-        if self._room < 0:
-            return
-        data = {mime: value for mime, value in formats.items() if isinstance(value, str)}
-        self._room -= _DISPLAY + sum(len(value) for value in data.values())
-        if self._room < 0:
-            self.outputs.append(_stream("[further outputs were cut off here]\n"))
-        else:
-            self.outputs.append({"output_type": "display_data", "data": data, "metadata": {}})
+_NobodyTypesError.__name__ = StdinNotImplementedError.__name__
 
 
-class _Hook(DisplayHook):
-    """Keeps the value of a cell's last expression instead of printing it."""
+class ZMQInteractiveShell(zmqshell.ZMQInteractiveShell):
+    """ipykernel's shell, under its own name: libraries tell by it that they are in a notebook."""
 
-    def write_output_prompt(self) -> None:
-        """Print no prompt."""
-
-    def write_format_data(self, format_dict: dict[str, Any], md_dict: Any = None) -> None:
-        _shell_of(self).shown.add(format_dict)
-
-
-class _Publisher(DisplayPublisher):
-    """Keeps what a cell displays."""
-
-    def publish(self, data: Any, *_: Any, **__: Any) -> None:
-        _shell_of(self).shown.add(data)
-
-    def clear_output(self, wait: bool = False) -> None:
-        """Keep it all: the record of a run is not an animation."""
-
-
-class CellShell(InteractiveShell):
-    """An IPython shell that keeps what a cell shows and raises instead of printing it."""
-
-    displayhook_class = Type(_Hook)
-    display_pub_class = Type(_Publisher)
-
-    def __init__(self, **kwargs: Any) -> None:
-        """Start with nothing shown."""
-        self.shown = _Shown()
-        self.last_error: Output | None = None
-        self.first_error: BaseException | None = None
-        super().__init__(**kwargs)
+    first_error: BaseException | None = None
 
     def _showtraceback(
         self, etype: type[BaseException], evalue: BaseException, stb: list[str]
     ) -> None:
-        self.first_error = self.first_error or evalue
-        self.last_error = {
-            "output_type": "error",
-            "ename": getattr(etype, "__name__", str(etype)),
-            "evalue": _cut(str(evalue)),
-            "traceback": [_cut(line) for line in stb],
-        }
+        if self.first_error is None:
+            self.first_error = evalue
+        try:
+            super()._showtraceback(etype, evalue, stb)
+        except Exception as unprintable:  # noqa: BLE001 - str() of what a student's code raises
+            super()._showtraceback(etype, unprintable, stb)
 
     @contextmanager
     def _tee(self, channel: str) -> Iterator[None]:
@@ -123,51 +89,156 @@ class CellShell(InteractiveShell):
         """Ignore ``exit``: the rest of the notebook is still run."""
 
 
-def _shell_of(part: Any) -> CellShell:
-    shell: CellShell = part.shell
-    return shell
+class _Compiler(XCachingCompiler):
+    """Gives cells the names that ipykernel does, and their number: `autograder.stuck` reads it."""
+
+    def get_code_name(self, raw_code: str, code: str, number: int) -> str:
+        path = Path(super().get_code_name(raw_code, code, number))
+        return str(path.with_name(f"{number}-{path.name}"))
 
 
-def make_shell() -> CellShell:
-    """Return this process's shell: no history file, no prompt, no colours."""
+class _Session(Session):
+    """Puts messages into a recording instead of sending them."""
+
+    recording = Instance(Recording)
+
+    def send(
+        self,
+        stream: Any,
+        msg_or_type: Message | str,
+        content: Any = None,
+        parent: Any = None,
+        ident: Any = None,
+        buffers: Any = None,
+        track: bool = False,
+        header: Any = None,
+        metadata: Any = None,
+    ) -> Message:
+        """Record a message, which is made as `jupyter_client.session.Session.send` makes it."""
+        message = msg_or_type
+        if isinstance(message, str):
+            message = self.msg(message, content, parent, header, metadata)
+        self.recording.take(message)
+        return message
+
+
+class Kernel(IPythonKernel):
+    """A kernel that runs cells one after the other when it is told to."""
+
+    shell_class = Type(ZMQInteractiveShell)
+    compiler_class = Type(_Compiler)
+    _supports_kernel_subshells = False
+
+    def __init__(self, recording: Recording, **traits: Any) -> None:
+        """Publish to a recording."""
+        self._recording = recording
+        publisher = Publisher()
+        session = _Session(recording=recording)
+        super().__init__(
+            session=session,
+            iopub_thread=publisher,
+            iopub_socket=publisher.background_socket,
+            # All that it asks of this thread is which one runs the cells.
+            shell_channel_thread=SimpleNamespace(parent_thread=threading.main_thread()),
+            **traits,
+        )
+        self._execute_sleep = 0.0  # it gives its publishing thread a moment, which is none here
+        self._descriptors = streams(session, publisher, recording)
+        self._loop = asyncio.new_event_loop()
+        asyncio.set_event_loop(self._loop)
+        self._context = contextvars.copy_context()
+        self._finish(self._begin())
+
+    @property
+    def cells(self) -> ZMQInteractiveShell:
+        """The shell that runs the cells."""
+        assert self.shell is not None
+        return self.shell  # type: ignore[no-any-return]
+
+    async def _begin(self) -> None:
+        self.start()
+        self._forward_input()  # for the tasks of cells, and what the examiner starts, as well
+
+    def run_cell(self, source: str, number: int) -> None:
+        """Run one cell. Whatever it does, the next one can be run.
+
+        Args:
+            source: the cell's text.
+            number: which of the notebook's code cells it is, from 0.
+        """
+        self.cells.execution_count = number + 1
+        self._finish(self._request(source, number))
+        self._descriptors.read(wait=True)
+        if asyncio.all_tasks(self._loop):
+            self._finish(asyncio.sleep(BETWEEN_CELLS_S))
+
+    def run_beside(self, number: int, call: Any) -> None:
+        """Call something in place of a cell: the loop runs meanwhile, as it does for a cell."""
+
+        async def called() -> None:
+            self._ask("", number)
+            call()
+
+        self._finish(called())
+
+    async def _request(self, source: str, number: int) -> None:
+        request = self._ask(source, number)
+        self.pre_handler_hook()
+        try:
+            await self.execute_request(None, [], request)
+        except Exception as error:  # noqa: BLE001 - of str() of what a student's code raised, say
+            failed = {"ename": type(error).__name__, "evalue": "", "traceback": []}
+            self.send_response(self.iopub_socket, "error", failed)
+        finally:
+            self.post_handler_hook()
+
+    def _ask(self, source: str, number: int) -> Message:
+        """Make the message that asks for a cell, from which on what is shown is that cell's."""
+        content = {
+            "code": source, "silent": False, "store_history": True, "user_expressions": {},
+            "allow_stdin": False, "stop_on_error": False,
+        }  # fmt: skip
+        assert self.session is not None
+        request: Message = self.session.msg("execute_request", content)
+        self._recording.begin(number, request["header"]["msg_id"])
+        self.set_parent([], request)
+        return request
+
+    def _finish(self, coroutine: Coroutine[Any, Any, None]) -> None:
+        """Run the loop until something is done, whatever a cell does to the loop."""
+        task = self._loop.create_task(coroutine, context=self._context)
+        task.add_done_callback(lambda _: self._loop.stop())
+        while not task.done():
+            with suppress(SystemExit, KeyboardInterrupt):  # of a task of the student's
+                self._loop.run_forever()
+        if not task.cancelled() and isinstance(error := task.exception(), Exception):
+            raise error
+
+    def raw_input(self, prompt: object = "") -> str:
+        """Refuse to wait for nobody."""
+        raise _NobodyTypesError("input")
+
+    def getpass(self, prompt: str = "", stream: Any = None, **_: Any) -> str:
+        """Refuse to wait for nobody."""
+        raise _NobodyTypesError("getpass.getpass")
+
+
+def make_kernel(recording: Recording) -> Kernel:
+    """Return this process's kernel: what `ipykernel_launcher` makes, but for sockets and threads.
+
+    Standard output and error are the kernel's from now on.
+    """
+    log = logging.Logger("kernel", logging.CRITICAL + 1)  # nobody reads it
     config = Config()
     config.HistoryManager.enabled = False
-    config.InteractiveShell.colors = "NoColor"
-    shell: CellShell = CellShell.instance(config=config)
-    return shell
-
-
-def run_cell(shell: CellShell, source: str, number: int) -> list[Output]:
-    """Run one cell and return its outputs in notebook format; an error is one of them.
-
-    Args:
-        shell: what runs it.
-        source: the cell's text.
-        number: which of the notebook's code cells it is, from 1: tracebacks say so.
-    """
-    shell.last_error = None
-    shell.execution_count = number
-    shell.shown = _Shown()
-    out, err = _Stream(), _Stream()
-    with redirect_stdout(out), redirect_stderr(err):
-        shell.run_cell(source, store_history=True)
-    streams = [(out.text(), "stdout"), (err.text(), "stderr")]
-    outputs = [_stream(text, name) for text, name in streams if text]
-    outputs += shell.shown.outputs
-    if shell.last_error is not None:
-        outputs.append(shell.last_error)
-    return outputs
-
-
-def _stream(text: str, name: str = "stdout") -> Output:
-    return {"output_type": "stream", "name": name, "text": text}
-
-
-def _cut(text: str) -> str:
-    return _shortened(text[:MAX_OUTPUT], max(len(text) - MAX_OUTPUT, 0))
-
-
-def _shortened(text: str, dropped: int) -> str:
-    if not dropped:
-        return text
-    return f"{text}\n[{dropped} more characters were cut off here]\n"
+    app = IPKernelApp.instance(config=config, log=log)
+    app.init_pdb()
+    app.init_signal()
+    kernel = Kernel.instance(recording, parent=app, log=log, user_ns=app.user_ns)
+    app.kernel = kernel
+    app.init_path()
+    app.init_shell()
+    app.init_gui_pylab()
+    app.init_extensions()
+    kernel.cells.user_ns_hidden.update(kernel.cells.user_ns)
+    return kernel

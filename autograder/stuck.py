@@ -26,7 +26,8 @@ PATIENCE, SILENCE = 3.0, 0.5
 """Seconds that an answer may take, and without anything more after which it is over."""
 
 _FRAME = re.compile(r'  File "([^"\n]{1,500})", line (\d{1,9}) in (.{1,100})')
-_CELL = re.compile(r"<ipython-input-(\d{1,9})-")
+_CELL = re.compile(r".*/ipykernel_\d{1,9}/(\d{1,9})-\d{1,20}\.py")
+"""The name that `autograder.shell` gives to a cell's code."""
 SUBJECT, EXAMINER = ("autograder/subject.py", "run"), ("autograder/examiner.py", "main")
 """The file and the function that the first thread of a process runs."""
 
@@ -87,7 +88,7 @@ def students(frames: list[Frame]) -> Frame | None:
 
 def line_of(frame: Frame, program: Program) -> str:
     """Return where a frame is, and what stands there, if it is in a cell of the program."""
-    cell = _CELL.match(frame.file)
+    cell = _CELL.fullmatch(frame.file)
     if cell is None:
         return f"line {frame.line} of {Path(frame.file).name[:100]}"
     number, line = int(cell[1]), frame.line

@@ -14,13 +14,15 @@ import shutil
 import socket
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from autograder import stuck
 from autograder.harness import Harness
 from autograder.raised import SUBJECT_ENV
+from autograder.recording import Recording
 from autograder.sandbox.limits import Limits
-from autograder.shell import make_shell, run_cell
+from autograder.shell import make_kernel
 from autograder.wire import Channel, ChannelClosed
 from course import Session
 from course.domains import reserve_domain
@@ -28,35 +30,56 @@ from course.domains import reserve_domain
 SHELL = (
     "IPython.core.application", "IPython.core.completer", "IPython.core.completerlib",
     "IPython.core.crashhandler", "IPython.core.logger", "IPython.core.magics.extension",
-    "IPython.core.oinspect", "pygments.formatters.terminal256", "stack_data",
+    "IPython.core.oinspect", "IPython.extensions.storemagic", "ipykernel.eventloops",
+    "ipywidgets", "pygments.formatters.terminal256", "stack_data",
 )  # fmt: skip
-"""What IPython imports for its first cell and for its first traceback."""
+"""What a kernel imports for its first cell and for its first traceback."""
+
+PLOTS = ("matplotlib.backends.backend_agg", "matplotlib.pyplot")
+"""What cells plot with. Not among it is the inline backend, which looks for a shell at once."""
 
 
 def run(engine: Channel, control: Channel, domain_id: int) -> None:
     """Run the engine's program cell by cell, and serve the examiner where it says so."""
-    shell = make_shell()
+    recording = Recording()
     # Up to here standard error told the grader why a subject does not start.
-    with Path(os.devnull).open("w") as nowhere:
-        os.dup2(nowhere.fileno(), sys.stderr.fileno())
+    kernel = make_kernel(recording)
     stuck.tell_when_asked(engine.fileno())
     engine.send({"ready": True})
 
     def open_session(threads: int, sim_time: bool) -> Session:
         return Session(domain_id=domain_id, threads=threads, sim_time=sim_time)
 
+    def serve() -> None:
+        Harness(open_session, kernel.cells.user_ns).serve(control)
+
+    process, exams = os.getpid(), set()
     for number, cell in enumerate(engine.receive()["cells"]):
         if cell["exam"]:
-            engine.send({"exam": number})
-            Harness(open_session, shell.user_ns).serve(control)
+            exams.add(number)
+            _tell(engine, {"exam": number}, recording, exams)
+            kernel.run_beside(number, serve)
         else:
-            engine.send({"ran": number, "outputs": run_cell(shell, cell["source"], number + 1)})
+            kernel.run_cell(cell["source"], number)
+            if os.getpid() != process:
+                os._exit(0)  # a cell has forked, and this is not the process that is graded
+            _tell(engine, {"ran": number}, recording, exams)
+
+
+def _tell(engine: Channel, message: dict[str, int], recording: Recording, exams: set[int]) -> None:
+    """Send what cells show that showed something else, or nothing, before; then a message."""
+    for number, outputs in recording.changed().items():
+        if number not in exams:
+            engine.send({"shows": number, "outputs": outputs})
+    engine.send(message)
 
 
 def preload() -> None:
     """Import what a run is going to need: `autograder.warm` calls it before it forks subjects."""
     from autograder.warm import modules
 
+    with suppress(OSError), modules.matplotlib_folder():  # plots take longer, that is all
+        modules.import_all(PLOTS)
     modules.import_all((*SHELL, "autograder.notebook_check"))
 
 

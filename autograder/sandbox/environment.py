@@ -17,6 +17,8 @@ DDS = {
     "COURSE_DISCOVERY": "inherit",
     "FASTRTPS_DEFAULT_PROFILES_FILE": str(Path(__file__).with_name("fastdds.xml")),
 }
+INLINE = "module://matplotlib_inline.backend_inline"
+"""Where plots go, as in a kernel: into the outputs of a cell."""
 KEPT = ("LANG", "LC_ALL", "LC_CTYPE", "TZ", "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOTSTRAP_COMPLETE",
         "AMENT_PREFIX_PATH", "PYTHONWARNINGS")  # fmt: skip
 """What a subject gets of the grader's environment: no token, no path of the course."""
@@ -29,7 +31,7 @@ def submission() -> dict[str, str]:
     home = str(view.HOME)
     return {
         **kept, **DDS, "PATH": programs, "HOME": home, "USER": "student", "LOGNAME": "student",
-        "IPYTHONDIR": f"{home}/.ipython", "ROS_LOG_DIR": f"{home}/log", "MPLBACKEND": "Agg",
+        "IPYTHONDIR": f"{home}/.ipython", "ROS_LOG_DIR": f"{home}/log", "MPLBACKEND": INLINE,
         "COURSE_INTERFACES_CACHE": str(cache.root()), "TMPDIR": "/tmp",
         # A numeric library's threads, one a processor of the machine, count as processes.
         "OPENBLAS_NUM_THREADS": "2", "OMP_NUM_THREADS": "2", "PYTHONDONTWRITEBYTECODE": "1",

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from autograder.files import scratch_folder
+from autograder.sandbox.environment import INLINE
 from autograder.sandbox.place import END_TIMEOUT, Process
 from course.domains import lease_domain
 
@@ -60,7 +61,7 @@ class HostSubject:
         cache = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
         env = {
             **os.environ, "HOME": home, "XDG_CACHE_HOME": cache, "IPYTHONDIR": f"{home}/.ipython",
-            "ROS_LOG_DIR": f"{home}/log", "MPLBACKEND": "Agg",
+            "ROS_LOG_DIR": f"{home}/log", "MPLBACKEND": INLINE,
         }  # fmt: skip
         self._process = subprocess.Popen(
             tethered(command), cwd=home, env=env, start_new_session=True, pass_fds=fds,

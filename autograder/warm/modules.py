@@ -6,9 +6,11 @@ Only time is saved by what stands here. What is missing is imported when it is n
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterable
-from contextlib import suppress
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from importlib import import_module
+from tempfile import TemporaryDirectory
 
 COURSE = (
     "course.ambient", "course.design.declaration", "course.design.node", "course.graph.reader",
@@ -44,6 +46,20 @@ def import_all(more: Iterable[str] = ()) -> None:
             _load(import_module(f"{package}.{module}"))
     # It notes the file of every module there is, once: IPython asks for each cell and traceback.
     inspect.getmodule(import_all.__code__)
+
+
+@contextmanager
+def matplotlib_folder() -> Iterator[None]:
+    """Give matplotlib a folder to write to while it is imported: without one it is not.
+
+    It lists the fonts of the machine, which takes half a second, and wants to keep the list.
+    """
+    with TemporaryDirectory(dir="/dev/shm") as folder:
+        os.environ["MPLCONFIGDIR"] = folder
+        try:
+            yield
+        finally:
+            del os.environ["MPLCONFIGDIR"]
 
 
 def _load(interfaces: object) -> None:
