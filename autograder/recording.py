@@ -28,7 +28,7 @@ from autograder.outputs import (
     stream,
 )
 
-_OVERHEAD = 100  # bytes that an output counts as, beside what is in it
+_OVERHEAD = 1000  # bytes that an output counts as, beside what is in it
 _VIEW = "application/vnd.jupyter.widget-view+json"
 MAX_WIDGETS = 1000
 """`Output` widgets of a notebook; what is printed within more of them is the cell's own."""
@@ -240,7 +240,11 @@ def _flat(area: _Area, widgets: Mapping[str, _Area], within: tuple[_Area, ...]) 
 
 def _add(area: _Area, kind: str, content: dict[str, Any]) -> None:
     """Add what a message of this kind says, if it is an output."""
-    if kind == "clear_output":
+    if kind == "execute_reply":
+        pages = [page["data"] for page in content["payload"] if page["source"] == "page"]
+        for data in pages[:1]:  # as JupyterLab shows help
+            _add(area, "display_data", {"data": data, "metadata": {}})
+    elif kind == "clear_output":
         (area.clear_later if content.get("wait") else area.clear)()
     elif kind == "stream":
         area.write(content["name"], content["text"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 import time
 from collections.abc import Iterable, Mapping
@@ -31,6 +32,9 @@ NOT_RUN = {
 """The output of a cell with a grade id that was not reached: nbgrader takes none for right."""
 
 TOO_MUCH = "The notebook printed more than is kept, so some of its outputs were left out."
+
+_CELL_NAME = re.compile(r"\d+-\d+\.py, (?=line \d+\)$)")
+"""What Python calls a cell's code where it is no Python: it is a file of no student's."""
 
 MOST_NOTES = 20
 """Remarks on cells that raised; a notebook may have a thousand."""
@@ -246,7 +250,7 @@ def _await_cell(
 def _note_error(outcome: Outcome, number: int) -> None:
     for output in outcome.outputs[number]:
         if output["output_type"] == "error" and len(outcome.notes) < MOST_NOTES:
-            what = f"{output.get('ename')}: {output.get('evalue')}"
+            what = f"{output['ename']}: {_CELL_NAME.sub('', output['evalue'])}"
             outcome.notes.append(f"Code cell {number + 1} of the notebook raised {what[:300]}")
 
 

@@ -21,7 +21,7 @@ STUB_MARK = "# Your work goes here."
 EVERYTHING = "everything"
 ROOTS = "the first"
 
-OURS = ("autograder", "site-packages", "/tmp/", "/project/src", "Traceback", "ipython-input")
+OURS = ("autograder", "site-packages", "/tmp/", "/project/src", "Traceback", "ipykernel_")
 """What no feedback may hold: the grader's own insides, paths, and tracebacks."""
 
 Splice = tuple[str, str]

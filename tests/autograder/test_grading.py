@@ -94,7 +94,7 @@ import json, os
 for number in range(100):
     for descriptor in range(3, 64):
         try:
-            os.write(descriptor, json.dumps({"ran": number, "outputs": [5]}).encode() + b"\\n")
+            os.write(descriptor, json.dumps({"shows": number, "outputs": [5]}).encode() + b"\\n")
         except OSError:
             pass
 """

@@ -1,0 +1,215 @@
+"""One notebook of probes, in a stock kernel and as it is graded: what comes out is the same."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import nbformat
+import pytest
+from nbclient import NotebookClient
+
+from autograder import runner
+from autograder.sandbox import probe
+from autograder.submission import Cell
+from tests.machine import needs_isolation, needs_warm_starts
+
+pytestmark = [needs_isolation, pytest.mark.xdist_group("kernel")]
+
+Output = dict[str, Any]
+
+PROBES = {
+    cell.split("\n", 1)[0]: cell.split("\n", 1)[1].strip("\n")
+    for cell in Path(__file__).with_name("kernel_probes.ipy").read_text().split("# %% ")[1:]
+}
+"""Cells by what they are about, in the order in which they are run."""
+
+
+class Stock(NotebookClient):
+    """Runs a notebook in a stock kernel, and shows help as JupyterLab does."""
+
+    def shows_help(self, cell: Any, cell_index: int, execute_reply: Any) -> None:
+        pages = [p for p in execute_reply["content"]["payload"] if p["source"] == "page"]
+        for page in pages[:1]:
+            cell.outputs.append(nbformat.v4.new_output("display_data", data=page["data"]))
+
+
+@pytest.fixture(scope="module")
+def stock(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Output]]:
+    cells = [nbformat.v4.new_code_cell(source) for source in PROBES.values()]
+    notebook = nbformat.v4.new_notebook(cells=cells)
+    client = Stock(
+        notebook, timeout=60, kernel_name="python3", allow_errors=True,
+        resources={"metadata": {"path": str(tmp_path_factory.mktemp("stock"))}},
+    )  # fmt: skip
+    client.on_cell_executed = client.shows_help
+    client.execute()
+    outputs = [with_widgets(cell.outputs, client.widget_state) for cell in notebook.cells]
+    return dict(zip(PROBES, outputs, strict=True))
+
+
+def with_widgets(outputs: list[Output], states: dict[str, Any]) -> list[Output]:
+    """Return outputs with those of an `Output` widget where it is shown, and without views."""
+    found = []
+    for output in outputs:
+        data = dict(output.get("data", {}))
+        view = data.pop("application/vnd.jupyter.widget-view+json", None)
+        found.append({**output, "data": data} if "data" in output else output)
+        if view is not None:
+            inner = states.get(view["model_id"], {}).get("outputs", [])
+            found += with_widgets(list(inner), states)
+    return found
+
+
+def graded() -> dict[str, list[Output]]:
+    outcome = runner.run(tuple(Cell(source) for source in PROBES.values()))
+    return dict(zip(PROBES, outcome.outputs, strict=True))
+
+
+@pytest.fixture(scope="module")
+def warm() -> dict[str, list[Output]]:
+    return graded()
+
+
+@pytest.fixture(scope="module")
+def cold() -> Iterator[dict[str, list[Output]]]:
+    able = replace(probe.abilities(), warm=False)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(probe, "abilities", lambda: able)
+        yield graded()
+
+
+CHANGING = {
+    r"0x[0-9a-f]+": "0xADDRESS",
+    r"/[^\s'\"]*/ipykernel_\d+/(?:\d+-)?\d+\.py": "CELL",
+    r"\b(?:\d+-)?\d+\.py(?=, line)": "CELL",
+    r"[\d.]+ (?:ns|us|[\u00b5\u03bc]s|ms|s)\b": "TIME",
+    r"(?:/[^\s'\"]*/stock\d*|/home/student|~)(?=[/'\"\s]|$)": "HOME",
+    r"\b[0-9a-f]{32}\b": "ID",
+    r'(?<=<dc:date>)[^<]*': "DATE",
+    r'\b[pmC]?[0-9a-f]{10}\b': "ID",
+}  # fmt: skip
+"""What differs from run to run."""
+
+
+def normal(outputs: list[Output]) -> list[Output]:
+    """Return outputs without what differs by nature, the text of each stream as one."""
+    texts: dict[str, str] = {}
+    others: list[Output] = []
+    for output in outputs:
+        if output["output_type"] == "stream":
+            # When a kernel sends what is printed depends on its threads.
+            texts[output["name"]] = texts.get(output["name"], "") + output["text"]
+        else:
+            others.append(settled(dict(output)))
+    return [*others, *({name: settled(text)} for name, text in sorted(texts.items()))]
+
+
+def settled(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: settled(item) for name, item in value.items() if name != "image/svg+xml"}
+    if isinstance(value, list):
+        # Where Python and its packages are differs, and what raises within a kernel's own code.
+        items = [settled(item) for item in value]
+        return [item for item in items if not str(item).startswith("File ")]
+    if isinstance(value, str):
+        value = re.sub(r"\x1b\[[\d;]*m", "", value)
+        for pattern, name in CHANGING.items():
+            value = re.sub(pattern, name, value)
+    return value
+
+
+@needs_warm_starts
+@pytest.mark.parametrize("name", PROBES)
+def test_a_cell_shows_the_same_as_in_a_kernel(
+    name: str, stock: dict[str, list[Output]], warm: dict[str, list[Output]]
+) -> None:
+    assert normal(warm[name]) == normal(stock[name])
+
+
+@pytest.mark.parametrize("name", PROBES)
+def test_a_cell_shows_the_same_without_a_warm_start(
+    name: str, stock: dict[str, list[Output]], cold: dict[str, list[Output]]
+) -> None:
+    assert normal(cold[name]) == normal(stock[name])
+
+
+def test_plots_come_as_pictures(warm: dict[str, list[Output]]) -> None:
+    for name, count in {
+        "plot without a magic": 1,
+        "inline": 1,
+        "two figures": 2,
+        "show": 1,
+    }.items():
+        pictures = [o for o in warm[name] if "image/png" in o.get("data", {})]
+        assert len(pictures) == count, name
+
+
+@pytest.mark.parametrize(
+    ("source", "function"),
+    [
+        ("input('how many? ')", "input"),
+        ("import getpass\ngetpass.getpass()", "getpass.getpass"),
+        (
+            "import asyncio\nasync def ask():\n    input()\nawait asyncio.create_task(ask())",
+            "input",
+        ),
+    ],
+)
+def test_a_cell_that_waits_for_input_says_that_nobody_types(source: str, function: str) -> None:
+    ((output,),) = runner.run((Cell(source),)).outputs
+    said = f"{function}() waits for somebody to type, and nobody does while a notebook is graded"
+    assert output["ename"] == "StdinNotImplementedError"
+    assert output["evalue"].startswith(said)
+    assert output["traceback"] == [f"StdinNotImplementedError: {output['evalue']}"]
+
+
+def test_what_a_cell_shows_changes_when_a_later_one_says_so() -> None:
+    first, second, third, _ = runner.run(
+        (
+            Cell("handle = display('one', display_id=True)"),
+            Cell("import asyncio\nasync def late():\n    await asyncio.sleep(0)\n"
+                 "    print('late')\n"
+                 "task = asyncio.create_task(late())"),
+            Cell("handle.update('two')\nawait task", "a-test"),
+            Cell("handle.update('three')"),
+        )
+    ).outputs  # fmt: skip
+    assert [output["data"]["text/plain"] for output in first] == ["'three'"]
+    assert [output["text"] for output in second] == ["late\n"], "as JupyterLab shows it"
+    assert third == []
+
+
+def test_what_a_test_showed_is_its_result_whatever_comes_later() -> None:
+    shown, _ = runner.run(
+        (
+            Cell("request = get_ipython().get_parent()\nassert False, 'no'", "a-test"),
+            Cell("from IPython.display import clear_output\n"
+                 "get_ipython().set_parent(request)\nclear_output()"),
+        )
+    ).outputs  # fmt: skip
+    assert [output["ename"] for output in shown] == ["AssertionError"]
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "exit()",
+        "import asyncio\nasyncio.get_running_loop().stop()",
+        "import asyncio\nasyncio.get_running_loop().call_soon(exit)",
+        "import asyncio, sys\nasyncio.get_running_loop().call_soon(sys.exit)",
+        "import asyncio\nasync def end():\n    raise KeyboardInterrupt\n"
+        "task = asyncio.create_task(end())",
+        "import asyncio\n[task.cancel() for task in asyncio.all_tasks()]",
+        "import asyncio\nawait asyncio.sleep(0)\n[task.cancel() for task in asyncio.all_tasks()]",
+        "import os\nos.fork()",
+        "import os\nos.close(1)\nos.close(2)",
+        "import sys\nsys.stdout = sys.stderr = None",
+    ],
+)
+def test_the_next_cell_runs_whatever_this_one_does(source: str) -> None:
+    outcome = runner.run((Cell(source), Cell("6 * 7")), cell_timeout=20)
+    assert [o["data"]["text/plain"] for o in outcome.outputs[1] if "data" in o] == ["42"]
