@@ -19,7 +19,7 @@ from nbgrader.coursedir import CourseDirectory
 from nbgrader.preprocessors import NbGraderPreprocessor
 from traitlets import Bool
 
-from autograder import cells, submission
+from autograder import cells, outputs, submission
 from autograder.beside import files_beside
 from autograder.insight import records
 from autograder.report import Report
@@ -87,10 +87,11 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         outcome = prepared.get(_names(resources)) or self._outcome(nb, resources, unreadable)
         outcome = runner.with_notes(outcome, notes)
         code_cells = [cell for cell in nb.cells if cell.cell_type == "code"]
-        for cell, outputs in zip(code_cells, outcome.outputs, strict=True):
+        for cell, shown in zip(code_cells, outcome.outputs, strict=True):
             verdict = outcome.verdicts.get(submission.grade_id(cell))
             if verdict is None:
-                cell.outputs = [new_output(**output) for output in outputs]  # type: ignore[no-untyped-call]
+                shown = outputs.of_test(shown, float(submission.metadata(cell).get("points") or 0))
+                cell.outputs = [new_output(**output) for output in shown]  # type: ignore[no-untyped-call]
             else:
                 # What stands here goes into the student's feedback: no hidden check, no key.
                 cell.source = cells.without_hidden(cell.source)
