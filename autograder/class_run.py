@@ -295,7 +295,9 @@ def _summary(work: Work, notebooks: list[str]) -> Graded:
     verdicts = [v for outcome in outcomes.values() for v in outcome.verdicts.values()]
     problems = list(work.problems)
     for outcome in outcomes.values():
-        problems += outcome.notes if outcome.unreadable else []
+        notes = outcome.notes if outcome.unreadable else []
+        # A problem may begin with what the student is told, and go on with what to do.
+        problems += [n for n in notes if not any(p.startswith(n) for p in problems)]
     problems = list(dict.fromkeys(problems))  # a reason may be that of every notebook
     return Graded(
         work.student, outcomes, sum(v.score for v in verdicts), sum(v.max_score for v in verdicts),

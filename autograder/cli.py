@@ -11,9 +11,11 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from autograder import quiz_cli
+from autograder.intake_names import shown
 from autograder.interruption import Stopped
 from course.errors import CourseError
 
@@ -124,6 +126,41 @@ def grade(
         out.print(f"Written: {', '.join(map(str, places))}", soft_wrap=True, highlight=False)
     if any(not graded.entered for graded in done):
         raise typer.Exit(EXIT_DIFFERENT)
+
+
+@app.command()
+def claim(
+    assignment: str,
+    student: str,
+    notebook: Annotated[
+        str, typer.Argument(help="Its name; for a quiz's attempts the quiz, as in quiz-ch05.")
+    ],
+    file: Annotated[
+        str,
+        typer.Argument(
+            help="Where it lies in the submission, in a zip file as in hand-in.zip/work.ipynb."
+        ),
+    ] = "",
+    nothing: Annotated[
+        bool, typer.Option("--nothing", help="Nothing was handed in: zero points, for good.")
+    ] = False,
+    withdraw: Annotated[
+        bool, typer.Option("--withdraw", help="Take back what was said before.")
+    ] = False,
+    root: Root = None,
+) -> None:
+    """Say which file of a submission is a student's notebook, where names do not say it.
+
+    The next ``autograder grade`` uses it, and asks nothing more about it. What was handed in is not
+    touched: claims are kept in claims.json of the course root. A claim holds until the student
+    hands in again.
+    """
+    from autograder import intake_command
+
+    said = intake_command.claim(
+        _root(root), assignment, student, notebook, file, nothing=nothing, withdraw=withdraw
+    )
+    out.print(said, soft_wrap=True, highlight=False, markup=False)
 
 
 @app.command()
@@ -278,11 +315,12 @@ def _demo_table(done: Any) -> None:
 def _grades_table(grades: list[Any], problems: dict[str, str]) -> None:
     table = Table("Student", "Score", "Needs a person", "Remark")
     for grade in grades:
-        score = f"{grade.score:g} of {grade.max_score:g}"
+        score = f"{'?' if grade.asked else f'{grade.score:g}'} of {grade.max_score:g}"
         needs = "yes" if grade.needs_manual_grade else ""
-        table.add_row(grade.student, score, needs, problems.get(grade.student, ""))
+        remark = problems.get(grade.student, "") or " ".join(grade.asked.values())
+        table.add_row(*map(escape, (shown(grade.student), score, needs, remark)))
     for student in sorted(problems.keys() - {grade.student for grade in grades}):
-        table.add_row(student, "none", "yes", problems[student])
+        table.add_row(*map(escape, (shown(student), "none", "yes", problems[student])))
     out.print(table)
 
 

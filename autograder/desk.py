@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import copy
+import hashlib
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
 from pathlib import Path
 
 import nbformat
 from nbformat import NotebookNode
 
-from autograder import ledger, quiz_marks, roster, runner, submission
+from autograder import intake_cells, intake_claims, ledger, quiz_marks, roster, runner, submission
 from autograder import nbgrader_bridge as bridge
-from autograder.beside import Beside, files_beside
+from autograder.files import walk
 from autograder.gradebook import CourseGradebook, GradebookError
+from autograder.intake import Found, Intake, NotHandedInError, UnclearError
+from autograder.intake_names import quoted
 from autograder.jobs import Job
 from autograder.ledger import Standing
 from autograder.nbgrader_once import FeedbackExporter
@@ -88,7 +90,10 @@ class Desk:
 
     def work(self, student: str, course: str) -> Work:
         """Return a student's submission; ``course`` is a digest of what all depend on."""
-        return Work(student, f"{course} {ledger.of_folder(self._submitted(student))}")
+        made_of = ledger.of_folder(self._submitted(student))
+        if claims := intake_claims.of_student(self.root, self.assignment, student):
+            made_of = hashlib.sha256(f"{made_of} {sorted(claims.items())}".encode()).hexdigest()
+        return Work(student, f"{course} {made_of}")
 
     def is_graded(self, student: str) -> bool:
         """Whether nbgrader has a graded copy of every notebook."""
@@ -101,13 +106,18 @@ class Desk:
     def pieces(self, work: Work) -> Iterator[Piece]:
         """Stage a submission's notebooks one by one."""
         submitted, staged = self._submitted(work.student), self._stage(work.student)
-        work.problems += roster.remarks(submitted)
-        beside = cache(partial(files_beside, submitted))  # every notebook finds the same
+        work.problems += roster.remarks(submitted, self.gradebook.zone)
+        intake = self._intake(work.student)
         for name in self.notebooks:
-            notebook, piece = self._piece(work, submitted / f"{name}.ipynb", beside)
+            notebook, piece = self._piece(work, name, intake)
             marked = quiz_marks.with_quizzes(
                 Outcome(), notebook, submitted, work.student, self.root
             )
+            asked = quiz_marks.questions(notebook, submitted, work.student, self.root)
+            for cell, (why, command) in asked.items():
+                said = f"{why} Say it with `{command}`, or with --nothing in place of the file."
+                work.problems.append(said)
+                bridge.ask(notebook, said, [cell])
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
             yield replace(piece, marks=marked.verdicts)
 
@@ -159,33 +169,65 @@ class Desk:
         staged = self._staged(student)
         shutil.rmtree(staged, ignore_errors=True)
         staged.mkdir(parents=True)
-        time = roster.timestamp(self._submitted(student) / "timestamp.txt")
+        time = roster.timestamp(self._submitted(student) / "timestamp.txt", self.gradebook.zone)
         if time is not None:
             (staged / "timestamp.txt").write_text(time, encoding="utf-8")
         return staged
 
-    def _piece(
-        self, work: Work, path: Path, beside: Callable[[], Beside]
-    ) -> tuple[NotebookNode, Piece]:
-        source, released = self._originals[path.stem]
+    def _intake(self, student: str) -> Intake:
+        _, release = self.folders
+        return Intake(
+            self._submitted(student),
+            {name: released for name, (_, released) in self._originals.items()},
+            intake_claims.of_student(self.root, self.assignment, student),
+            whose=f"{quoted(self.assignment)} {quoted(student)}",
+            given=frozenset(path.relative_to(release).as_posix() for path in walk(release)),
+        )
+
+    def _piece(self, work: Work, name: str, intake: Intake) -> tuple[NotebookNode, Piece]:
         try:
-            notebook, notes = submission.restore(submission.read(path), source, released)
+            found = intake.notebook(name)
+            work.problems += found.remarks
+            notebook, notes = self._restored(work, name, found)
             program = submission.program(notebook)
-            found = beside()
+            beside = intake.beside(found)
+        except UnclearError as error:
+            work.problems.append(f"{error} {error.suggestion}")
+            notebook, outcome = self._unreadable(name, str(error), "not_checked")
+            bridge.ask(notebook, f"{error} {error.suggestion}", bridge.graded_cells(notebook))
         except SubmissionError as error:
-            notebook, outcome = self._unreadable(path.stem, str(error), "not_checked")
+            notebook, outcome = self._unreadable(name, str(error), "not_checked")
             # Whoever hands in some of the notebooks has left the others out: nothing to look into.
-            left_out = not path.exists() and any(path.parent.glob("*.ipynb"))
-            outcome = replace(outcome, unreadable=not left_out)
+            left_out = not intake.proper(name).exists() and intake.has_others
+            settled = isinstance(error, NotHandedInError)
+            outcome = replace(outcome, unreadable=not (left_out or settled))
         except CourseError:
             raise
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
             reason = f"{type(error).__name__}: {error}"
-            notebook, outcome = self._unreadable(path.stem, reason, "grader_error")
+            notebook, outcome = self._unreadable(name, reason, "grader_error")
         else:
-            notebook.metadata[bridge.NOTES_KEY] = notes + found.notes
-            return notebook, Piece(work, path.stem, Job(program, found.files, self._trust))
-        return notebook, Piece(work, path.stem, outcome=outcome)
+            notebook.metadata[bridge.NOTES_KEY] = [*notes, *beside.notes]
+            return notebook, Piece(work, name, Job(program, beside.files, self._trust))
+        return notebook, Piece(work, name, outcome=outcome)
+
+    def _restored(self, work: Work, name: str, found: Found) -> tuple[NotebookNode, list[str]]:
+        """Return a notebook whose cells are what they should be, and notes for the student."""
+        source, released = self._originals[name]
+        known = intake_cells.recognise(found.notebook, released)
+        notebook, notes = submission.restore(found.notebook, source, released)
+        doubts = {} if found.claimed else known.doubts
+        for why in dict.fromkeys(doubts.values()):
+            cells = [cell for cell, reason in doubts.items() if reason == why]
+            suggestion = (
+                f"Give them their points in the formgrader; or put a notebook in order and claim "
+                f"it, or this one as it stands, with `autograder claim {quoted(self.assignment)} "
+                f"{quoted(work.student)} {quoted(name)} FILE`."
+            )
+            said = f"{name}, {', '.join(cells)}: {why} {suggestion}"
+            work.problems.append(said)
+            bridge.ask(notebook, said, cells)
+        return notebook, [*found.notes, *known.notes, *dict.fromkeys(doubts.values()), *notes]
 
     def _unreadable(self, name: str, reason: str, status: Status) -> tuple[NotebookNode, Outcome]:
         """Return the released notebook in place of one that cannot be read, and why."""
@@ -195,7 +237,7 @@ class Desk:
         return notebook, runner.refuse(submission.program(notebook), reason, status)
 
     def _submitted(self, student: str) -> Path:
-        return self.root / "submitted" / student / self.assignment
+        return roster.folder(self.root, student) / self.assignment
 
     def _staged(self, student: str) -> Path:
         return self.root / bridge.WORK_FOLDER / "staged" / student / self.assignment

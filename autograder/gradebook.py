@@ -10,7 +10,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +21,11 @@ from sqlalchemy.exc import SQLAlchemyError
 from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
-from autograder import database, roster
+from autograder import database, intake_asked, roster
 from autograder.database import GradebookUnusable
+from autograder.intake_asked import Question
 from autograder.ledger import Standing
-from autograder.nbgrader_bridge import RestoreCells, SubmissionExporter
+from autograder.nbgrader_bridge import WORK_FOLDER, RestoreCells, SubmissionExporter
 from autograder.nbgrader_once import Engines, FeedbackExporter
 from autograder.roster import Roster
 from course.errors import CourseError
@@ -42,7 +43,9 @@ class Grade:
     """One student's result: points earned and possible, and whether a person must still look.
 
     ``score`` is less what the course's rules take off for lateness, as in nbgrader's own export.
-    ``cells`` is {notebook: {grade id: points, or None while a manual grade is missing}}.
+    ``cells`` is {notebook: {grade id: points, or None while a manual grade is missing}}, and
+    ``asked`` {notebook: why} of what may have been handed in after all: as long as a person has
+    not settled that, ``score`` is no number to pass on.
     """
 
     student: str
@@ -50,6 +53,7 @@ class Grade:
     max_score: float
     needs_manual_grade: bool
     cells: dict[str, dict[str, float | None]]
+    asked: dict[str, str] = field(default_factory=dict)
 
 
 class CourseGradebook:
@@ -102,15 +106,25 @@ class CourseGradebook:
 
     def grades(self, assignment: str) -> list[Grade]:
         """Return the grades of an assignment, one a student, sorted by student."""
+        asked = intake_asked.of_assignment(self.root / WORK_FOLDER, assignment)
         with self._open() as gradebook:
             submissions = gradebook.assignment_submissions(assignment)
-            return sorted((_grade(s) for s in submissions), key=lambda grade: grade.student)
+            return sorted(
+                (_grade(s, asked.get(s.student.id, {})) for s in submissions),
+                key=lambda grade: grade.student,
+            )
 
     def standings(self, assignment: str, student: str = "") -> dict[str, Standing]:
         """Return how the students (or one) stand in the gradebook, as digests to compare."""
         with self._open() as gradebook:
             rows = database.standing_rows(gradebook.db, assignment, student)
         return {name: Standing(*map(_digest, both)) for name, both in rows.items()}
+
+    @property
+    def zone(self) -> str:
+        """The course's own time zone, as its configuration of the exchange has it; or empty."""
+        zone = self.config.Exchange.get("timezone", "")
+        return zone if isinstance(zone, str) else ""
 
     @property
     def excluded(self) -> frozenset[str]:
@@ -217,7 +231,7 @@ def _digest(rows: list[list[Any]]) -> str:
     return hashlib.sha256("\n".join(ordered).encode()).hexdigest()
 
 
-def _grade(submission: Any) -> Grade:
+def _grade(submission: Any, asked: dict[str, Question]) -> Grade:
     cells: dict[str, dict[str, float | None]] = {}
     for notebook in submission.notebooks:
         cells[notebook.name] = {
@@ -226,12 +240,15 @@ def _grade(submission: Any) -> Grade:
             else float(grade.score)
             for grade in notebook.grades
         }
+    waiting = {name: [cell for cell, points in found.items() if points is None]
+               for name, found in cells.items()}  # fmt: skip
     return Grade(
         submission.student.id,
         max(0.0, float(submission.score) - float(submission.late_submission_penalty)),
         float(submission.max_score),
         bool(submission.needs_manual_grade),
         cells,
+        intake_asked.open_ones(asked, waiting),
     )
 
 

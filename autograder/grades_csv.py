@@ -15,6 +15,8 @@ HEAD = ("assignment", "student_id", "score", "max_score", "needs_manual_grade")
 def write(grades: Mapping[str, list[Grade]], path: Path) -> None:
     """Write one line a student and assignment; a cell that waits for a manual grade is empty.
 
+    The score is empty, too, while a person is asked what was handed in at all (`Grade.asked`).
+
     ``grades`` has the grades of each assignment. A text that a spreadsheet would run as a formula
     has an apostrophe in front.
 
@@ -26,7 +28,9 @@ def write(grades: Mapping[str, list[Grade]], path: Path) -> None:
     rows = [[*HEAD, *(guarded(f"{notebook}:{cell}") for notebook, cell in columns)]]
     for assignment, grade in lines:
         points = [grade.cells.get(notebook, {}).get(cell) for notebook, cell in columns]
-        found = (grade.score, grade.max_score, grade.needs_manual_grade)
+        # What may be zero only because nobody knows yet what was handed in is no number.
+        score = "" if grade.asked else grade.score
+        found = (score, grade.max_score, grade.needs_manual_grade)
         texts = [guarded(assignment), guarded(grade.student), *map(str, found)]
         rows.append([*texts, *("" if p is None else str(p) for p in points)])
     write_whole(path, as_csv(rows))

@@ -8,18 +8,21 @@ reads the notebooks: one that cannot be read is entered with the reason, too.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from nbconvert.exporters import NotebookExporter
 from nbformat import NotebookNode
 from nbformat.v4 import new_output
-from nbgrader.api import Gradebook
+from nbgrader.api import Gradebook, MissingEntry
 from nbgrader.coursedir import CourseDirectory
 from nbgrader.preprocessors import NbGraderPreprocessor
+from nbgrader.utils import parse_utc
 from traitlets import Bool
 
-from autograder import cells, outputs, submission
+from autograder import cells, intake_asked, intake_cells, outputs, roster, submission
 from autograder.beside import files_beside
 from autograder.insight import records
 from autograder.report import Report
@@ -28,7 +31,9 @@ from autograder.verdict import Verdict
 
 NOTES_KEY = "ros2_course_notes"
 UNREADABLE_KEY = "ros2_course_unreadable"
-"""Metadata that the first steps leave for the later ones: remarks, and why there is no more."""
+ASKED_KEY = "ros2_course_asked"
+"""Metadata that the first steps leave for the later ones: remarks, why there is no more, and what a
+person is asked: {grade id: why}."""
 
 WORK_FOLDER = ".autograder"
 """Folder under the course root where the engine keeps outcomes and staged submissions."""
@@ -63,7 +68,11 @@ class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ship
     def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:
         """Mend ``nb`` against the source and the released notebook; remember what was mended."""
         source, released = originals(_coursedir(self), *_names(resources)[::2])
+        known = intake_cells.recognise(nb, released)
         nb, notes = submission.restore(nb, source, released)
+        notes = [*known.notes, *dict.fromkeys(known.doubts.values()), *notes]
+        for name, why in known.doubts.items():
+            ask(nb, why, [name])
         # The grading steps read what is written here: nothing of a submission's own metadata is.
         nb.metadata[NOTES_KEY] = notes
         if UNREADABLE_KEY in resources:
@@ -83,6 +92,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         from autograder import runner
 
         notes = list(nb.metadata.pop(NOTES_KEY, []))
+        asked = dict(nb.metadata.pop(ASKED_KEY, {}))
         unreadable = str(nb.metadata.pop(UNREADABLE_KEY, ""))
         outcome = prepared.get(_names(resources)) or self._outcome(nb, resources, unreadable)
         outcome = runner.with_notes(outcome, notes)
@@ -97,11 +107,11 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
                 cell.source = cells.without_hidden(cell.source)
                 cell.outputs = _graded(verdict)
         resources["ros2_course_outcome"] = outcome
-        resources["ros2_course_flags"] = [
-            name
-            for name, verdict in outcome.verdicts.items()
-            if outcome.unreadable or verdict.needs_human
-        ]
+        # Of what could not be read, nobody knows whether the written answers are empty.
+        flags = graded_cells(nb) if outcome.unreadable else []
+        flags += [name for name, verdict in outcome.verdicts.items() if verdict.needs_human]
+        resources["ros2_course_flags"] = [*dict.fromkeys([*flags, *asked])]
+        resources[ASKED_KEY] = asked
         return nb, resources
 
     def _outcome(self, nb: NotebookNode, resources: Resources, unreadable: str) -> Any:
@@ -134,14 +144,50 @@ class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]
         if "ros2_course_outcome" in resources:
             work = Path(_coursedir(self).root) / WORK_FOLDER
             records.keep(work, assignment, student, notebook, resources["ros2_course_outcome"])
+            asked = resources[ASKED_KEY]
+            why = " ".join(dict.fromkeys(asked.values()))
+            question = intake_asked.Question(why, tuple(asked)) if asked else None
+            intake_asked.keep(work, assignment, student, notebook, question)
+        self._correct_time(resources)
         flags = resources.get("ros2_course_flags", [])
         if flags:
             with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
                 for name in flags:
                     grade = gradebook.find_grade(name, notebook, assignment, student)
                     grade.needs_manual_grade = True
+                    with suppress(MissingEntry):  # nbgrader takes it for an answer left empty
+                        comment = gradebook.find_comment(name, notebook, assignment, student)
+                        comment.auto_comment = None
                 gradebook.db.commit()
         return nb, resources
+
+    def _correct_time(self, resources: Resources) -> None:
+        """Have lateness counted from the time that was meant: nbgrader misreads some zones."""
+        assignment, student, _ = _names(resources)
+        coursedir = _coursedir(self)
+        folder = coursedir.format_path(coursedir.submitted_directory, student, assignment)
+        file = Path(folder) / "timestamp.txt"
+        if not file.exists():
+            return
+        zone = str(self.config.Exchange.get("timezone", ""))
+        time = roster.timestamp(file, zone)
+        with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
+            submitted = gradebook.find_submission(assignment, student)
+            submitted.timestamp = parse_utc(time)
+            gradebook.db.commit()
+
+
+def ask(notebook: NotebookNode, why: str, cells_: Iterable[str]) -> None:
+    """Have a person asked about grade cells of a notebook: they wait for points by hand."""
+    asked = dict(notebook.metadata.get(ASKED_KEY, {}))
+    for name in cells_:
+        asked[name] = why
+    notebook.metadata[ASKED_KEY] = asked
+
+
+def graded_cells(notebook: NotebookNode) -> list[str]:
+    """Return the grade ids of the cells of a restored notebook that earn points."""
+    return [submission.grade_id(c) for c in notebook.cells if submission.metadata(c).get("grade")]
 
 
 def originals(

@@ -10,12 +10,14 @@ the feedback; a file that looks machine-made is marked for a person, with the re
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from nbformat import NotebookNode
 
-from autograder import submission
+from autograder import intake_attempts, submission
+from autograder.intake_names import same
 from autograder.runner import Outcome
 from autograder.verdict import CheckResult, Status, Verdict
 from course.errors import CourseError
@@ -83,7 +85,9 @@ def with_quizzes(
         QuizMarksError: a bank is not sound.
     """
     asked = [name for name in in_cells(notebook) if name in names(root)]
-    marked = {f"{PREFIX}{name}": verdict(find_bank(root, name), folder, student) for name in asked}
+    marked = {
+        f"{PREFIX}{name}": verdict(find_bank(root, name), folder, student, root) for name in asked
+    }
     return replace(outcome, verdicts={**outcome.verdicts, **marked}) if marked else outcome
 
 
@@ -101,19 +105,42 @@ def unmarked(outcome: Outcome, notebook: NotebookNode, root: Path, reason: str) 
     return replace(outcome, verdicts={**outcome.verdicts, **marks})
 
 
-def verdict(bank: Bank, folder: Path, student: str) -> Verdict:
-    """Mark the best attempt that lies in ``folder``."""
+def questions(
+    notebook: NotebookNode, folder: Path, student: str, root: Path
+) -> dict[str, tuple[str, str]]:
+    """Return {grade id: (what a person is asked, the command that answers)} of its quizzes.
+
+    Arguments as in `with_quizzes`.
+    """
+    asked: dict[str, tuple[str, str]] = {}
+    for name in in_cells(notebook):
+        if name in names(root):
+            with suppress(OSError):
+                found = intake_attempts.find(folder, name, student, root)
+                if found.question:
+                    asked[f"{PREFIX}{name}"] = (found.question, found.command)
+    return asked
+
+
+def verdict(bank: Bank, folder: Path, student: str, root: Path | None = None) -> Verdict:
+    """Mark the best attempt that lies in ``folder``.
+
+    The course ``root`` is that above ``submitted/STUDENT/ASSIGNMENT`` if it is left out.
+    """
     name = record.filename(bank.quiz)
+    root = root or folder.parents[2]
     try:
-        content = record.handed_in(folder, bank.quiz)
-    except FileNotFoundError:
+        found = intake_attempts.find(folder, bank.quiz, student, root)
+    except OSError as error:
+        return _unmarked(bank, f"{name} cannot be read ({error.strerror or error}).")
+    if found.content is None:
         reason = (
             f"There is no {name} in the submission: it lies beside the notebook once you have "
             "submitted the quiz, and has to be handed in with it."
         )
-        return _unmarked(bank, reason)
-    except OSError as error:
-        return _unmarked(bank, f"{name} cannot be read ({error.strerror or error}).")
+        status: Status = "not_examined" if found.question else "not_checked"
+        return _unmarked(bank, found.question or reason, status=status)
+    content = found.content
     try:
         marked = regrade.mark_file(bank, content)
     except Exception as error:  # noqa: BLE001 - one student's data must not end the class
@@ -129,7 +156,12 @@ def verdict(bank: Bank, folder: Path, student: str) -> Verdict:
         title = "The attempts were made by a person"
         doubt = CheckResult("attempts", title, "not_examined", 0.0, 0.0, actual=marked.doubt)
         checks = (*checks, doubt)
-    return Verdict(f"{PREFIX}{bank.quiz}", PART, checks, tuple(_notes(marked, student)))
+    if found.question:
+        title = "The attempts are the student's own"
+        whose = CheckResult("login", title, "not_examined", 0.0, 0.0, actual=found.question)
+        checks = (*checks, whose)
+    notes = (*([found.note] if found.note else []), *_notes(marked, student))
+    return Verdict(f"{PREFIX}{bank.quiz}", PART, checks, notes)
 
 
 def in_cells(notebook: NotebookNode) -> Iterator[str]:
@@ -159,7 +191,7 @@ def _notes(marked: regrade.Marked, student: str) -> Iterator[str]:
         f"The best of {count} attempts counts:" if count > 1 else "The one attempt that counts is"
     )
     yield f"{which} number {paper.attempt}. {marked.best.headline}"
-    if paper.student != student:
+    if not same(paper.student, student):
         yield f"It was made under the login '{paper.student}'."
     yield from _remarks(marked)
 

@@ -6,10 +6,12 @@ import difflib
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
-from nbgrader.utils import parse_utc
-
+from autograder import intake_times
+from autograder.intake_names import entry, normal, same, shown
+from autograder.intake_times import UnclearTimeError
 from quizzes.record import read_plain
 
 GLOB = "*?[]"
@@ -44,15 +46,36 @@ def submissions(root: Path, assignment: str, roster: Roster) -> tuple[list[str],
     for folder in _folders(root / "submitted"):
         problem = _misplaced(folder, assignment)
         if not problem and (folder / assignment).is_dir():
-            problem = _bad_id(folder.name) or _stranger(folder.name, roster)
-            good += [] if problem else [folder.name]
+            student = _student(folder.name, roster)
+            problem = _bad_id(folder.name) or _stranger(student, roster)
+            if not problem and student in good:
+                problem = (
+                    f"There is another folder whose name reads '{shown(student)}': put what the "
+                    "student handed in into one of them."
+                )
+            good += [] if problem else [student]
         if problem:
             wrong[folder.name] = problem
     return good, wrong
 
 
-def remarks(folder: Path) -> list[str]:
-    """Return what a person should know about how a submission's folder looks."""
+def _student(name: str, roster: Roster) -> str:
+    """Return the id of the student whose folder has a ``name``: macOS writes letters otherwise."""
+    if name in roster.known:
+        return name
+    return next((known for known in sorted(roster.known) if same(known, name)), normal(name))
+
+
+def folder(root: Path, student: str) -> Path:
+    """Return the folder of what a student handed in, in whichever form the name is written."""
+    return entry(root / "submitted", student)
+
+
+def remarks(folder: Path, zone: str = "") -> list[str]:
+    """Return what a person should know about how a submission's folder looks.
+
+    ``zone`` is the course's own time zone, for the time of submission.
+    """
     found = []
     try:
         cut = sorted(path.name for path in folder.iterdir() if _is_partial_copy(path))
@@ -66,22 +89,36 @@ def remarks(folder: Path) -> list[str]:
             "grade again."
         )
     file = folder / "timestamp.txt"
-    if os.path.lexists(file) and timestamp(file) is None:
-        found.append("timestamp.txt holds no date, so the time of submission is unknown.")
+    if os.path.lexists(file):
+        try:
+            _time(file, zone)
+        except UnclearTimeError as error:
+            found.append(
+                f"timestamp.txt is not clear: {error}. So the time of submission is unknown, and "
+                "nothing is taken off for lateness: write it as in 2026-11-27 20:15 +0100, then "
+                "grade again."
+            )
+        except (OSError, ValueError):
+            found.append("timestamp.txt holds no date, so the time of submission is unknown.")
     return found
 
 
-def timestamp(file: Path) -> str | None:
-    """Return a time of submission that nbgrader can read, or None."""
+def timestamp(file: Path, zone: str = "") -> str | None:
+    """Return a time of submission as nbgrader reads it, or None if there is none that is clear.
+
+    ``zone`` is the course's own time zone (see `intake_times.read`).
+    """
     try:
-        content = read_plain(file, LONGEST_TIME + 1)
-        if len(content) > LONGEST_TIME:
-            return None
-        text = content.decode("utf-8").strip()
-        parse_utc(text)
-    except Exception:  # noqa: BLE001 - a stranger's text: dateutil fails in many ways
+        return intake_times.for_nbgrader(_time(file, zone))
+    except (OSError, ValueError):
         return None
-    return text
+
+
+def _time(file: Path, zone: str) -> datetime:
+    content = read_plain(file, LONGEST_TIME + 1)
+    if len(content) > LONGEST_TIME:
+        raise ValueError("too long")
+    return intake_times.read(content.decode("utf-8-sig").strip(), zone)
 
 
 def of_people(people: Mapping[str, bool], create: bool) -> Roster:

@@ -109,17 +109,27 @@ def _text(path: Path) -> str:
                 f"{path.name} has {status.st_size / 2**20:.0f} MB, more than the "
                 f"{MAX_NOTEBOOK // 2**20} MB that are read: clear its outputs and hand it in again."
             )
-        return path.read_text(encoding="utf-8-sig")
+        return decoded(path.read_bytes(), path.name)
     except FileNotFoundError:
         raise SubmissionError(f"There is no {path.name} in the submission.") from None
-    except UnicodeError as error:
-        raise SubmissionError(
-            f"{path.name} is not valid JSON ({str(error)[:120]}): the file was cut off or damaged; "
-            "hand in the original again."
-        ) from None
     except OSError as error:
         raise SubmissionError(
             f"{path.name} cannot be read ({error.strerror}): hand in the notebook itself."
+        ) from None
+
+
+def decoded(content: bytes, name: str) -> str:
+    """Return the text of a notebook's file; ``name`` is the file's, for what is said of it.
+
+    Raises:
+        SubmissionError: it is no UTF-8.
+    """
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeError as error:
+        raise SubmissionError(
+            f"{name} is not valid JSON ({str(error)[:120]}): the file was cut off or damaged; "
+            "hand in the original again."
         ) from None
 
 

@@ -47,7 +47,8 @@ def canvas(data: ClassData, column: str = "", *, provisional: bool = False) -> E
         data: the class.
         column: the assignment's name in Canvas, with its id, as in "Exercise 1 (4711)", if it is
             there already; the name in nbgrader if left out. Canvas makes a new one of an unknown.
-        provisional: also export grades that still wait for a person.
+        provisional: also export grades that still wait for a person, unless they are asked what
+            was handed in at all.
     """
     rows: list[Sequence[str]] = [
         (*CANVAS_COLUMNS, _header(data, column)),
@@ -95,7 +96,7 @@ def as_csv(rows: Iterable[Sequence[str]]) -> str:
 
 
 def _export(data: ClassData, rows: list[Sequence[str]], students: int, provisional: bool) -> Export:
-    left_out = () if provisional else tuple(g.student for g in data.grades if _waits(g))
+    left_out = tuple(g.student for g in data.grades if not _is_exported(g, provisional))
     shown = (grade.student for grade in data.grades if grade.student not in left_out)
     odd = tuple(student for student in shown if is_formula(student))
     return Export(as_csv(rows), students, left_out, odd)
@@ -105,8 +106,13 @@ def _complete(data: ClassData, provisional: bool) -> list[tuple[Person, Grade]]:
     return [
         (data.people.get(grade.student, Person(grade.student)), grade)
         for grade in data.grades
-        if provisional or not _waits(grade)
+        if _is_exported(grade, provisional)
     ]
+
+
+def _is_exported(grade: Grade, provisional: bool) -> bool:
+    """Whether a grade is passed on; never while it is not clear what was handed in."""
+    return not grade.asked and (provisional or not _waits(grade))
 
 
 def _waits(grade: Grade) -> bool:

@@ -43,6 +43,10 @@ def people_needed(data: ClassData) -> list[Need]:
 def _reasons(data: ClassData, grade: Grade) -> Iterator[tuple[bool, str]]:
     explained = False
     for notebook, cells in grade.cells.items():
+        if notebook in grade.asked:
+            explained = True
+            yield True, feedback.stripped(grade.asked[notebook], [grade.student])
+            continue
         record = data.records.get(grade.student, {}).get(notebook)
         waiting = [cell for cell, points in cells.items() if points is None]
         examined = set(record.verdicts) if record else set()

@@ -1,0 +1,66 @@
+"""Names that strangers gave to files and folders: compared as people read them, shown safely.
+
+macOS writes an "ü" as "u" and two dots (decomposed), other systems as one letter (composed); both
+are the same name to whoever reads them.
+"""
+
+from __future__ import annotations
+
+import shlex
+import unicodedata
+from collections.abc import Iterable
+from pathlib import Path
+
+LONGEST_SHOWN = 300
+"""Characters of a name that are shown."""
+
+_MOST_NAMED = 4
+
+
+def normal(name: str) -> str:
+    """Return a name in the composed form, in which equal names are equal strings."""
+    return unicodedata.normalize("NFC", name)
+
+
+def same(one: str, other: str) -> bool:
+    """Whether two names read the same."""
+    return normal(one) == normal(other)
+
+
+def entry(folder: Path, name: str) -> Path:
+    """Return where ``name`` lies in a folder, in whichever form it is written there.
+
+    What lies there under exactly this name comes first; if there is nothing, that is its place.
+    """
+    place = folder / name
+    if place.is_symlink() or place.exists():
+        return place
+    try:
+        return next((path for path in sorted(folder.iterdir()) if same(path.name, name)), place)
+    except OSError:
+        return place
+
+
+def shown(name: str) -> str:
+    """Return a name as it can be shown: line breaks and other control characters as escapes."""
+    text = "".join(_escaped(letter) for letter in normal(name))
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}…"
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names as part of a sentence, in quotes; of many only the first."""
+    some = [f"'{shown(name)}'" for name in names]
+    if len(some) > _MOST_NAMED:
+        return f"{', '.join(some[:_MOST_NAMED])} and {len(some) - _MOST_NAMED} more"
+    return " and ".join(filter(None, [", ".join(some[:-1]), *some[-1:]]))
+
+
+def quoted(name: str) -> str:
+    """Return a name as it is typed in a shell; `shown` if it has characters that nobody types."""
+    return shlex.quote(shown(name))
+
+
+def _escaped(letter: str) -> str:
+    if letter.isprintable():
+        return letter
+    return letter.encode("unicode_escape", "surrogatepass").decode("ascii")
