@@ -21,11 +21,11 @@ from autograder.rigs.backlogs import (
 )
 from autograder.rigs.gap import Aftermath, radio_gap
 from autograder.rigs.joining import require_no_past
+from autograder.rigs.pauses import BURST
 from autograder.rigs.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Sensor
 from autograder.rigs.refusal import Refusal, refusal
 from autograder.rigs.sensors import CONSUMERS, DRIVERS, SensorRig, sensor_rig
 from autograder.rigs.singles import require_each_at_once
-from autograder.rigs.stalling import BURST
 from autograder.rigs.stops import (
     amiss,
     around,

@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 from autograder.exam import Failed, NotExaminable
+from autograder.rigs.pauses import BURST, Backlog, Burst
 from autograder.rigs.readings import IMU, LIDAR, STOP, Sensor, is_open
 from autograder.rigs.sensors import SensorRig
 from autograder.rigs.singles import thinned
-from autograder.rigs.stalling import (
-    BURST,
-    EVENTS,
-    LONGEST,
-    Backlog,
-    Burst,
-    busy_consumer,
-    short_pause,
-)
+from autograder.rigs.stalling import EVENTS, LONGEST, busy_consumer, short_pause
 
-THINNED = 0.8  # a driver that publishes less than this share of the readings drops some
 OPEN_SCANS = 10  # scans that are sent until the consumer hands one on
 
 
@@ -35,7 +27,7 @@ def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
         )
     if found.altered or sensor.topic in rig.node.altered:
         raise altered(sensor)
-    if found.published < (found.count if sensor is STOP else (found.count - 1) * THINNED):
+    if found.withheld:
         raise _withheld(rig, sensor, found.count, found.published)
     if fewer := thinned(rig, sensor):
         raise _withheld(rig, sensor, *fewer)
@@ -67,15 +59,15 @@ def _withheld(rig: SensorRig, sensor: Sensor, came: int, went: int) -> Failed:
 def require_fresh(rig: SensorRig, sensor: Sensor, expected: str) -> None:
     """Fail unless the consumer goes on with the newest after a long pause, and keeps up then."""
     found = backlog(rig, sensor)
-    count, kept, most, behind = found.count, found.kept, sensor.most, found.behind
-    if max(kept, default=-1) < count - 1:
+    kept, behind = found.kept, found.behind
+    if found.unfinished:
         actual = (
-            f"Of {count} readings in a pause the newest never came out: it got "
+            f"Of {found.count} readings in a pause the newest never came out: it got "
             f"{few(kept)}{rig.raised()}."
         )
-    elif found.replayed > most and found.oldest > most / sensor.rate:
+    elif found.stale:
         actual = f"It then worked through the last {found.replayed} of {found.published} readings."
-    elif kept != sorted(kept):
+    elif found.disordered:
         actual = f"It passed them on out of order: {few(kept)}."
     elif behind is not None and behind.undecided:
         raise NotExaminable(

@@ -23,7 +23,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
-from autograder.rigs.readings import IMU, SENSORS, STOP, Sensor
+from autograder.rigs.readings import IMU, Sensor
 from autograder.rigs.sensors import SensorRig
 
 WATCHED = 0.8  # s after a pause; from then on a fresh reading shows that a consumer keeps up
@@ -95,14 +95,18 @@ class Share:
 
 
 def pursue(
-    rig: SensorRig, phase: str, resumed: int, stop: Callable[[Sensor], None]
+    rig: SensorRig,
+    sensors: Iterable[Sensor],
+    phase: str,
+    resumed: int,
+    stop: Callable[[Sensor], None],
 ) -> dict[str, Pursuit]:
     """Watch what is handed on since ``resumed`` (ns); return what was seen, by sensor name.
 
     To be called while readings go on coming in, which it lets ``stop`` where all has been seen: on
     a busy machine the others then come at their rate sooner.
     """
-    pursuits = [Pursuit(rig, sensor, phase, resumed) for sensor in SENSORS if sensor is not STOP]
+    pursuits = [Pursuit(rig, sensor, phase, resumed) for sensor in sensors]
     watched = list(pursuits)
 
     def over(enough: Callable[[Pursuit], bool]) -> bool:

@@ -15,12 +15,14 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import partial
+from itertools import count
 from typing import Any
 
 from rclpy.qos import ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import Bench
+from autograder.rigs.patience import Patience
 from autograder.rigs.phrases import callback_raised
 from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor
 from autograder.rigs.sensor_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
@@ -29,8 +31,6 @@ from course import WaitTimeout
 
 DRIVERS, CONSUMERS = "SensorDrivers", "SensorConsumers"
 
-SETTLE = 8.0
-"""Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
 ENDLESS = 3600 * 10**9
 """Nanoseconds: a lifespan of an hour or more is as good as none."""
 PROBE_PERIOD = 0.1
@@ -81,12 +81,21 @@ class SensorRig:
             qos = lossless() if reliable else undemanding()
             self.node.listen(sensor, topic, qos, self.node.consumed)
 
-    def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
-        """Wait until ``condition`` holds; return whether it did before the deadline."""
+    def wait(self, condition: Callable[[], Any], timeout: float | None = None) -> bool:
+        """Wait until ``condition`` holds; return whether it did before the deadline.
+
+        Without ``timeout`` (s) that is when it would have come: see `Patience`.
+        """
+        if timeout is None:
+            return self.patience().wait(self._session, condition)
         with suppress(WaitTimeout):
             self._session.until(condition, timeout=timeout, what="an observation")
             return True
         return False
+
+    def patience(self) -> Patience:
+        """Return for how long something is waited for that may never come."""
+        return Patience(self._still)
 
     def rest(self, patience: float = RESTLESS) -> None:
         """Return when all that was sent has been dealt with, or after ``patience`` s of work."""
@@ -110,10 +119,12 @@ class SensorRig:
         self._probes += 1
         phase = f"probe{self._probes}"
         silent = list(sensors)
-        for attempt in range(int(SETTLE / PROBE_PERIOD)):
+        patience = self.patience()
+        for attempt in count():
             self._round(silent, heard, phase, attempt)
             silent = self._silent(silent, heard, phase)
-            if all(give_up is not None and give_up(sensor) for sensor in silent):
+            hopeless = all(give_up is not None and give_up(sensor) for sensor in silent)
+            if hopeless or not patience.lasts():
                 break
         return silent
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from autograder.exam import Failed
 from autograder.rigs.readings import SENSORS, Sensor
 from autograder.rigs.sensor_node import LAG
-from autograder.rigs.sensors import SETTLE, SensorRig
+from autograder.rigs.sensors import SensorRig
 
 SINGLES = 16
 MOST = 3 * SINGLES
@@ -127,7 +127,7 @@ def _held_for_the_next(rig: SensorRig, records: dict[Sensor, _Record]) -> list[S
         if len(record.missed) > 1 and record.missed[-1] - record.missed[-2] == 1
     ]
     # Perhaps it was the machine that did not come to it.
-    rig.wait(lambda: not any(record.unseen(last) for _, record, last in running), SETTLE / 2)
+    rig.wait(lambda: not any(record.unseen(last) for _, record, last in running))
     return [sensor for sensor, record, last in running if record.unseen(last)]
 
 

@@ -11,74 +11,27 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 
-from autograder.rigs.pursuit import Handing, Share, pursue
+from autograder.rigs.patience import SETTLE_S
+from autograder.rigs.pauses import BURST, Backlog, Burst
+from autograder.rigs.pursuit import pursue
 from autograder.rigs.readings import IMU, SENSORS, STOP, Sensor
 from autograder.rigs.sensor_node import LAG, Stream
-from autograder.rigs.sensors import CONSUMERS, SETTLE, SensorRig
+from autograder.rigs.sensors import CONSUMERS, SensorRig
+from autograder.rigs.singles import thinned
 
 PAUSE = 1.5  # s that the consumer is busy
 EVENTS = 100  # stop events in that time
 LONGEST = 60  # s that these may take
 LULL = 0.06  # s without readings at its end: more than half of the time between two scans
-BURST = 5  # IMU readings that come in while the consumer is busy for 50 ms
 PROMPT, YOUNG = 0.15, 0.35
 """Seconds from the end of a short pause in which a burst comes out of an idle machine, and from
 its first reading on in which it must: a design that goes by the age of a reading (0.5 s is old) may
 rightly find a later one too old, and then it is the machine that is slow."""
 TRIES = 8
 TURNS = BURST + 2  # of a driver, after which a consumer has had one for each reading of a burst
-
-
-@dataclass(frozen=True)
-class Backlog:
-    """One sensor's readings: how many came in during the pause, and what became of them.
-
-    ``published`` is how many of these the driver put on the topic. ``kept`` has the numbers in the
-    order in which the consumer passed them on; those from ``count`` on came in after the pause.
-    ``replayed`` is how many the driver published from the first of them to the end of the pause: it
-    may have lost some of its own, which nobody can have kept.
-    ``oldest`` is how old the first of them was at the end of the pause, in s since its publication.
-    ``early`` says that some came out while the consumer was held back, ``behind`` what it handed on
-    when it had fallen far behind later on, if it did, ``omits`` what share it handed on then, if it
-    left out some again and again. ``altered`` says that the driver changed some reading, ``again``
-    how many stop events have been handed on more than once.
-    """
-
-    count: int
-    published: int
-    kept: list[int]
-    replayed: int
-    oldest: float
-    early: bool
-    behind: Handing | None
-    omits: Share | None
-    altered: bool
-    again: int
-
-
-@dataclass(frozen=True)
-class Burst:
-    """What a consumer passed on of a burst, in order; ``aged`` if a reading may have got old.
-
-    ``published`` is how many of the burst the driver put on the topic.
-    """
-
-    kept: list[int]
-    published: int
-    aged: bool
-
-    @property
-    def missing(self) -> int:
-        """How many readings were lost."""
-        return BURST - len(set(self.kept))
-
-    @property
-    def telling(self) -> bool:
-        """Whether what is missing tells something of the consumer."""
-        return not self.missing or (self.published == BURST and not self.aged)
 
 
 def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
@@ -103,30 +56,53 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     # All but the events go on, as on a robot.
     for sensor in SENSORS:
         _drain(rig, sensor, phase, counts[sensor.name], streams.values())
+
+    def left(sensor: Sensor) -> Backlog:
+        name = sensor.name
+        return _left(rig, sensor, phase, counts[name], published[name], resumed, name in early)
+
+    # What is decided is not watched any longer, and no more of it comes in.
+    open_ones = [s for s in SENSORS if s is not STOP and not _is_decided(rig, left(s))]
     for sensor in SENSORS:
-        if sensor is not STOP:
+        if sensor in open_ones:
             streams[sensor.name].insist()
-    pursuits = pursue(rig, phase, resumed, lambda sensor: streams[sensor.name].stop())
+        else:
+            streams[sensor.name].stop()
+    pursuits = pursue(rig, open_ones, phase, resumed, lambda s: streams[s.name].stop())
     for stream in streams.values():
         stream.stop()
-    found = {}
-    for s in SENSORS:
-        kept = rig.consumed(s, phase)
-        pursuit = pursuits.get(s.name)  # of stop events there is none
-        oldest = (resumed - rig.published(s, phase, min(kept))) / 1e9 if kept else 0.0
-        found[s.name] = Backlog(
-            count=counts[s.name],
-            published=len(published[s.name]),
-            kept=kept,
-            replayed=sum(number >= min(kept, default=0) for number in published[s.name]),
-            oldest=oldest,
-            early=s.name in early,
-            behind=pursuit.behind if pursuit else None,
-            omits=pursuit.omits if pursuit else None,
-            altered=s.topic in rig.node.altered,
-            again=rig.comes_again() if s is STOP else 0,
-        )
+    found = {s.name: left(s) for s in SENSORS}
+    for name, pursuit in pursuits.items():
+        found[name] = replace(found[name], behind=pursuit.behind, omits=pursuit.omits)
     return found
+
+
+def _is_decided(rig: SensorRig, found: Backlog) -> bool:
+    return found.decided or thinned(rig, found.sensor) is not None
+
+
+def _left(
+    rig: SensorRig,
+    sensor: Sensor,
+    phase: str,
+    count: int,
+    published: set[int],
+    resumed: int,
+    early: bool,
+) -> Backlog:
+    """Return what has become of a sensor's readings by now."""
+    kept = rig.consumed(sensor, phase)
+    return Backlog(
+        sensor,
+        count=count,
+        published=len(published),
+        kept=kept,
+        replayed=sum(number >= min(kept, default=0) for number in published),
+        oldest=(resumed - rig.published(sensor, phase, min(kept))) / 1e9 if kept else 0.0,
+        early=early,
+        altered=sensor.topic in rig.node.altered,
+        again=rig.comes_again() if sensor is STOP else 0,
+    )
 
 
 @contextmanager
@@ -183,7 +159,7 @@ def _drain(
         rig.wait(lambda: len(set(rig.consumed(sensor, phase))) >= count, PROMPT)
     elif not is_out():
         with _held(streams):
-            rig.rest(SETTLE)
+            rig.rest(SETTLE_S)
         rig.wait(is_out)
 
 
@@ -194,14 +170,14 @@ def short_pause(rig: SensorRig) -> Burst:
     driver has lost.
     """
     for number in range(TRIES):
-        patience = SETTLE if number == TRIES - 1 else PROMPT
+        patience = None if number == TRIES - 1 else PROMPT
         burst = _burst(rig, f"short pause {number}", patience)
         if burst.telling:
             break
     return burst
 
 
-def _burst(rig: SensorRig, phase: str, patience: float) -> Burst:
+def _burst(rig: SensorRig, phase: str, patience: float | None) -> Burst:
     rig.rest()  # what still waits for the consumer would be ahead of the burst
     rig.subject.pause(CONSUMERS)
     stream = Stream(rig.node, IMU, phase, BURST)
@@ -235,9 +211,11 @@ def _turns_later(rig: SensorRig, phase: str) -> int:
     it shares a thread with the consumer, and after as many of its turns (ns) the consumer has had
     its own.
     """
-    deadline = time.monotonic() + SETTLE
+    patience = rig.patience()
     number = 0
-    while number < TURNS or not (rig.consumed(IMU, phase) or time.monotonic() > deadline):
+    while number < TURNS or not rig.consumed(IMU, phase):
+        if not patience.lasts() and number >= TURNS:
+            break
         due = time.monotonic() + (0 if number < TURNS else 1 / IMU.rate)
         rig.node.publish(IMU, phase, number)
         rig.wait(partial(rig.taken, IMU, phase, number), LAG)

@@ -86,6 +86,10 @@ class Stillness:
                 self._nap.wait(_NAP)
             before, looked = now, moment
 
+    def all_asleep(self) -> bool:
+        """Return whether every thread of both sleeps just now; one that never does not count."""
+        return self._look().awake is None
+
     def _blame(self, worked: Mapping[Task, float], most: float) -> None:
         """Note who has computed for the larger part of a rest that was not reached."""
         row = {t: s + self._restless.get(t, 0.0) for t, s in worked.items() if s >= most}

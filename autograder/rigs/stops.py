@@ -10,9 +10,10 @@ from rclpy.qos import QoSProfile
 
 from autograder.exam import Failed
 from autograder.rigs.backlogs import backlog, few, lost
+from autograder.rigs.patience import SETTLE_S
 from autograder.rigs.readings import STOP, Heard
 from autograder.rigs.sensor_node import LAG, lossless, undemanding
-from autograder.rigs.sensors import DRIVERS, PRESSES, SETTLE, SensorRig
+from autograder.rigs.sensors import DRIVERS, PRESSES, SensorRig
 
 EVENTS = 5
 WORDS = (0, 1, 0, 1)
@@ -76,7 +77,7 @@ def _press(rig: SensorRig) -> bool:
     rig.subject.pause(DRIVERS)
     for index in range(EVENTS - 1):
         rig.node.publish(STOP, "event", index)
-    rig.node.hardware[STOP.name].wait_for_all_acked(Duration(seconds=SETTLE))
+    rig.node.hardware[STOP.name].wait_for_all_acked(Duration(seconds=SETTLE_S))
     rig.subject.resume(DRIVERS)
     rig.wait(lambda: rig.taken(STOP, "event", EVENTS - 2), LAG)
     rig.node.publish(STOP, "event", EVENTS - 1)
