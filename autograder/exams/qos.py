@@ -12,6 +12,11 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import StudentError
 from autograder.exam import Exam, Failed, NotExaminable
+from autograder.rigs.alike import (
+    require_each_of_the_same,
+    require_same_again,
+    require_told_apart,
+)
 from autograder.rigs.backlogs import (
     altered,
     require_burst,
@@ -33,7 +38,6 @@ from autograder.rigs.stops import (
     require_all_heard,
     require_no_repeats,
     require_only_events,
-    require_told_apart,
 )
 
 EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
@@ -203,6 +207,7 @@ def camera_newest(rig: SensorRig) -> None:
     """
     expected = f"After a pause at most the last {CAMERA.most} frames (1 s) are processed."
     require_fresh(rig, CAMERA, expected)
+    require_same_again(rig, CAMERA)
 
 
 @EXAM.check(
@@ -222,6 +227,7 @@ def lidar_fresh(rig: SensorRig) -> str:
     expected = f"After a pause no scan older than 0.5 s (the last {LIDAR.most}) is acted on."
     require_fresh(rig, LIDAR, expected)
     require_open_scans(rig)
+    require_same_again(rig, LIDAR)
     return _practice(rig, LIDAR)
 
 
@@ -263,6 +269,7 @@ def imu_burst(rig: SensorRig) -> str:
         raise
     require_burst(rig, expected)
     require_whole(rig)
+    require_each_of_the_same(rig)
     return _practice(rig, IMU)
 
 

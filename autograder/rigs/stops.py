@@ -13,11 +13,9 @@ from autograder.rigs.backlogs import backlog, few, lost
 from autograder.rigs.patience import SETTLE_S
 from autograder.rigs.readings import STOP, Heard
 from autograder.rigs.sensor_node import LAG, lossless, undemanding
-from autograder.rigs.sensors import DRIVERS, PRESSES, SensorRig
+from autograder.rigs.sensors import DRIVERS, SensorRig
 
 EVENTS = 5
-WORDS = (0, 1, 0, 1)
-"""Events that bear the same words again, as pressed, released, pressed, released do."""
 
 
 def require_all_heard(rig: SensorRig, *, give_up: bool) -> Sequence[Heard]:
@@ -111,23 +109,6 @@ def require_no_repeats(rig: SensorRig, listeners: Sequence[Heard]) -> None:
                 f"{EVENTS} came again where they had been heard before. A consumer would brake "
                 "again for an event that is over.",
             )
-
-
-def require_told_apart(rig: SensorRig) -> None:
-    """Fail unless the consumer also hands on events that bear the words of earlier ones."""
-    for sent, number in enumerate(WORDS, 1):
-        rig.node.publish(STOP, PRESSES, number)
-        # Of stop events only one is ever on its way into a driver.
-        rig.wait(lambda n=sent: len(rig.witnessed(STOP, PRESSES)) >= n, LAG)  # type: ignore[misc]
-    rig.wait(lambda: len(rig.consumed(STOP, PRESSES)) >= len(WORDS))
-    if (got := rig.consumed(STOP, PRESSES)) != list(WORDS):
-        raise Failed(
-            expected="A stop event is handled even if it bears the words of an earlier one, as one "
-            "press of the button does of another.",
-            actual=f"{len(WORDS)} events came in, the last two with the words of the first two. "
-            f"The driver published {len(rig.witnessed(STOP, PRESSES))} of them, and your "
-            f"consumer handed on {len(got)}{rig.raised()}.",
-        )
 
 
 def require_all_handled(rig: SensorRig) -> None:

@@ -29,11 +29,12 @@
 # emergency stop remembers its last event for late joiners is up to you.
 #
 # The drivers publish each reading as soon as the hardware delivers it, at most 0.1 s later, with
-# its content unchanged; the consumers hand on, in order, what they act on: they may change its header and
-# clean its content, but not leave it out. On `emergency/stop` and `consumer/emergency_stop` come
-# stop events and nothing else. What a consumer already held before a pause does not count against
-# it. And it keeps up while readings come in: a list that fills faster than it is emptied, or is
-# always full, is a queue, too, and the same bounds hold for it.
+# its content unchanged; the consumers hand on, in order, what they act on: they may change its
+# header and clean its content, but not leave it out, not even if it reads like the one before. On
+# `emergency/stop` and `consumer/emergency_stop` come stop events and nothing else. What a consumer
+# already held before a pause does not count against it. And it keeps up while readings come in: a
+# list that fills faster than it is emptied, or is always full, is a queue, too, and the same bounds
+# hold for it.
 #
 # Each node has all its publishers and subscriptions once its constructor has returned, whether or
 # not anybody listens yet.
