@@ -153,17 +153,21 @@ class Subject:
         """Execute the node's callbacks again, beginning with what queued up."""
         self._ask("resume", name)
 
-    def advance(self, seconds: float, step: float = 0.01) -> None:
+    def advance(self, seconds: float, step: float = 0.01) -> bool:
         """Move simulated time on (see `course.Session.sim`); needs `open` with ``sim_time``.
+
+        Returns:
+            Whether some callback has begun, and not ended by now.
 
         Raises:
             StudentError: a callback held up a step for longer than PATIENCE.
             SubjectGone: it does not answer at all.
         """
-        self._ask(
+        reply = self._ask(
             "advance", f"{seconds:g} s of simulated time", REPLY_TIMEOUT + PATIENCE,
             seconds=seconds, step=step, patience=PATIENCE,
         )  # fmt: skip
+        return self._read(lambda: bool(reply["goes_on"]))
 
     def nudge(self) -> None:
         """Tell its nodes that a nanosecond of simulated time has passed; wait for no callback."""
@@ -221,9 +225,10 @@ class Subject:
         )
 
     def wall_waits(self) -> list[str]:
-        """Return in which methods of rclpy's callbacks wait by the wall clock now, and where.
+        """Return which callbacks wait by the wall clock now, and where, a phrase each.
 
-        Each is like ``wait_for_service: Asker.ask of /asker (at line 7: ...)``.
+        Each is like ``wait_for_service: Asker.ask of /asker (at line 7: ...)``, where the method is
+        rclpy's, or without it: see `autograder.wall_waits`.
         """
         reply = self._ask("wall_waits", "", doing="say what its callbacks wait for")
         return self._read(lambda: _texts(reply["waits"], MAX_ERROR))

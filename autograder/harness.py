@@ -26,6 +26,7 @@ from autograder.raised import (
     spins,
     student_trace,
 )
+from autograder.wall_waits import wall_waits
 from autograder.wire import Channel, ChannelClosed
 from course import Session
 from course.runtime.context import default_context_beside
@@ -193,7 +194,7 @@ class Harness:
     def _advance(self, request: dict[str, Any]) -> dict[str, Any]:
         seconds, step, patience = (float(request[k]) for k in ("seconds", "step", "patience"))
         self._hosting.sim.advance(seconds, step, patience)
-        return {}
+        return {"goes_on": bool(self._hosting.blocked_callbacks(0.0))}
 
     def _nudge(self, _: dict[str, Any]) -> dict[str, Any]:
         self._hosting.sim.nudge()
@@ -234,8 +235,8 @@ class Harness:
         }
 
     def _wall_waits(self, request: dict[str, Any]) -> dict[str, Any]:
-        waits = [one for one in self._hosting.blocked_callbacks(0.0) if one.wall_wait]
-        return {"waits": [f"{one.wall_wait}: {one.what}"[:500] for one in waits]}
+        waits = wall_waits(self._hosting.blocked_callbacks(0.0))
+        return {"waits": [told[:500] for told in waits]}
 
     def _errors(self, request: dict[str, Any]) -> dict[str, Any]:
         recent = self._hosting.errors[-5:]

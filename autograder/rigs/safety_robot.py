@@ -22,6 +22,14 @@ ROUNDS = 10  # of requests that may follow from each other while time stands sti
 SETTLE = 8.0  # s of wall time that endpoints may take to find each other; 0.3 s as a rule
 
 
+NAP_S = 0.1
+"""Seconds of wall time that a thread may nap between two looks at the node's clock."""
+
+
+class WallWait(Failed):
+    """A callback waits by the wall clock: what comes after that, and when, says nothing more."""
+
+
 class Robot:
     """One of the student's nodes at work."""
 
@@ -33,6 +41,7 @@ class Robot:
         """
         self.name, self._bench, self._player, self._still = name, bench, player, still
         self._unserved = False
+        self._goes_on = False  # a callback that was there at the end of the last stride
         # What earlier nodes of the same session raised, of whom this one knows nothing.
         self._known = bench.subject.own_errors()
         self._raised = frozenset(bench.subject.errors())
@@ -101,10 +110,11 @@ class Robot:
 
     @contextmanager
     def unserved(self) -> Iterator[None]:
-        """Let no callback wait by the wall clock within the block: nobody serves what it asks for.
+        """Look before each stride whether a callback waits by the wall clock: nobody serves it.
 
-        How much simulated time such a wait takes depends on the machine, and so would every
-        observation. Threads of the student's own may wait as they like.
+        Outside such a block that is looked for only while some callback goes on. How much simulated
+        time such a wait takes depends on the machine, and so would every observation. Threads of
+        the student's own may wait as they like.
         """
         self._unserved = True
         try:
@@ -115,10 +125,11 @@ class Robot:
     def _go_on(self, seconds: float) -> None:
         # Now, and not after the stride: what the node does has just come to rest, so that a wait
         # has only begun, while a stride with a blocked callback takes long in real time.
-        waits = self._bench.subject.wall_waits() if self._unserved else []
+        looks = self._unserved or self._goes_on
+        waits = self._bench.subject.wall_waits() if looks else []
         self._player.now += seconds  # before: what comes in on the way bears the stride's end
         try:
-            self._bench.subject.advance(seconds)
+            self._goes_on = self._bench.subject.advance(seconds)
         except StudentError:
             raise Failed(
                 expected=f"No callback of {self.name} blocks while something is slow or broken.",
@@ -127,11 +138,27 @@ class Robot:
                 + self.complaint(),
             ) from None
         if waits:
-            raise Failed(
-                expected=f"All waiting of {self.name} runs on the node's clock.",
-                actual=_of_waits(waits).strip(),
-            )
+            raise WallWait(expected=self._by_the_clock, actual=_of_waits(waits).strip())
         self.rest()
+
+    @property
+    def _by_the_clock(self) -> str:
+        return f"All waiting of {self.name} runs on the node's clock."
+
+    def require_still(self, happened: Callable[[], Any], what: str, seconds: float) -> None:
+        """Require that something does not happen while the node's clock stands still.
+
+        A thread or a timer on the wall clock would go on. ``what`` it would be, as a clause.
+        """
+        if waits := self._bench.subject.wall_waits():
+            raise WallWait(expected=self._by_the_clock, actual=_of_waits(waits).strip())
+        if happened() or not self._still.reached() or self.wait(happened, NAP_S):
+            return  # it came by then, or somebody is at work all the time: that proves nothing
+        if self.wait(happened, seconds):
+            raise WallWait(
+                expected=self._by_the_clock,
+                actual=f"{what}, within {seconds:g} s of wall time, while that stood still.",
+            )
 
     def complaint(self) -> str:
         """Return what a callback and a thread raised last, a sentence each; empty if none did.

@@ -44,6 +44,7 @@ class BlockedCallback:
         advice: what to do about it.
         wall_wait: the method of rclpy in which it waits by the wall clock, such as
             ``wait_for_service``, or "".
+        thread_id: Python's identifier of the thread that runs it.
         key: tells this run of the callback from any other.
     """
 
@@ -55,6 +56,7 @@ class BlockedCallback:
     holds_up: bool
     advice: str
     wall_wait: str
+    thread_id: int
     key: tuple[int, float]
 
     @property
@@ -112,6 +114,7 @@ def describe(job: Job) -> BlockedCallback:
         holds_up=len({other.thread_id for other in home.running.copy()} - {0}) >= home.threads,
         advice=advice,
         wall_wait=next((name for frame in frames if (name := _wall_wait(frame))), ""),
+        thread_id=job.thread_id,
         key=(id(job), job.since),
     )
 

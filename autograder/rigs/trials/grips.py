@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 
 from autograder.exam import Failed
 from autograder.rigs.gripper import GripUser
 from autograder.rigs.safety import RobotRig
-from autograder.rigs.safety_robot import COARSE, STRIDE, Robot
+from autograder.rigs.safety_robot import COARSE, STRIDE, Robot, WallWait
 from autograder.rigs.trials import heart
 from autograder.rigs.trials.gripping import (
     ALLOWED,
@@ -29,6 +30,7 @@ ANSWER = 1.0  # s after which a try without an answer has failed
 FIRST_GAP = 1.5  # s between the first two tries: 1 s without an answer, 0.5 s of pause
 GROWTH = 0.5  # s by which the second pause is longer, at least
 IDLE = 2.0  # s in which a node that has not been asked for anything shows its heartbeat
+HELD_S = 1.0  # s of wall time for which the node's clock stands still in the first pause
 BACK = 1.8  # s after a request in which the gripper comes back: a third try is still to come
 GIVEN_UP = "After three tries without an answer"
 SECOND = " That was at the second request in a row that got no answer; at the first all was right."
@@ -73,7 +75,8 @@ def refused(rig: RobotRig) -> None:
         tried(robot, user, True)
         _refuses(robot, user, "When the gripper answered success=False")
         tried(robot, user, False)
-        robot.run(lambda: len(user.tries) > 1 or user.outcomes, LONGEST, COARSE)
+        with suppress(WallWait):
+            robot.run(lambda: len(user.tries) > 1 or user.outcomes, LONGEST, COARSE)
         tries_again = len(user.tries) > 1
         if tries_again:
             when = "When the gripper answered not the first try, but the second with success=False"
@@ -110,7 +113,7 @@ def unanswered(rig: RobotRig) -> None:
     So it does with the next request, too: the tries and pauses of that one begin anew.
     """
     with client(rig) as (robot, user):
-        _given_up(robot, user, True)
+        _given_up(robot, user, True, held=True)
         user.tries[2].reply(True)
         once(robot, user, f"{GIVEN_UP}, and a late answer to the third")
         try:
@@ -128,12 +131,23 @@ def _soon_after(robot: Robot, user: GripUser) -> None:
     _carries_out(robot, user, False, SLOW, LEFT)
 
 
-def _given_up(robot: Robot, user: GripUser, close: bool) -> None:
-    """Ask for a grip, answer no try, and require three of them, their pauses and the outcome."""
+def _given_up(robot: Robot, user: GripUser, close: bool, *, held: bool = False) -> None:
+    """Ask for a grip, answer no try, and require three of them, their pauses and the outcome.
+
+    ``held``: time stands still for a while when the first try has had its own.
+    """
     tried(robot, user, close)
     began = user.now
+
+    def goes_on() -> bool:
+        return len(user.tries) > 1 or bool(user.outcomes)
+
     # In half strides: they blur how short the first pause is.
-    robot.run(lambda: len(user.tries) > 1 or user.outcomes, DEADLINE, STRIDE / 2)
+    robot.run(goes_on, ANSWER + STRIDE / 2, STRIDE / 2)
+    if held:
+        what = f"{ANSWER:g} s after the first try the next one came, or an outcome"
+        robot.require_still(goes_on, what, HELD_S)
+    robot.run(goes_on, DEADLINE + began - user.now, STRIDE / 2)
     if len(user.tries) > 1:
         user.tries[1].crash()
     robot.run(lambda: len(user.tries) > 2 or user.outcomes, DEADLINE + began - user.now)
