@@ -131,7 +131,7 @@ def test_lint_says_all_that_is_wrong_with_several_banks(tmp_path: Path, autograd
     assert "exam.yaml: 7 to mend" in said
     assert said.count("field objektive: there is no such field: did you mean 'objective'?") == 3
     assert said.count("field objective: it is missing") == 3
-    assert "line 28, item 'timer-rate-1', field unti: there is no such field: did you mean" in said
+    assert "line 29, item 'timer-rate-1', field unti: there is no such field: did you mean" in said
     assert "Its questions are read critically once these are mended." in said
     assert "tab.yaml is not valid YAML: line 2: a tab" in error
     assert "There is no quiz 'nobody'" in error
