@@ -5,31 +5,28 @@
 from __future__ import annotations
 
 import contextlib
-import itertools
-import statistics
 from typing import Any
 
 from rclpy.qos import QoSProfile
 
-from course import ambient, plain, values
-from course.errors import SessionError, WaitTimeout
+from course import ambient, plain
+from course.errors import SessionError
 from course.graph import reader, words
 from course.graph.model import Graph, Topic
+from course.ros import listening
 from course.ros.arguments import Add, operands, type_and_values
 from course.ros.arguments import timeout as add_timeout
 from course.ros.qos import declare as declare_qos
 from course.ros.qos import profile
 from course.ros.repetitions import declare as add_repetitions
 from course.ros.repetitions import repetitions
-from course.ros.types import agreed, message
-from course.runtime.arguments import seconds, whole
+from course.ros.types import message, message_type
+from course.runtime.arguments import whole
 from course.runtime.names import type_name
-from course.runtime.offers import full_topic, load_type
-from course.runtime.waiting import Deadline
+from course.runtime.offers import load_type
 from course.values import to_data
 
 NOUN = "topic"
-_ENOUGH = 20  # messages for a rate that one late message does not spoil
 
 
 def list_(
@@ -80,82 +77,6 @@ def info(topic: str, verbose: bool = False) -> str:
     return "\n".join(lines)
 
 
-def echo(
-    topic: str, asked: str, count: int, timeout: float, field: str, longest: int, flow_style: bool,
-    **qos: Any,
-) -> str:  # fmt: skip
-    """Show the next message of a topic; -n for more."""
-    whole(count, "-n", least=1, example=1)
-    longest = whole(longest, "-l", least=0, example=128)
-    msg_type = _agreed(topic, asked) if asked else None
-    deadline = Deadline(seconds(timeout))
-    with ambient.record(
-        topic, msg_type, limit=count, timeout=timeout, qos=profile(qos, "sensor_data")
-    ) as recorder:
-        try:
-            messages = recorder.wait(count, round(deadline.left, 2))
-        except WaitTimeout:
-            messages = recorder.messages
-            if not messages:
-                raise
-    shown = [_part(stamped.message, field) for stamped in messages[:count]]
-    # A longest of 0 keeps all.
-    data = [values.to_plain(part, longest or None) for part in shown]
-    if flow_style:
-        return "\n---\n".join(plain.one_line(one) for one in data)
-    return "---\n".join(plain.lines(one).removesuffix("...\n") for one in data)
-
-
-def _part(message: Any, field: str) -> Any:
-    """Return what a path such as ``pose.position.x`` stands for in a message."""
-    part = message
-    for name in field.split(".") if field else ():
-        known = [slot for slot, _ in values.fields(type(part))] if _is_message(part) else []
-        if name not in known:
-            raise SessionError(
-                f"--field {field}: {plain.shown(name)} is no field there, it has "
-                f"{', '.join(known) or 'none'}."
-            )
-        part = getattr(part, name)
-    return part
-
-
-def _is_message(part: Any) -> bool:
-    return hasattr(part, "get_fields_and_field_types")
-
-
-def hz(topic: str, window: int, timeout: float) -> str:
-    """Measure the rate at which messages are published."""
-    whole(window, "--window", least=2, example=_ENOUGH)
-    deadline = Deadline(seconds(timeout))
-    with ambient.record(topic, timeout=timeout, limit=window) as recorder:
-        try:
-            recorder.wait(window, round(deadline.left, 2))
-        except WaitTimeout as error:
-            if recorder.count < 2:
-                raise _too_few(error, recorder.count, topic, timeout) from None
-        stamps = [stamped.stamp_ns / 1e9 for stamped in recorder.messages]
-        rate = recorder.rate()
-    gaps = [later - earlier for earlier, later in itertools.pairwise(stamps)]
-    return (
-        f"average rate: {rate:.3f} Hz over {len(stamps)} messages\n"
-        f"  period: min {min(gaps):.4f} s, max {max(gaps):.4f} s, "
-        f"standard deviation {statistics.pstdev(gaps):.4f} s"
-    )
-
-
-def _too_few(error: WaitTimeout, count: int, topic: str, timeout: float) -> WaitTimeout:
-    """Return what there is to say of a topic on which two messages did not come in time."""
-    if not ambient.session().observer.count_publishers(_full(topic)):
-        return error  # it says that nobody publishes: listening longer helps nobody
-    only = "Only one message" if count else "No message"
-    why = "" if count else f" {str(error).partition('. ')[2]}"
-    return WaitTimeout(
-        f"{only} arrived on {_full(topic)} in {timeout:g} s, and a rate takes two.{why} A slow "
-        f"topic takes longer: %ros topic hz {topic} --timeout {4 * timeout:g}."
-    )
-
-
 def pub(
     topic: str, asked: str, text: str, named: str, once: bool, times: int | None,
     rate: float | None, subscriptions: int | None, timeout: float, **qos: Any,
@@ -163,7 +84,7 @@ def pub(
     """Publish one message, once a subscription is there to get it; -r and -t for more."""
     session = ambient.session()
     asked, text = operands(asked, text, named)
-    msg_type = _agreed(topic, asked)
+    msg_type = message_type(topic, asked)
     number, rate = repetitions(once, times, rate)
     endless = number > 1 and times is None
     least = subscriptions if subscriptions is not None else 0 if endless else 1
@@ -184,19 +105,6 @@ def pub(
                 done, others = number_sent, max(others, publisher.get_subscription_count())
     heard = plain.counted(others, "subscription") if others else "nobody: no subscription fits"
     return f"Published {plain.counted(done, 'message')} on {topic}, to {heard}: {to_data(sent)}"
-
-
-def _agreed(topic: str, asked: str) -> Any:
-    """Return the class of a topic's type: as asked for, or as on the graph."""
-    observer = ambient.session().observer
-    name = full_topic(observer, topic)
-    types = dict(observer.get_topic_names_and_types()).get(name, [])
-    if not (asked or types):
-        raise SessionError(
-            f"Nobody uses {topic}, so its type is unknown: name it behind the topic, as in %ros "
-            f'topic pub {topic} std_msgs/msg/String "data: hello".'
-        )
-    return agreed("msg", name, asked, types)
 
 
 def _graph(everything: bool = False) -> Graph:
@@ -238,26 +146,6 @@ def _declare_find(add: Add) -> None:
     add("asked", metavar="TYPE", help="as in std_msgs/msg/String")
 
 
-def _declare_echo(add: Add) -> None:
-    _declare_topic(add)
-    add("asked", metavar="TYPE", nargs="?", default="", help="as in std_msgs/msg/String")
-    add("-n", "--count", type=int, default=1, metavar="N", help="how many messages (1)")
-    add("--once", dest="count", action="store_const", const=1, help="one message")
-    add("--field", default="", metavar="F", help="only this field, as in pose.position.x")
-    add("-l", "--truncate-length", dest="longest", type=int, default=values.LONGEST, metavar="N",
-        help="so many elements of a sequence")  # fmt: skip
-    add("-f", "--full-length", dest="longest", action="store_const", const=0, help="all of them")
-    add("--flow-style", action="store_true", help="each message on one line")
-    add_timeout(add)
-    declare_qos(add)
-
-
-def _declare_hz(add: Add) -> None:
-    _declare_topic(add)
-    add("-w", "--window", type=int, default=_ENOUGH, metavar="N", help="over so many messages")
-    add_timeout(add)
-
-
 def _declare_pub(add: Add) -> None:
     _declare_topic(add)
     type_and_values(add, "std_msgs/msg/String", "'{data: hello}'")
@@ -271,8 +159,8 @@ def _declare_pub(add: Add) -> None:
 VERBS = {
     "list": (list_, _declare_list),
     "info": (info, _declare_info),
-    "echo": (echo, _declare_echo),
-    "hz": (hz, _declare_hz),
+    "echo": (listening.echo, listening.declare_echo),
+    "hz": (listening.hz, listening.declare_hz),
     "pub": (pub, _declare_pub),
     "type": (show_type, _declare_topic),
     "find": (find, _declare_find),

@@ -1,5 +1,7 @@
 """The type of a topic, service or action, as asked for or as on the graph, and its messages."""
 
+# mypy: allow-untyped-calls
+
 from __future__ import annotations
 
 import time
@@ -8,10 +10,10 @@ from typing import Any
 
 from rosidl_parser.definition import NamespacedType
 
-from course import values
+from course import ambient, values
 from course.errors import SessionError
 from course.runtime.names import type_name
-from course.runtime.offers import load_type
+from course.runtime.offers import full_topic, load_type
 from course.runtime.session import Session
 
 
@@ -62,3 +64,20 @@ def _stamped(msg_type: Any, data: Any, stamp: Mapping[str, int]) -> Any:
         elif isinstance(given, Mapping):
             filled[name] = _stamped(values.class_of(slot), given, stamp)
     return filled
+
+
+def message_type(topic: str, asked: str) -> Any:
+    """Return the class of a topic's type: as asked for, or as on the graph.
+
+    Raises:
+        SessionError: see `agreed`; or nobody uses the topic, and no type was asked for.
+    """
+    observer = ambient.session().observer
+    name = full_topic(observer, topic)
+    types = dict(observer.get_topic_names_and_types()).get(name, [])
+    if not (asked or types):
+        raise SessionError(
+            f"Nobody uses {topic}, so its type is unknown: name it behind the topic, as in %ros "
+            f'topic pub {topic} std_msgs/msg/String "data: hello".'
+        )
+    return agreed("msg", name, asked, types)

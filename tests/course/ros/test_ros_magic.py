@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -234,6 +235,21 @@ def test_what_has_a_rate_and_no_end_ends_by_itself(
     )
     said = answer(capsys, 'service call -r 10 /lamp std_srvs/srv/SetBool "{data: true}"')
     assert said.count("message: lamp True") == 5
+
+
+def test_an_interrupt_ends_what_has_a_rate_without_an_error(
+    robot: Robot, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(repetitions, "TIMEOUT", 60.0)
+
+    def stop(_message: String) -> None:
+        if len(robot.orders) == 3:
+            _thread.interrupt_main()
+
+    robot.create_subscription(String, "orders", stop, 10)
+    said = answer(capsys, 'topic pub -r 20 /orders std_msgs/msg/String "{data: go}"')
+    assert said.startswith("Published ")
+    assert 3 <= int(said.split()[1]) < 1000
 
 
 def test_headers_and_times_are_filled_in(robot: Robot, capsys: pytest.CaptureFixture[str]) -> None:
