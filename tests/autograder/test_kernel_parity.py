@@ -17,7 +17,7 @@ from autograder.sandbox import probe
 from autograder.submission import Cell
 from tests.machine import needs_isolation, needs_warm_starts
 
-pytestmark = [needs_isolation, pytest.mark.xdist_group("kernel")]
+pytestmark = [needs_isolation, pytest.mark.xdist_group("kernel"), pytest.mark.timeout(600)]
 
 Output = dict[str, Any]
 
@@ -46,7 +46,9 @@ def stock(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Output]]:
         resources={"metadata": {"path": str(tmp_path_factory.mktemp("stock"))}},
     )  # fmt: skip
     client.on_cell_executed = client.shows_help
-    client.execute()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("PYTEST_CURRENT_TEST", raising=False)  # ipykernel looks for it
+        client.execute()
     outputs = [with_widgets(cell.outputs, client.widget_state) for cell in notebook.cells]
     return dict(zip(PROBES, outputs, strict=True))
 
@@ -165,6 +167,20 @@ def test_a_cell_that_waits_for_input_says_that_nobody_types(source: str, functio
     assert output["ename"] == "StdinNotImplementedError"
     assert output["evalue"].startswith(said)
     assert output["traceback"] == [f"StdinNotImplementedError: {output['evalue']}"]
+
+
+def test_a_fork_of_a_cell_prints_into_the_cell() -> None:
+    source = """
+import os
+pid = os.fork()
+if pid == 0:
+    print('by a fork')
+    os._exit(0)
+os.waitpid(pid, 0)[1]
+"""
+    text, value = runner.run((Cell(source),)).outputs[0]
+    assert text["text"] == "by a fork\n"
+    assert value["data"] == {"text/plain": "0"}
 
 
 def test_what_a_cell_shows_changes_when_a_later_one_says_so() -> None:
