@@ -51,12 +51,12 @@ def files_beside(folder: Path) -> Beside:
                 room -= status.st_size
     if too_large:
         beside.notes.append(
-            f"Your code was run without {_named(too_large)}: the files beside the notebooks may "
+            f"Your code was run without {named(too_large)}: the files beside the notebooks may "
             f"have {MAX_BYTES // 2**20} MB together. Hand in smaller ones."
         )
     if links:
         beside.notes.append(
-            f"Your code was run without {_named(links)}: a link leads out of the submission. Hand "
+            f"Your code was run without {named(links)}: a link leads out of the submission. Hand "
             "in the file itself."
         )
     if len(paths) >= MAX_FILES:
@@ -72,7 +72,8 @@ def _is_passed_over(name: Path) -> bool:
     return hidden or name.suffix == ".ipynb" or name == Path("timestamp.txt")
 
 
-def _named(names: list[str]) -> str:
+def named(names: list[str]) -> str:
+    """Return the first few ``names`` of a stranger's files, and how many more there are."""
     shown = [f"'{os.fsencode(name).decode(errors='replace')[:100]}'" for name in names]
     more = len(shown) - _MOST_NAMED
     return ", ".join(shown[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

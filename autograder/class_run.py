@@ -89,8 +89,9 @@ class ClassRun:
         self._feedback, self._since = feedback, since
         self._ledger = Ledger(desk.work_folder, desk.assignment)
         self._course = ledger.of_course(
-            desk.root, desk.folders, workers.modes[0], _exams(desk.assignment)
-        )
+            desk.root, desk.folders, workers.modes[0], _exams(desk.assignment),
+            desk.gradebook.late_rule,
+        )  # fmt: skip
         self._running: dict[str, list[Piece]] = {}
         self._refusals: Counter[str] = Counter()
         self._failures: Counter[str] = Counter()
@@ -252,7 +253,7 @@ class ClassRun:
         self._ledger.remove(work.student)
         try:
             graded = _summary(work, self._desk.notebooks)
-            standing = self._desk.enter(work, same=same)
+            entered = self._desk.enter(work, same=same)
             missing = self._missing_feedback(work)
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
             work.failure = _reason(error)
@@ -261,11 +262,12 @@ class ClassRun:
             self._ledger.put(
                 work.student,
                 Entry(
-                    work.made_of, standing, graded.points, graded.max_points, graded.seconds,
-                    graded.problem, self._feedback and not missing,
+                    work.made_of, entered.standing, graded.points, graded.max_points,
+                    graded.seconds, graded.problem, self._feedback and not missing,
                 ),
             )  # fmt: skip
-        return replace(graded, problem=f"{graded.problem} {missing}".strip())
+        # Not in the record: it is said once, and then the gradebook shows what waits.
+        return _with_remarks(graded, entered.asked, missing)
 
     def _missing_feedback(self, work: Work) -> str:
         """Write feedback on grades that are entered, or say why there is none: they stand."""
@@ -282,12 +284,16 @@ class ClassRun:
         try:
             self._desk.set_aside(work, work.failure)
             graded = _summary(work, self._desk.notebooks)
-            self._desk.enter(work)
+            entered = self._desk.enter(work)
             missing = self._missing_feedback(work)
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
             problem = " ".join(dict.fromkeys([*work.problems, work.failure, _reason(error)]))
             return Graded(work.student, {}, problem=problem, entered=False)
-        return replace(graded, problem=f"{graded.problem} {missing}".strip())
+        return _with_remarks(graded, entered.asked, missing)
+
+
+def _with_remarks(graded: Graded, *remarks: str) -> Graded:
+    return replace(graded, problem=" ".join(filter(None, (graded.problem, *remarks))))
 
 
 def _summary(work: Work, notebooks: list[str]) -> Graded:

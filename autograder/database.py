@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import errno
+import sqlite3
 import tempfile
 from collections.abc import Callable, Iterable
+from contextlib import closing
+from datetime import timedelta
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -126,6 +129,24 @@ def require_this_schema(db_url: str, root: Path) -> None:
         engine.dispose()
 
 
+def copied(db_url: str, root: Path, copy: Path) -> str:
+    """Return the URL of a gradebook to try something with: a copy, or a new one for other kinds.
+
+    Raises:
+        GradebookUnusable: the gradebook of ``root`` cannot be read.
+    """
+    file = Path(db_url.removeprefix("sqlite:///"))
+    if db_url.startswith("sqlite:///") and file.is_file():
+        try:
+            with closing(sqlite3.connect(file)) as old, closing(sqlite3.connect(copy)) as new:
+                old.backup(new)
+        except sqlite3.Error as error:
+            raise unusable(str(error), root) or GradebookUnusable(
+                f"The gradebook of {root} cannot be read ({error}): put a copy back that was sound."
+            ) from error
+    return f"sqlite:///{copy}"
+
+
 @cache
 def _this_schema() -> str | None:
     """Return the name of the newest schema that the installed nbgrader knows."""
@@ -149,7 +170,10 @@ def _old(root: Path) -> OldGradebookError:
 
 
 def standing_rows(db: Session, assignment: str, student: str = "") -> dict[str, tuple[Rows, Rows]]:
-    """Return {student: (what was found automatically, what people set)} of an assignment.
+    """Return {student: (what grading found and goes by, what people set)} of an assignment.
+
+    Grading goes by the due date, an extension, and what a cell is worth. What is taken off for
+    lateness may depend on the whole score, so where somebody is late, it goes by people's marks.
 
     Args:
         db: the gradebook's session.
@@ -163,12 +187,29 @@ def standing_rows(db: Session, assignment: str, student: str = "") -> dict[str, 
         query = query.filter(Assignment.name == assignment)
         return query.filter(submitted.student_id == student) if student else query
 
-    whole = db.query(submitted.student_id, submitted.timestamp, submitted.extension)
-    for name, time, extension in chosen(whole.join(Assignment)):
-        rows[name] = ([[str(time)]], [[str(extension)]])
-    for name, notebook, cell, auto, *by_hand in chosen(_of_cells(db, Grade, Grade.auto_score,
-            Grade.manual_score, Grade.extra_credit, Grade.needs_manual_grade)):  # fmt: skip
-        rows[name][0].append([notebook, cell, auto])
+    late = set()
+    whole = db.query(
+        submitted.student_id, submitted.timestamp, submitted.extension, Assignment.duedate
+    )
+    for name, time, extension, due in chosen(whole.join(Assignment)):
+        rows[name] = ([[str(time), str(extension), str(due)]], [])
+        if time is not None and due is not None and time > due + (extension or timedelta()):
+            late.add(name)
+    penalties = db.query(
+        submitted.student_id, Notebook.name, SubmittedNotebook.late_submission_penalty
+    )
+    of_notebooks = penalties.select_from(SubmittedNotebook).join(Notebook).join(
+        submitted, SubmittedNotebook.assignment_id == submitted.id
+    )  # fmt: skip
+    for name, *penalty in chosen(
+        of_notebooks.join(Assignment, submitted.assignment_id == Assignment.id)
+    ):
+        rows[name][0].append(penalty)
+    for name, notebook, cell, auto, kind, worth, *by_hand in chosen(_of_cells(db, Grade,
+            Grade.auto_score, BaseCell.type, Grade.max_score, Grade.manual_score,
+            Grade.extra_credit, Grade.needs_manual_grade)):  # fmt: skip
+        marks = by_hand[:2] if name in late else []
+        rows[name][0].append([notebook, cell, auto, kind, worth, *marks])
         rows[name][1].append([notebook, cell, *by_hand])
     for name, notebook, cell, auto, by_hand in chosen(
         _of_cells(db, Comment, Comment.auto_comment, Comment.manual_comment)

@@ -12,7 +12,17 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
-from autograder import intake_cells, intake_claims, ledger, quiz_marks, roster, runner, submission
+from autograder import (
+    intake_cells,
+    intake_claims,
+    ledger,
+    marked,
+    quiz_marks,
+    roster,
+    runner,
+    staging,
+    submission,
+)
 from autograder import nbgrader_bridge as bridge
 from autograder.files import walk
 from autograder.gradebook import CourseGradebook, GradebookError
@@ -20,6 +30,7 @@ from autograder.intake import Found, Intake, NotHandedInError, UnclearError
 from autograder.intake_names import quoted
 from autograder.jobs import Job
 from autograder.ledger import Standing
+from autograder.marked import MarkedCells, MarkedStore
 from autograder.nbgrader_once import FeedbackExporter
 from autograder.runner import Outcome
 from autograder.submission import SubmissionError
@@ -60,6 +71,19 @@ class Piece:
     marks: Mapping[str, Verdict] = field(default_factory=dict)
 
 
+@dataclass(frozen=True)
+class Entered:
+    """What became of a submission that was entered.
+
+    Attributes:
+        standing: how its student now stands in the gradebook.
+        asked: what a person has to mark again, and why, as a sentence; empty if nothing.
+    """
+
+    standing: Standing
+    asked: str
+
+
 class Desk:
     """Reads the submissions of one assignment, and enters their outcomes."""
 
@@ -73,6 +97,7 @@ class Desk:
         self.root = gradebook.root
         self.work_folder = self.root / bridge.WORK_FOLDER
         self._trust = trust
+        self._marked = MarkedStore(self.work_folder, assignment)
         self._originals = {
             name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
         }
@@ -107,10 +132,12 @@ class Desk:
         """Stage a submission's notebooks one by one."""
         submitted, staged = self._submitted(work.student), self._stage(work.student)
         work.problems += roster.remarks(submitted, self.gradebook.zone)
+        limits = self.gradebook.file_limits
+        work.problems += staging.copy_files(submitted, staged, limits, self.notebooks)
         intake = self._intake(work.student)
         for name in self.notebooks:
             notebook, piece = self._piece(work, name, intake)
-            marked = quiz_marks.with_quizzes(
+            quizzes = quiz_marks.with_quizzes(
                 Outcome(), notebook, submitted, work.student, self.root
             )
             asked = quiz_marks.questions(notebook, submitted, work.student, self.root)
@@ -119,7 +146,7 @@ class Desk:
                 work.problems.append(said)
                 bridge.ask(notebook, said, [cell])
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
-            yield replace(piece, marks=marked.verdicts)
+            yield replace(piece, marks=quizzes.verdicts)
 
     def set_aside(self, work: Work, reason: str) -> None:
         """Stage the released notebooks in place of a submission's, with ``reason`` as outcomes."""
@@ -127,51 +154,69 @@ class Desk:
         for name in self.notebooks:
             notebook, outcome = self._unreadable(name, reason, "grader_error")
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
-            marked = quiz_marks.unmarked(outcome, notebook, self.root, reason)
-            work.outcomes[name] = marked
+            work.outcomes[name] = quiz_marks.unmarked(outcome, notebook, self.root, reason)
 
     def refused(self, piece: Piece, reason: str, status: Status) -> Outcome:
         """Return the outcome of a notebook that could not be run after all, for ``reason``."""
         assert piece.job is not None
         return runner.refuse(piece.job.program, reason, status)
 
-    def enter(self, work: Work, *, same: bool = False) -> Standing:
+    def enter(self, work: Work, *, same: bool = False) -> Entered:
         """Enter one student's outcomes into the gradebook; return how the student then stands.
 
         Only ever in the one writer. ``same`` says that it is the submission that was entered the
-        last time: then what a person has graded need not be looked at again.
+        last time.
 
         Raises:
             GradebookError: nbgrader cannot enter this student.
             GradebookUnusable: it could not enter anybody.
         """
+        before = self._marked_before(work.student)
         for name, outcome in work.outcomes.items():
             bridge.prepared[self.assignment, work.student, name] = outcome
-        settled = self.gradebook.settled(self.assignment, work.student) if same else {}
         try:
             self.gradebook.autograde(self.assignment, work.student)
         finally:
             for name in work.outcomes:
                 bridge.prepared.pop((self.assignment, work.student, name), None)
         shutil.rmtree(self._staged(work.student).parent, ignore_errors=True)
-        if settled:
-            self.gradebook.settle(self.assignment, work.student, settled)
+        staging.let_feedback_replace(self._autograded(work.student), self.notebooks)
+        asked = self._settle(work.student, before, same=same)
         standings = self.gradebook.standings(self.assignment, work.student)
         if work.student not in standings:
             raise GradebookError(
                 f"nbgrader entered nothing for {work.student}, and did not say why: look whether "
                 "nbgrader_config.py leaves this student out."
             )
-        return standings[work.student]
+        return Entered(standings[work.student], asked)
+
+    def _marked_before(self, student: str) -> MarkedCells:
+        """Return what a person has marked so far, and keep it until the student is entered."""
+        scores = self.gradebook.settled(self.assignment, student)
+        settled = marked.with_copy(scores, self._autograded(student))
+        # Of a run that was ended in between: its marks are asked for, and the copy may be gone.
+        before = {**self._marked.get(student), **settled}
+        if before:
+            self._marked.put(student, before)
+        return before
+
+    def _settle(self, student: str, before: MarkedCells, *, same: bool) -> str:
+        """Take the marks of what is still the same for good; return what is to be marked again."""
+        if not before:
+            return ""
+        scores = self.gradebook.automatic(self.assignment, student, before)
+        after = marked.with_copy(scores, self._autograded(student))
+        asked = marked.changes(before, after, same=same)
+        self.gradebook.settle(self.assignment, student, after.keys() - asked.keys())
+        self._marked.remove(student)
+        return marked.remark(asked)
 
     def _stage(self, student: str) -> Path:
-        """Return an empty folder for a submission's notebooks, with the time it was handed in."""
+        """Return a folder for a submission's notebooks, empty but for the exchange's marks."""
         staged = self._staged(student)
         shutil.rmtree(staged, ignore_errors=True)
         staged.mkdir(parents=True)
-        time = roster.timestamp(self._submitted(student) / "timestamp.txt", self.gradebook.zone)
-        if time is not None:
-            (staged / "timestamp.txt").write_text(time, encoding="utf-8")
+        staging.copy_marks(self._submitted(student), staged, self.gradebook.zone)
         return staged
 
     def _intake(self, student: str) -> Intake:
@@ -241,6 +286,9 @@ class Desk:
 
     def _staged(self, student: str) -> Path:
         return self.root / bridge.WORK_FOLDER / "staged" / student / self.assignment
+
+    def _autograded(self, student: str) -> Path:
+        return self.root / "autograded" / student / self.assignment
 
     def _has(self, step: str, student: str, suffix: str) -> bool:
         folder = self.root / step / student / self.assignment

@@ -6,9 +6,10 @@ import hashlib
 import json
 import logging
 import re
+import sys
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,21 +22,36 @@ from sqlalchemy.exc import SQLAlchemyError
 from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
-from autograder import database, intake_asked, roster
+from autograder import database, intake_asked, penalties, roster
 from autograder.database import GradebookUnusable
 from autograder.intake_asked import Question
 from autograder.ledger import Standing
 from autograder.nbgrader_bridge import WORK_FOLDER, RestoreCells, SubmissionExporter
 from autograder.nbgrader_once import Engines, FeedbackExporter
 from autograder.roster import Roster
+from autograder.staging import Limits
 from course.errors import CourseError
+
+CONFIG = "nbgrader_config.py"
 
 LOCK_PATIENCE = 30.0
 """Seconds that another program may hold the gradebook: SQLite itself waits 5 s at a time."""
 
 
+_OWN_ERROR = re.compile(r"^(?:[\w.]*NbGraderException|RuntimeError): ")
+"""How a line begins in which nbgrader itself says what is wrong."""
+
+
 class GradebookError(CourseError):
-    """nbgrader could not do what was asked; the message carries its own last words."""
+    """nbgrader could not do what was asked; the message carries its own last words.
+
+    ``reason`` is those words alone, if it said any.
+    """
+
+    def __init__(self, message: str, reason: str = "") -> None:
+        """Say ``message``."""
+        super().__init__(message)
+        self.reason = reason
 
 
 @dataclass(frozen=True)
@@ -59,15 +75,31 @@ class Grade:
 class CourseGradebook:
     """nbgrader on one course root (the folder with ``nbgrader_config.py``)."""
 
-    def __init__(self, root: Path, *, staged: str = "") -> None:
+    def __init__(
+        self,
+        root: Path,
+        *,
+        staged: str = "",
+        released: Path | None = None,
+        trial: Path | None = None,
+    ) -> None:
         """Use the course at ``root``.
 
-        ``staged`` names a folder of submissions whose cells have been restored already; nbgrader
-        then reads these in place of ``submitted``.
+        Args:
+            root: the folder with its ``nbgrader_config.py``.
+            staged: a folder of submissions whose cells have been restored already; nbgrader then
+                reads these in place of ``submitted``.
+            released: where it puts releases, in place of ``release``.
+            trial: the same, and it works on a copy of the gradebook that is made there.
         """
         self.root = root.resolve()
         config = _config(self.root)
         config.CourseDirectory.root = str(self.root)
+        if place := trial or released:
+            config.CourseDirectory.release_directory = str(place)
+        if trial:
+            url = CourseDirectory(config=config).db_url
+            config.CourseDirectory.db_url = database.copied(url, self.root, trial / "gradebook.db")
         if staged:
             config.CourseDirectory.submitted_directory = staged
             steps = config.Autograde.sanitize_preprocessors
@@ -131,6 +163,28 @@ class CourseGradebook:
         """The students whom nbgrader passes over, as the course's configuration says."""
         return frozenset(self.coursedir.student_id_exclude.split(",")) - {""}
 
+    @property
+    def late_rule(self) -> str:
+        """A digest of how points are taken off for lateness.
+
+        Raises:
+            GradebookUnusable: the plugin for it cannot be loaded.
+        """
+        try:
+            return penalties.rule_digest(self.config)
+        except Exception as error:
+            raise GradebookUnusable(
+                f"The plugin for late penalties that {self.root / CONFIG} names cannot be loaded "
+                f"({_first_line(error)}): mend it, then run the same command again."
+            ) from error
+
+    @property
+    def file_limits(self) -> Limits:
+        """How much of what lies beside a notebook nbgrader takes, as its configuration says."""
+        course = self.coursedir
+        most = 1000 * course.max_dir_size
+        return Limits(tuple(course.ignore), 1000 * course.max_file_size or most, most)
+
     def settled(self, assignment: str, student: str) -> dict[tuple[str, str], float | None]:
         """Return {(notebook, cell): automatic score} of what a person has graded for good."""
         with self._open() as gradebook:
@@ -145,19 +199,28 @@ class CourseGradebook:
                 if grade.manual_score is not None and not grade.needs_manual_grade
             }
 
-    def settle(
-        self, assignment: str, student: str, cells: dict[tuple[str, str], float | None]
-    ) -> None:
-        """Take a person's grades for good again, wherever the automatic score is still the same.
+    def automatic(
+        self, assignment: str, student: str, cells: Iterable[tuple[str, str]]
+    ) -> dict[tuple[str, str], float | None]:
+        """Return {(notebook, cell): automatic score} of those of ``cells`` that there are."""
+        found = {}
+        with self._open() as gradebook:
+            for notebook, cell in cells:
+                with suppress(MissingEntry):  # the assignment has lost a cell since
+                    grade = gradebook.find_grade(cell, notebook, assignment, student)
+                    found[notebook, cell] = grade.auto_score
+        return found
+
+    def settle(self, assignment: str, student: str, cells: Iterable[tuple[str, str]]) -> None:
+        """Take a person's marks of these (notebook, cell) for good again.
 
         nbgrader wants each to be looked at again after autograding, as the work may be another.
         """
         with self._open() as gradebook:
-            for (notebook, cell), score in cells.items():
-                with suppress(MissingEntry):  # the assignment has lost a cell since
-                    grade = gradebook.find_grade(cell, notebook, assignment, student)
-                    if grade.manual_score is not None and grade.auto_score == score:
-                        grade.needs_manual_grade = False
+            for notebook, cell in cells:
+                grade = gradebook.find_grade(cell, notebook, assignment, student)
+                if grade.manual_score is not None:
+                    grade.needs_manual_grade = False
             gradebook.db.commit()
 
     def roster(self) -> Roster:
@@ -185,8 +248,9 @@ class CourseGradebook:
             database.full(said, self.root, self._written()) or database.unusable(raised, self.root)
         ):
             raise unusable
+        why = _why(said)
         raise GradebookError(
-            f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: {_why(said)}"
+            f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: {why}", why
         )
 
     def _written(self) -> list[Path]:
@@ -221,9 +285,10 @@ def _why(said: str) -> str:
     """Return the line of nbgrader's log that names the cause: of a traceback, the last line."""
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     causes = [line for line in lines if re.match(r"[\w.]+(Error|Exception|Entry)\b", line)]
-    # Of what nbgrader itself raises in the end, none says why.
-    told = [line for line in causes if "NbGraderException" not in line]
-    return (told or causes or lines or ["no reason given"])[-1][:300]
+    # What it raises in the end says no more than that there is a log.
+    told = [line for line in causes if "Please see the" not in line]
+    found = [line for line in told if "NbGraderException" not in line] or told or causes or lines
+    return _OWN_ERROR.sub("", (found or ["no reason given"])[-1])[:300]
 
 
 def _digest(rows: list[list[Any]]) -> str:
@@ -253,13 +318,24 @@ def _grade(submission: Any, asked: dict[str, Question]) -> Grade:
 
 
 def _config(root: Path) -> Config:
-    if not (root / "nbgrader_config.py").is_file():
+    if not (root / CONFIG).is_file():
         raise GradebookError(
-            f"There is no nbgrader_config.py in {root}: name the course root with --root, or start "
+            f"There is no {CONFIG} in {root}: name the course root with --root, or start "
             "in the folder that `autograder release` was run for."
         )
-    loader = PyFileConfigLoader("nbgrader_config.py", path=str(root))
-    return Config(loader.load_config())
+    if str(root) not in sys.path:
+        sys.path.append(str(root))  # a plugin of the course's own may lie there, as for nbgrader
+    try:
+        return Config(PyFileConfigLoader(CONFIG, path=str(root)).load_config())
+    except Exception as error:
+        raise GradebookError(
+            f"{root / CONFIG} cannot be used ({_first_line(error)}): mend it, then run the same "
+            "command again."
+        ) from error
+
+
+def _first_line(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}".splitlines()[0][:300]
 
 
 @contextmanager

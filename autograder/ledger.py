@@ -20,7 +20,7 @@ from autograder.beside import MAX_BYTES
 from autograder.files import walk, write_whole
 from autograder.submission import MAX_NOTEBOOK
 
-VERSION = 1
+VERSION = 2
 FOLDER = "entered"
 MAX_FILE = MAX_NOTEBOOK + MAX_BYTES
 """Bytes of one file beyond which only its size and date are looked at: it is not read anyway."""
@@ -96,17 +96,21 @@ class Ledger:
         return self._folder / f"{name}.json"
 
 
-def of_course(root: Path, folders: Iterable[Path], mode: str, exams: tuple[str, ...]) -> str:
+def of_course(
+    root: Path, folders: Iterable[Path], mode: str, exams: tuple[str, ...], late_rule: str
+) -> str:
     """Return a digest of what all students' grades depend on.
 
     Args:
-        root: the course root, whose configuration and quizzes count.
+        root: the course root, whose configuration, with what it imports from there, and quizzes
+            count.
         folders: the assignment's source and release.
         mode: how submissions are run (see `autograder.sandbox.Abilities`).
         exams: sorted names of the assignment's exams.
+        late_rule: digest of what is taken off for lateness (see `penalties.rule_digest`).
     """
-    state = hashlib.sha256(f"{mode} {digests.of_grading(exams)}".encode())
-    for path in (root / "nbgrader_config.py", root / "authoring" / "banks", *folders):
+    state = hashlib.sha256(f"{mode} {digests.of_grading(exams)} {late_rule}".encode())
+    for path in (*sorted(root.glob("*.py")), root / "authoring" / "banks", *folders):
         state.update(of_folder(path).encode())
     return state.hexdigest()
 

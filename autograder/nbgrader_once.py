@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
+from pathlib import Path
 from types import CodeType
 from typing import Any
 
@@ -24,6 +25,8 @@ from jinja2.bccache import Bucket
 from nbconvert.exporters import HTMLExporter
 from nbformat import NotebookNode
 from sqlalchemy.exc import DataError, IntegrityError
+
+from autograder.pictures import with_pictures
 
 
 class _Compiled(BytecodeCache):
@@ -54,15 +57,15 @@ class FeedbackExporter(HTMLExporter):
     def from_notebook_node(
         self, nb: NotebookNode, resources: Any = None, **more: Any
     ) -> tuple[Any, dict[str, Any]]:
-        """Return the page.
+        """Return the page, with the pictures that lie beside the notebook in it.
 
         nbconvert parses each page that it has made, to give pictures a text to read aloud, and so
         closes the tags that a student has left open. Where there can be neither, it need not.
         """
-        if _has_html_of_its_own(nb):
-            return super().from_notebook_node(nb, resources, **more)
-        with _pages_as_they_are():
-            return super().from_notebook_node(nb, resources, **more)
+        with nullcontext() if _has_html_of_its_own(nb) else _pages_as_they_are():
+            page, resources = super().from_notebook_node(nb, resources, **more)
+        folder = resources.get("metadata", {}).get("path")
+        return with_pictures(page, Path(folder)) if folder else page, resources
 
     def _create_environment(self) -> Environment:
         environment: Environment = super()._create_environment()  # type: ignore[no-untyped-call]

@@ -21,6 +21,7 @@ from autograder.nbgrader_bridge import (
     RestoreCells,
     SubmissionExporter,
 )
+from autograder.nbgrader_once import FeedbackExporter
 
 c = get_config()  # noqa: F821 - given by nbgrader
 root = Path(__file__).resolve().parent
@@ -66,3 +67,6 @@ c.Autograde.autograde_preprocessors = [
     AssignLatePenalties,
     CheckCellMetadata,
 ]
+
+# Feedback that holds the pictures it shows: the exchange hands out the page alone.
+c.GenerateFeedback.exporter_class = FeedbackExporter
