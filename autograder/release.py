@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
+import time
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import nbformat
@@ -12,6 +15,10 @@ from nbformat import NotebookNode
 from autograder import cells
 from autograder.submission import grade_id, metadata
 from course.errors import CourseError
+from course.files import PARTIAL
+
+_OLD_S = 600.0
+"""Seconds after which a folder that a release was made in belongs to nobody."""
 
 
 class ReleaseError(CourseError):
@@ -21,29 +28,44 @@ class ReleaseError(CourseError):
 def release(root: Path, assignment: str) -> Path:
     """Write the student version of ``assignment`` to ``release/``; return its folder.
 
-    The release holds the notebooks, the questions of closed quizzes, and nothing else. One that
-    would give away a solution or a hidden test is removed again.
+    The release holds the notebooks, the questions of closed quizzes, and nothing else. It is made
+    beside the earlier one, and takes its place, in the gradebook, too, once nothing can go wrong
+    any more: a release that fails leaves everything as it was.
 
     Args:
         root: the nbgrader course root.
         assignment: a folder name under ``source``.
 
     Raises:
-        ReleaseError: no such assignment, files in it that students must not get, or a leak.
+        ReleaseError: no such assignment, files in it that students must not get, a leak, or
+            nbgrader cannot make it.
         QuizMarksError, QuizSheetError: a quiz that it uses is not sound, or cannot be handed out.
-        GradebookError: nbgrader could not do it.
+        GradebookError: there is no course at ``root``.
+        GradebookUnusable: its gradebook cannot be used.
     """
-    from autograder.gradebook import CourseGradebook
+    from autograder.gradebook import CourseGradebook, GradebookError
 
     source, released = root / "source" / assignment, root / "release" / assignment
     beside = _check_source(root, assignment)
-    CourseGradebook(root).generate_assignment(assignment)
-    if found := leaks(source, released, beside):
-        _remove(released)
-        raise ReleaseError(
-            f"The release of '{assignment}' was removed again, because {found[0]}: correct "
-            f"authoring/assignments/{assignment}, then build and release again."
-        )
+    with _place_beside(released) as place:
+        try:
+            # First with a copy of the gradebook: nbgrader changes it notebook by notebook.
+            CourseGradebook(root, trial=place).generate_assignment(assignment)
+            if found := leaks(source, place / assignment, beside):
+                raise ReleaseError(
+                    f"'{assignment}' is not released, because in the release {found[0]}: correct "
+                    f"authoring/assignments/{assignment}, then build and release again. "
+                    f"{_as_before(released)}"
+                )
+            CourseGradebook(root, released=place).generate_assignment(assignment)
+        except GradebookError as error:
+            if not error.reason:
+                raise
+            raise ReleaseError(
+                f"'{assignment}' is not released, because nbgrader says: {error.reason.rstrip('.')}"
+                f": {_way_out(error.reason, assignment)} {_as_before(released)}"
+            ) from error
+        _put_in_place(place / assignment, released, place / "earlier")
     return released
 
 
@@ -143,11 +165,54 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
     return beside
 
 
-def _remove(folder: Path) -> None:
+def _as_before(released: Path) -> str:
+    return "The earlier release stands as it was." if released.exists() else ""
+
+
+def _way_out(reason: str, assignment: str) -> str:
+    """Return what to do about something that nbgrader says."""
+    if "submissions associated with it" in reason:
+        return (
+            "notebooks and graded cells stay as they are once work has been graded, so undo that "
+            f"change, or release it as an assignment of another name; `nbgrader db assignment "
+            f"remove {assignment} --force` would also do, but loses its marks and due date."
+        )
+    return f"correct authoring/assignments/{assignment}, then build and release again."
+
+
+@contextmanager
+def _place_beside(released: Path) -> Iterator[Path]:
+    """Give a hidden folder beside a release for the block, and remove it afterwards."""
+    prefix, suffix = f".{released.name}.", PARTIAL
     try:
-        if folder.exists():
-            shutil.rmtree(folder)
+        released.parent.mkdir(parents=True, exist_ok=True)
+        for left in released.parent.glob(f"{prefix}*{suffix}"):  # by a killed process
+            if time.time() - left.stat().st_mtime > _OLD_S:
+                shutil.rmtree(left, ignore_errors=True)
+        folder = tempfile.TemporaryDirectory(suffix, prefix, released.parent)
     except OSError as error:
-        raise ReleaseError(
-            f"{folder} cannot be replaced ({error.strerror or error}): remove it by hand."
-        ) from error
+        raise _cannot_write(released.parent, error) from error
+    with folder as name:
+        yield Path(name)
+
+
+def _put_in_place(made: Path, released: Path, earlier: Path) -> None:
+    """Have a release that was ``made`` take the place of the earlier one, which is moved away."""
+    try:
+        if released.exists():
+            released.rename(earlier)
+        try:
+            made.rename(released)
+        except OSError:
+            if earlier.exists():
+                earlier.rename(released)
+            raise
+    except OSError as error:
+        raise _cannot_write(released, error) from error
+
+
+def _cannot_write(path: Path, error: OSError) -> ReleaseError:
+    return ReleaseError(
+        f"{path} cannot be replaced ({error.strerror or error}): make it writable, or make room "
+        "there, then release again."
+    )
