@@ -6,6 +6,9 @@ mark does not count; what was kept since does, whoever goes on after a kill.
 
 from __future__ import annotations
 
+import hashlib
+import json
+from collections.abc import Iterable
 from pathlib import Path
 
 from autograder.files import write_whole
@@ -16,9 +19,12 @@ FOLDER = "fresh"
 class Anew:
     """The mark of one assignment: only one engine looks at it at a time."""
 
-    def __init__(self, work: Path, assignment: str) -> None:
-        """Keep it in the engine's folder ``work``."""
-        self._path = work / FOLDER / assignment
+    def __init__(self, work: Path, assignment: str, students: Iterable[str] = ()) -> None:
+        """Keep it in the engine's folder ``work``; a run for some ``students`` has its own."""
+        chosen = json.dumps(sorted(students)) if students else ""
+        some = f"+{hashlib.sha256(chosen.encode()).hexdigest()[:32]}" if chosen else ""
+        # No assignment of nbgrader's has a plus sign in its name.
+        self._path = work / FOLDER / f"{assignment}{some}"
 
     @property
     def since(self) -> int:

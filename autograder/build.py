@@ -9,7 +9,7 @@ questions of its closed quizzes beside it. What is built is committed, so `build
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +55,8 @@ def build(
 
     Raises:
         BuildError: a source is not sound, there is none, a file cannot be written, or
-            (``check``) some are not in step. A source that is not sound leaves all as it was.
+            (``check``) some are not in step, or have no source. A source that is not sound leaves
+            all as it was.
         QuizMarksError, QuizSheetError: a quiz that it uses is not sound, or cannot be handed out.
     """
     if points is None:
@@ -67,15 +68,46 @@ def build(
     if not built:
         raise BuildError(f"There is nothing to build: no {root / 'authoring'}/*/*.py.")
     stale = [path for path, content in built.items() if _content(path) != content]
-    if check and stale:
-        names = ", ".join(str(path.relative_to(root)) for path in stale)
-        raise BuildError(
-            f"Not in step with the sources in {root / 'authoring'}: {names}; "
-            "run `autograder build`."
-        )
+    if check:
+        _require_in_step(root, stale, orphans(root, built))
     for path in stale:
         _write(path, built[path])
     return list(built)
+
+
+def orphans(root: Path, built: Iterable[Path]) -> list[Path]:
+    """Return the notebooks of a course that are none of those ``built``: they lost their source.
+
+    Of the releases, too: students would still get an exercise that is gone.
+    """
+    made = {path.relative_to(root) for path in built}
+    made |= {Path("release", *path.parts[1:]) for path in made if path.parts[0] == "source"}
+    found = (
+        path
+        for pattern in ("chapters/*.ipynb", "source/*/*.ipynb", "release/*/*.ipynb")
+        for path in sorted(root.glob(pattern))
+    )
+    return [path for path in found if path.relative_to(root) not in made]
+
+
+def _require_in_step(root: Path, stale: list[Path], orphaned: list[Path]) -> None:
+    problems = []
+    if stale:
+        problems.append(
+            f"Not in step with the sources in {root / 'authoring'}: {_names(root, stale)}; "
+            "run `autograder build`."
+        )
+    if orphaned:
+        problems.append(
+            f"Without a source in {root / 'authoring'}: {_names(root, orphaned)}; remove what is "
+            "no part of the course any more, or put its source back."
+        )
+    if problems:
+        raise BuildError(" ".join(problems))
+
+
+def _names(root: Path, paths: Iterable[Path]) -> str:
+    return ", ".join(str(path.relative_to(root)) for path in paths)
 
 
 def build_assignment(

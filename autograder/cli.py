@@ -11,11 +11,9 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from autograder import quiz_cli
-from autograder.intake_names import shown
 from autograder.interruption import Stopped
 from course.errors import CourseError
 
@@ -75,6 +73,9 @@ def release(assignment: str, root: Root = None) -> None:
 def grade(
     assignment: str,
     root: Root = None,
+    student: Annotated[
+        list[str] | None, typer.Option("--student", help="Only this one; may be repeated.")
+    ] = None,
     jobs: Jobs = IN_FLIGHT,
     fresh: Annotated[bool, typer.Option("--fresh", help="Also run what did not change.")] = False,
     trust: Annotated[
@@ -106,12 +107,12 @@ def grade(
 
     where = _root(root)
     done = engine.grade(
-        where, assignment, jobs=jobs, fresh=fresh, trust=trust, scheduler=scheduler,
-        progress=progress.for_console(out, err, machine=as_json),
+        where, assignment, students=student or (), jobs=jobs, fresh=fresh, trust=trust,
+        scheduler=scheduler, progress=progress.for_console(out, err, machine=as_json),
     )  # fmt: skip
     gradebook = CourseGradebook(where)
     every = {name: gradebook.grades(name) for name in gradebook.assignments()}
-    grades = every[assignment]
+    grades = [grade for grade in every[assignment] if not student or grade.student in student]
     grades_csv.write(every, where / "grades.csv")
     problems = {
         graded.student: graded.problem if graded.entered else f"NOT ENTERED: {graded.problem}"
@@ -161,6 +162,28 @@ def claim(
         _root(root), assignment, student, notebook, file, nothing=nothing, withdraw=withdraw
     )
     out.print(said, soft_wrap=True, highlight=False, markup=False)
+
+
+@app.command()
+def extend(
+    assignment: str,
+    students: Annotated[list[str], typer.Argument(help="One or several.")],
+    hours: Annotated[
+        float, typer.Option("--hours", min=0, help="Beyond the due date; 0 takes it away.")
+    ],
+    root: Root = None,
+) -> None:
+    """Give students more time for an assignment, in place of an earlier extension of theirs."""
+    from autograder import extensions
+
+    for due in extensions.extend(_root(root), assignment, students, hours):
+        then = (
+            "it counts once the work is graded."
+            if due.waits
+            else f"run `autograder grade {assignment}`, and the penalty is reckoned again."
+        )
+        line = f"{due.student}: due {due.time:%Y-%m-%d %H:%M} UTC; {then}"
+        out.print(line, soft_wrap=True, highlight=False, markup=False)
 
 
 @app.command()
@@ -313,15 +336,9 @@ def _demo_table(done: Any) -> None:
 
 
 def _grades_table(grades: list[Any], problems: dict[str, str]) -> None:
-    table = Table("Student", "Score", "Needs a person", "Remark")
-    for grade in grades:
-        score = f"{'?' if grade.asked else f'{grade.score:g}'} of {grade.max_score:g}"
-        needs = "yes" if grade.needs_manual_grade else ""
-        remark = problems.get(grade.student, "") or " ".join(grade.asked.values())
-        table.add_row(*map(escape, (shown(grade.student), score, needs, remark)))
-    for student in sorted(problems.keys() - {grade.student for grade in grades}):
-        table.add_row(*map(escape, (shown(student), "none", "yes", problems[student])))
-    out.print(table)
+    from autograder import grades_table
+
+    out.print(grades_table.table(grades, problems))
 
 
 def _say(silent: bool) -> Any:

@@ -7,7 +7,8 @@ and the next run takes up what is missing.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import difflib
+from collections.abc import Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -52,6 +53,7 @@ def grade(
     root: Path,
     assignment: str,
     *,
+    students: Collection[str] = (),
     jobs: int = 2,
     fresh: bool = False,
     trust: bool = False,
@@ -66,6 +68,7 @@ def grade(
     Args:
         root: the nbgrader course root.
         assignment: its name.
+        students: grade only these; all if there are none.
         jobs: how many notebooks are run at a time.
         fresh: run also what was run before and has not changed. Until such a run is through,
             whichever comes after it goes on with it.
@@ -77,6 +80,7 @@ def grade(
 
     Raises:
         AssignmentError: no such assignment, not released, or nothing submitted.
+        NotReadyError: its source or its release is missing or damaged.
         BusyError: another engine is at work in this course.
         ClusterError: the scheduler cannot be used.
         GradebookError: the gradebook itself cannot be used.
@@ -87,13 +91,13 @@ def grade(
     """
     gradebook = CourseGradebook(root, staged=STAGED)
     names = _notebooks(gradebook, assignment)
-    students, wrong = _students(gradebook, assignment)
+    found, wrong = _students(gradebook, assignment, students)
     if not trust and not scheduler:
         sandbox.warm_up()
         sandbox.require()
     refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
-    refused += [Graded(s, {}, problem=EXCLUDED) for s in students if s in gradebook.excluded]
-    students = [s for s in students if s not in gradebook.excluded]
+    refused += [Graded(s, {}, problem=EXCLUDED) for s in found if s in gradebook.excluded]
+    found = [s for s in found if s not in gradebook.excluded]
     store = OutcomeStore(root / bridge.WORK_FOLDER / "outcomes", trust=trust, hidden=[root])
     with ExitStack() as stack:
         stack.enter_context(_alone(root))
@@ -103,15 +107,17 @@ def grade(
         workers = stack.enter_context(_workers(jobs, store, trust, scheduler, root, progress))
         interruption = stack.enter_context(Interruption(workers.wake))
         desk = Desk(gradebook, assignment, names, trust=trust)
-        anew = Anew(desk.work_folder, assignment)
+        whole = Anew(desk.work_folder, assignment)
+        anew = Anew(desk.work_folder, assignment, students) if students else whole
         if anew.since:
             progress.say("Going on with the run with --fresh that was ended before it was through.")
         if fresh:
             anew.begin()
         run = ClassRun(
-            desk, store, workers, interruption, progress, feedback=feedback, since=anew.since
-        )
-        graded = [*refused, *run.grade(students, refused)]
+            desk, store, workers, interruption, progress, feedback=feedback,
+            since=max(anew.since, whole.since),
+        )  # fmt: skip
+        graded = [*refused, *run.grade(found, refused)]
         anew.end()
     return sorted(graded, key=lambda item: item.student)
 
@@ -147,7 +153,8 @@ def _alone(root: Path) -> Iterator[None]:
 def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
     """Return the notebooks of a released assignment, or say what is missing."""
     known = gradebook.assignments()
-    if assignment not in known:
+    released = gradebook.notebooks(assignment) if assignment in known else []
+    if not released:
         sources = sorted(
             path.name for path in (gradebook.root / "source").glob("*") if path.is_dir()
         )
@@ -160,16 +167,30 @@ def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
             f"There is no assignment '{assignment}' in {gradebook.root}: there are "
             f"{', '.join(sources) or 'none yet'}."
         )
-    folder = gradebook.root / "source" / assignment
-    return sorted(path.stem for path in folder.glob("*.ipynb"))
+    return released
 
 
-def _students(gradebook: CourseGradebook, assignment: str) -> tuple[list[str], dict[str, str]]:
-    """Return who has submitted, and what is wrong with the folders that cannot be graded."""
+def _students(
+    gradebook: CourseGradebook, assignment: str, only: Collection[str]
+) -> tuple[list[str], dict[str, str]]:
+    """Return who has submitted, and what is wrong with the folders that cannot be graded.
+
+    ``only`` are the students that are meant; all if there are none.
+    """
     students, wrong = roster.submissions(gradebook.root, assignment, gradebook.roster())
+    for student in only:
+        if student not in students and student not in wrong:
+            close = difflib.get_close_matches(student, [*students, *wrong], n=1)
+            meant = f" (is it '{close[0]}'?)" if close else ""
+            raise AssignmentError(
+                f"'{student}' has not submitted '{assignment}'{meant}: there is no folder "
+                f"{gradebook.root / 'submitted' / student / assignment}."
+            )
     if not students and not wrong:
         raise AssignmentError(
             f"Nobody has submitted '{assignment}' yet: nbgrader expects the files in "
             f"{gradebook.root / 'submitted'}/<student>/{assignment}/."
         )
-    return students, wrong
+    if not only:
+        return students, wrong
+    return [s for s in students if s in only], {s: p for s, p in wrong.items() if s in only}

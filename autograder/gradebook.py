@@ -58,7 +58,8 @@ class GradebookError(CourseError):
 class Grade:
     """One student's result: points earned and possible, and whether a person must still look.
 
-    ``score`` is less what the course's rules take off for lateness, as in nbgrader's own export.
+    ``score`` is less what the course's rules take off for lateness, as in nbgrader's own export:
+    ``penalty`` points, for ``seconds_late``.
     ``cells`` is {notebook: {grade id: points, or None while a manual grade is missing}}, and
     ``asked`` {notebook: why} of what may have been handed in after all: as long as a person has
     not settled that, ``score`` is no number to pass on.
@@ -70,6 +71,8 @@ class Grade:
     needs_manual_grade: bool
     cells: dict[str, dict[str, float | None]]
     asked: dict[str, str] = field(default_factory=dict)
+    seconds_late: float = 0.0
+    penalty: float = 0.0
 
 
 class CourseGradebook:
@@ -133,13 +136,18 @@ class CourseGradebook:
 
     def assignments(self) -> list[str]:
         """Return the assignments that have been released into the gradebook."""
-        with self._open() as gradebook:
+        with self.opened() as gradebook:
             return sorted(assignment.name for assignment in gradebook.assignments)
+
+    def notebooks(self, assignment: str) -> list[str]:
+        """Return the notebooks of an assignment that have been released into the gradebook."""
+        with self.opened() as gradebook:
+            return sorted(book.name for book in gradebook.find_assignment(assignment).notebooks)
 
     def grades(self, assignment: str) -> list[Grade]:
         """Return the grades of an assignment, one a student, sorted by student."""
         asked = intake_asked.of_assignment(self.root / WORK_FOLDER, assignment)
-        with self._open() as gradebook:
+        with self.opened() as gradebook:
             submissions = gradebook.assignment_submissions(assignment)
             return sorted(
                 (_grade(s, asked.get(s.student.id, {})) for s in submissions),
@@ -148,7 +156,7 @@ class CourseGradebook:
 
     def standings(self, assignment: str, student: str = "") -> dict[str, Standing]:
         """Return how the students (or one) stand in the gradebook, as digests to compare."""
-        with self._open() as gradebook:
+        with self.opened() as gradebook:
             rows = database.standing_rows(gradebook.db, assignment, student)
         return {name: Standing(*map(_digest, both)) for name, both in rows.items()}
 
@@ -162,6 +170,11 @@ class CourseGradebook:
     def excluded(self) -> frozenset[str]:
         """The students whom nbgrader passes over, as the course's configuration says."""
         return frozenset(self.coursedir.student_id_exclude.split(",")) - {""}
+
+    @property
+    def work_folder(self) -> Path:
+        """Where the engine keeps what is no part of nbgrader's."""
+        return self.root / WORK_FOLDER
 
     @property
     def late_rule(self) -> str:
@@ -187,7 +200,7 @@ class CourseGradebook:
 
     def settled(self, assignment: str, student: str) -> dict[tuple[str, str], float | None]:
         """Return {(notebook, cell): automatic score} of what a person has graded for good."""
-        with self._open() as gradebook:
+        with self.opened() as gradebook:
             try:
                 notebooks = gradebook.find_submission(assignment, student).notebooks
             except MissingEntry:
@@ -204,7 +217,7 @@ class CourseGradebook:
     ) -> dict[tuple[str, str], float | None]:
         """Return {(notebook, cell): automatic score} of those of ``cells`` that there are."""
         found = {}
-        with self._open() as gradebook:
+        with self.opened() as gradebook:
             for notebook, cell in cells:
                 with suppress(MissingEntry):  # the assignment has lost a cell since
                     grade = gradebook.find_grade(cell, notebook, assignment, student)
@@ -216,7 +229,7 @@ class CourseGradebook:
 
         nbgrader wants each to be looked at again after autograding, as the work may be another.
         """
-        with self._open() as gradebook:
+        with self.opened() as gradebook:
             for notebook, cell in cells:
                 grade = gradebook.find_grade(cell, notebook, assignment, student)
                 if grade.manual_score is not None:
@@ -225,7 +238,7 @@ class CourseGradebook:
 
     def roster(self) -> Roster:
         """Return which students the gradebook knows, and whether there may be others."""
-        with self._open() as gradebook:
+        with self.opened() as gradebook:
             people = {
                 s.id: bool(s.first_name or s.last_name or s.email) for s in gradebook.students
             }
@@ -260,7 +273,8 @@ class CourseGradebook:
         return [folder for folder in folders if folder.is_dir()]
 
     @contextmanager
-    def _open(self) -> Iterator[Gradebook]:
+    def opened(self) -> Iterator[Gradebook]:
+        """Give nbgrader's own gradebook for the block; raises as `autograde` does."""
         try:
             database.require_this_schema(self.coursedir.db_url, self.root)
             with (
@@ -307,13 +321,18 @@ def _grade(submission: Any, asked: dict[str, Question]) -> Grade:
         }
     waiting = {name: [cell for cell, points in found.items() if points is None]
                for name, found in cells.items()}  # fmt: skip
+    penalty = float(submission.late_submission_penalty)
+    # nbgrader itself cannot tell how late something is if it was extended and is never due.
+    due = submission.assignment.duedate
     return Grade(
         submission.student.id,
-        max(0.0, float(submission.score) - float(submission.late_submission_penalty)),
+        max(0.0, float(submission.score) - penalty),
         float(submission.max_score),
         bool(submission.needs_manual_grade),
         cells,
         intake_asked.open_ones(asked, waiting),
+        float(submission.total_seconds_late) if due is not None else 0.0,
+        penalty,
     )
 
 

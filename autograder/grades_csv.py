@@ -10,6 +10,8 @@ from autograder.gradebook import Grade
 from autograder.insight.exports import as_csv, guarded
 
 HEAD = ("assignment", "student_id", "score", "max_score", "needs_manual_grade")
+LATE = ("total_seconds_late", "late_submission_penalty")
+"""Columns at the end, as nbgrader calls them; the score is less the penalty already."""
 
 
 def write(grades: Mapping[str, list[Grade]], path: Path) -> None:
@@ -25,12 +27,13 @@ def write(grades: Mapping[str, list[Grade]], path: Path) -> None:
     """
     lines = [(assignment, grade) for assignment, found in grades.items() for grade in found]
     columns = sorted({(n, c) for _, g in lines for n, cells in g.cells.items() for c in cells})
-    rows = [[*HEAD, *(guarded(f"{notebook}:{cell}") for notebook, cell in columns)]]
+    rows = [[*HEAD, *(guarded(f"{notebook}:{cell}") for notebook, cell in columns), *LATE]]
     for assignment, grade in lines:
         points = [grade.cells.get(notebook, {}).get(cell) for notebook, cell in columns]
         # What may be zero only because nobody knows yet what was handed in is no number.
         score = "" if grade.asked else grade.score
         found = (score, grade.max_score, grade.needs_manual_grade)
         texts = [guarded(assignment), guarded(grade.student), *map(str, found)]
-        rows.append([*texts, *("" if p is None else str(p) for p in points)])
+        late = (str(grade.seconds_late), str(grade.penalty))
+        rows.append([*texts, *("" if p is None else str(p) for p in points), *late])
     write_whole(path, as_csv(rows))

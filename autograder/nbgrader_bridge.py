@@ -24,10 +24,12 @@ from traitlets import Bool
 
 from autograder import cells, intake_asked, intake_cells, outputs, roster, submission
 from autograder.beside import files_beside
+from autograder.extensions import Waiting
 from autograder.insight import records
 from autograder.report import Report
 from autograder.submission import SubmissionError
 from autograder.verdict import Verdict
+from course.errors import CourseError
 
 NOTES_KEY = "ros2_course_notes"
 UNREADABLE_KEY = "ros2_course_unreadable"
@@ -37,6 +39,11 @@ person is asked: {grade id: why}."""
 
 WORK_FOLDER = ".autograder"
 """Folder under the course root where the engine keeps outcomes and staged submissions."""
+
+
+class NotReadyError(CourseError):
+    """An assignment that cannot be graded as it stands; the message says what to do."""
+
 
 Resources = dict[str, Any]
 Key = tuple[str, str, str]
@@ -139,8 +146,15 @@ class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]
     """After the scores are saved: have a person look where the grader could not decide."""
 
     def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:
-        """Mark the flagged grade cells as needing a manual grade; keep the verdicts of all."""
+        """Mark the flagged grade cells as needing a manual grade; keep the verdicts of all.
+
+        The penalty for lateness is next: an extension that waits for this submission is granted.
+        """
         assignment, student, notebook = _names(resources)
+        hours = Waiting(Path(_coursedir(self).root) / WORK_FOLDER, assignment).take(student)
+        if hours:
+            with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
+                gradebook.grant_extension(assignment, student, hours=hours)
         if "ros2_course_outcome" in resources:
             work = Path(_coursedir(self).root) / WORK_FOLDER
             records.keep(work, assignment, student, notebook, resources["ros2_course_outcome"])
@@ -193,13 +207,30 @@ def graded_cells(notebook: NotebookNode) -> list[str]:
 def originals(
     coursedir: CourseDirectory, assignment: str, notebook: str
 ) -> tuple[NotebookNode, NotebookNode]:
-    """Return the source and the released version of a notebook of an assignment."""
-    folders = (coursedir.source_directory, coursedir.release_directory)
-    source, released = (
-        submission.read(Path(coursedir.format_path(folder, ".", assignment)) / f"{notebook}.ipynb")
-        for folder in folders
-    )
-    return source, released
+    """Return the source and the released version of a notebook of an assignment.
+
+    Raises:
+        NotReadyError: one of them is missing or damaged: no submission is to blame.
+    """
+    source = _original(coursedir, coursedir.source_directory, assignment, notebook)
+    return source, _original(coursedir, coursedir.release_directory, assignment, notebook)
+
+
+def _original(
+    coursedir: CourseDirectory, step: str, assignment: str, notebook: str
+) -> NotebookNode:
+    path = Path(coursedir.format_path(step, ".", assignment)) / f"{notebook}.ipynb"
+    try:
+        return submission.read(path)
+    except SubmissionError:
+        wrong = "damaged" if path.exists() else "missing"
+        command = f"autograder release {assignment}"
+        if step == coursedir.source_directory:
+            command = "autograder build"
+        raise NotReadyError(
+            f"The instructor's {path} is {wrong}, so nothing can be graded: make it again with "
+            f"`{command}`, then grade."
+        ) from None
 
 
 def _coursedir(preprocessor: NbGraderPreprocessor) -> CourseDirectory:

@@ -148,7 +148,15 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
             f"There is no assignment '{assignment}' in {root}: there are "
             f"{', '.join(sorted(authored | set(known))) or 'none yet'}."
         )
-    notebooks = [_read(path) for path in sorted(folder.glob("*.ipynb"))]
+    texts = root / "authoring" / "assignments" / assignment
+    paths = sorted(folder.glob("*.ipynb"))
+    orphans = [path for path in paths if not (texts / f"{path.stem}.py").is_file()]
+    if assignment in authored and orphans:
+        raise ReleaseError(
+            f"{orphans[0]} has no source in {texts}: remove it if it is no part of the assignment "
+            "any more, or put its source back, then release again."
+        )
+    notebooks = [_read(path) for path in paths]
     beside = quiz_sheets.of_notebooks(root, notebooks)
     for name, content in beside.items():
         if not (folder / name).is_file() or (folder / name).read_bytes() != content:

@@ -382,17 +382,23 @@ def test_nobody_at_all_is_one_sentence(course: Course) -> None:
 
 
 def test_the_grades_of_every_assignment_are_written(tmp_path: Path) -> None:
-    design = Grade("ada", 3.0, 5.0, False, {"design": {"a": 3.0}})
+    design = Grade("ada", 3.0, 5.0, False, {"design": {"a": 3.0}}, 3600.0, 1.5)
     quiz = Grade("ada", 1.0, 2.0, True, {"quiz": {"q": None}})
     grades_csv.write({"ch05": [design], "ch05-quiz": [quiz]}, tmp_path / "grades.csv")
     head, *lines = (tmp_path / "grades.csv").read_text().splitlines()
-    assert head.endswith("needs_manual_grade,design:a,quiz:q")
-    assert lines == ["ch05,ada,3.0,5.0,False,3.0,", "ch05-quiz,ada,1.0,2.0,True,,"]
+    late = ",total_seconds_late,late_submission_penalty"
+    assert head.endswith(f"needs_manual_grade,design:a,quiz:q{late}")
+    assert lines == [
+        "ch05,ada,3.0,5.0,False,3.0,,3600.0,1.5",
+        "ch05-quiz,ada,1.0,2.0,True,,,0.0,0.0",
+    ]
 
 
 def test_a_spreadsheet_runs_nothing_of_what_a_student_is_called(tmp_path: Path) -> None:
     found = [Grade("=1+1", 3.0, 5.0, False, {"@nb": {"cell": 3.0, "text": None}})]
     grades_csv.write({"-ch05": found}, tmp_path / "grades.csv")
     head, line = (tmp_path / "grades.csv").read_text().splitlines()
-    assert head == "assignment,student_id,score,max_score,needs_manual_grade,'@nb:cell,'@nb:text"
-    assert line == "'-ch05,'=1+1,3.0,5.0,False,3.0,"
+    assert head.startswith(
+        "assignment,student_id,score,max_score,needs_manual_grade,'@nb:cell,'@nb:text,"
+    )
+    assert line == "'-ch05,'=1+1,3.0,5.0,False,3.0,,0.0,0.0"

@@ -1,0 +1,140 @@
+"""More time for a student: nbgrader's own extensions, also before there is a submission.
+
+nbgrader keeps an extension with a submission. One for a student who has not handed in yet waits in
+the engine's folder until the submission is entered, by whichever door.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from filelock import FileLock
+from nbgrader.api import Gradebook, MissingEntry
+
+from autograder.files import write_whole
+from course.errors import CourseError
+
+FOLDER = "extensions"
+MAX_HOURS = 10 * 366 * 24.0
+"""Longest extension: with one of some thousand years no date could be reckoned."""
+
+
+class ExtensionError(CourseError):
+    """An extension that cannot be granted; the message says why, and what to do."""
+
+
+@dataclass(frozen=True)
+class Due:
+    """When a student's work is due, in UTC; ``waits`` if there is no submission yet."""
+
+    student: str
+    time: datetime
+    waits: bool
+
+
+def extend(root: Path, assignment: str, students: list[str], hours: float) -> list[Due]:
+    """Give students so many hours beyond the due date, in place of an earlier extension.
+
+    Args:
+        root: the course root.
+        assignment: its name.
+        students: their ids; nobody has more time unless all of them are known.
+        hours: 0 takes an extension away.
+
+    Raises:
+        ExtensionError: no such assignment or student, or it is never due.
+        GradebookError: there is no course at ``root``.
+        GradebookUnusable: its gradebook cannot be used.
+    """
+    from autograder.gradebook import CourseGradebook
+
+    if not 0 <= hours <= MAX_HOURS:
+        raise ExtensionError(f"An extension has 0 to {MAX_HOURS:g} hours, not {hours:g}.")
+    course = CourseGradebook(root)
+    waiting = Waiting(course.work_folder, assignment)
+    with course.opened() as book:
+        due = _due(book, assignment)
+        _require_known(book, course.root, students)
+        dues = []
+        for student in students:
+            try:
+                book.grant_extension(assignment, student, hours=hours)
+            except MissingEntry:
+                waiting.put(student, hours)
+                waits = True
+            else:
+                waiting.take(student)
+                waits = False
+            dues.append(Due(student, due + timedelta(hours=hours), waits))
+    return dues
+
+
+class Waiting:
+    """The extensions of one assignment whose students have not handed in yet."""
+
+    def __init__(self, work: Path, assignment: str) -> None:
+        """Keep them in the engine's folder ``work``."""
+        self._path = work / FOLDER / f"{assignment}.json"
+
+    def put(self, student: str, hours: float) -> None:
+        """Keep one for a student, or with 0 hours none."""
+        with self._changing() as waiting:
+            waiting.pop(student, None)
+            if hours:
+                waiting[student] = hours
+
+    def take(self, student: str) -> float:
+        """Return the hours that wait for a student, which from now on are in the gradebook."""
+        if not self._path.exists():
+            return 0.0
+        with self._changing() as waiting:
+            return waiting.pop(student, 0.0)
+
+    @contextmanager
+    def _changing(self) -> Iterator[dict[str, float]]:
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        with FileLock(self._path.with_suffix(".lock")):
+            try:
+                waiting = json.loads(self._path.read_text(encoding="utf-8"))
+            except FileNotFoundError:
+                waiting = {}
+            before = dict(waiting)
+            yield waiting
+            if waiting != before:
+                write_whole(self._path, json.dumps(waiting))
+
+
+def _due(book: Gradebook, assignment: str) -> datetime:
+    try:
+        due: datetime | None = book.find_assignment(assignment).duedate
+    except MissingEntry:
+        known = ", ".join(sorted(a.name for a in book.assignments)) or "none yet"
+        raise ExtensionError(
+            f"There is no assignment '{assignment}' in the gradebook: there are {known}."
+        ) from None
+    if due is None:
+        raise ExtensionError(
+            f"'{assignment}' is never due, so nobody needs more time: set a date with `nbgrader db "
+            f'assignment add {assignment} --duedate="2030-01-31 23:59 UTC"` first.'
+        )
+    return due
+
+
+def _require_known(book: Gradebook, root: Path, students: list[str]) -> None:
+    folders = root / "submitted"
+    handed_in = [path.name for path in folders.iterdir()] if folders.is_dir() else []
+    known = {*(student.id for student in book.students), *handed_in}
+    for student in students:
+        if student not in known:
+            close = difflib.get_close_matches(student, known, n=1)
+            meant = f" (is it '{close[0]}'?)" if close else ""
+            raise ExtensionError(
+                f"The course has no student '{student}'{meant}: add the student with `nbgrader db "
+                f"student add {student}`, then run the same command again."
+            )
