@@ -54,7 +54,7 @@ def release(root: Path, assignment: str) -> Path:
             if found := leaks(source, place / assignment, beside):
                 raise ReleaseError(
                     f"'{assignment}' is not released, because in the release {found[0]}: correct "
-                    f"authoring/assignments/{assignment}, then build and release again. "
+                    f"authoring/assignments/{assignment}, then build and release again."
                     f"{_as_before(released)}"
                 )
             CourseGradebook(root, released=place).generate_assignment(assignment)
@@ -63,7 +63,7 @@ def release(root: Path, assignment: str) -> Path:
                 raise
             raise ReleaseError(
                 f"'{assignment}' is not released, because nbgrader says: {error.reason.rstrip('.')}"
-                f": {_way_out(error.reason, assignment)} {_as_before(released)}"
+                f": {_way_out(error.reason, assignment)}{_as_before(released)}"
             ) from error
         _put_in_place(place / assignment, released, place / "earlier")
     return released
@@ -174,7 +174,7 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
 
 
 def _as_before(released: Path) -> str:
-    return "The earlier release stands as it was." if released.exists() else ""
+    return " The earlier release stands as it was." if released.exists() else ""
 
 
 def _way_out(reason: str, assignment: str) -> str:

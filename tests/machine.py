@@ -12,6 +12,7 @@ import pytest
 from autograder.sandbox import abilities
 from course.interfaces.toolchain import compiler_problem
 from course.qoslab import link
+from tests import people
 
 
 def _needs(problem: str | None) -> pytest.MarkDecorator:
@@ -38,3 +39,4 @@ needs_warm_starts = _needs("" if abilities().warm else "The sandbox has no warm 
 needs_compiler = _needs(compiler_problem())
 needs_lossy_link = _needs(link.problem())
 needs_own_mounts = _needs(_namespace_problem())
+needs_users = _needs(people.problem())

@@ -197,6 +197,32 @@ def test_check_says_which_notebooks_are_not_in_step_and_changes_nothing(root: Pa
     assert everything(root) == before
 
 
+def test_check_names_notebooks_whose_source_is_gone(root: Path) -> None:
+    build(root, points={"test": 3})
+    (root / "release" / "ps1").mkdir(parents=True)
+    for name in ("release/ps1/two.ipynb", "chapters/checkpoint.txt"):
+        (root / name).write_text("{}")
+    assert build(root, check=True, points={"test": 3})
+    (root / "release" / "ps1" / "gone.ipynb").write_text("{}")
+    write(root, "chapters/one.py", "x = 1", "x = 2")
+    with pytest.raises(BuildError) as raised:
+        build(root, check=True, points={"test": 3})
+    assert "Not in step" in str(raised.value)
+    assert "Without a source in" in str(raised.value)
+    assert "release/ps1/gone.ipynb; remove what is no part" in str(raised.value)
+    build(root, points={"test": 3})
+    (root / "authoring" / "assignments" / "ps1" / "two.py").unlink()
+    before = everything(root)
+    with pytest.raises(BuildError, match=r"source/ps1/two\.ipynb.*release/ps1/two\.ipynb"):
+        build(root, check=True, points={})
+    (root / "authoring" / "chapters" / "one.py").rename(
+        root / "authoring" / "chapters" / "three.py"
+    )
+    with pytest.raises(BuildError, match=r"chapters/one\.ipynb.*; remove"):
+        build(root, check=True, points={})
+    assert everything(root).keys() - before.keys() == {"authoring/chapters/three.py"}
+
+
 def test_an_unsound_source_leaves_every_notebook_as_it_was(root: Path) -> None:
     build(root, points={"test": 3})
     write(root, "chapters/one.py", "x = 1", "x = 2")

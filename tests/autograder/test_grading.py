@@ -19,6 +19,7 @@ from autograder import engine, nbgrader_once, points, runner, submission
 from autograder.corpus import Case
 from autograder.engine import AssignmentError
 from autograder.gradebook import CourseGradebook, Grade, GradebookError
+from autograder.nbgrader_bridge import NotReadyError
 from autograder.nbgrader_once import FeedbackExporter
 from tests.machine import needs_sandbox
 
@@ -285,6 +286,35 @@ def test_an_assignment_that_is_not_released_says_so(course: Course) -> None:
     (source / "x.ipynb").write_text(nbformat.writes(course.source))
     with pytest.raises(AssignmentError, match="run `autograder release ch06` first"):
         engine.grade(course.root, "ch06")
+
+
+@pytest.mark.parametrize(
+    ("step", "content", "wrong", "command"),
+    [
+        ("release", None, "missing", "autograder release ch05"),
+        ("release", "{", "damaged", "autograder release ch05"),
+        ("source", None, "missing", "autograder build"),
+    ],
+)
+def test_what_the_instructor_lacks_is_not_blamed_on_a_submission(
+    course: Course, step: str, content: str | None, wrong: str, command: str
+) -> None:
+    course.submit("ada", "{")
+    path = course.root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
+    path.unlink()
+    if content is not None:
+        path.write_text(content)
+    sentence = rf"The instructor's .*{step}/{ASSIGNMENT}/.* is {wrong}.*`{command}`, then grade"
+    with pytest.raises(NotReadyError, match=sentence):
+        engine.grade(course.root, ASSIGNMENT)
+    assert grades(course) == {}
+
+
+def test_a_notebook_that_is_not_released_yet_is_not_graded(course: Course) -> None:
+    course.submit("ada", "{")
+    source = course.root / "source" / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
+    source.with_name("next-week.ipynb").write_bytes(source.read_bytes())
+    assert list(grade(course)["ada"].cells) == [NOTEBOOK]
 
 
 def test_an_empty_class_says_where_files_belong(course: Course) -> None:

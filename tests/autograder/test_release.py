@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import re
 import shutil
+import sqlite3
+import time
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import nbformat
 import pytest
 from nbformat import NotebookNode
+from nbgrader.api import Gradebook
 
 from autograder.release import ReleaseError, leaks, release
 from course.student_version import student_versions
@@ -106,13 +113,106 @@ def test_outputs_are_found(root: Path) -> None:
     assert found.endswith("has outputs")
 
 
-def test_a_release_that_leaks_is_removed_again(root: Path) -> None:
+def state(root: Path) -> dict[str, bytes]:
+    """Return the release as it stands, and what the gradebook says of it."""
+    folder = root / "release"
+    found = {str(p.relative_to(root)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    with closing(sqlite3.connect(root / "gradebook.db")) as gradebook:
+        found["gradebook"] = "\n".join(gradebook.iterdump()).encode()
+    return found
+
+
+def test_a_release_that_leaks_is_not_made_and_the_old_one_stays(root: Path) -> None:
+    before = state(root)
     config = root / "nbgrader_config.py"
     stub = 'c.ClearSolutions.code_stub = {"python": "stop_qos = QoSProfile("}\n'
     config.write_text(config.read_text(encoding="utf-8") + stub, encoding="utf-8")
-    with pytest.raises(ReleaseError, match=r"removed again, because .*qos-solution"):
+    with pytest.raises(ReleaseError, match=r"because in the release .*qos-solution.*as it was"):
         release(root, "ch05")
-    assert not (root / "release" / "ch05").exists()
+    assert state(root) == before
+    shutil.rmtree(root / "release")
+    with pytest.raises(ReleaseError, match=r"then build and release again\.$"):
+        release(root, "ch05")
+    assert list((root / "release").iterdir()) == []
+
+
+def hand_in(root: Path) -> None:
+    with Gradebook(f"sqlite:///{root / 'gradebook.db'}") as gradebook:
+        gradebook.add_student("ada")
+        gradebook.add_submission("ch05", "ada")
+
+
+def rename_a_cell(root: Path) -> None:
+    path = root / "source" / "ch05" / "qos-design.ipynb"
+    path.write_text(path.read_text().replace("qos-explanation-loss", "qos-explanation-lost"))
+
+
+def add_a_notebook(root: Path) -> None:
+    for folder, suffix in (("source", "ipynb"), ("authoring/assignments", "py")):
+        old = root / folder / "ch05" / f"qos-design.{suffix}"
+        shutil.copy(old, old.with_name(f"a-new-one.{suffix}"))
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (rename_a_cell, r"Cannot add or remove cells for notebook 'qos-design' because"),
+        (add_a_notebook, r"Cannot modify existing assignment 'Assignment<ch05>' because"),
+    ],
+)
+def test_what_nbgrader_refuses_once_work_is_graded_is_said_with_the_way_out(
+    root: Path, change: Callable[[Path], None], reason: str
+) -> None:
+    hand_in(root)
+    change(root)
+    before = state(root)
+    with pytest.raises(ReleaseError) as raised:
+        release(root, "ch05")
+    said = str(raised.value)
+    assert re.search(f"'ch05' is not released, because nbgrader says: {reason}", said)
+    assert "undo that change, or release it as an assignment of another name" in said
+    assert said.endswith("The earlier release stands as it was.")
+    assert len(said.splitlines()) == 1
+    assert state(root) == before
+
+
+def test_a_release_that_cannot_be_put_in_place_leaves_the_old_one(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = state(root)
+    rename = Path.rename
+
+    def fails(self: Path, target: Path) -> Path:
+        if self.parent.name.endswith(".partial") and self.name == "ch05":
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", fails)
+    with pytest.raises(ReleaseError, match=r"cannot be replaced \(No space left"):
+        release(root, "ch05")
+    assert state(root) == before
+
+
+def test_what_a_killed_release_leaves_is_cleared_away(root: Path) -> None:
+    for name, age in {"old": 1000.0, "new": 0.0}.items():
+        left = root / "release" / f".ch05.{name}.partial"
+        left.mkdir()
+        os.utime(left, (time.time() - age,) * 2)
+    release(root, "ch05")
+    assert sorted(path.name for path in (root / "release").iterdir()) == [
+        ".ch05.new.partial",
+        "ch05",
+    ]
+    assert (root / "release" / "ch05").stat().st_mode & 0o777 == 0o755
+
+
+def test_a_notebook_without_its_text_is_not_released(root: Path) -> None:
+    before = state(root)
+    source = root / "source" / "ch05" / "qos-design.ipynb"
+    shutil.copy(source, source.with_name("removed.ipynb"))
+    with pytest.raises(ReleaseError, match=r"removed\.ipynb has no source in .*remove it"):
+        release(root, "ch05")
+    assert state(root) == before
 
 
 def test_releasing_again_replaces_the_release(root: Path) -> None:
