@@ -105,6 +105,9 @@ class People:
             yield from ("--perms", "0755", "--tmpfs", str(above))
         for path, above in closed.items():
             if above is not None:
+                between = [p for p in reversed(path.parents) if p.is_relative_to(above)]
+                for folder in between[1:]:  # which only root could enter otherwise
+                    yield from ("--perms", "0755", "--dir", str(folder))
                 bind = "--bind" if path == self.folder else "--ro-bind"
                 yield from (bind, str(path), str(path))
 

@@ -153,6 +153,7 @@ def add_a_notebook(root: Path) -> None:
         shutil.copy(old, old.with_name(f"a-new-one.{suffix}"))
 
 
+@pytest.mark.filterwarnings("ignore::sqlalchemy.exc.SAWarning")  # of nbgrader's own
 @pytest.mark.parametrize(
     ("change", "reason"),
     [
