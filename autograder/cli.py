@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from autograder import quiz_cli
+from autograder import marks_cli, quiz_cli
 from autograder.interruption import Stopped
 from course.errors import CourseError
 
@@ -27,6 +27,7 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+app.add_typer(marks_cli.app, name="marks")
 app.add_typer(quiz_cli.app, name="quiz")
 out = Console()
 err = Console(stderr=True)

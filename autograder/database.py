@@ -205,22 +205,28 @@ def standing_rows(db: Session, assignment: str, student: str = "") -> dict[str, 
         of_notebooks.join(Assignment, submitted.assignment_id == Assignment.id)
     ):
         rows[name][0].append(penalty)
-    for name, notebook, cell, auto, kind, worth, *by_hand in chosen(_of_cells(db, Grade,
+    for name, notebook, cell, auto, kind, worth, *by_hand in chosen(of_cells(db, Grade,
             Grade.auto_score, BaseCell.type, Grade.max_score, Grade.manual_score,
             Grade.extra_credit, Grade.needs_manual_grade)):  # fmt: skip
         marks = by_hand[:2] if name in late else []
         rows[name][0].append([notebook, cell, auto, kind, worth, *marks])
         rows[name][1].append([notebook, cell, *by_hand])
     for name, notebook, cell, auto, by_hand in chosen(
-        _of_cells(db, Comment, Comment.auto_comment, Comment.manual_comment)
+        of_cells(db, Comment, Comment.auto_comment, Comment.manual_comment)
     ):
         rows[name][0].append([notebook, cell, auto])
         rows[name][1].append([notebook, cell, by_hand])
     return rows
 
 
-def _of_cells(db: Session, what: Callable[..., Any], *columns: Any) -> Any:
-    """Return a query for columns of grades or comments, with student, notebook and cell."""
+def of_cells(db: Session, what: Callable[..., Any], *columns: Any) -> Any:
+    """Return a query for columns of grades or comments, with student, notebook and cell.
+
+    Args:
+        db: the gradebook's session.
+        what: `Grade` or `Comment`.
+        columns: columns of it, or of what is joined: they follow the three names.
+    """
     kind: Any = what
     query = db.query(SubmittedAssignment.student_id, Notebook.name, BaseCell.name, *columns)
     return (

@@ -24,6 +24,7 @@ from autograder import (
     submission,
 )
 from autograder import nbgrader_bridge as bridge
+from autograder.feedback_page import INDEX
 from autograder.files import walk
 from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.intake import Found, Intake, NotHandedInError, UnclearError
@@ -125,8 +126,9 @@ class Desk:
         return self._has("autograded", student, ".ipynb")
 
     def has_feedback(self, student: str) -> bool:
-        """Whether there is feedback on every notebook."""
-        return self._has("feedback", student, ".html")
+        """Whether there is feedback on every notebook, and the page about all."""
+        index = self.root / "feedback" / student / self.assignment / INDEX
+        return index.is_file() and self._has("feedback", student, ".html")
 
     def pieces(self, work: Work) -> Iterator[Piece]:
         """Stage a submission's notebooks one by one."""

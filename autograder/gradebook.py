@@ -22,7 +22,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
-from autograder import database, intake_asked, penalties, roster
+from autograder import database, index_page, intake_asked, penalties, roster
 from autograder.database import GradebookUnusable
 from autograder.intake_asked import Question
 from autograder.ledger import Standing
@@ -111,6 +111,7 @@ class CourseGradebook:
                 del config.Autograde.exporter_class  # what is staged can be read
         if "exporter_class" not in config.GenerateFeedback:
             config.GenerateFeedback.exporter_class = FeedbackExporter
+        index_page.configure(config)
         self._engines = Engines()
         self.config: Config = config
         self.coursedir = CourseDirectory(config=config)

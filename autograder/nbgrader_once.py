@@ -25,6 +25,9 @@ from jinja2.bccache import Bucket
 from nbconvert.exporters import HTMLExporter
 from nbformat import NotebookNode
 from sqlalchemy.exc import DataError, IntegrityError
+from traitlets.config import Config
+
+from autograder import feedback_page
 
 from autograder.pictures import with_pictures
 
@@ -52,7 +55,18 @@ _PLAIN = {"text/plain", "text/vnd.mermaid"}
 
 
 class FeedbackExporter(HTMLExporter):
-    """nbconvert's HTML, from templates that are compiled once, and read again if need be."""
+    """The course's own page of feedback, from templates that are compiled once.
+
+    A configuration that names another template (``c.FeedbackExporter.template_name``) has its way.
+    """
+
+    def __init__(self, config: Config | None = None, **more: Any) -> None:
+        """Make an exporter as nbgrader and nbconvert do."""
+        ours = Config()
+        ours.FeedbackExporter.template_name = feedback_page.TEMPLATE
+        ours.FeedbackExporter.extra_template_basedirs = [str(feedback_page.TEMPLATES)]
+        ours.merge(config or Config())
+        super().__init__(config=ours, **more)  # type: ignore[no-untyped-call]
 
     def from_notebook_node(
         self, nb: NotebookNode, resources: Any = None, **more: Any
@@ -66,6 +80,11 @@ class FeedbackExporter(HTMLExporter):
             page, resources = super().from_notebook_node(nb, resources, **more)
         folder = resources.get("metadata", {}).get("path")
         return with_pictures(page, Path(folder)) if folder else page, resources
+
+    def _preprocess(self, nb: NotebookNode, resources: Any) -> tuple[NotebookNode, Any]:
+        nb, resources = super()._preprocess(nb, resources)  # type: ignore[no-untyped-call]
+        resources["feedback"] = feedback_page.describe(nb, resources, self.parent)
+        return nb, resources
 
     def _create_environment(self) -> Environment:
         environment: Environment = super()._create_environment()  # type: ignore[no-untyped-call]
@@ -81,11 +100,10 @@ class FeedbackExporter(HTMLExporter):
     def warm_up(cls, notebook: NotebookNode) -> None:
         """Compile what feedback is made with, by rendering a ``notebook`` for nobody.
 
-        nbgrader's template is one of nbconvert's ``classic``, with which most of it is compiled,
-        and what highlights code and renders Markdown as well.
+        What highlights code and renders Markdown is warm then, too.
         """
         with suppress(Exception):  # only time is lost: where it matters, nbgrader meets it, too
-            cls(template_name="classic").from_notebook_node(notebook)
+            cls().from_notebook_node(notebook)
 
 
 def _has_html_of_its_own(notebook: NotebookNode) -> bool:

@@ -15,6 +15,7 @@ from nbgrader.preprocessors import (
     SaveAutoGrades,
 )
 
+from autograder.index_page import IndexPages
 from autograder.nbgrader_bridge import (
     FlagForHumans,
     GradeByBehaviour,
@@ -68,5 +69,7 @@ c.Autograde.autograde_preprocessors = [
     CheckCellMetadata,
 ]
 
-# Feedback that holds the pictures it shows: the exchange hands out the page alone.
+# Feedback that holds the pictures it shows (the exchange hands out the page alone), calls answers by
+# their questions and says what still waits for its mark; and a page about all exercises beside it.
 c.GenerateFeedback.exporter_class = FeedbackExporter
+c.GenerateFeedback.post_convert_hook = IndexPages(c)

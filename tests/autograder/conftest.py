@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import shutil
 import time
 from dataclasses import dataclass
@@ -10,14 +11,16 @@ from pathlib import Path
 import nbformat
 import pytest
 from nbformat import NotebookNode
+from nbgrader.api import Gradebook
 
-from autograder import corpus, submission
+from autograder import corpus, engine, points, submission
 from autograder.build import build
 from autograder.corpus import Case
 from autograder.corpus.trials import one_notebook
 from autograder.gradebook import Grade
 from autograder.release import release
 from tests.killing import Engine, fresh_copy
+from tests.machine import sandbox_problem
 
 SUBMISSIONS = Path(__file__).parents[1] / "submissions"
 ASSIGNMENT, NOTEBOOK = "ch05", "qos-design"
@@ -95,3 +98,52 @@ def class_(
     started = time.monotonic()
     whole.finish()
     return Undisturbed(course.root, whole.root, whole.grades(), time.monotonic() - started)
+
+
+PEOPLE = {
+    "ann": ("Ann", "O'Hara"), "bob": ("Bob", "<b>Bee"), "cy": ("Cy", "Young"),
+    "-dan": ("Dan", "Dent"), "eve": ("Eve", "Ever"), "late": ("Lee", "Late"),
+    "zoe": ("Zoe", "Zest"),
+}  # fmt: skip
+"""The class of `graded_course`: "late" hands in after the grading, "zoe" never."""
+
+
+def mark_written_answers(course: Course, *students: str) -> None:
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        for student, cell in itertools.product(students, points.table()["qos"].manual):
+            entry = book.find_grade(cell, NOTEBOOK, ASSIGNMENT, student)
+            entry.manual_score, entry.needs_manual_grade = 0.5, False
+        book.db.commit()
+
+
+@pytest.fixture(scope="session")
+def graded_course(
+    released_course: Path, cases: dict[str, Case], tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    """A class that was really graded, with names and a due date; half of it waits for marks."""
+    if problem := sandbox_problem():
+        pytest.skip(problem)
+    course = Course(Path(shutil.copytree(
+        released_course, tmp_path_factory.mktemp("graded") / "course"
+    )))  # fmt: skip
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        book.update_or_create_assignment(ASSIGNMENT, duedate="2026-04-30 12:00:00 UTC")
+        for student, (first, last) in PEOPLE.items():
+            book.add_student(student, first_name=first, last_name=last)
+    for student, case in {
+        "ann": "right-two-sides", "bob": "wrong-imu-endless", "cy": "wrong-imu-endless",
+        "-dan": "right-two-sides",
+    }.items():  # fmt: skip
+        course.submit(student, cases[case].submission(course.source, course.released))
+    (course.folder("ann") / "timestamp.txt").write_text("2026-04-30 14:05:00 UTC")
+    course.submit("eve", "{" + '"cells": [')
+    engine.grade(course.root, ASSIGNMENT)
+    mark_written_answers(course, "ann", "-dan")
+    engine.grade(course.root, ASSIGNMENT)
+    course.folder("late")
+    return course.root
+
+
+@pytest.fixture
+def graded(graded_course: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(graded_course, tmp_path / "graded"))

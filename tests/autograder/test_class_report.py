@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
-import itertools
 import json
 import random
 import re
-import shutil
 from collections.abc import Sequence
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
-from nbgrader.api import Gradebook
 
-from autograder import engine, exams, points
-from autograder.corpus import Case
+from autograder import exams
 from autograder.database import GradebookUnusable
 from autograder.gradebook import Grade
 from autograder.insight import InsightError, exports, feedback, figures, needs, records, similarity
@@ -28,12 +24,12 @@ from autograder.insight.collect import ClassData, Person
 from autograder.insight.own_text import GivenText, OwnText, tokens
 from autograder.insight.records import Record
 from autograder.verdict import CheckResult, Status, Verdict
-from tests.machine import sandbox_problem
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
 from .test_cli import autograder
 
-Cases = dict[str, Case]
+pytestmark = pytest.mark.xdist_group("graded class")
+
 EVIL = "<script>alert(1)</script>"
 NOTHING_GIVEN = GivenText({})
 
@@ -99,14 +95,6 @@ def class_of_skill(count: int, worth: Sequence[float], seed: int = 1) -> ClassDa
         ]
         for n in range(count)
     })  # fmt: skip
-
-
-def mark_written_answers(course: Course, *students: str) -> None:
-    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
-        for student, cell in itertools.product(students, points.table()["qos"].manual):
-            entry = book.find_grade(cell, NOTEBOOK, ASSIGNMENT, student)
-            entry.manual_score, entry.needs_manual_grade = 0.5, False
-        book.db.commit()
 
 
 def rows_of(text: str) -> list[list[str]]:
@@ -379,32 +367,6 @@ def test_everything_from_a_student_is_escaped_and_nothing_is_loaded() -> None:
 
 
 # Really graded submissions
-
-
-@pytest.fixture(scope="module")
-def graded_course(
-    released_course: Path, cases: Cases, tmp_path_factory: pytest.TempPathFactory
-) -> Path:
-    if problem := sandbox_problem():
-        pytest.skip(problem)
-    root = tmp_path_factory.mktemp("graded") / "course"
-    shutil.copytree(released_course, root)
-    course = Course(root)
-    for student, case in {
-        "ann": "right-two-sides", "bob": "wrong-imu-endless", "cy": "wrong-imu-endless",
-        "-dan": "right-two-sides",
-    }.items():  # fmt: skip
-        course.submit(student, cases[case].submission(course.source, course.released))
-    course.submit("eve", "{" + '"cells": [')
-    engine.grade(root, ASSIGNMENT)
-    mark_written_answers(course, "ann", "-dan")
-    course.folder("late")
-    return root
-
-
-@pytest.fixture
-def graded(graded_course: Path, tmp_path: Path) -> Path:
-    return Path(shutil.copytree(graded_course, tmp_path / "graded"))
 
 
 def test_the_report_of_a_graded_class(graded: Path) -> None:
