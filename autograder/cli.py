@@ -241,6 +241,9 @@ def report(
     provisional: Annotated[
         bool, typer.Option("--provisional", help="Also export grades that wait for a person.")
     ] = False,
+    zero_absent: Annotated[
+        bool, typer.Option("--zero-absent", help="Export 0 for those who handed in nothing.")
+    ] = False,
     similarity: Annotated[
         float, typer.Option("--similarity", min=0.7, max=1.0, help="Show pairs at least so alike.")
     ] = 0.9,
@@ -262,8 +265,10 @@ def report(
     in points: map Username, or another that identifies your users, and the assignment's grade
     item.
 
-    Neither has students whose grade still waits for a person: both platforms take an empty cell
-    for "delete the grade".
+    Both have everybody whom nbgrader's gradebook knows. The cell of a student whose grade still
+    waits for a person is empty, and so is that of one who handed in nothing (unless --zero-absent
+    says that this is a 0): both platforms take an empty cell for "no grade", and delete one that
+    is there.
     """
     from autograder import quiz_report
     from autograder.insight import command
@@ -271,8 +276,9 @@ def report(
     where = _root(root)
     assignment = quiz_report.assignment_of(where, assignment)
     made = command.run(
-        where, assignment, column=column, provisional=provisional, threshold=similarity
-    )
+        where, assignment, column=column, provisional=provisional, threshold=similarity,
+        zero_absent=zero_absent,
+    )  # fmt: skip
     grades = made.report.data.grades
     quizzes = quiz_report.of_assignment(where, assignment)
     if as_json:

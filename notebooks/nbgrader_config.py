@@ -16,6 +16,7 @@ from nbgrader.preprocessors import (
 )
 
 from autograder.index_page import IndexPages
+from autograder.model_answers import ShowModelAnswers
 from autograder.nbgrader_bridge import (
     FlagForHumans,
     GradeByBehaviour,
@@ -73,3 +74,6 @@ c.Autograde.autograde_preprocessors = [
 # their questions and says what still waits for its mark; and a page about all exercises beside it.
 c.GenerateFeedback.exporter_class = FeedbackExporter
 c.GenerateFeedback.post_convert_hook = IndexPages(c)
+
+# The formgrader shows the model answer above each written answer; no other page has it.
+c.HTMLExporter.preprocessors = [ShowModelAnswers]

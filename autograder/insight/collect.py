@@ -9,10 +9,13 @@ from pathlib import Path
 from nbgrader.api import Gradebook
 from sqlalchemy.exc import SQLAlchemyError
 
+from autograder import questions
 from autograder.gradebook import CourseGradebook, Grade
 from autograder.insight import InsightError, records
 from autograder.insight.records import Record, RecordError
 from autograder.nbgrader_bridge import WORK_FOLDER
+from autograder.questions import Question
+from autograder.submission import SubmissionError
 from quizzes.errors import guess
 
 
@@ -25,6 +28,11 @@ class Person:
     last_name: str = ""
     email: str = ""
     lms_user_id: str = ""
+
+    @property
+    def name(self) -> str:
+        """First and last name; empty if neither is known."""
+        return " ".join(part for part in (self.first_name, self.last_name) if part)
 
 
 @dataclass(frozen=True)
@@ -40,6 +48,9 @@ class ClassData:
         records: {student: {notebook: what came of running it}}; what is missing was graded before
             records were kept, or is damaged (`notes` says so).
         not_entered: students with a folder in ``submitted/`` and no grade.
+        absent: students of the gradebook who have handed in nothing.
+        left_out: {student: notebooks that are not in what they handed in}.
+        questions: {notebook: {grade id: question}}, as far as the source is there.
         notes: a sentence for each thing that is left out.
     """
 
@@ -51,6 +62,28 @@ class ClassData:
     records: Mapping[str, Mapping[str, Record]] = field(default_factory=dict)
     not_entered: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    absent: tuple[str, ...] = ()
+    left_out: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    questions: Mapping[str, Mapping[str, Question]] = field(default_factory=dict)
+
+    def has_left_out(self, student: str, notebook: str) -> bool:
+        """Whether a student who handed in something has not handed in this."""
+        return notebook in self.left_out.get(student, ())
+
+    def is_unreadable(self, student: str, notebook: str) -> bool:
+        """Whether a notebook could not be run at all, so that a person has to look at it."""
+        record = self.records.get(student, {}).get(notebook)
+        return record is not None and record.unreadable
+
+    def not_handed_in(self, notebook: str) -> int:
+        """How many students of the gradebook have not handed in a notebook."""
+        left_out = sum(notebook in notebooks for notebooks in self.left_out.values())
+        return len(self.absent) + left_out
+
+    def called(self, student: str) -> str:
+        """Return how a student is called: the name, if one is known, with the id behind it."""
+        person = self.people.get(student)
+        return f"{person.name} ({student})" if person and person.name else student
 
 
 def collect(root: Path, assignment: str) -> ClassData:
@@ -79,10 +112,13 @@ def collect(root: Path, assignment: str) -> ClassData:
         )
     found, notes = _records(gradebook.root, assignment, grades)
     known = {grade.student for grade in grades}
+    handed_in = _submitted(gradebook.root, assignment)
+    absent = people.keys() - known - set(handed_in)
     return ClassData(
         gradebook.root, assignment, max(grade.max_score for grade in grades), grades, people,
-        found, tuple(s for s in _submitted(gradebook.root, assignment) if s not in known),
-        tuple(notes),
+        found, tuple(student for student in handed_in if student not in known), tuple(notes),
+        tuple(sorted(absent)), _left_out(gradebook.root, assignment, found),
+        _questions(gradebook, assignment),
     )  # fmt: skip
 
 
@@ -103,6 +139,7 @@ def _people(gradebook: CourseGradebook) -> dict[str, Person]:
                 s.id, s.first_name or "", s.last_name or "", s.email or "", s.lms_user_id or ""
             )
             for s in book.students
+            if s.id not in gradebook.excluded
         }
 
 
@@ -131,6 +168,30 @@ def _records(
             f"`autograder grade {assignment}` again to have it written."
         )
     return found, notes
+
+
+def _left_out(
+    root: Path, assignment: str, found: Mapping[str, Mapping[str, Record]]
+) -> dict[str, frozenset[str]]:
+    """Return the notebooks that are not there and were not examined under another name either."""
+
+    def is_missing(student: str, notebook: str, record: Record) -> bool:
+        results = [check for verdict in record.verdicts.values() for check in verdict.checks]
+        if record.unreadable or any(check.status != "not_checked" for check in results):
+            return False
+        return not (root / "submitted" / student / assignment / f"{notebook}.ipynb").exists()
+
+    return {
+        student: frozenset(n for n, record in notebooks.items() if is_missing(student, n, record))
+        for student, notebooks in found.items()
+    }
+
+
+def _questions(gradebook: CourseGradebook, assignment: str) -> dict[str, dict[str, Question]]:
+    try:
+        return questions.of_assignment(gradebook.coursedir, assignment)
+    except (SubmissionError, OSError):
+        return {}
 
 
 def _submitted(root: Path, assignment: str) -> list[str]:

@@ -28,28 +28,45 @@ class Made:
 
     def tables(self) -> list[Table]:
         """Return the checks, and what needs a person, for a terminal."""
-        checks = Table("Check", "Fails", "r", "Remark", padding=(0, 0))
-        checks.caption = "Fails: of those examined; r: discrimination, correlation with the rest"
+        checks = Table("Check", "n", "Fails", "r", "Remark", padding=(0, 0))
+        checks.caption = (
+            "n: submissions on which it was examined; Fails: of these; r: discrimination, "
+            "correlation with the rest"
+        )
         for check in self.report.checks:
             rate = "" if check.failure_rate is None else f"{100 * check.failure_rate:.0f} %"
             r = "" if check.discrimination is None else f"{check.discrimination:+.2f}"
-            checks.add_row(escape(check.title), rate, r, check.advice)
+            checks.add_row(escape(check.title), str(check.examined), rate, r, check.advice)
+        means = Table("Exercise", "Mean", "n", "Waiting", padding=(0, 1))
+        for mean in self.report.means.exercises:
+            value = "" if mean.mean is None else f"{mean.mean:.1f} of {mean.max_points:g}"
+            means.add_row(escape(mean.about), value, str(mean.n), str(mean.waiting or ""))
         needs = Table("Needs a person", "How many", "Who")
         for need in self.report.needs:
-            who = ", ".join(need.students[:5]) + (", …" if len(need.students) > 5 else "")
+            named = [self.report.data.called(student) for student in need.students[:5]]
+            who = ", ".join(named) + (", …" if len(need.students) > 5 else "")
             style = "bold" if need.urgent else None
             needs.add_row(escape(need.why), str(len(need.students)), escape(who), style=style)
-        return [table for table in (checks, needs) if table.row_count]
+        return [table for table in (means, checks, needs) if table.row_count]
 
 
-def run(root: Path, assignment: str, *, column: str, provisional: bool, threshold: float) -> Made:
+def run(
+    root: Path,
+    assignment: str,
+    *,
+    column: str,
+    provisional: bool,
+    threshold: float,
+    zero_absent: bool = False,
+) -> Made:
     """Make the report of an assignment and write it; arguments as in `report` and `exports`.
 
     Raises:
         InsightError: no such assignment, nothing graded, or a folder that cannot be written.
     """
     made = report.make(root, assignment, threshold)
-    files = report.write(made, column, provisional=provisional)
-    export = exports.canvas(made.data, column, provisional=provisional)
+    chosen = {"provisional": provisional, "zero_absent": zero_absent}
+    files = report.write(made, column, **chosen)
+    export = exports.canvas(made.data, column, **chosen)
     remarks = [*made.notes, *report.export_remarks(export)]
     return Made(made, files, remarks)

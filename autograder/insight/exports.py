@@ -2,17 +2,22 @@
 
 Canvas (its importer's own rules): the first columns are Student, ID, SIS User ID, SIS Login ID and
 Section, the row "Points Possible" comes first, a student is found by ID, then by SIS User ID, then
-by SIS Login ID, and an empty cell *deletes* a score that is there. Moodle (Grades, Import, CSV
-file): any columns, mapped by hand, one of which identifies the user; an empty cell deletes a grade,
-and one row of a user it does not know makes it refuse the whole file. So neither file has a row for
-a student whose grade is not complete.
+by SIS Login ID, and an empty cell is no score: it *deletes* one that is there. Moodle (Grades,
+Import, CSV file): any columns, mapped by hand, one of which identifies the user; an empty cell is
+no grade here, too, and one row of a user it does not know makes it refuse the whole file.
+
+So both files have everybody whom nbgrader's gradebook knows, and nobody else, and a cell stays
+empty as long as there is no final grade. Who has handed in nothing has no grade either: that it
+counts as 0 is a rule of the course, which Canvas (its policy for missing submissions) and Moodle
+("exclude empty grades") each apply by themselves, and an illness or an extension is known to
+neither of us. A course in which it is a 0 asks for it.
 """
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from autograder.gradebook import Grade
@@ -28,19 +33,22 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "\0", "＝", "＋", "－", "＠
 
 @dataclass(frozen=True)
 class Export:
-    """One file: its text, how many students are in it, and who is left out or written otherwise.
+    """One file: its text, how many students have points in it, and whose cell is empty, and why.
 
-    ``waiting`` are left out, because their grades are not complete; ``guarded`` are ids that were
-    written with an apostrophe in front (see `guarded`).
+    ``waiting`` are those whose grades are not complete, ``absent`` those who handed in nothing;
+    ``guarded`` are ids that were written with an apostrophe in front (see `guarded`).
     """
 
     text: str
     students: int
     waiting: tuple[str, ...]
+    absent: tuple[str, ...]
     guarded: tuple[str, ...]
 
 
-def canvas(data: ClassData, column: str = "", *, provisional: bool = False) -> Export:
+def canvas(
+    data: ClassData, column: str = "", *, provisional: bool = False, zero_absent: bool = False
+) -> Export:
     """Return the grades for the import of Canvas's gradebook.
 
     Args:
@@ -49,21 +57,26 @@ def canvas(data: ClassData, column: str = "", *, provisional: bool = False) -> E
             there already; the name in nbgrader if left out. Canvas makes a new one of an unknown.
         provisional: also export grades that still wait for a person, unless they are asked what
             was handed in at all.
+        zero_absent: write 0 for those who have handed in nothing.
     """
     rows: list[Sequence[str]] = [
         (*CANVAS_COLUMNS, _header(data, column)),
         (POINTS_POSSIBLE, "", "", "", "", f"{data.max_score:g}"),
     ]
-    for person, grade in _complete(data, provisional):
+    points = _points(data, provisional, zero_absent)
+    for person in _everybody(data):
         cells = (_sortable(person), person.lms_user_id, "", person.student, "")
-        rows.append((*map(guarded, cells), _points(grade)))
-    return _export(data, rows, len(rows) - 2, provisional)
+        rows.append((*map(guarded, cells), points[person.student]))
+    return _export(data, rows, points)
 
 
-def moodle(data: ClassData, column: str = "", *, provisional: bool = False) -> Export:
+def moodle(
+    data: ClassData, column: str = "", *, provisional: bool = False, zero_absent: bool = False
+) -> Export:
     """Return the grades for Moodle's import of a CSV file, in points; arguments as in `canvas`."""
     rows: list[Sequence[str]] = [(*MOODLE_COLUMNS, _header(data, column))]
-    for person, grade in _complete(data, provisional):
+    points = _points(data, provisional, zero_absent)
+    for person in _everybody(data):
         cells = (
             person.student,
             person.lms_user_id,
@@ -71,8 +84,8 @@ def moodle(data: ClassData, column: str = "", *, provisional: bool = False) -> E
             person.last_name,
             person.email,
         )
-        rows.append((*map(guarded, cells), _points(grade)))
-    return _export(data, rows, len(rows) - 1, provisional)
+        rows.append((*map(guarded, cells), points[person.student]))
+    return _export(data, rows, points)
 
 
 def guarded(text: str) -> str:
@@ -95,19 +108,31 @@ def as_csv(rows: Iterable[Sequence[str]]) -> str:
     return buffer.getvalue()
 
 
-def _export(data: ClassData, rows: list[Sequence[str]], students: int, provisional: bool) -> Export:
-    left_out = tuple(g.student for g in data.grades if not _is_exported(g, provisional))
-    shown = (grade.student for grade in data.grades if grade.student not in left_out)
-    odd = tuple(student for student in shown if is_formula(student))
-    return Export(as_csv(rows), students, left_out, odd)
+def _export(data: ClassData, rows: list[Sequence[str]], points: Mapping[str, str]) -> Export:
+    empty = [student for student, shown in points.items() if not shown]
+    absent = set(data.absent)
+    return Export(
+        as_csv(rows), len(points) - len(empty), tuple(s for s in empty if s not in absent),
+        tuple(s for s in empty if s in absent), tuple(s for s in points if is_formula(s)),
+    )  # fmt: skip
 
 
-def _complete(data: ClassData, provisional: bool) -> list[tuple[Person, Grade]]:
-    return [
-        (data.people.get(grade.student, Person(grade.student)), grade)
+def _everybody(data: ClassData) -> list[Person]:
+    """Return whom the gradebook knows; a folder of somebody else is no participant anywhere."""
+    graded = {grade.student: Person(grade.student) for grade in data.grades}
+    return [person for _, person in sorted({**graded, **data.people}.items())]
+
+
+def _points(data: ClassData, provisional: bool, zero_absent: bool) -> dict[str, str]:
+    """Return {student: what stands in the cell}, for everybody."""
+    shown = {
+        grade.student: f"{round(grade.score, 2):g}"
         for grade in data.grades
         if _is_exported(grade, provisional)
-    ]
+    }
+    if zero_absent:
+        shown |= dict.fromkeys(data.absent, "0")
+    return {person.student: shown.get(person.student, "") for person in _everybody(data)}
 
 
 def _is_exported(grade: Grade, provisional: bool) -> bool:
@@ -127,7 +152,3 @@ def _sortable(person: Person) -> str:
 
 def _header(data: ClassData, column: str) -> str:
     return guarded(column or data.assignment)
-
-
-def _points(grade: Grade) -> str:
-    return f"{round(grade.score, 2):g}"

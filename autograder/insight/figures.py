@@ -20,6 +20,8 @@ from quizzes.insight.analysis import discrimination
 
 FEW = 10
 """Submissions below which figures say little; they are shown all the same, and marked."""
+FEWEST_FAILURES = 5
+"""Failures below which nothing is advised: a single student can turn the figures."""
 EASY, HARD, FLAT = 0.05, 0.75, 0.1
 """Bounds for advice: failure rates that hardly anybody or nearly everybody has; hardly tells."""
 
@@ -39,6 +41,7 @@ class CheckFigures:
         discrimination: correlation of passing with the rest score, -1 to 1, among those on which
             it was examined; None if it is not defined.
         advice: what to look at, or "".
+        not_handed_in: students of the class who have not handed in the notebook: nobody's failure.
     """
 
     notebook: str
@@ -53,6 +56,12 @@ class CheckFigures:
     failure_rate: float | None
     discrimination: float | None
     advice: str
+    not_handed_in: int = 0
+
+    @property
+    def examined(self) -> int:
+        """The n of failure rate and discrimination: submissions on which it was examined."""
+        return self.passed + self.failed
 
 
 @dataclass(frozen=True)
@@ -79,7 +88,7 @@ def results(data: ClassData) -> Iterator[tuple[str, Key, CheckResult]]:
     """
     for student, notebooks in data.records.items():
         for notebook, record in notebooks.items():
-            if record.unreadable:
+            if record.unreadable or data.has_left_out(student, notebook):
                 continue
             for grade_id, verdict in record.verdicts.items():
                 if not verdict.exam.startswith(PREFIX):
@@ -98,7 +107,9 @@ def checks(data: ClassData) -> tuple[CheckFigures, ...]:
             totals[student] += result.points
     notebooks = {key[0]: None for key in sorted(by_check, key=lambda key: key[0])}
     ordered = (key for notebook in notebooks for key in by_check if key[0] == notebook)
-    return tuple(_figures(key, by_check[key], totals) for key in ordered)
+    return tuple(
+        _figures(key, by_check[key], totals, data.not_handed_in(key[0])) for key in ordered
+    )
 
 
 def times(data: ClassData) -> Times:
@@ -106,12 +117,17 @@ def times(data: ClassData) -> Times:
     seconds = {
         student: sum(record.seconds for record in notebooks.values())
         for student, notebooks in data.records.items()
-        if any(not record.unreadable for record in notebooks.values())
+        if any(
+            not record.unreadable and not data.has_left_out(student, notebook)
+            for notebook, record in notebooks.items()
+        )
     }
     return Times(seconds)
 
 
-def _figures(key: Key, found: dict[str, CheckResult], totals: Mapping[str, float]) -> CheckFigures:
+def _figures(
+    key: Key, found: dict[str, CheckResult], totals: Mapping[str, float], not_handed_in: int
+) -> CheckFigures:
     counts = Counter(result.status for result in found.values())
     examined = counts["passed"] + counts["failed"]
     rate = counts["failed"] / examined if examined else None
@@ -125,7 +141,7 @@ def _figures(key: Key, found: dict[str, CheckResult], totals: Mapping[str, float
     return CheckFigures(
         *key, any_result.title, any_result.max_points,
         counts["passed"], counts["failed"], counts["not_checked"], counts["grader_error"],
-        rate, correlation, _advice(counts, examined, rate, correlation),
+        rate, correlation, _advice(counts, examined, rate, correlation), not_handed_in,
     )  # fmt: skip
 
 
@@ -138,6 +154,8 @@ def _advice(
         return "it was examined on no submission"
     if examined < FEW:
         return "too few submissions"
+    if counts["failed"] < FEWEST_FAILURES:
+        return ""
     if correlation is not None and correlation < -FLAT:
         return "those who do well on the rest fail it: look at the check and at the task's wording"
     if rate > HARD:

@@ -1,7 +1,8 @@
 """What of a submission its student wrote, as lines and as tokens that can be compared.
 
-The assignment's given code and its stub do not count, nor do comments, blanks and the names that a
-student has chosen: what is left is the choice of calls, values and structure.
+The assignment's given code, its stub and its own solution do not count, nor do comments, blanks and
+the names that a student has chosen: what is left is the choice of calls, values and structure. Of
+an answer in words what stands in the question or in the model answer does not count.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import ast
 import builtins
 import keyword
+import re
 import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -28,6 +30,9 @@ MAX_TOKENS = 2_000
 MANY, COMMON = 10, 0.25
 """A line is common ground if more than ten students, and a quarter of the class, have it."""
 
+RUN = 4
+"""Words in a row that an answer shares with the question or its model only by repeating it."""
+
 OWN_NAME = "\N{OPEN BOX}"
 
 
@@ -40,10 +45,14 @@ class OwnText:
 
 
 class GivenText:
-    """The assignment's own code: the lines of its released notebooks."""
+    """The assignment's own code: the lines of its released notebooks, and of its solutions."""
 
-    def __init__(self, released: Mapping[str, NotebookNode]) -> None:
-        """Take {notebook: released notebook}."""
+    def __init__(
+        self,
+        released: Mapping[str, NotebookNode],
+        source: Mapping[str, NotebookNode] | None = None,
+    ) -> None:
+        """Take {notebook: released notebook}, and {notebook: the instructor's} if it is there."""
         self._cells = {
             (name, submission.grade_id(cell)): cell.source
             for name, notebook in released.items()
@@ -51,7 +60,13 @@ class GivenText:
             if submission.grade_id(cell)
         }
         sources = [c.source for nb in released.values() for c in nb.cells if c.cell_type == "code"]
-        self.lines = frozenset(bare(line) for s in sources for line in s.splitlines())
+        solved = [
+            cell.source
+            for notebook in (source or {}).values()
+            for cell in notebook.cells
+            if cell.cell_type == "code"
+        ]
+        self.lines = frozenset(bare(line) for s in sources + solved for line in s.splitlines())
         self.names = frozenset(
             text for s in sources for kind, text in _lex(s) if _within(kind, Name)
         )
@@ -98,6 +113,25 @@ def tokens(
     left = [line for line in text.lines if bare(line) not in given.lines | common]
     chosen = _chosen_names("\n".join(text.lines)) - given.names
     return tuple(islice(_normal("\n".join(left), chosen), most))
+
+
+def words(text: OwnText, given: str) -> tuple[str, ...]:
+    """Return the words of an answer, without what it has in common with a ``given`` text.
+
+    That is every run of `RUN` words or more which stands there, too.
+    """
+    known = _words(given)
+    runs = {known[n : n + RUN] for n in range(len(known) - RUN + 1)}
+    own = _words("\n".join(text.lines))[:MAX_TOKENS]
+    taken: set[int] = set()
+    for n in range(len(own) - RUN + 1):
+        if own[n : n + RUN] in runs:
+            taken.update(range(n, n + RUN))
+    return tuple(word for n, word in enumerate(own) if n not in taken)
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(re.findall(r"\w+", text.casefold()))
 
 
 def _normal(text: str, chosen: set[str]) -> Iterable[str]:

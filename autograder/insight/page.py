@@ -10,16 +10,19 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from itertools import groupby
 
+from autograder import questions
 from autograder.insight import plots
 from autograder.insight.figures import FEW, CheckFigures
+from autograder.insight.means import Mean
 from autograder.insight.report import ClassReport
 from autograder.insight.similarity import MOST_PAIRS, Pair, side_by_side
 from course.plain import counted
 
 CHECK_COLUMNS = (
-    "check", "points", "passed", "failed", "not checked", "grader error", "failure rate",
-    "discrimination", "remark",
+    "check", "points", "passed", "failed", "not checked", "not handed in", "grader error", "n",
+    "failure rate", "discrimination", "remark",
 )  # fmt: skip
+MEAN_COLUMNS = ("mean", "of it", "n", "waiting")
 MOST_NAMES = 12
 """Students named in a table's cell; the rest stands behind a disclosure."""
 MOST_GROUPS = 20
@@ -56,6 +59,8 @@ def page(report: ClassReport) -> str:
         f"<h1>{escape(title)}</h1>",
         *_scores(report),
         *_needs(report),
+        *_absent(report),
+        *_means(report),
         *_checks(report),
         *_feedback(report),
         *_times(report),
@@ -77,7 +82,7 @@ def _scores(report: ClassReport) -> list[str]:
     waiting = sum(grade.needs_manual_grade for grade in grades)
     said = (
         f"{counted(len(grades), 'student')} with a grade, of {most:g} points; "
-        f"median {report.median:g}, mean {report.mean:.1f}."
+        f"median {report.median:g}, mean {report.mean:.1f} (n = {len(grades)})."
     )
     if waiting:
         said += (
@@ -94,11 +99,59 @@ def _needs(report: ClassReport) -> list[str]:
         return [*parts, "<p>Nothing.</p>"]
     rows = "".join(
         f'<tr><td class="{"urgent" if need.urgent else "text"}">{escape(need.why)}</td>'
-        f'<td class="number">{len(need.students)}</td><td>{_names(need.students)}</td></tr>'
+        f'<td class="number">{len(need.students)}</td><td>{_names(report, need.students)}</td></tr>'
         for need in report.needs
     )
     caption = "Reasons, and whom they hold for; without a mark from you these grades are not final"
     return [*parts, _table(caption, ("why", "how many", "students"), rows)]
+
+
+def _absent(report: ClassReport) -> list[str]:
+    absent, left_out = report.data.absent, report.data.left_out
+    parts = ["<h2>What was not handed in</h2>"]
+    if absent:
+        number = counted(len(absent), "student")
+        parts.append(f"<p>Nothing, by {number}: {_names(report, absent)}</p>")
+    for notebook in sorted({name for names in left_out.values() for name in names}):
+        who = [student for student, names in sorted(left_out.items()) if notebook in names]
+        title = questions.title_of_notebook(report.data.assignment, notebook)
+        number = counted(len(who), "more student")
+        parts.append(f"<p>{escape(title)}, by {number}: {_names(report, who)}</p>")
+    return parts if len(parts) > 1 else []
+
+
+def _means(report: ClassReport) -> list[str]:
+    found = report.means
+    if not found.exercises:
+        return []
+    return [
+        "<h2>Means</h2><p><em>n</em> is how many students are in a mean: who has not handed in an "
+        "exercise, or still waits for a mark in it, is not. What lateness takes off is left out."
+        "</p>",
+        _table("By exercise", ("exercise", *MEAN_COLUMNS), _mean_rows(found.exercises, "about")),
+        _table(
+            "By question", ("exercise", "question", *MEAN_COLUMNS),
+            _mean_rows(found.questions, "about", "title"),
+        ),
+        *([_table(
+            "By learning objective: the share of its points that students have, of those that are "
+            "given so far", ("objective", *MEAN_COLUMNS[1:]),
+            _mean_rows(found.objectives, "title", points=False),
+        )] if found.objectives else []),
+    ]  # fmt: skip
+
+
+def _mean_rows(found: Iterable[Mean], *texts: str, points: bool = True) -> str:
+    rows = []
+    for mean in found:
+        names = "".join(f'<th scope="row">{escape(getattr(mean, text))}</th>' for text in texts)
+        value = "" if mean.mean is None else f"{mean.mean:.2f} of {mean.max_points:g}"
+        share = "" if mean.share is None else f"{100 * mean.share:.0f} %"
+        numbers = [value] if points else []
+        numbers += [share, str(mean.n), str(mean.waiting or "")]
+        cells = "".join(f'<td class="number">{number}</td>' for number in numbers)
+        rows.append(f"<tr>{names}{cells}</tr>")
+    return "".join(rows)
 
 
 def _checks(report: ClassReport) -> list[str]:
@@ -120,7 +173,9 @@ def _checks(report: ClassReport) -> list[str]:
 
 _EXPLAINED = (
     "<p>The <em>failure rate</em> counts submissions on which the check was examined; it is "
-    "<em>not checked</em> where something that it needs had failed. <em>Discrimination</em> is the "
+    "<em>not checked</em> where something that it needs had failed, and <em>not handed in</em> by "
+    "those whose notebook is missing. <em>n</em> is how many it was examined on: failure rate and "
+    "<em>discrimination</em> are of these. Discrimination is the "
     "correlation of passing with the points on all other checks: above 0.3 a check tells well who "
     "can do it, near 0 it does not, and below 0 something is wrong with it or with the task. "
     "Submissions that could not be run are left out.</p>"
@@ -130,7 +185,7 @@ _EXPLAINED = (
 def _check_row(check: CheckFigures) -> str:
     numbers = (
         f"{check.max_points:g}", str(check.passed), str(check.failed), str(check.not_checked),
-        str(check.grader_errors),
+        str(check.not_handed_in), str(check.grader_errors), str(check.examined),
         "" if check.failure_rate is None else f"{100 * check.failure_rate:.0f} %",
         "" if check.discrimination is None else f"{check.discrimination:+.2f}",
     )  # fmt: skip
@@ -146,7 +201,7 @@ def _feedback(report: ClassReport) -> list[str]:
         return [*parts, "<p>No check failed.</p>"]
     rows = "".join(
         f'<tr><td class="number">{len(group.students)}</td><td>{escape(group.about)}</td>'
-        f"<td>{escape(group.text)}</td><td>{_names(group.students)}</td></tr>"
+        f"<td>{escape(group.text)}</td><td>{_names(report, group.students)}</td></tr>"
         for group in report.feedback[:MOST_GROUPS]
     )
     shown = min(MOST_GROUPS, len(report.feedback))
@@ -161,10 +216,12 @@ def _times(report: ClassReport) -> list[str]:
     seconds = report.times.seconds
     if not seconds:
         return []
-    slowest = ", ".join(f"{who} {taken:.1f} s" for who, taken in report.times.slowest)
+    slowest = ", ".join(
+        f"{report.data.called(who)} {taken:.1f} s" for who, taken in report.times.slowest
+    )
     said = (
-        f"Median {report.times.median:.1f} s, all together {sum(seconds.values()) / 60:.1f} min "
-        f"one after another. The slowest: {slowest}."
+        f"Median {report.times.median:.1f} s (n = {len(seconds)}), all together "
+        f"{sum(seconds.values()) / 60:.1f} min one after another. The slowest: {slowest}."
     )
     drawn = plots.times(list(seconds.values()))
     return [
@@ -175,34 +232,42 @@ def _times(report: ClassReport) -> list[str]:
 
 
 def _alike(report: ClassReport) -> list[str]:
-    found = report.likeness
+    found = report.alike
     said = (
-        f"{counted(found.compared, 'submission')} compared; "
-        f"{counted(found.found, 'pair')} at least {100 * report.threshold:.0f} % alike in what the "
-        "students wrote themselves. The assignment's own lines, lines that a good part of the "
-        "class has, comments and chosen names do not count."
+        f"{found.compared} programs and answers compared, each exercise and each "
+        f"question by itself; {counted(found.found, 'pair')} at least "
+        f"{100 * report.threshold:.0f} % alike in what the students wrote themselves. The "
+        "assignment's own lines and its model answers, lines that a good part of the class has, "
+        "comments and chosen names do not count."
     )
     if found.too_short:
-        said += f" Too little to compare: {counted(len(found.too_short), 'submission')}."
+        said += f" Too short to compare: {len(found.too_short)}."
     hint = (
         "This is a hint where to look, never a verdict: people who learn together, or from the "
         "same example, write alike."
     )
     parts = [f"<h2>Alike</h2><p><strong>{escape(hint)}</strong></p><p>{escape(said)}</p>"]
-    if found.found > MOST_PAIRS:
-        parts.append(f"<p>The {MOST_PAIRS} most alike are shown.</p>")
-    return [*parts, *(_pair(report, pair) for pair in found.pairs)]
+    if not found.pairs:
+        return parts
+    rows = "".join(_pair(report, pair) for pair in found.pairs)
+    caption = "Where, who, and how much of it" + (
+        f"; the {MOST_PAIRS} most alike" if found.found > MOST_PAIRS else ""
+    )
+    return [*parts, _table(caption, ("exercise", "one", "the other", "alike"), rows)]
 
 
 def _pair(report: ClassReport, pair: Pair) -> str:
-    rows = side_by_side(report.texts[pair.left], report.texts[pair.right])
-    head = "".join(f'<th scope="col">{escape(who)}</th>' for who in (pair.left, "", pair.right))
+    names = [escape(report.data.called(who)) for who in (pair.left, pair.right)]
+    texts = report.texts[pair.where]
+    rows = side_by_side(texts[pair.left], texts[pair.right])
+    head = "".join(f'<th scope="col">{name}</th>' for name in (names[0], "", names[1]))
     body = "".join(_diff_row(report, *row) for row in rows)
     return (
-        f"<details><summary>{escape(pair.left)} and {escape(pair.right)}: "
-        f"{100 * pair.similarity:.0f} % alike</summary>"
+        f"<tr><td>{escape(pair.where)}</td><td>{names[0]}</td><td>{names[1]}</td>"
+        f'<td class="number">{100 * pair.similarity:.0f} %</td>'
+        '</tr><tr><td colspan="4"><details><summary>side by side</summary>'
         f'<div class="scroll"><table class="diff"><thead><tr>{head}</tr></thead>'
-        f"<tbody>{body}</tbody></table></div></details>"
+        f"<tbody>{body}</tbody></table></div></details></td></tr>"
     )
 
 
@@ -235,12 +300,13 @@ def _table(caption: str, columns: Sequence[str], rows: str) -> str:
     )
 
 
-def _names(students: Sequence[str]) -> str:
-    if len(students) <= MOST_NAMES:
-        return _listed(students)
+def _names(report: ClassReport, students: Sequence[str]) -> str:
+    called = [report.data.called(student) for student in students]
+    if len(called) <= MOST_NAMES:
+        return _listed(called)
     return (
-        f"{_listed(students[:MOST_NAMES])}<details><summary>and {len(students) - MOST_NAMES} more"
-        f"</summary>{_listed(students[MOST_NAMES:])}</details>"
+        f"{_listed(called[:MOST_NAMES])}<details><summary>and {len(called) - MOST_NAMES} more"
+        f"</summary>{_listed(called[MOST_NAMES:])}</details>"
     )
 
 

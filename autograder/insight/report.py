@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from nbformat import NotebookNode
 
 from autograder import submission
-from autograder.beside import files_beside
 from autograder.gradebook import CourseGradebook
-from autograder.insight import InsightError, exports, feedback, figures, needs, similarity
+from autograder.insight import (
+    InsightError,
+    exports,
+    feedback,
+    figures,
+    likeness,
+    means,
+    needs,
+    similarity,
+)
 from autograder.insight.collect import ClassData, collect
 from autograder.insight.exports import Export
-from autograder.insight.own_text import GivenText, OwnText
+from autograder.insight.own_text import GivenText
 from autograder.submission import SubmissionError
+from course.plain import counted
 
 PAGE, CANVAS, MOODLE = "class-report.html", "canvas.csv", "moodle.csv"
 
@@ -26,8 +34,8 @@ PAGE, CANVAS, MOODLE = "class-report.html", "canvas.csv", "moodle.csv"
 class ClassReport:
     """Everything that the page shows.
 
-    ``texts`` is {student: what they wrote}, ``given`` the assignment's own code, ``threshold`` the
-    similarity from which pairs are shown, ``notes`` says what is left out.
+    ``texts`` is what the students wrote, by what was compared, ``given`` the assignment's own code,
+    ``threshold`` the similarity from which pairs are shown, ``notes`` says what is left out.
     """
 
     data: ClassData
@@ -35,11 +43,12 @@ class ClassReport:
     times: figures.Times
     feedback: list[feedback.Group]
     needs: list[needs.Need]
-    likeness: similarity.Likeness
-    texts: Mapping[str, OwnText]
+    alike: similarity.Likeness
+    texts: likeness.Texts
     given: GivenText
     threshold: float
     notes: tuple[str, ...]
+    means: means.Means
 
     @property
     def examined(self) -> int:
@@ -63,7 +72,11 @@ class ClassReport:
             "seconds": self.times.seconds,
             "feedback": [vars(group) for group in self.feedback],
             "needs_person": [vars(need) for need in self.needs],
-            "alike": [vars(pair) for pair in self.likeness.pairs],
+            "absent": list(self.data.absent),
+            "means": {
+                kind: [vars(mean) for mean in found] for kind, found in vars(self.means).items()
+            },
+            "alike": [vars(pair) for pair in self.alike.pairs],
             "notes": list(self.notes),
         }
 
@@ -76,16 +89,18 @@ def make(root: Path, assignment: str, threshold: float = similarity.THRESHOLD) -
         GradebookError: ``root`` is no course.
     """
     data = collect(root, assignment)
-    given = GivenText(_released(data))
-    texts, notes = _texts(data, given)
+    given = GivenText(_notebooks(data, "release"), _notebooks(data, "source"))
+    texts, notes = likeness.texts_of(data, given)
     return ClassReport(
         data, figures.checks(data), figures.times(data), feedback.common(data),
-        needs.people_needed(data), similarity.alike(texts, given, threshold), texts, given,
-        threshold, (*data.notes, *notes),
+        needs.people_needed(data), likeness.compare(data, texts, given, threshold), texts, given,
+        threshold, (*data.notes, *notes), means.of_class(data),
     )  # fmt: skip
 
 
-def write(report: ClassReport, column: str = "", *, provisional: bool = False) -> list[Path]:
+def write(
+    report: ClassReport, column: str = "", *, provisional: bool = False, zero_absent: bool = False
+) -> list[Path]:
     """Write the page and both exports into ``reports/ASSIGNMENT``; return the files.
 
     Raises:
@@ -94,10 +109,11 @@ def write(report: ClassReport, column: str = "", *, provisional: bool = False) -
     from autograder.insight import page  # plots take a moment to import
 
     folder = report.data.root / "reports" / report.data.assignment
+    chosen = {"provisional": provisional, "zero_absent": zero_absent}
     contents = {
         PAGE: page.page(report),
-        CANVAS: exports.canvas(report.data, column, provisional=provisional).text,
-        MOODLE: exports.moodle(report.data, column, provisional=provisional).text,
+        CANVAS: exports.canvas(report.data, column, **chosen).text,
+        MOODLE: exports.moodle(report.data, column, **chosen).text,
     }
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -116,12 +132,24 @@ def write(report: ClassReport, column: str = "", *, provisional: bool = False) -
 def export_remarks(export: Export) -> list[str]:
     """Return what an instructor has to know before importing the files, as sentences."""
     remarks = []
+    everybody = export.students + len(export.waiting) + len(export.absent)
+    if export.waiting or export.absent:
+        remarks.append(
+            f"The exports have points for {export.students} of {everybody} students; an empty cell "
+            "is no grade for both platforms, and deletes one that is there."
+        )
     if export.waiting:
         number = len(export.waiting)
         remarks.append(
-            f"The exports hold {export.students} of {export.students + number} students: the "
-            f"{'grade' if number == 1 else 'grades'} of the other {number} still "
-            f"{'waits' if number == 1 else 'wait'} for a person (--provisional takes them in)."
+            f"Empty for {counted(number, 'student')} whose {'grade' if number == 1 else 'grades'} "
+            f"still {'waits' if number == 1 else 'wait'} for a person (--provisional takes them "
+            "in)."
+        )
+    if export.absent:
+        remarks.append(
+            f"Empty for {counted(len(export.absent), 'student')} who handed in nothing: whether "
+            "that is a 0 is your course's rule, which the platforms can apply themselves "
+            "(--zero-absent writes it)."
         )
     if export.guarded:
         remarks.append(
@@ -131,38 +159,17 @@ def export_remarks(export: Export) -> list[str]:
     return remarks
 
 
-def _released(data: ClassData) -> dict[str, NotebookNode]:
+def _notebooks(data: ClassData, step: Literal["source", "release"]) -> dict[str, NotebookNode]:
     coursedir = CourseGradebook(data.root).coursedir
-    folder = Path(coursedir.format_path(coursedir.release_directory, ".", data.assignment))
-    released = {}
+    directory = {"source": coursedir.source_directory, "release": coursedir.release_directory}
+    folder = Path(coursedir.format_path(directory[step], ".", data.assignment))
+    mend = {"source": "build", "release": f"release {data.assignment}"}
+    found = {}
     for path in sorted(folder.glob("*.ipynb")):
         try:
-            released[path.stem] = submission.read(path)
+            found[path.stem] = submission.read(path)
         except SubmissionError as error:
             raise InsightError(
-                f"{error} It lies in {folder}: run `autograder release {data.assignment}` again."
+                f"{error} It lies in {folder}: run `autograder {mend[step]}` again."
             ) from None
-    return released
-
-
-def _texts(data: ClassData, given: GivenText) -> tuple[dict[str, OwnText], list[str]]:
-    names = sorted({name for grade in data.grades for name in grade.cells})
-    texts: dict[str, OwnText] = {}
-    unread = []
-    for grade in data.grades:
-        folder = data.root / "submitted" / grade.student / data.assignment
-        notebooks = {}
-        for name in names:
-            try:
-                notebooks[name] = submission.read(folder / f"{name}.ipynb")
-            except SubmissionError:
-                continue  # "what needs a person" names it, and why it cannot be read
-        if notebooks:
-            texts[grade.student] = given.own(notebooks, files_beside(folder).files)
-        else:
-            unread.append(grade.student)
-    if not unread:
-        return texts, []
-    more = f" and {len(unread) - 10} more" if len(unread) > 10 else ""
-    note = f"Not compared, because no notebook can be read: {', '.join(unread[:10])}{more}."
-    return texts, [note]
+    return found

@@ -1,27 +1,38 @@
 """Submissions that are alike: a hint where to look, never a verdict.
 
-Two submissions are compared by the normalised Indel similarity of their own tokens (`own_text`):
-twice the length of the longest common subsequence, by the sum of both lengths. The assignment's own
-lines do not count, nor do lines that a good part of the class has.
+Exercise by exercise, and for each answer in words, what two students wrote is compared by the
+normalised Indel similarity of their own tokens (`own_text`): twice the length of the longest common
+subsequence, by the sum of both lengths. So one exercise that was copied is found in a submission
+that is otherwise somebody's own. What the assignment itself says does not count, nor do lines of
+code that a good part of the class has.
 """
 
 from __future__ import annotations
 
 import difflib
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
 
 from rapidfuzz import process
 from rapidfuzz.distance import Indel
 
-from autograder.insight.own_text import MAX_TOKENS, GivenText, OwnText, common_ground, tokens
+from autograder.insight.own_text import (
+    MAX_TOKENS,
+    GivenText,
+    OwnText,
+    common_ground,
+    tokens,
+    words,
+)
 
 THRESHOLD = 0.9
 """Similarity from which a pair is shown, 0 to 1."""
 FEWEST_TOKENS = 40
 """Own tokens below which likeness says nothing: so little turns out alike by chance."""
+FEWEST_WORDS = 15
+"""Own words of an answer below which likeness says nothing: two or three sentences have thirty."""
 MOST_PAIRS = 40
 """Most pairs that are shown side by side; the table's heading says how many there are."""
 MOST_LINES = 250
@@ -35,11 +46,12 @@ BLOCK = 256
 
 @dataclass(frozen=True)
 class Pair:
-    """Two students whose submissions are alike, ``similarity`` from 0 to 1."""
+    """Two students whose work is alike: ``similarity`` from 0 to 1, ``where`` says of what."""
 
     left: str
     right: str
     similarity: float
+    where: str = ""
 
 
 @dataclass(frozen=True)
@@ -49,8 +61,8 @@ class Likeness:
     Attributes:
         pairs: the most alike first, at most `MOST_PAIRS`.
         found: how many pairs reach the threshold in all.
-        compared: how many submissions were compared.
-        too_short: students who wrote too little to say anything.
+        compared: how many texts were compared: programs and answers.
+        too_short: students who wrote too little to say anything, once for each text.
     """
 
     pairs: tuple[Pair, ...]
@@ -59,18 +71,55 @@ class Likeness:
     too_short: tuple[str, ...]
 
 
-def alike(texts: Mapping[str, OwnText], given: GivenText, threshold: float = THRESHOLD) -> Likeness:
-    """Compare every submission with every other.
+def alike(
+    texts: Mapping[str, OwnText],
+    given: GivenText,
+    threshold: float = THRESHOLD,
+    where: str = "",
+    work: int = MOST_WORK,
+) -> Likeness:
+    """Compare every student's program with every other's.
 
     Args:
         texts: {student: what they wrote}.
         given: the assignment's own code.
         threshold: similarity from which a pair is reported.
+        where: what the pairs are to be called by.
+        work: tokens of the class that are compared.
     """
     common = common_ground(texts.values())
-    most = max(FEWEST_TOKENS, min(MAX_TOKENS, MOST_WORK // max(1, len(texts))))
+    most = max(FEWEST_TOKENS, min(MAX_TOKENS, work // max(1, len(texts))))
     own = {student: tokens(text, given, common, most) for student, text in texts.items()}
-    long_enough = {student: text for student, text in own.items() if len(text) >= FEWEST_TOKENS}
+    return _compare(own, FEWEST_TOKENS, threshold, where)
+
+
+def alike_in_words(
+    texts: Mapping[str, OwnText], given: str, threshold: float = THRESHOLD, where: str = ""
+) -> Likeness:
+    """Compare every student's answer with every other's; arguments as in `alike`.
+
+    ``given`` is the question with its model answer.
+    """
+    most = MOST_WORK // max(1, len(texts))
+    own = {student: words(text, given)[:most] for student, text in texts.items()}
+    return _compare(own, FEWEST_WORDS, threshold, where)
+
+
+def together(found: Iterable[Likeness]) -> Likeness:
+    """Return what several comparisons have found as one."""
+    every = list(found)
+    return Likeness(
+        tuple(_top([pair for likeness in every for pair in likeness.pairs])),
+        sum(likeness.found for likeness in every),
+        sum(likeness.compared for likeness in every),
+        tuple(student for likeness in every for student in likeness.too_short),
+    )
+
+
+def _compare(
+    own: Mapping[str, tuple[str, ...]], fewest: int, threshold: float, where: str
+) -> Likeness:
+    long_enough = {student: text for student, text in own.items() if len(text) >= fewest}
     same: defaultdict[tuple[str, ...], list[str]] = defaultdict(list)
     for student in sorted(long_enough):
         same[long_enough[student]].append(student)
@@ -78,10 +127,10 @@ def alike(texts: Mapping[str, OwnText], given: GivenText, threshold: float = THR
     best: list[Pair] = []
     for similarity, left, right in _scores(same, threshold):
         found += 1
-        best.append(Pair(min(left, right), max(left, right), similarity))
+        best.append(Pair(min(left, right), max(left, right), similarity, where))
         if len(best) > 50 * MOST_PAIRS:
             best = _top(best)
-    short = tuple(sorted(texts.keys() - long_enough.keys()))
+    short = tuple(sorted(own.keys() - long_enough.keys()))
     return Likeness(tuple(_top(best)), found, len(long_enough), short)
 
 
@@ -139,4 +188,4 @@ def _encoded(texts: list[tuple[str, ...]]) -> list[str]:
 
 
 def _top(pairs: list[Pair]) -> list[Pair]:
-    return sorted(pairs, key=lambda p: (-p.similarity, p.left, p.right))[:MOST_PAIRS]
+    return sorted(pairs, key=lambda p: (-p.similarity, p.where, p.left, p.right))[:MOST_PAIRS]

@@ -4,25 +4,39 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import json
 import random
 import re
+import tomllib
 from collections.abc import Sequence
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from autograder import exams
+from autograder import exams, points, questions
 from autograder.database import GradebookUnusable
 from autograder.gradebook import Grade
-from autograder.insight import InsightError, exports, feedback, figures, needs, records, similarity
+from autograder.insight import (
+    InsightError,
+    exports,
+    feedback,
+    figures,
+    likeness,
+    means,
+    needs,
+    records,
+    similarity,
+)
 from autograder.insight import page as pages
 from autograder.insight import report as reports
 from autograder.insight.collect import ClassData, Person
 from autograder.insight.own_text import GivenText, OwnText, tokens
 from autograder.insight.records import Record
+from autograder.questions import Question
 from autograder.verdict import CheckResult, Status, Verdict
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
@@ -121,6 +135,94 @@ def test_failure_rates_and_discrimination_are_what_numpy_says() -> None:
         assert check.discrimination == pytest.approx(np.corrcoef(passed[:, k], rest)[0, 1])
         assert check.discrimination is not None
         assert check.discrimination > 0.3
+
+
+def test_nothing_is_advised_on_fewer_than_five_failures() -> None:
+    def advice(students: int, failing: int) -> str:
+        data = class_of({
+            f"s{n:03}": [result("x", "failed" if n < failing else "passed"),
+                         result("y", "passed" if n % 2 else "failed")]
+            for n in range(students)
+        })  # fmt: skip
+        return figures.checks(data)[0].advice
+
+    assert advice(9, 8) == "too few submissions"
+    assert [advice(students, 4) for students in (10, 12, 400)] == ["", "", ""]
+    assert "does not tell" in advice(12, 6)
+    assert "most fail it" in advice(12, 11)
+    assert advice(400, 5) == "hardly anybody fails it"
+
+
+def test_what_was_not_handed_in_is_apart_from_what_was_not_checked() -> None:
+    data = class_of({
+        "a": [result("x", "passed"), result("y", "not_checked")],
+        "b": [result("x", "not_checked"), result("y", "not_checked")],
+        "c": [result("x", "failed"), result("y", "not_checked")],
+    })  # fmt: skip
+    data = replace(data, left_out={"b": frozenset({NOTEBOOK})}, absent=("zoe",))
+    x, y = figures.checks(data)
+    assert (x.passed, x.failed, x.not_checked, x.not_handed_in, x.examined) == (1, 1, 0, 2, 2)
+    assert (y.not_checked, y.not_handed_in, y.examined) == (2, 2, 0)
+    assert "b" not in figures.times(data).seconds
+
+
+# Means
+
+
+def question(grade_id: str, title: str, most: float, written: bool = False) -> Question:
+    return Question(NOTEBOOK, grade_id, title, written, most)
+
+
+def test_means_are_of_what_was_handed_in_and_marked_each_with_its_n() -> None:
+    cells = {
+        "ann": {"qos-visible": 8.0, "qos-explanation-depth": 1.0},
+        "bob": {"qos-visible": 4.0, "qos-explanation-depth": None},
+        "cy": {"qos-visible": 0.0, "qos-explanation-depth": 0.0},
+    }
+    data = class_of({
+        "ann": [result("camera_newest", "passed", 2.0), result("late_joiner", "failed", 3.0)],
+        "bob": [result("camera_newest", "failed", 2.0), result("late_joiner", "grader_error")],
+        "cy": [result("camera_newest", "not_checked", 2.0)],
+    })  # fmt: skip
+    data = replace(
+        data, left_out={"cy": frozenset({NOTEBOOK})},
+        grades=tuple(Grade(who, 0.0, 11.0, False, {NOTEBOOK: c}) for who, c in cells.items()),
+        questions={NOTEBOOK: {
+            "qos-visible": question("qos-visible", "Checks in the notebook", 10.0),
+            "qos-explanation-depth": question("qos-explanation-depth", "Depth", 1.0, written=True),
+        }},
+    )  # fmt: skip
+    found = means.of_class(data)
+    [exercise] = found.exercises
+    assert (exercise.n, exercise.mean, exercise.max_points, exercise.waiting) == (1, 9.0, 11.0, 1)
+    visible, depth = found.questions
+    assert (visible.title, visible.n, visible.mean, visible.share) == (
+        "Checks in the notebook", 2, 6.0, 0.6,
+    )  # fmt: skip
+    assert (depth.title, depth.n, depth.mean, depth.waiting) == ("Depth", 1, 1.0, 1)
+    objectives = {mean.title: mean for mean in found.objectives}
+    history = objectives["Choose history and depth for a reader that can be slow"]
+    assert (history.n, history.mean, history.waiting) == (2, (3 / 3 + 0 / 2) / 2, 1)
+    durability = objectives["Choose durability for a reader that joins late"]
+    assert (durability.n, durability.mean, durability.waiting) == (1, 0.0, 1)
+
+
+def test_every_check_and_every_written_answer_of_the_course_has_one_objective() -> None:
+    asked = {
+        (exam, name)
+        for exam, entry in points.table().items()
+        for name in [*itertools.chain(*entry.parts.values()), *entry.manual]
+    }
+    assert set(means.objectives()) == asked
+    raw = tomllib.loads((Path(means.__file__).parents[1] / "objectives.toml").read_text("utf-8"))
+    named = [
+        (exam, name)
+        for entry in raw["objective"]
+        for exam, names in entry.items()
+        if exam != "text"
+        for name in names
+    ]
+    assert len(named) == len(set(named))
 
 
 def test_what_was_not_examined_is_no_failure() -> None:
@@ -225,13 +327,24 @@ def test_canvas_and_moodle_files_have_the_columns_that_they_import() -> None:
     ]
 
 
-def test_a_grade_that_waits_is_not_exported_unless_asked_for() -> None:
-    data = ClassData(Path("/x"), "ch05", 20.0, (grade("ann"), grade("bob", waits=True)))
+def test_everybody_is_exported_and_only_a_final_grade_is_a_number() -> None:
+    people = {name: Person(name) for name in ("ann", "bob", "zoe")}
+    data = ClassData(
+        Path("/x"), "ch05", 20.0, (grade("ann"), grade("bob", waits=True)), people,
+        not_entered=("stranger",), absent=("zoe",),
+    )  # fmt: skip
+
+    def cells(export: exports.Export) -> dict[str, str]:
+        # The login is the fourth column for Canvas, the first for Moodle.
+        rows = [row for row in rows_of(export.text)[1:] if row[0] != exports.POINTS_POSSIBLE]
+        return {(row[0] or row[3]): row[-1] for row in rows}
+
     for write in (exports.canvas, exports.moodle):
         export = write(data)
-        assert (export.students, export.waiting) == (1, ("bob",))
-        assert "bob" not in export.text
-        assert "bob" in write(data, provisional=True).text
+        assert cells(export) == {"ann": "1", "bob": "", "zoe": ""}
+        assert (export.students, export.waiting, export.absent) == (1, ("bob",), ("zoe",))
+        assert cells(write(data, provisional=True)) == {"ann": "1", "bob": "1", "zoe": ""}
+        assert cells(write(data, zero_absent=True)) == {"ann": "1", "bob": "", "zoe": "0"}
 
 
 @pytest.mark.parametrize(
@@ -294,6 +407,65 @@ def test_given_code_and_the_stub_do_not_count(course: Course) -> None:
     assert similarity.alike({"a": stub, "b": stub}, given).too_short == ("a", "b")
 
 
+ANSWER = (
+    "The camera sends each picture once and nobody repeats it, because by the time a second copy "
+    "arrived the robot would already look at another place and steer by what is behind it."
+)
+
+
+def class_with(
+    answers: dict[str, str], programs: dict[str, dict[str, str]]
+) -> tuple[ClassData, dict[str, dict[str, OwnText]]]:
+    """Return a class of two exercises and one question, as `likeness` compares it."""
+    asked = {NOTEBOOK: {"q": replace(question("q", "Loss", 1.0, written=True), model=ANSWER)}}
+    data = replace(class_of({}), questions=asked)
+    texts = {name: {who: text(code) for who, code in found.items()}
+             for name, found in programs.items()}  # fmt: skip
+    title = questions.title_of_notebook(ASSIGNMENT, NOTEBOOK)
+    where = likeness.called(title, asked[NOTEBOOK]["q"])
+    return data, {**texts, where: {who: text(said) for who, said in answers.items()}}
+
+
+def test_one_copied_exercise_in_an_otherwise_own_submission_is_found_and_named() -> None:
+    rng = random.Random(7)
+
+    def own() -> str:
+        names = (f"{rng.choice('abc')}.{rng.choice('xyzuvw')}" for _ in range(80))
+        return "\n".join(f"{name}({rng.random()}, k={rng.random()})" for name in names)
+
+    programs = {
+        "Exercise 1": {"ann": CODE, "bob": CODE.replace("found", "mine"), "cy": OTHER},
+        "Exercise 2": {who: own() for who in ("ann", "bob", "cy")},
+    }
+    data, texts = class_with({}, programs)
+    found = likeness.compare(data, texts, NOTHING_GIVEN, 0.9)
+    assert found.pairs == (similarity.Pair("ann", "bob", 1.0, "Exercise 1"),)
+
+
+def test_a_copied_answer_is_found_and_the_model_answer_does_not_count() -> None:
+    mine = (
+        "A frame that is lost stays lost with best effort; my driver keeps the five newest ones, "
+        "so the operator sees at most half a second of old pictures before the live view is back."
+    )
+    answers = {
+        "ann": mine, "bob": mine.replace(";", ".").replace("so the", "and so the").upper(),
+        "cy": ANSWER, "dan": ANSWER + " I think.",
+        "eve": "Short.", "fay": "Short.",
+    }  # fmt: skip
+    data, texts = class_with(answers, {})
+    found = likeness.compare(data, texts, NOTHING_GIVEN, 0.9)
+    [pair] = found.pairs
+    assert (pair.left, pair.right) == ("ann", "bob")
+    assert pair.where == "Exercise 1: QoS profile design: Loss"
+    assert 0.9 < pair.similarity < 1.0
+    assert set(found.too_short) == {"cy", "dan", "eve", "fay"}
+
+
+def test_the_exemplars_own_lines_do_not_count(course: Course) -> None:
+    given = GivenText({NOTEBOOK: course.released}, {NOTEBOOK: course.source})
+    assert tokens(given.own({NOTEBOOK: course.source}, {}), given, frozenset()) == ()
+
+
 def test_what_many_have_is_common_ground() -> None:
     texts = {f"s{n}": text(CODE) for n in range(20)}
     assert similarity.alike(texts, NOTHING_GIVEN).found == 0
@@ -348,18 +520,20 @@ def test_everything_from_a_student_is_escaped_and_nothing_is_loaded() -> None:
                      "bob": [result("x", "grader_error", actual=EVIL)]})  # fmt: skip
     data = ClassData(
         data.root, ASSIGNMENT, 20.0, (grade(evil, waits=True), grade("bob", waits=True)),
-        records=data.records, not_entered=(EVIL,), notes=(EVIL,),
+        people={"bob": Person("bob", EVIL, EVIL), EVIL: Person(EVIL)}, records=data.records,
+        not_entered=(EVIL,), notes=(EVIL,), absent=(EVIL,), left_out={"bob": frozenset({EVIL})},
     )  # fmt: skip
-    texts = {name: text(CODE + f"print('{EVIL}')") for name in (evil, "bob")}
+    texts = {EVIL: {name: text(CODE + f"print('{EVIL}')") for name in (evil, "bob")}}
+    mean = means.Mean(EVIL, EVIL, 1, 0.5, 1.0, 1)
     report = reports.ClassReport(
         data, figures.checks(data), figures.times(data), feedback.common(data),
-        needs.people_needed(data), similarity.alike(texts, NOTHING_GIVEN), texts, NOTHING_GIVEN,
-        0.9, data.notes,
+        needs.people_needed(data), likeness.compare(data, texts, NOTHING_GIVEN, 0.9), texts,
+        NOTHING_GIVEN, 0.9, data.notes, means.Means((mean,), (mean,), (mean,)),
     )  # fmt: skip
     html = pages.page(report)
-    assert report.likeness.pairs
+    assert report.alike.pairs
     assert "<script" not in html
-    assert html.count("&lt;script&gt;") >= 8
+    assert html.count("&lt;script&gt;") >= 18
     parsed = Links(html)
     assert parsed.loads == []
     assert parsed.open == []
@@ -386,15 +560,32 @@ def test_the_report_of_a_graded_class(graded: Path) -> None:
     [waiting] = [need for need in report.needs if not need.urgent]
     assert waiting.students == ("bob", "cy")
     assert waiting.why == "Written answers of qos-design wait for their marks."
-    alike = {(pair.left, pair.right): pair.similarity for pair in report.likeness.pairs}
-    assert alike == {("-dan", "ann"): 1.0, ("bob", "cy"): 1.0}
+    where = questions.title_of_notebook(ASSIGNMENT, NOTEBOOK)
+    alike = {(p.left, p.right): p.similarity for p in report.alike.pairs if p.where == where}
+    assert alike[("-dan", "ann")] == alike[("bob", "cy")] == 1.0
     assert rows_of(canvas.read_text())[2:] == [
-        ["'-dan", "", "", "'-dan", "", "17.5"],
-        ["ann", "", "", "ann", "", "17.5"],
+        ["Dent, Dan", "", "", "'-dan", "", "17.5"],
+        ["O'Hara, Ann", "", "", "ann", "", "17.5"],
+        ["<b>Bee, Bob", "", "", "bob", "", ""],
+        ["Young, Cy", "", "", "cy", "", ""],
+        ["Ever, Eve", "", "", "eve", "", ""],
+        ["Late, Lee", "", "", "late", "", ""],
+        ["Zest, Zoe", "", "", "zoe", "", ""],
     ]
-    assert len(rows_of(moodle.read_text())) == 3
-    assert Links(page.read_text()).loads == []
-    assert "never a verdict" in page.read_text()
+    assert [row[0] for row in rows_of(moodle.read_text())[1:]] == [
+        "'-dan", "ann", "bob", "cy", "eve", "late", "zoe",
+    ]  # fmt: skip
+    assert report.data.absent == ("zoe",)
+    by_title = {mean.title: mean for mean in report.means.questions}
+    assert (by_title["Durability"].n, by_title["Durability"].waiting) == (2, 3)
+    assert by_title["Durability"].mean == 0.5
+    html = page.read_text()
+    assert Links(html).loads == []
+    assert Links(html).open == []
+    assert "never a verdict" in html
+    for said in ("Nothing, by 1 student: Zoe Zest (zoe)", "Bob &lt;b&gt;Bee (bob)", "n = 5",
+                 "By learning objective"):  # fmt: skip
+        assert said in html, said
 
 
 @pytest.mark.parametrize(
@@ -419,11 +610,15 @@ def test_the_command_speaks_to_people_and_to_machines(graded: Path) -> None:
     root = ("--root", str(graded))
     shown = autograder("report", ASSIGNMENT, *root, cwd=graded).stdout
     assert "class-report.html" in shown
-    assert "The exports hold 2 of 5 students" in shown
+    assert "The exports have points for 2 of 7 students" in shown
+    assert "Empty for 4 students whose grades still wait" in shown
+    assert "Empty for 1 student who handed in nothing" in shown
     assert "match them by hand: -dan" in shown
     spoken = json.loads(autograder("report", ASSIGNMENT, *root, "--json", cwd=graded).stdout)
     assert len(spoken["checks"]) == len(exams.load("qos").checks)
-    assert [pair["left"] for pair in spoken["alike"]] == ["-dan", "bob"]
+    assert spoken["absent"] == ["zoe"]
+    assert len(spoken["means"]["questions"]) == 7
+    assert {"-dan", "bob"} <= {pair["left"] for pair in spoken["alike"]}
 
 
 def test_a_read_only_folder_is_one_sentence(graded: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from nbgrader.api import Gradebook
 from playwright.sync_api import Browser, FrameLocator, Locator, expect
 
-from autograder import corpus, points, submission
+from autograder import corpus, points, questions, submission
 from autograder.build import build
 from autograder.corpus.trials import one_notebook
 from autograder.release import release
@@ -97,6 +97,15 @@ def test_an_instructor_grades_our_assignment_in_the_formgrader(
     for link in (ASSIGNMENT, NOTEBOOK, "Submission #1"):
         frame.get_by_role("link", name=link, exact=True).click()
     expect(frame.locator("body")).to_contain_text("qos: 8 of 10 points")
+    # Above each answer stands what it should say, and what the points are for.
+    source = submission.read(course_root / "source" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+    models = [q.model.splitlines()[0] for q in questions.of_notebook(source, NOTEBOOK).values()
+              if q.written]  # fmt: skip
+    beside = frame.locator(".model-answer")
+    expect(beside).to_have_count(len(EXPLANATIONS))
+    for number, model in enumerate(models):
+        expect(beside.nth(number)).to_contain_text(model.replace("`", ""))
+        expect(beside.nth(number)).to_contain_text("half a point if only a part")
     *clicked, missed, half = EXPLANATIONS
     for cell in EXPLANATIONS:
         # The page asks for the marks after it was drawn; what is given before they came is lost.
@@ -111,6 +120,9 @@ def test_an_instructor_grades_our_assignment_in_the_formgrader(
         lambda: marks(course_root).items() >= given.items(),
         60, lambda: f"the points did not reach the gradebook: {marks(course_root)}",
     )  # fmt: skip
+    for step in ("autograded", "release"):
+        for path in (course_root / step).rglob("*.ipynb"):
+            assert not any(model in path.read_text("utf-8") for model in models), path
     # nbgrader's own page asks for MathJax; nothing else leaves the machine, and it works without.
     hosts = {urlsplit(url).hostname for url in instructor.foreign_requests()}
     assert hosts <= {"cdnjs.cloudflare.com"}
