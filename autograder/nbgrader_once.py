@@ -28,7 +28,6 @@ from sqlalchemy.exc import DataError, IntegrityError
 from traitlets.config import Config
 
 from autograder import feedback_page
-
 from autograder.pictures import with_pictures
 
 

@@ -70,8 +70,8 @@ c.Autograde.autograde_preprocessors = [
     CheckCellMetadata,
 ]
 
-# Feedback that holds the pictures it shows (the exchange hands out the page alone), calls answers by
-# their questions and says what still waits for its mark; and a page about all exercises beside it.
+# Feedback that holds the pictures it shows (the exchange hands out the page alone), calls answers
+# by their questions and says what waits for its mark; and a page about all exercises beside it.
 c.GenerateFeedback.exporter_class = FeedbackExporter
 c.GenerateFeedback.post_convert_hook = IndexPages(c)
 
