@@ -1,7 +1,7 @@
 # title: The stub's four nodes, with nothing in their methods
 # fails: the first
 # says: gripper_answers: the gripper was not called. It said nothing
-# says: speed_serves: speed/set
+# says: speed_serves: No answer came.
 # points: 0
 
 class GripperClient(Node):
