@@ -238,6 +238,11 @@ class Desk:
             notebook, notes = self._restored(work, name, found)
             program = submission.program(notebook)
             beside = intake.beside(found)
+            if found.item is not None:
+                staging.copy_around(
+                    beside.files, self._staged(work.student), self.gradebook.file_limits,
+                    self.notebooks,
+                )  # fmt: skip
         except UnclearError as error:
             work.problems.append(f"{error} {error.suggestion}")
             notebook, outcome = self._unreadable(name, str(error), "not_checked")

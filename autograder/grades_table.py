@@ -32,6 +32,6 @@ def table(grades: Iterable[Grade], problems: Mapping[str, str]) -> Table:
         remark = problems.get(grade.student, "") or " ".join(grade.asked.values())
         made.add_row(*map(escape, (*cells, needs, remark)))
     for student in sorted(problems.keys() - {grade.student for grade in grades}):
-        row = (shown(student), "none", *["" for _ in more], "yes", problems[student])
-        made.add_row(*map(escape, row))
+        empty = ["" for _ in more]
+        made.add_row(*map(escape, (shown(student), "none", *empty, "yes", problems[student])))
     return made

@@ -9,7 +9,8 @@ from __future__ import annotations
 import os
 import shutil
 import stat
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
@@ -71,10 +72,10 @@ class _LeftOut:
         return found
 
 
-def copy_marks(submitted: Path, staged: Path, zone: str) -> None:
+def copy_marks(submitted: Path, staged: Path, zone: str = "") -> None:
     """Copy when a submission was handed in, and the exchange's secret, as far as they are sound.
 
-    ``zone`` is the course's: a time that names none is one of its.
+    ``zone`` is the course's own time zone (see `roster.timestamp`).
     """
     time = roster.timestamp(submitted / TIME, zone)
     if time is not None:
@@ -124,6 +125,26 @@ def copy_files(
             room -= status.st_size
             count += 1
     return left_out.sentences()
+
+
+def copy_around(
+    files: Mapping[str, bytes], staged: Path, limits: Limits, notebooks: Iterable[str]
+) -> None:
+    """Put what lay around a notebook that was found elsewhere, in a folder say, beside it.
+
+    ``files`` has it by the paths that the notebook knows it by; what is there already stays.
+    """
+    pages = {f"{name}.html" for name in notebooks}
+    for path, content in files.items():
+        name = Path(path)
+        if name.is_absolute() or ".." in name.parts:
+            continue
+        if _is_passed_over(name, limits.ignored, pages):
+            continue
+        if not any((staged / part).is_file() for part in (name, *name.parents)):
+            (staged / name.parent).mkdir(parents=True, exist_ok=True)
+            with suppress(IsADirectoryError):
+                (staged / name).write_bytes(content)
 
 
 def let_feedback_replace(folder: Path, notebooks: Iterable[str]) -> None:

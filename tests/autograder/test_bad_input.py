@@ -382,7 +382,7 @@ def test_nobody_at_all_is_one_sentence(course: Course) -> None:
 
 
 def test_the_grades_of_every_assignment_are_written(tmp_path: Path) -> None:
-    design = Grade("ada", 3.0, 5.0, False, {"design": {"a": 3.0}}, 3600.0, 1.5)
+    design = Grade("ada", 3.0, 5.0, False, {"design": {"a": 3.0}}, seconds_late=3600.0, penalty=1.5)
     quiz = Grade("ada", 1.0, 2.0, True, {"quiz": {"q": None}})
     grades_csv.write({"ch05": [design], "ch05-quiz": [quiz]}, tmp_path / "grades.csv")
     head, *lines = (tmp_path / "grades.csv").read_text().splitlines()

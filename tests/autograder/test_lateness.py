@@ -219,9 +219,9 @@ def test_lateness_is_told_as_people_tell_it(seconds: float, words: str) -> None:
 
 def test_columns_of_lateness_come_last_and_only_when_somebody_was_late(tmp_path: Path) -> None:
     in_time = Grade("ada", 3.0, 5.0, False, {"nb": {"a": 3.0}})
-    late = Grade("bob", 2.0, 5.0, False, {"nb": {"a": 3.0}}, 3600.0, 1.0)
+    late = Grade("bob", 2.0, 5.0, False, {"nb": {"a": 3.0}}, seconds_late=3600, penalty=1)
     assert len(grades_table.table([in_time], {"eve": "why"}).columns) == 4
     assert len(grades_table.table([in_time, late], {"eve": "[why"}).columns) == 6
     grades_csv.write({"ch05": [in_time, late]}, tmp_path / "grades.csv")
     rows = list(csv.reader((tmp_path / "grades.csv").read_text().splitlines()))
-    assert [row[-3:] for row in rows[1:]] == [["3.0", "0.0", "0.0"], ["3.0", "3600.0", "1.0"]]
+    assert [row[-3:] for row in rows[1:]] == [["3.0", "0.0", "0.0"], ["3.0", "3600", "1"]]

@@ -24,15 +24,16 @@ PICTURE = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
 SECRET = "5e" * 64
+PAGES = (f"{NOTEBOOK}.html", "index.html")
 LIMITS = Limits((".ipynb_checkpoints", "*.pyc", "__pycache__", "feedback"), 1000, 2000)
 
 
 def files(folder: Path) -> dict[str, tuple[int, bytes]]:
-    """Return {path: (mode, content)} of all but notebooks and the pages made of them."""
+    """Return {path: (mode, content)} of all but the notebook and the pages of feedback."""
     return {
         str(path.relative_to(folder)): (stat.S_IMODE(path.stat().st_mode), path.read_bytes())
         for path in folder.rglob("*")
-        if path.is_file() and path.stem != NOTEBOOK
+        if path.is_file() and path.name not in (f"{NOTEBOOK}.ipynb", *PAGES)
     }
 
 
@@ -158,3 +159,15 @@ def test_a_name_in_any_encoding_is_copied(tmp_path: Path, course: Course) -> Non
     staged.mkdir()
     assert staging.copy_files(course.folder("ada"), staged, LIMITS, [NOTEBOOK]) == []
     assert (staged / latin).read_bytes() == PICTURE
+
+
+def test_what_lay_around_a_notebook_in_a_folder_is_put_beside_it(tmp_path: Path) -> None:
+    (tmp_path / "mine.png").write_bytes(b"mine")
+    (tmp_path / "folder").mkdir()
+    names = ["plot.png", "data/a.csv", "mine.png", "mine.png/x", "folder", "../out", "/out"]
+    names += ["feedback/old.html", "timestamp.txt", f"{NOTEBOOK}.html/x"]
+    files = dict.fromkeys(names, b"new")
+    staging.copy_around(files, tmp_path, LIMITS, [NOTEBOOK])
+    found = {str(p.relative_to(tmp_path)) for p in tmp_path.rglob("*") if p.is_file()}
+    assert found == {"mine.png", "plot.png", "data/a.csv"}
+    assert (tmp_path / "mine.png").read_bytes() == b"mine"
