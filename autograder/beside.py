@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from autograder.files import MAX_FILES, walk
+from autograder.intake_names import normal, shown
 
 MAX_BYTES = 10 * 1024 * 1024
 """Bytes of other files that are given to a submission's code."""
@@ -47,7 +47,8 @@ def files_beside(folder: Path) -> Beside:
             if status.st_size > room:
                 too_large.append(str(name))
             else:
-                beside.files[str(name)] = path.read_bytes()
+                # What macOS writes decomposed, code names as it is typed.
+                beside.files[normal(str(name))] = path.read_bytes()
                 room -= status.st_size
     if too_large:
         beside.notes.append(
@@ -74,6 +75,6 @@ def _is_passed_over(name: Path) -> bool:
 
 def named(names: list[str]) -> str:
     """Return the first few ``names`` of a stranger's files, and how many more there are."""
-    shown = [f"'{os.fsencode(name).decode(errors='replace')[:100]}'" for name in names]
-    more = len(shown) - _MOST_NAMED
-    return ", ".join(shown[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    quoted = [f"'{shown(name)[:100]}'" for name in names]
+    more = len(quoted) - _MOST_NAMED
+    return ", ".join(quoted[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

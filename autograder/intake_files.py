@@ -85,7 +85,8 @@ class HandedIn:
     def beside(self, item: Item) -> Iterator[tuple[str, Item]]:
         """Yield (path as seen from there, file) of what lies in the folder of ``item``."""
         for other in self.items:
-            if other.archive is item.archive and other.place.startswith(item.folder):
+            together = other.path == item.path if item.archive else other.archive is None
+            if together and other.place.startswith(item.folder):
                 yield other.place[len(item.folder) :], other
 
 

@@ -131,9 +131,7 @@ def _zone(word: str, moment: datetime, zone: str) -> tzinfo:
                 assert offset is not None
                 return timezone(offset)
     if word not in ZONES:
-        raise UnclearTimeError(
-            f"the time zone '{word}' is not known, or not the only one so called"
-        )
+        raise UnclearTimeError(f"the time zone '{word}' is not known, or there are several")
     return timezone(timedelta(hours=ZONES[word]))
 
 

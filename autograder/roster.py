@@ -41,7 +41,7 @@ class Roster:
 
 def submissions(root: Path, assignment: str, roster: Roster) -> tuple[list[str], dict[str, str]]:
     """Return the students whose submissions can be graded, and {folder: what is wrong with it}."""
-    good: list[str] = []
+    good: dict[str, str] = {}
     wrong: dict[str, str] = {}
     for folder in _folders(root / "submitted"):
         problem = _misplaced(folder, assignment)
@@ -49,14 +49,15 @@ def submissions(root: Path, assignment: str, roster: Roster) -> tuple[list[str],
             student = _student(folder.name, roster)
             problem = _bad_id(folder.name) or _stranger(student, roster)
             if not problem and student in good:
-                problem = (
-                    f"There is another folder whose name reads '{shown(student)}': put what the "
-                    "student handed in into one of them."
+                problem = wrong[good[student]] = (
+                    f"There are two folders whose names read '{shown(student)}': put what the "
+                    "student handed in into one of them, and remove the other."
                 )
-            good += [] if problem else [student]
+            elif not problem:
+                good[student] = folder.name
         if problem:
             wrong[folder.name] = problem
-    return good, wrong
+    return sorted(s for s, name in good.items() if name not in wrong), wrong
 
 
 def _student(name: str, roster: Roster) -> str:

@@ -54,6 +54,8 @@ def _reasons(data: ClassData, grade: Grade) -> Iterator[tuple[bool, str]]:
         if examined & set(waiting):
             yield from reasons
             explained = explained or bool(reasons)
+        if record is not None and record.unreadable:
+            continue  # nobody knows of its other cells whether they are empty
         for cell in waiting:
             if cell not in examined:
                 explained = True

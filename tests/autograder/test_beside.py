@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
+import unicodedata
 from pathlib import Path
 
 import pytest
@@ -24,6 +25,17 @@ def test_other_files_of_a_submission_are_found_and_links_are_not(tmp_path: Path)
     assert found.files == {"pack/more.py": b"x = 1", "profiles.py": b"depth = 5"}
     (note,) = found.notes
     assert "without 'away', 'link.py': a link leads out of the submission." in note
+
+
+def test_a_decomposed_name_is_found_as_code_names_it(tmp_path: Path) -> None:
+    (tmp_path / unicodedata.normalize("NFD", "größe.csv")).write_text("1")
+    assert files_beside(tmp_path).files == {unicodedata.normalize("NFC", "größe.csv"): b"1"}
+
+
+def test_a_name_with_a_line_break_is_said_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "a\n\x1b[31mb").symlink_to("/etc")
+    (note,) = files_beside(tmp_path).notes
+    assert "without 'a\\n\\x1b[31mb'" in note
 
 
 def test_what_is_too_large_is_left_out_and_named(tmp_path: Path) -> None:

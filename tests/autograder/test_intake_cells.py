@@ -182,9 +182,8 @@ def test_merged_cells_are_taken_apart(one: str, other: str, keeps: str) -> None:
 
 
 def test_three_merged_cells_are_taken_apart() -> None:
-    notebook = merged(
-        merged(worked_on(), "given", "solution", "given"), "given", "visible", "given"
-    )
+    twice = merged(worked_on(), "given", "solution", "given")
+    notebook = merged(twice, "given", "visible", "given")
     texts, known, whole = mended(notebook)
     assert (texts, known.doubts) == (RIGHT, {})
     assert code(whole).count("def design") == 1

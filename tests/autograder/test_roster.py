@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import unicodedata
 from pathlib import Path
 
 import pytest
@@ -65,5 +66,41 @@ def test_a_time_stamp_that_is_none_is_not_waited_for(tmp_path: Path, kind: str) 
 def test_a_time_stamp_is_read(tmp_path: Path) -> None:
     assert roster.remarks(tmp_path) == []
     (tmp_path / "timestamp.txt").write_text("2026-01-01 12:00:00 UTC\n")
-    assert roster.timestamp(tmp_path / "timestamp.txt") == "2026-01-01 12:00:00 UTC"
+    assert roster.timestamp(tmp_path / "timestamp.txt") == "2026-01-01 12:00:00.000000 UTC"
     assert roster.remarks(tmp_path) == []
+
+
+@pytest.mark.parametrize("text", ["2026-01-01 12:00 CST", "01/02/2026 12:00"])
+def test_a_time_stamp_that_can_be_several_is_asked_about(tmp_path: Path, text: str) -> None:
+    (tmp_path / "timestamp.txt").write_text(text)
+    assert roster.timestamp(tmp_path / "timestamp.txt") is None
+    (said,) = roster.remarks(tmp_path)
+    assert "timestamp.txt is not clear" in said
+    assert "nothing is taken off for lateness" in said
+
+
+def test_the_courses_zone_makes_a_time_stamp_clear(tmp_path: Path) -> None:
+    (tmp_path / "timestamp.txt").write_text("2026-01-01 12:00 CST")
+    file, zone = tmp_path / "timestamp.txt", "America/Chicago"
+    assert roster.timestamp(file, zone) == "2026-01-01 18:00:00.000000 UTC"
+    assert roster.remarks(tmp_path, zone) == []
+
+
+MUELLER = unicodedata.normalize("NFC", "Müller")
+
+
+def test_a_decomposed_folder_name_is_the_student_of_the_roster(submitted: Path) -> None:
+    (submitted / unicodedata.normalize("NFD", MUELLER) / "ch05").mkdir(parents=True)
+    root = submitted.parent
+    for people in (Roster(), Roster(frozenset({"alice", MUELLER}), closed=True)):
+        assert roster.submissions(root, "ch05", people) == ([MUELLER, "alice"], {})
+    assert (roster.folder(root, MUELLER) / "ch05").is_dir()
+
+
+def test_two_folders_whose_names_read_the_same_are_two(submitted: Path) -> None:
+    for form in ("NFC", "NFD"):
+        (submitted / unicodedata.normalize(form, MUELLER) / "ch05").mkdir(parents=True)
+    good, wrong = found(submitted)
+    assert good == ["alice"]
+    assert len(wrong) == 2
+    assert all("two folders whose names read 'Müller'" in problem for problem in wrong.values())

@@ -1,0 +1,173 @@
+"""Submissions under other names, or without metadata, on their way into the gradebook."""
+
+from __future__ import annotations
+
+import csv
+import io
+import unicodedata
+import zipfile
+from functools import partial
+from pathlib import Path
+
+import nbformat
+import pytest
+from nbformat import NotebookNode
+from nbgrader.api import Gradebook
+from typer.testing import CliRunner
+
+from autograder import cli, engine, grades_csv, submission
+from autograder.corpus import Case
+from autograder.gradebook import CourseGradebook, Grade
+from autograder.insight import exports, needs
+from autograder.insight.collect import collect
+from tests.machine import needs_sandbox
+
+from .conftest import ASSIGNMENT, NOTEBOOK, Course
+
+pytestmark = [needs_sandbox, pytest.mark.timeout(900)]
+
+ANSWER = "Nobody, as all of them are best effort, and a lost reading is replaced by the next."
+MUELLER = unicodedata.normalize("NFC", "Müller")
+
+
+def put(course: Course, student: str, place: str, notebook: NotebookNode) -> None:
+    path = course.folder(student) / place
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(nbformat.writes(notebook))
+
+
+def stripped(notebook: NotebookNode) -> NotebookNode:
+    """Return it as Colab, or a copy into a new notebook, would leave it."""
+    for number, cell in enumerate(notebook.cells):
+        cell.metadata = nbformat.from_dict({})
+        cell.id = f"cell-{number}"
+    return notebook
+
+
+def answered(notebook: NotebookNode) -> NotebookNode:
+    for cell in notebook.cells:
+        if submission.grade_id(cell) == "qos-explanation-loss":
+            cell.source = ANSWER
+    return notebook
+
+
+def grade(course: Course) -> tuple[dict[str, Grade], dict[str, str]]:
+    problems = {g.student: g.problem for g in engine.grade(course.root, ASSIGNMENT, feedback=False)}
+    found = CourseGradebook(course.root).grades(ASSIGNMENT)
+    return {one.student: one for one in found}, problems
+
+
+def scores(course: Course) -> dict[str, str]:
+    """Return {student: score} of grades.csv."""
+    gradebook = CourseGradebook(course.root)
+    grades_csv.write({ASSIGNMENT: gradebook.grades(ASSIGNMENT)}, course.root / "grades.csv")
+    rows = csv.DictReader(io.StringIO((course.root / "grades.csv").read_text()))
+    return {row["student_id"]: row["score"] for row in rows}
+
+
+def exported(course: Course) -> tuple[set[str], set[str]]:
+    """Return who is in the files for Canvas and Moodle, even of grades that may still change."""
+    data = collect(course.root, ASSIGNMENT)
+    texts = [export(data, provisional=True).text for export in (exports.canvas, exports.moodle)]
+    students = {grade.student for grade in data.grades}
+    canvas, moodle = ({s for s in students if s in text} for text in texts)
+    return canvas, moodle
+
+
+def claim(course: Course, *arguments: str) -> str:
+    done = CliRunner().invoke(
+        cli.app, ["claim", ASSIGNMENT, *arguments, "--root", str(course.root)]
+    )
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        return str(done.exception)
+    return done.output
+
+
+def test_a_score_is_never_zero_because_of_a_name_or_lost_metadata(
+    course: Course, cases: dict[str, Case]
+) -> None:
+    right = partial(cases["right-chapter"].submission, course.source, course.released)
+    wrong = partial(cases["wrong-imu-single"].submission, course.source, course.released)
+    put(course, "renamed", f"{NOTEBOOK} (1).ipynb", right())
+    put(course, "stripped", f"{NOTEBOOK}.ipynb", stripped(answered(right())))
+    put(course, unicodedata.normalize("NFD", MUELLER), f"{ASSIGNMENT}/{NOTEBOOK}.ipynb", right())
+    put(course, "two", "a.ipynb", right())
+    put(course, "two", "b\n[/red].ipynb", wrong())
+    lost = stripped(right())
+    lost.cells = [c for c in lost.cells if "camera_qos" not in c.source]
+    lost.cells.append(nbformat.v4.new_code_cell("profile = my_profile()"))
+    put(course, "lost", f"{NOTEBOOK}.ipynb", lost)
+    (course.folder("document") / "report.pdf").write_bytes(b"%PDF")
+    with zipfile.ZipFile(course.folder("zipped") / "hand-in.zip", "w") as archive:
+        archive.writestr("ch05/my work.ipynb", nbformat.writes(right()))
+
+    found, problems = grade(course)
+
+    for student in ("renamed", "stripped", MUELLER, "zipped"):
+        assert found[student].score == 15, problems[student]
+        assert found[student].asked == {}
+    assert f"'{NOTEBOOK} (1).ipynb' holds its cells" in problems["renamed"]
+    answer = found["stripped"].cells[NOTEBOOK]["qos-explanation-loss"]
+    assert answer is None, "it waits for a person"
+    asked = {"two", "lost", "document"}
+    for student in asked:
+        assert found[student].needs_manual_grade
+        assert NOTEBOOK in found[student].asked
+        assert f"autograder claim {ASSIGNMENT} {student} {NOTEBOOK}" in problems[student]
+        assert problems[student].isprintable()
+    assert "'b\\n[/red].ipynb'" in problems["two"]
+    written = scores(course)
+    assert {student for student, score in written.items() if not score} == asked
+    assert exported(course) == (set(found) - asked,) * 2
+    urgent = {s for need in needs.people_needed(collect(course.root, ASSIGNMENT)) if need.urgent
+              for s in need.students}  # fmt: skip
+    assert asked <= urgent
+    table = CliRunner().invoke(cli.app, ["grade", ASSIGNMENT, "--root", str(course.root)])
+    assert "? of 20" in table.output
+
+    assert "there is 'a.ipynb' and 'b\\n[/red].ipynb'" in claim(course, "two", NOTEBOOK, "c.ipynb")
+    assert "is 'b\\n[/red].ipynb'" in claim(course, "two", NOTEBOOK, "b\\n[/red].ipynb")
+    assert "was not handed in" in claim(course, "document", NOTEBOOK, "--nothing")
+    found, problems = grade(course)
+    assert found["two"].cells[NOTEBOOK]["qos-hidden"] == 4.0
+    assert found["document"].score == 0
+    assert not found["document"].needs_manual_grade
+    assert {**found["two"].asked, **found["document"].asked} == {}
+    assert scores(course)["document"] == "0.0"
+    assert (course.folder("two") / "a.ipynb").is_file()
+
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        for name, points in {"qos-visible": 3.0, "qos-hidden": 1.0}.items():
+            entry = book.find_grade(name, NOTEBOOK, ASSIGNMENT, "lost")
+            entry.manual_score, entry.needs_manual_grade = points, False
+        book.db.commit()
+    assert CourseGradebook(course.root).grades(ASSIGNMENT)
+    settled = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}["lost"]
+    assert (settled.asked, settled.score) == ({}, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("nobody", NOTEBOOK, "a.ipynb"), "has handed in for 'ch05'"),
+        (("ana", "qos", "a.ipynb"), f"'qos' is no notebook of 'ch05': there are '{NOTEBOOK}'"),
+        (("ana", NOTEBOOK), "Name one file"),
+        (("ana", NOTEBOOK, "a.ipynb", "--nothing"), "Name one file"),
+        (("ana", NOTEBOOK, "a.ipynb"), "a.ipynb is not valid JSON"),
+        (("ana", NOTEBOOK, "../../bob/ch05/a.ipynb"), "There is no '../../bob/ch05/a.ipynb'"),
+    ],
+)
+def test_a_claim_that_cannot_be_is_one_sentence(
+    course: Course, arguments: tuple[str, ...], said: str
+) -> None:
+    (course.folder("ana") / "a.ipynb").write_text("{")
+    (course.folder("bob") / "a.ipynb").write_text("{}")
+    assert said in claim(course, *arguments)
+    assert not (course.root / "claims.json").exists()
+
+
+def test_a_claim_of_no_assignment_names_those_there_are(tmp_path: Path, course: Course) -> None:
+    done = CliRunner().invoke(
+        cli.app, ["claim", "ch06", "ana", "x", "y", "--root", str(course.root)]
+    )
+    assert "there is 'ch05'" in str(done.exception)
