@@ -316,8 +316,7 @@ class Bank(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _needs_more_to_teach(cls, data: Any, handler: Callable[[Any], Bank]) -> Bank:
-        closed = data.get("closed") if isinstance(data, dict) else None
-        with fields.validating(teaches=closed is not True):
+        with fields.validating(teaches=not fields.is_closed(data)):
             return handler(data)
 
     @property

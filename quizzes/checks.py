@@ -14,6 +14,7 @@ from typing import Any
 from quizzes import rendering
 from quizzes.bank import MIN_VARIANTS
 from quizzes.faults import Problem, inside
+from quizzes.fields import is_closed
 from quizzes.yaml_text import Place
 
 _DEEPEST = 4
@@ -35,7 +36,7 @@ def problems(data: Any, quiz: str, folder: Path) -> Iterator[Problem]:
     if isinstance(data.get("quiz"), str) and data["quiz"] != quiz:
         said = f"it says '{data['quiz']}', but the file's name says '{quiz}'"
         yield Problem(("quiz",), said)
-    if data.get("keyless") is True and data.get("closed") is not True:
+    if data.get("keyless") is True and not is_closed(data):
         yield Problem(("keyless",), "only the questions of a closed quiz go without keys")
     concepts = _list(data.get("concepts"))
     needed = data.get("pass_mark")
@@ -45,7 +46,7 @@ def problems(data: Any, quiz: str, folder: Path) -> Iterator[Problem]:
     for number, concept in enumerate(concepts):
         place: Place = ("concepts", number, "variants")
         variants = _list(inside(concept, "variants"))
-        if data.get("closed") is not True and 0 < len(variants) < MIN_VARIANTS:
+        if not is_closed(data) and 0 < len(variants) < MIN_VARIANTS:
             least = f"at least {MIN_VARIANTS} in a quiz that teaches"
             yield Problem(place, f"it must have {least}, not {len(variants)}")
         for which, variant in enumerate(variants):

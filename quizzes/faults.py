@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import datetime
 import difflib
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, get_args
@@ -55,6 +55,8 @@ def of_schema(
             for inside, phrase in cause.problems:
                 steps = (int(s) - 1 if s.isdigit() else s for s in inside.split())
                 yield Problem((*place, *steps), phrase)
+        elif detail["type"] == "invalid_key":
+            yield Problem(place[:-1], _phrase(detail, place[:-1], document))
         else:
             if detail["type"].startswith("union_tag"):  # no kind, or none that there is
                 yield from _as_meant(detail["input"], document, place, teaches=teaches)
@@ -130,7 +132,7 @@ def _place(data: Any, location: Place) -> Place:
         if step != "[key]":
             place.append(step)
         elif not isinstance(place[-1], str):
-            place.pop()  # the name of a field, which is what is wrong
+            place.pop()  # a name that is no text: pydantic gives its position
     return tuple(place)
 
 
@@ -161,6 +163,8 @@ def _phrase(detail: ErrorDetails, place: Place, document: Document) -> str:
     if kind == "string_pattern_mismatch":
         given = str(detail["input"])[:_LONGEST]
         return f"{given!r} is no id: write lower-case words joined by hyphens, such as qos-purpose"
+    if kind == "string_unicode":
+        return "it holds half of a character, which is no text"
     if kind == "string_too_short":
         return "it is empty"
     if kind in ("too_short", "too_long"):
@@ -196,22 +200,11 @@ def _of_another_kind(wanted: str, given: Any, written: str | None) -> str:
         quotes = "; a text that begins with { or [ must stand in quotes" if wanted == "text" else ""
         return f"it must be {wanted}, but it is {have}{quotes}"
     shown = (written or str(given))[:_LONGEST]
-    if isinstance(given, bool) and written is None:
-        read_as = "without quotes YAML reads yes, no, on and off as true or false"
-        return f"it must be {wanted}, and {read_as}: write them in quotes"
-    if wanted == "text" or wanted.startswith("text,"):
-        read_as = next(name for types, name in _READ_AS if isinstance(given, types))
+    if wanted.startswith("text"):
+        read_as = "true or false" if isinstance(given, bool) else "a number"
         quoted = f"write '{shown}', in quotes"
         return f"it must be {wanted}, but YAML reads {shown} as {read_as}: {quoted}"
     return f"it must be {wanted}, not {shown!r}{_way_to_write(wanted, given)}"
-
-
-_READ_AS: list[tuple[Any, str]] = [
-    (bool, "true or false"),
-    (int | float, "a number"),
-    (datetime.date, "a date"),
-    (object, "something else"),
-]
 
 
 def _way_to_write(wanted: str, given: Any) -> str:
@@ -219,17 +212,14 @@ def _way_to_write(wanted: str, given: Any) -> str:
     if not isinstance(given, str):
         return ""
     if wanted == "true or false":
-        return " in quotes" if given.lower() in ("yes", "no", "true", "false", "on", "off") else ""
-    if "number" not in wanted:
+        meant = {"yes": "true", "on": "true", "no": "false", "off": "false"}.get(given.lower())
+        return f": write {meant}" if meant else " in quotes" * (given.lower() in ("true", "false"))
+    found = re.match(r"[-+]?[0-9]+([.,][0-9]+)?", given) if "number" in wanted else None
+    if not found:
         return ""
-    try:
-        number = float(given.replace(",", "."))
-    except ValueError:
-        return ""
-    if wanted == "a whole number" and not number.is_integer():
-        return ""
-    plain = f"{number:.0f}" if wanted == "a whole number" else repr(number)
-    return f": write {plain} without quotes" if abs(number) < 1e15 else ""
+    if found[0] != given:
+        return ": write a number alone; what it is a number of goes elsewhere"
+    return f": write {given.replace(',', '.')} without quotes"
 
 
 def _unknown(location: Place) -> str:

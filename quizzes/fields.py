@@ -58,6 +58,14 @@ def validating(*, teaches: bool) -> Iterator[None]:
         _teaches.reset(token)
 
 
+def is_closed(data: object) -> bool:
+    """Whether the data of a bank says that it is closed.
+
+    A ``closed`` that is neither true nor false means that it is; the schema asks which.
+    """
+    return isinstance(data, dict) and data.get("closed", False) is not False
+
+
 def teaches() -> bool:
     """Whether the bank that is being validated teaches."""
     return _teaches.get()

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from quizzes import checks, faults, yaml_text
 from quizzes.bank import Bank
 from quizzes.errors import BankError, guess
+from quizzes.fields import is_closed
 from quizzes.yaml_text import Document
 
 BANKS = Path(__file__).resolve().parent / "banks"
@@ -136,8 +137,7 @@ def _sound(document: Document, source: str, quiz: str, folder: Path, noun: str) 
     try:
         bank = Bank.model_validate(data)
     except ValidationError as error:
-        closed = faults.inside(data, "closed")
-        problems += faults.of_schema(error, document, teaches=closed is not True)
+        problems += faults.of_schema(error, document, teaches=not is_closed(data))
     found = faults.sentences(problems, document, source, noun)
     if bank is None or found:
         raise BankError(_summary(found), found)

@@ -25,7 +25,7 @@ out.
   counts, of a closed quiz the one attempt, unless `attempts` says it.
 - Texts are Markdown: fenced code, `$LaTeX$`, and pictures `![what it shows](assets/NAME.svg)` that
   lie beside the bank.
-- Put a text in quotes if it is `yes`, `no`, a number or a date, or has `: ` or ` #` in it, or
+- Put a text in quotes if it is a number, `true`, `false` or `null`, or has `: ` or ` #` in it, or
   begins with one of ``[]{{}}*&!|>%@`'"``. A text below `|` needs none. Indent with blanks, never
   with tabs.
 - `autograder quiz lint NAME` shows everything that is wrong with a bank, with line numbers.

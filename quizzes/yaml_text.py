@@ -1,7 +1,13 @@
-"""YAML as people write it: its data, where each part stands, and what is wrong in plain words."""
+"""YAML as people write it: its data, where each part stands, and what is wrong in plain words.
+
+Plain values mean what they look like, as in YAML 1.2 (https://yaml.org/spec/1.2.2/, section 10.3):
+``yes``, ``12:30`` and a date are texts, ``1e3`` and ``010`` are the numbers 1000 and 10. PyYAML
+alone would read them as true, 750, a date, a text and 8.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -27,6 +33,9 @@ _PARSER_SAYS = {
     "could not find expected ':'": "there is no ':' behind a field's name, or the text above is "
     "not indented far enough",
     "expected ',' or": "a bracket that opens before is never closed",
+    "unhashable key": "the name of a field must be a word",
+    "unknown escape character": "between double quotes a backslash begins something special: use "
+    "single quotes, or write it twice",
     "expected alphabetic or numeric": "a text that begins with * or & must stand in quotes",
 }
 _RESERVED = "`@%&*!|>"
@@ -73,7 +82,7 @@ def parse(text: str, name: str) -> Document:
         BankError: it is no YAML; the message says in which line, and what to do.
     """
     try:
-        loader = yaml.SafeLoader(text)
+        loader = _Loader(text)
         node = loader.get_single_node()
         if node is None:
             return Document(None)
@@ -91,6 +100,26 @@ def parse(text: str, name: str) -> Document:
     except (yaml.YAMLError, ValueError, OverflowError, TypeError) as error:
         problem = " ".join(str(error).split())[:300]
         raise BankError(f"{name} is not valid YAML: {problem}.") from None
+
+
+class _Loader(yaml.SafeLoader):
+    def construct_whole_number(self, node: yaml.ScalarNode) -> int:
+        return int(self.construct_scalar(node))
+
+
+_Loader.yaml_implicit_resolvers = {}
+for _tag, _looks, _first in (
+    ("bool", r"true|True|TRUE|false|False|FALSE", "tTfF"),
+    ("null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("int", r"[-+]?[0-9]+", "-+0123456789"),
+    ("float", r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?|[-+]?\.(inf|Inf|INF)"
+              r"|\.(nan|NaN|NAN)", "-+.0123456789"),
+    ("merge", r"<<", "<"),
+):  # fmt: skip
+    _Loader.add_implicit_resolver(
+        f"tag:yaml.org,2002:{_tag}", re.compile(f"^(?:{_looks})$"), list(_first)
+    )
+_Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_whole_number)
 
 
 def _inside(node: yaml.Node | None, step: str | int) -> tuple[yaml.Node, yaml.Node] | None:

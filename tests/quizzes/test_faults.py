@@ -10,28 +10,30 @@ import pytest
 import yaml
 
 from quizzes import loader
-from quizzes.bank import Bank
+from quizzes.bank import Bank, Numeric
 from quizzes.errors import BankError
 from quizzes.loader import read_bank
 
 from . import sample
 
+EXAM = loader.BANKS.parent / "examples" / "exam.yaml"
+
 BAD = """\
 quiz: bad
 titel: Hello
-chapter: 2024-01-01
+chapter: 20240101
 pass_mark: "2"
 misconceptions:
-  no: x
+  5: x
 concepts:
   - id: one
-    objective: 12:30
+    objective: [12, 30]
     variants:
       - id: a-1
         kind: singel
-        stem: yes
+        stem: true
         options:
-          - text: yes
+          - text: true
             correct: "true"
           - text: first
             feedback: so
@@ -39,7 +41,7 @@ concepts:
         kind: numeric
         stem: |
           What? ![x](assets/none.svg)
-        answer: 1e3
+        answer: 1,5
         tolerance: -2
       - id: a-2
         kind: single
@@ -62,22 +64,22 @@ concepts:
 SAID = """\
 line 1, field title: it is missing, and is required here.
 line 2, field titel: there is no such field: did you mean 'title'?
-line 3, field chapter: it must be text, but YAML reads 2024-01-01 as a date: write '2024-01-01', in quotes.
+line 3, field chapter: it must be text, but YAML reads 20240101 as a number: write '20240101', in quotes.
 line 4, field pass_mark: it must be a whole number, not '2': write 2 without quotes.
-line 5, field misconceptions: it must be text, and without quotes YAML reads yes, no, on and off as true or false: write them in quotes.
-line 9, item 'one', field objective: it must be text, but YAML reads 12:30 as a number: write '12:30', in quotes.
+line 5, field misconceptions: it must be text, but YAML reads 5 as a number: write '5', in quotes.
+line 9, item 'one', field objective: it must be text, but it is a list; a text that begins with { or [ must stand in quotes.
 line 10, item 'one', field variants: it must have at least 4 in a quiz that teaches, not 3.
 line 11, item 'a-1', field proof: PROOF.
 line 12, item 'a-1', field kind: it must be one of single, predict, multiple, numeric, ordering, matching: did you mean 'single'?
-line 13, item 'a-1', field stem: it must be text, but YAML reads yes as true or false: write 'yes', in quotes.
-line 15, item 'a-1', field options 1 text: it must be text, but YAML reads yes as true or false: write 'yes', in quotes.
+line 13, item 'a-1', field stem: it must be text, but YAML reads true as true or false: write 'true', in quotes.
+line 15, item 'a-1', field options 1 text: it must be text, but YAML reads true as true or false: write 'true', in quotes.
 line 15, item 'a-1', field options 1 feedback: PROOF.
 line 16, item 'a-1', field options 1 correct: it must be true or false, not 'true' in quotes.
 line 17, item 'a-1', field options 2 misconception: a wrong option needs a misconception in a quiz that teaches.
 line 19, item 'a-2', field proof: PROOF.
 line 19, item 'a-2', field feedback: PROOF.
 line 21, item 'a-2', field stem: the image 'assets/none.svg' cannot be read (No such file or directory).
-line 23, item 'a-2', field answer: it must be a number, not '1e3': write 1000.0 without quotes.
+line 23, item 'a-2', field answer: it must be a number, not '1,5': write 1.5 without quotes.
 line 24, item 'a-2', field tolerance: it must be at least 0, not -2.
 line 25, item 'a-2', field id: this id is used twice.
 line 27, item 'a-2', field stem: it must be text, but it is fields with values; a text that begins with { or [ must stand in quotes.
@@ -156,7 +158,7 @@ def test_fields_given_twice_come_first_with_both_lines(tmp_path: Path) -> None:
 
 def test_a_merged_mapping_gives_no_field_twice(tmp_path: Path) -> None:
     """YAML's `<<: *name` takes over fields, and fields of its own go before them."""
-    text = (loader.BANKS.parent / "examples" / "exam.yaml").read_text()
+    text = EXAM.read_text()
     options = textwrap.indent('- &one {text: "One", correct: true}\n- {<<: *one, text: "Two"}\n',
                               " " * 10)  # fmt: skip
     start, end = text.index('          - text: "One'), text.index("  - id: timer-rate")
@@ -188,6 +190,8 @@ def test_a_merged_mapping_gives_no_field_twice(tmp_path: Path) -> None:
         ("quiz: a\n title: b", "line 2: a text with ': ' in it must stand in quotes; without one"),
         ("quiz: a\ntitle\nchapter: c", "line 3: there is no ':' behind a field's name"),
         ("quiz: a\ntitle: \x00", "line 2: the character 0x0000 is not allowed; delete it."),
+        ("quiz: a\n? [b]\n: c", "line 2: the name of a field must be a word"),
+        ('quiz: "C:\\quiz"', "line 1: between double quotes a backslash begins something special"),
         ("- a\nquiz: b", "line 2: this does not fit what stands above it"),
         ("[" * 1500, "nested too deeply"),
     ],
@@ -229,6 +233,54 @@ def test_a_long_text_is_no_fault(tmp_path: Path) -> None:
     assert len(bank.concepts[0].variants[0].stem) > 100_000
 
 
+@pytest.mark.parametrize(
+    ("written", "means"),
+    [("yes", "yes"), ("No", "No"), ("on", "on"), ("12:30", "12:30"), ("2024-01-01", "2024-01-01"),
+     ("1_000", "1_000"), ("0x", "0x"), ("=", "=")],
+)  # fmt: skip
+def test_a_text_is_what_it_looks_like(written: str, means: str, tmp_path: Path) -> None:
+    path = tmp_path / "exam.yaml"
+    text = EXAM.read_text().replace("right: service", f"right: {written}")
+    path.write_text(text.replace('title: "Midterm"', f"title: {written}"))
+    bank = read_bank(path)
+    assert bank.title == means
+    assert means in bank.concepts[2].variants[0].texts
+
+
+@pytest.mark.parametrize(
+    ("written", "means"),
+    [("1e3", 1000.0), ("010", 10.0), ("-2", -2.0), ("+.5", 0.5), ("2.", 2.0), ("1.5E-3", 0.0015)],
+)
+def test_a_number_is_what_it_looks_like(written: str, means: float, tmp_path: Path) -> None:
+    path = tmp_path / "exam.yaml"
+    path.write_text(EXAM.read_text().replace("answer: 20", f"answer: {written}"))
+    question = read_bank(path).concepts[1].variants[0]
+    assert isinstance(question, Numeric)
+    assert question.answer == means
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("answer: 20", "answer: 1:30", "answer: it must be a number, not '1:30': write a number"),
+        ("answer: 20", "answer: 20 Hz", "answer: it must be a number, not '20 Hz': write a number"),
+        ("answer: 20", "answer: '20'", "answer: it must be a number, not '20': write 20 without"),
+        ("closed: true", "closed: yes", "closed: it must be true or false, not 'yes': write true."),
+        ("closed: true", "closed: 'true'", "closed: it must be true or false, not 'true' in quo"),
+        ("closed: true", "closed: 1", "closed: it must be true or false, not '1'."),
+        ("Midterm", "\\ud800", "title: it holds half of a character, which is no text."),
+        ("pass_mark: 2", "pass_mark: 2.5", "pass_mark: it must be a whole number, not '2.5'."),
+        ("pass_mark: 2", "pass_mark: 2\n7: x", "line 2: it must be text, as every field's name"),
+        ("kind: matching", "kind: [matching]", "kind: it must be one of single, predict, mult"),
+    ],
+)
+def test_one_mistake_is_one_sentence(old: str, new: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "exam.yaml"
+    path.write_text(EXAM.read_text().replace(old, new))
+    [fault] = faults(path)
+    assert said in fault
+
+
 @pytest.mark.parametrize("value", [10**400, "1,5", "1_0", "ten", True, None, float("inf")])
 def test_a_number_that_is_none_is_one_sentence(value: Any, tmp_path: Path) -> None:
     data = sample.data()
@@ -258,5 +310,4 @@ def test_a_bank_that_lacks_only_the_right_suffix_is_named(tmp_path: Path) -> Non
 
 
 def test_a_closed_bank_validates_by_itself() -> None:
-    path = loader.BANKS.parent / "examples" / "exam.yaml"
-    assert Bank.model_validate(yaml.safe_load(path.read_text())).closed
+    assert Bank.model_validate(yaml.safe_load(EXAM.read_text())).closed

@@ -67,7 +67,7 @@ BROKEN: list[tuple[Change, list[str]]] = [
     (option("predict", text=42),
      ["'predict-2'", "options 2 text", "YAML reads 42 as a number: write '42'"]),
     (option("predict", correct="yes"),
-     ["'predict-2'", "options 2 correct", "true or false, not 'yes' in quotes"]),
+     ["'predict-2'", "options 2 correct", "true or false, not 'yes': write true"]),
     (option("predict", show="print("), ["'predict-2'", "options 2 show", "no Python"]),
     (option("predict", misconception=None, correct=True), ["'predict-2', field options: exactly"]),
     (change("multiple", options=[sample.option("a"), sample.option("b")]),
