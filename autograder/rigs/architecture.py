@@ -15,12 +15,14 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from autograder.bench import Bench, StudentError
 from autograder.rigs.errands import SETTLE, WAYPOINT, marked
+from autograder.rigs.patience import Patience
 from autograder.rigs.pouring import Poured, Pours
 from autograder.rigs.quiet import QuietNode
 from autograder.rigs.robot_graph import Offer, RobotGraph, Topic, read_graph
 from autograder.rigs.robot_jobs import ACTION, MOTORS, SENSORS, WHEELS, Jobs
 from autograder.rigs.robot_reasons import every, link_faults
 from autograder.rigs.robot_types import UnknownTypeError, load_type
+from autograder.rigs.stillness import Stillness
 from course import WaitTimeout
 from course.design import dye
 
@@ -106,8 +108,13 @@ class ArchitectureRig:
         except UnknownTypeError:
             return False
 
-    def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
-        """Wait until ``condition`` holds; return whether it did before the deadline."""
+    def wait(self, condition: Callable[[], Any], timeout: float | None = None) -> bool:
+        """Wait until ``condition`` holds; return whether it did before the deadline.
+
+        Without ``timeout`` (s) that is when it would have come: see `Patience`.
+        """
+        if timeout is None:
+            return Patience(Stillness(self.subject.pid)).wait(self._session, condition)
         with suppress(WaitTimeout):
             self._session.until(condition, timeout, "an observation")
             return True

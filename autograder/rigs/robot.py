@@ -24,7 +24,9 @@ from std_msgs.msg import Float64
 from autograder.bench import Bench, StudentError
 from autograder.exam import Failed
 from autograder.rigs.hardware import ExaminerNode
+from autograder.rigs.patience import Patience
 from autograder.rigs.phrases import callback_raised
+from autograder.rigs.stillness import Stillness
 from course import WaitTimeout
 
 T = TypeVar("T")
@@ -79,6 +81,7 @@ class RobotRig:
         self.broadcasts = False
         self.limit: float | None = None
         self.obeyed: float | None = None
+        self._threads = Stillness(bench.subject.pid)
         self._steps = [(0, 0.0)]
         self._beside = ThreadPoolExecutor(thread_name_prefix="asking")
         self._clients: dict[str, Any] = {}
@@ -126,8 +129,13 @@ class RobotRig:
         at = bisect_left(self._steps, (moment, 0.0))
         return self._steps[at - 1][1], self._steps[at][1] if at < len(self._steps) else self.elapsed
 
-    def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
-        """Wait until ``condition`` holds, the student's clock standing still; return whether."""
+    def wait(self, condition: Callable[[], Any], timeout: float | None = None) -> bool:
+        """Wait until ``condition`` holds, the student's clock standing still; return whether.
+
+        Without ``timeout`` (s) as long as it may come: see `Patience`.
+        """
+        if timeout is None:
+            return Patience(self._threads).wait(self.session, condition)
         with suppress(WaitTimeout):
             self.session.until(condition, timeout=max(0.0, timeout), what="an observation")
             return True
@@ -155,7 +163,8 @@ class RobotRig:
             if time.monotonic() >= deadline:
                 return False
             if seconds is not None and seconds - (self.elapsed - began) <= step / 2:
-                return self.wait(condition, deadline - time.monotonic())
+                left = max(0.0, deadline - time.monotonic())
+                return Patience(self._threads, left).wait(self.session, condition)
             self.step(step)
             self.wait(condition, 0.01)
         return True

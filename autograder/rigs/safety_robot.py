@@ -12,6 +12,7 @@ from typing import Any
 
 from autograder.bench import Bench, Endpoints, StudentError
 from autograder.exam import Failed
+from autograder.rigs.patience import Patience
 from autograder.rigs.player import Player
 from autograder.rigs.stillness import Stillness
 from course import WaitTimeout
@@ -19,7 +20,6 @@ from course import WaitTimeout
 STRIDE = 0.1  # s of simulated time between two looks
 COARSE = 0.5  # s between two looks where it does not matter when exactly something happens
 ROUNDS = 10  # of requests that may follow from each other while time stands still
-SETTLE = 8.0  # s of wall time that endpoints may take to find each other; 0.3 s as a rule
 
 
 NAP_S = 0.1
@@ -67,8 +67,13 @@ class Robot:
         )
         self.rest()
 
-    def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
-        """Wait for something of DDS's own: simulated time stands still."""
+    def wait(self, condition: Callable[[], Any], timeout: float | None = None) -> bool:
+        """Wait for something of DDS's own, for ``timeout`` s or with `Patience`: time stands still.
+
+        Endpoints take 0.3 s to find each other, as a rule.
+        """
+        if timeout is None:
+            return Patience(self._still).wait(self._bench.session, condition)
         with suppress(WaitTimeout):
             self._bench.session.until(condition, timeout=timeout, what="an observation")
             return True

@@ -67,6 +67,11 @@ def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> boo
             return False
 
 
+def follow_each_other(executors: Sequence[BackgroundExecutor]) -> bool:
+    """Return whether callbacks were found to follow each other without end a moment ago."""
+    return any(time.monotonic() - executor.endless < _MOMENT for executor in executors)
+
+
 class _Chain:
     """Callbacks that follow each other, looked at from now on."""
 
@@ -74,8 +79,7 @@ class _Chain:
         self._executors = executors
         self._began = time.monotonic()
         self._ended_before = self._ended()
-        recently = any(self._began - executor.endless < _MOMENT for executor in executors)
-        self._signs = _TURN if recently else (_ENDLESS,)
+        self._signs = _TURN if follow_each_other(executors) else (_ENDLESS,)
 
     def _ended(self) -> int:
         return sum(executor.finished for executor in self._executors)

@@ -26,10 +26,11 @@ from course.runtime.jobs import current_job
 from course.runtime.names import node_name
 from course.runtime.probe import Probe
 from course.runtime.residents import Residents
-from course.runtime.settle import all_held, come_to_rest
+from course.runtime.settle import all_held, come_to_rest, follow_each_other
 
 _NS = 1_000_000_000
 _LONGEST_STRIDE = 1000  # steps
+_POLLED_STRIDE = 5  # steps, where somebody looks again and again: each look takes its time
 _STEP_TIMEOUT = 10.0  # s of wall time that a callback may hold up one step
 
 
@@ -118,12 +119,17 @@ class SimulatedTime:
         """Return how far to move: one step, or several at once if no timer is due in between.
 
         Nothing could tell the difference, unless others follow /clock or a callback waits for it.
+        Callbacks that go on for ever, as a coroutine does that naps and looks again, can, but a few
+        steps are no more to them than a nap that took longer.
         """
         followers = self._followers()
         if self._publisher.get_subscription_count() != len(followers):
             return step_ns
-        if any(executor.running for executor in self._crew.all()):
-            return step_ns
+        most, executors = _LONGEST_STRIDE, self._crew.all()
+        if any(executor.running for executor in executors):
+            if not follow_each_other(executors):
+                return step_ns
+            most = _POLLED_STRIDE
         waits = [
             wait
             for node in followers
@@ -131,8 +137,8 @@ class SimulatedTime:
             if timer.clock is node.get_clock()
             and (wait := timer.time_until_next_call()) is not None
         ]
-        steps = -(-min(waits) // step_ns) if waits else _LONGEST_STRIDE
-        return step_ns * min(max(1, steps), _LONGEST_STRIDE)
+        steps = -(-min(waits) // step_ns) if waits else most
+        return step_ns * min(max(1, steps), most)
 
     def _move_to(self, moment_ns: int, patience: float) -> None:
         self._now_ns = moment_ns
