@@ -16,7 +16,6 @@ from autograder import (
     intake_cells,
     intake_claims,
     ledger,
-    marked,
     quiz_marks,
     roster,
     runner,
@@ -31,7 +30,7 @@ from autograder.intake import Found, Intake, NotHandedInError, UnclearError
 from autograder.intake_names import quoted
 from autograder.jobs import Job
 from autograder.ledger import Standing
-from autograder.marked import MarkedCells, MarkedStore
+from autograder.marked import Marks
 from autograder.nbgrader_once import FeedbackExporter
 from autograder.runner import Outcome
 from autograder.submission import SubmissionError
@@ -98,7 +97,7 @@ class Desk:
         self.root = gradebook.root
         self.work_folder = self.root / bridge.WORK_FOLDER
         self._trust = trust
-        self._marked = MarkedStore(self.work_folder, assignment)
+        self._marks = Marks(self.work_folder, assignment)
         self._originals = {
             name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
         }
@@ -173,7 +172,9 @@ class Desk:
             GradebookError: nbgrader cannot enter this student.
             GradebookUnusable: it could not enter anybody.
         """
-        before = self._marked_before(work.student)
+        copy = self._autograded(work.student)
+        with self.gradebook.opened() as book:
+            self._marks.remember(book, work.student, copy)
         for name, outcome in work.outcomes.items():
             bridge.prepared[self.assignment, work.student, name] = outcome
         try:
@@ -182,8 +183,9 @@ class Desk:
             for name in work.outcomes:
                 bridge.prepared.pop((self.assignment, work.student, name), None)
         shutil.rmtree(self._staged(work.student).parent, ignore_errors=True)
-        staging.let_feedback_replace(self._autograded(work.student), self.notebooks)
-        asked = self._settle(work.student, before, same=same)
+        staging.let_feedback_replace(copy, self.notebooks)
+        with self.gradebook.opened() as book:
+            asked = self._marks.settle(book, work.student, copy, same=same)
         standings = self.gradebook.standings(self.assignment, work.student)
         if work.student not in standings:
             raise GradebookError(
@@ -191,27 +193,6 @@ class Desk:
                 "nbgrader_config.py leaves this student out."
             )
         return Entered(standings[work.student], asked)
-
-    def _marked_before(self, student: str) -> MarkedCells:
-        """Return what a person has marked so far, and keep it until the student is entered."""
-        scores = self.gradebook.settled(self.assignment, student)
-        settled = marked.with_copy(scores, self._autograded(student))
-        # Of a run that was ended in between: its marks are asked for, and the copy may be gone.
-        before = {**self._marked.get(student), **settled}
-        if before:
-            self._marked.put(student, before)
-        return before
-
-    def _settle(self, student: str, before: MarkedCells, *, same: bool) -> str:
-        """Take the marks of what is still the same for good; return what is to be marked again."""
-        if not before:
-            return ""
-        scores = self.gradebook.automatic(self.assignment, student, before)
-        after = marked.with_copy(scores, self._autograded(student))
-        asked = marked.changes(before, after, same=same)
-        self.gradebook.settle(self.assignment, student, after.keys() - asked.keys())
-        self._marked.remove(student)
-        return marked.remark(asked)
 
     def _stage(self, student: str) -> Path:
         """Return a folder for a submission's notebooks, empty but for the exchange's marks."""

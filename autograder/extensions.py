@@ -69,7 +69,7 @@ def extend(root: Path, assignment: str, students: list[str], hours: float) -> li
                 waiting.put(student, hours)
                 waits = True
             else:
-                waiting.take(student)
+                waiting.put(student, 0)
                 waits = False
             dues.append(Due(student, due + timedelta(hours=hours), waits))
     return dues
@@ -89,12 +89,12 @@ class Waiting:
             if hours:
                 waiting[student] = hours
 
-    def take(self, student: str) -> float:
-        """Return the hours that wait for a student, which from now on are in the gradebook."""
+    def of(self, student: str) -> float:
+        """Return the hours that wait for a student; 0 if none do."""
         if not self._path.exists():
             return 0.0
         with self._changing() as waiting:
-            return waiting.pop(student, 0.0)
+            return waiting.get(student, 0.0)
 
     @contextmanager
     def _changing(self) -> Iterator[dict[str, float]]:

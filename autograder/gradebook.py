@@ -9,8 +9,8 @@ import re
 import sys
 import time
 import warnings
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -198,44 +198,6 @@ class CourseGradebook:
         course = self.coursedir
         most = 1000 * course.max_dir_size
         return Limits(tuple(course.ignore), 1000 * course.max_file_size or most, most)
-
-    def settled(self, assignment: str, student: str) -> dict[tuple[str, str], float | None]:
-        """Return {(notebook, cell): automatic score} of what a person has graded for good."""
-        with self.opened() as gradebook:
-            try:
-                notebooks = gradebook.find_submission(assignment, student).notebooks
-            except MissingEntry:
-                return {}
-            return {
-                (notebook.name, grade.name): grade.auto_score
-                for notebook in notebooks
-                for grade in notebook.grades
-                if grade.manual_score is not None and not grade.needs_manual_grade
-            }
-
-    def automatic(
-        self, assignment: str, student: str, cells: Iterable[tuple[str, str]]
-    ) -> dict[tuple[str, str], float | None]:
-        """Return {(notebook, cell): automatic score} of those of ``cells`` that there are."""
-        found = {}
-        with self.opened() as gradebook:
-            for notebook, cell in cells:
-                with suppress(MissingEntry):  # the assignment has lost a cell since
-                    grade = gradebook.find_grade(cell, notebook, assignment, student)
-                    found[notebook, cell] = grade.auto_score
-        return found
-
-    def settle(self, assignment: str, student: str, cells: Iterable[tuple[str, str]]) -> None:
-        """Take a person's marks of these (notebook, cell) for good again.
-
-        nbgrader wants each to be looked at again after autograding, as the work may be another.
-        """
-        with self.opened() as gradebook:
-            for notebook, cell in cells:
-                grade = gradebook.find_grade(cell, notebook, assignment, student)
-                if grade.manual_score is not None:
-                    grade.needs_manual_grade = False
-            gradebook.db.commit()
 
     def roster(self) -> Roster:
         """Return which students the gradebook knows, and whether there may be others."""

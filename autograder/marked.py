@@ -11,11 +11,13 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from urllib.parse import unquote
 
 from nbformat import NotebookNode
+from nbgrader.api import Gradebook, MissingEntry
 
 from autograder import staging, submission
 from autograder.files import walk, write_whole
@@ -96,21 +98,59 @@ def remark(asked: Mapping[CellName, str]) -> str:
     return f"To be marked again: {cells}."
 
 
-class MarkedStore:
-    """Where it is kept what a person had marked, while nbgrader enters the submission again."""
+class Marks:
+    """The marks that people gave for one assignment, while nbgrader enters submissions again."""
 
     def __init__(self, work: Path, assignment: str) -> None:
-        """Keep it in the engine's folder ``work``."""
+        """Keep in the folder ``work`` what a run that is ended in between must not lose."""
+        self._assignment = assignment
         self._folder = work / FOLDER / assignment
 
-    def put(self, student: str, cells: MarkedCells) -> None:
-        """Keep it for a student; raises OSError if it cannot be written."""
-        rows = [[*name, asdict(marked)] for name, marked in cells.items()]
-        data = {"version": VERSION, "student": student, "cells": rows}
-        write_whole(self._path(student), json.dumps(data))
+    def remember(self, book: Gradebook, student: str, copy: Path) -> None:
+        """Note what is marked for good, and what it is of: the graded ``copy`` is replaced next.
 
-    def get(self, student: str) -> MarkedCells:
-        """Return what is left of a run that was ended in between: most often nothing."""
+        Raises:
+            OSError: it cannot be written down.
+        """
+        try:
+            notebooks = book.find_submission(self._assignment, student).notebooks
+        except MissingEntry:
+            return
+        scores = {
+            (notebook.name, grade.name): grade.auto_score
+            for notebook in notebooks
+            for grade in notebook.grades
+            if grade.manual_score is not None and not grade.needs_manual_grade
+        }
+        # Of a run that was ended in between: its marks are asked for, and the copy may be gone.
+        if before := {**self.kept(student), **with_copy(scores, copy)}:
+            rows = [[*name, asdict(marked)] for name, marked in before.items()]
+            data = {"version": VERSION, "student": student, "cells": rows}
+            write_whole(self._path(student), json.dumps(data))
+
+    def settle(self, book: Gradebook, student: str, copy: Path, *, same: bool) -> str:
+        """Take the marks of what is still the same for good again, once a student is entered.
+
+        Return the sentence that says what is to be marked again, and why; empty if nothing.
+        """
+        before = self.kept(student)
+        if not before:
+            return ""
+        grades = {}
+        for notebook, cell in before:
+            with suppress(MissingEntry):  # the assignment has lost the cell since
+                grades[notebook, cell] = book.find_grade(cell, notebook, self._assignment, student)
+        scores = {name: grade.auto_score for name, grade in grades.items()}
+        asked = changes(before, with_copy(scores, copy), same=same)
+        for name, grade in grades.items():
+            if name not in asked and grade.manual_score is not None:
+                grade.needs_manual_grade = False
+        book.db.commit()
+        self._path(student).unlink(missing_ok=True)
+        return remark(asked)
+
+    def kept(self, student: str) -> MarkedCells:
+        """Return what is remembered of a student who is not entered yet."""
         try:
             data = json.loads(self._path(student).read_text(encoding="utf-8"))
             if (data["version"], data["student"]) != (VERSION, student):
@@ -118,10 +158,6 @@ class MarkedStore:
             return {(notebook, cell): Marked(**marked) for notebook, cell, marked in data["cells"]}
         except (OSError, ValueError, KeyError, TypeError):
             return {}
-
-    def remove(self, student: str) -> None:
-        """Forget it: the submission is entered."""
-        self._path(student).unlink(missing_ok=True)
 
     def _path(self, student: str) -> Path:
         name = hashlib.sha256(student.encode(errors="surrogateescape")).hexdigest()[:32]

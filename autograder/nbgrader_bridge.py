@@ -151,10 +151,11 @@ class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]
         The penalty for lateness is next: an extension that waits for this submission is granted.
         """
         assignment, student, notebook = _names(resources)
-        hours = Waiting(Path(_coursedir(self).root) / WORK_FOLDER, assignment).take(student)
-        if hours:
+        waiting = Waiting(Path(_coursedir(self).root) / WORK_FOLDER, assignment)
+        if hours := waiting.of(student):
             with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
                 gradebook.grant_extension(assignment, student, hours=hours)
+            waiting.put(student, 0)  # it is in the gradebook from now on
         if "ros2_course_outcome" in resources:
             work = Path(_coursedir(self).root) / WORK_FOLDER
             records.keep(work, assignment, student, notebook, resources["ros2_course_outcome"])

@@ -11,8 +11,7 @@ from nbgrader.api import Gradebook
 
 from autograder import engine, marked, points, submission
 from autograder.build import build
-from autograder.desk import Desk
-from autograder.marked import Marked
+from autograder.marked import Marked, Marks
 from autograder.release import release
 from tests.killing import fresh_copy
 from tests.machine import needs_sandbox
@@ -112,7 +111,7 @@ def test_an_engine_that_ends_in_between_forgets_no_mark(
 
     (course.folder("right") / "timestamp.txt").write_text("2030-01-31 12:00:00 UTC")
     with monkeypatch.context() as patched:
-        patched.setattr(Desk, "_settle", ends)
+        patched.setattr(Marks, "settle", ends)
         with pytest.raises(SystemExit):
             grade(course)
     assert asked(course) == {*ANSWERS, "qos-visible"}, "nbgrader asks for all of them again"
@@ -138,15 +137,15 @@ def test_what_must_be_looked_at_again(old: Marked, new: Marked, same: bool, why:
     assert marked.changes({cell: old}, {}, same=same) == {}
 
 
-def test_what_was_marked_is_kept_whole_or_not_at_all(tmp_path: Path) -> None:
-    store = marked.MarkedStore(tmp_path, "ch05")
-    assert store.get("ada") == {}
-    cells = {("nb", "a"): Marked(None, 1.0, "x"), ("nb", "b"): Marked(2.0)}
-    store.put("ada", cells)
-    assert store.get("ada") == cells
-    assert store.get("bob") == {}
-    (path,) = tmp_path.rglob("*.json")
+def test_what_was_marked_is_kept_whole_or_not_at_all(course: Course) -> None:
+    marks = Marks(course.root / ".autograder", ASSIGNMENT)
+    copy = course.root / "autograded" / "right" / ASSIGNMENT
+    with book(course) as gradebook:
+        for student in ("right", "wrong", "nobody"):
+            marks.remember(gradebook, student, copy)
+    assert {cell for _, cell in marks.kept("right")} == {*ANSWERS, "qos-visible"}
+    assert all(cell.content and cell.points for cell in marks.kept("right").values())
+    assert marks.kept("wrong") == marks.kept("nobody") == {}
+    (path,) = (course.root / ".autograder" / marked.FOLDER).rglob("*.json")
     path.write_text(path.read_text()[:20])
-    assert store.get("ada") == {}
-    store.remove("ada")
-    store.remove("ada")
+    assert marks.kept("right") == {}
