@@ -16,7 +16,7 @@ from pathlib import Path, PurePosixPath
 from nbformat import NotebookNode
 from rapidfuzz import fuzz
 
-from autograder import intake_cells, intake_claims, submission
+from autograder import intake_attempts, intake_cells, intake_claims, submission
 from autograder.beside import MAX_BYTES, Beside, files_beside
 from autograder.intake_claims import Claim
 from autograder.intake_files import HandedIn, Item, look_through
@@ -287,6 +287,8 @@ class Intake:
         for item in self.handed_in.items:
             if item in strange or item.archive is not None or item.place in self._given:
                 continue
+            if intake_attempts.is_likely(item.name):
+                continue  # a quiz's, and asked about as such
             if normal(item.place) in notebooks or any(c.item == item for c in taken):
                 continue
             if any(c.item.path == item.path and c.item.archive for c in taken):

@@ -43,6 +43,11 @@ class Attempts:
     nothing: bool = False
 
 
+def is_likely(name: str) -> bool:
+    """Whether a file's name is like one of a quiz's attempts."""
+    return bool(_LIKELY.search(name))
+
+
 def find(folder: Path, quiz: str, student: str, root: Path) -> Attempts:
     """Return a student's attempts at a quiz that lie in a submission.
 
@@ -77,7 +82,7 @@ def find(folder: Path, quiz: str, student: str, root: Path) -> Attempts:
 
 
 def _elsewhere(handed_in: HandedIn, quiz: str, name: str, command: str) -> Attempts:
-    likely = [item for item in handed_in.items if _LIKELY.search(item.name)]
+    likely = [item for item in handed_in.items if is_likely(item.name)]
     holding: dict[bytes, Item] = {}
     for item in likely[:MAX_READ]:
         content = _read(item)

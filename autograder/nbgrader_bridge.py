@@ -22,10 +22,11 @@ from nbgrader.preprocessors import NbGraderPreprocessor
 from nbgrader.utils import parse_utc
 from traitlets import Bool
 
-from autograder import cells, intake_asked, intake_cells, outputs, roster, submission
+from autograder import cells, intake_asked, intake_cells, intake_stock, outputs, roster, submission
 from autograder.beside import files_beside
 from autograder.extensions import Waiting
 from autograder.insight import records
+from autograder.intake import Intake, UnclearError
 from autograder.report import Report
 from autograder.submission import SubmissionError
 from autograder.verdict import Verdict
@@ -36,6 +37,10 @@ UNREADABLE_KEY = "ros2_course_unreadable"
 ASKED_KEY = "ros2_course_asked"
 """Metadata that the first steps leave for the later ones: remarks, why there is no more, and what a
 person is asked: {grade id: why}."""
+
+FOUND_KEY = "ros2_course_found"
+UNCLEAR_KEY = "ros2_course_unclear"
+"""Resources that the exporter leaves for the first step: which file it is, or what is not clear."""
 
 WORK_FOLDER = ".autograder"
 """Folder under the course root where the engine keeps outcomes and staged submissions."""
@@ -60,12 +65,22 @@ class SubmissionExporter(NotebookExporter):
     ) -> tuple[NotebookNode, Resources]:
         """Return the notebook at ``filename``; the released one, with why, if it is unreadable."""
         resources = resources or {}
+        converter: Any = self.parent
+        coursedir, (assignment, student, name) = converter.coursedir, _names(resources)
+        folder = intake_stock.submitted(coursedir, assignment, student)
         try:
-            notebook = submission.read(Path(filename))
+            if Path(filename).parent == folder:
+                intake = _intake(coursedir, assignment, student)
+                found = intake.notebook(name)
+                notebook = found.notebook
+                resources[FOUND_KEY] = found
+            else:  # nbgrader reads a second time what it has written itself
+                notebook = submission.read(Path(filename))
         except SubmissionError as error:
-            converter: Any = self.parent
-            _, notebook = originals(converter.coursedir, *_names(resources)[::2])
+            _, notebook = originals(coursedir, assignment, name)
             resources[UNREADABLE_KEY] = str(error)
+            if isinstance(error, UnclearError):
+                resources[UNCLEAR_KEY] = f"{error} {error.suggestion}"
         return self.from_notebook_node(notebook, resources, **more)  # type: ignore[no-untyped-call,no-any-return]
 
 
@@ -74,12 +89,23 @@ class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ship
 
     def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:
         """Mend ``nb`` against the source and the released notebook; remember what was mended."""
-        source, released = originals(_coursedir(self), *_names(resources)[::2])
+        from autograder import quiz_marks
+
+        coursedir, (assignment, student, notebook) = _coursedir(self), _names(resources)
+        source, released = originals(coursedir, assignment, notebook)
         known = intake_cells.recognise(nb, released)
         nb, notes = submission.restore(nb, source, released)
-        notes = [*known.notes, *dict.fromkeys(known.doubts.values()), *notes]
-        for name, why in known.doubts.items():
+        found = resources.pop(FOUND_KEY, None)
+        doubts = {} if found is not None and found.claimed else known.doubts
+        before = found.notes if found is not None else ()
+        notes = [*before, *known.notes, *dict.fromkeys(doubts.values()), *notes]
+        for name, why in doubts.items():
             ask(nb, why, [name])
+        if UNCLEAR_KEY in resources:
+            ask(nb, resources.pop(UNCLEAR_KEY), graded_cells(nb))
+        folder, root = intake_stock.submitted(coursedir, assignment, student), Path(coursedir.root)
+        for name, (why, command) in quiz_marks.questions(nb, folder, student, root).items():
+            ask(nb, f"{why} Say it with `{command}`.", [name])
         # The grading steps read what is written here: nothing of a submission's own metadata is.
         nb.metadata[NOTES_KEY] = notes
         if UNREADABLE_KEY in resources:
@@ -164,6 +190,7 @@ class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]
             question = intake_asked.Question(why, tuple(asked)) if asked else None
             intake_asked.keep(work, assignment, student, notebook, question)
         self._correct_time(resources)
+        self._ask_about_missing(resources)
         flags = resources.get("ros2_course_flags", [])
         if flags:
             with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
@@ -175,6 +202,18 @@ class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]
                         comment.auto_comment = None
                 gradebook.db.commit()
         return nb, resources
+
+    def _ask_about_missing(self, resources: Resources) -> None:
+        """Ask about what nbgrader has not found under its own name, and given zero points."""
+        assignment, student, _ = _names(resources)
+        coursedir = _coursedir(self)
+        folder = intake_stock.submitted(coursedir, assignment, student)
+        gone = intake_stock.missing(folder, _notebooks(coursedir, assignment))
+        if gone:
+            work = Path(coursedir.root) / WORK_FOLDER
+            intake = _intake(coursedir, assignment, student)
+            with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
+                intake_stock.ask_about(gradebook, intake, gone, assignment, student, work)
 
     def _correct_time(self, resources: Resources) -> None:
         """Have lateness counted from the time that was meant: nbgrader misreads some zones."""
@@ -232,6 +271,17 @@ def _original(
             f"The instructor's {path} is {wrong}, so nothing can be graded: make it again with "
             f"`{command}`, then grade."
         ) from None
+
+
+def _notebooks(coursedir: CourseDirectory, assignment: str) -> list[str]:
+    folder = Path(coursedir.format_path(coursedir.source_directory, ".", assignment))
+    return sorted(path.stem for path in folder.glob("*.ipynb"))
+
+
+def _intake(coursedir: CourseDirectory, assignment: str, student: str) -> Intake:
+    names = _notebooks(coursedir, assignment)
+    released = {name: originals(coursedir, assignment, name)[1] for name in names}
+    return intake_stock.look_into(coursedir, assignment, student, released)
 
 
 def _coursedir(preprocessor: NbGraderPreprocessor) -> CourseDirectory:

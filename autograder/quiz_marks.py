@@ -138,6 +138,8 @@ def verdict(bank: Bank, folder: Path, student: str, root: Path | None = None) ->
             f"There is no {name} in the submission: it lies beside the notebook once you have "
             "submitted the quiz, and has to be handed in with it."
         )
+        if found.nothing:
+            reason = f"{name} was not handed in, as a person has said."
         status: Status = "not_examined" if found.question else "not_checked"
         return _unmarked(bank, found.question or reason, status=status)
     content = found.content

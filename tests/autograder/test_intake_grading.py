@@ -6,6 +6,7 @@ import csv
 import io
 import unicodedata
 import zipfile
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from autograder.insight.collect import collect
 from tests.machine import needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
+from .test_grading import nbgrader
 
 pytestmark = [needs_sandbox, pytest.mark.timeout(900)]
 
@@ -171,3 +173,36 @@ def test_a_claim_of_no_assignment_names_those_there_are(tmp_path: Path, course: 
         cli.app, ["claim", "ch06", "ana", "x", "y", "--root", str(course.root)]
     )
     assert "there is 'ch05'" in str(done.exception)
+
+
+def test_nbgraders_own_command_asks_where_it_would_give_zero(
+    course: Course, cases: dict[str, Case]
+) -> None:
+    second = nbformat.v4.new_notebook(metadata=course.source.metadata)
+    flags = {"schema_version": 3, "locked": True, "solution": False}
+    text = {**flags, "grade": False, "grade_id": "second-text"}
+    test = {**flags, "grade": True, "grade_id": "second-test", "points": 2}
+    second.cells = [
+        nbformat.v4.new_markdown_cell("# Second", id="a", metadata={"nbgrader": text}),
+        nbformat.v4.new_code_cell("assert 1 + 1 == 2", id="b", metadata={"nbgrader": test}),
+    ]
+    nbformat.write(second, course.root / "source" / ASSIGNMENT / "second.ipynb")
+    CourseGradebook(course.root).generate_assignment(ASSIGNMENT)
+    put(course, "renamed", "second.ipynb", second)
+    right = cases["right-chapter"].submission(course.source, course.released)
+    put(course, "renamed", f"{NOTEBOOK} (1).ipynb", right)
+    put(course, "left-out", "second.ipynb", second)
+    (course.folder("renamed") / "timestamp.txt").write_text("2026-07-27 20:15:05 CEST\n")
+
+    done = nbgrader(course, "autograde", ASSIGNMENT)
+
+    assert done.returncode == 0, done.stderr
+    found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    assert found["renamed"].needs_manual_grade
+    assert f"`autograder grade {ASSIGNMENT}` takes it" in found["renamed"].asked[NOTEBOOK]
+    assert set(found["renamed"].cells[NOTEBOOK].values()) == {None}
+    assert not found["left-out"].needs_manual_grade
+    assert found["left-out"].score == 2
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        time = book.find_submission(ASSIGNMENT, "renamed").timestamp
+    assert time == datetime(2026, 7, 27, 18, 15, 5)
