@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from quizzes import loader
 from quizzes.bank import Bank
-from quizzes.exchange import files, gift, merge, questions
+from quizzes.exchange import files, gift, limits, merge, questions
 from quizzes.exchange.questions import (
     Choice,
     ChoiceQuestion,
@@ -119,7 +119,7 @@ def test_so_does_what_looks_like_gift(content: str) -> None:
 
 
 def test_the_bank_survives_export_and_import_untouched() -> None:
-    found, _ = questions.of_bank(BANK)
+    found = questions.of_bank(BANK)
     content = gift.write(found, BANK.title)
     merged = merge.merge(BANK, gift.read(content, "ch05.gift"), "ch05.gift")
     assert merged.bank == BANK
@@ -135,7 +135,7 @@ def test_yaml_that_is_written_is_the_same_bank(tmp_path: Path) -> None:
 
 def changed(old: str, new: str) -> merge.Merged:
     """Export, edit as somebody would in Moodle, and import."""
-    found, _ = questions.of_bank(BANK)
+    found = questions.of_bank(BANK)
     content = gift.write(found)
     assert content.count(old) == 1
     return merge.merge(BANK, gift.read(content.replace(old, new), "x.gift"), "x.gift")
@@ -179,7 +179,7 @@ def test_an_edited_prediction_keeps_its_code() -> None:
 
 
 def test_a_new_question_says_what_it_still_needs() -> None:
-    found, _ = questions.of_bank(BANK)
+    found = questions.of_bank(BANK)
     content = (
         f"{gift.write(found)}\n\n$CATEGORY: ch05/qos-purpose\n\n"
         "// by hand\n::qos-purpose-6::Is depth announced?{FALSE#Wrong\\: it is not.#Right.}\n"
@@ -196,14 +196,14 @@ def test_a_new_question_says_what_it_still_needs() -> None:
 
 
 def test_questions_that_a_file_leaves_out_stay() -> None:
-    found, _ = questions.of_bank(BANK)
+    found = questions.of_bank(BANK)
     merged = merge.merge(BANK, gift.read(gift.write(found[1:]), "x.gift"), "x.gift")
     assert merged.bank == BANK
     assert merged.notes == ["x.gift does not have qos-purpose-1: kept as they are."]
 
 
 def test_the_exporter_says_what_gift_cannot_hold() -> None:
-    _, notes = questions.of_bank(BANK)
+    notes = limits.of_gift(BANK)
     text = " ".join(notes)
     for said in (
         "misconceptions", "cells", "proofs", "pass mark", "pattern-navigation-2 became",
