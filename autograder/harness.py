@@ -6,11 +6,12 @@ requests, and the examiner believes what it observes on DDS.
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import json
 import sys
-from collections.abc import Callable, Mapping
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from typing import Any
 
@@ -63,7 +64,7 @@ class Harness:
 
     def serve(self, channel: Channel) -> None:
         """Answer requests until the examiner says that it is done or goes away."""
-        with self._threads:
+        with self._threads, _as_in_a_program():
             try:
                 while (request := channel.receive())["op"] != "done":
                     channel.send(self._answer(request))
@@ -258,6 +259,21 @@ class Harness:
                 if line
             ]
         }
+
+
+@contextmanager
+def _as_in_a_program() -> Iterator[None]:
+    """Hide the event loop that a kernel runs while a cell is executed.
+
+    The main thread of a program has none: there a node may run a loop of its own to the end, when
+    it is destroyed, say, and asyncio would refuse that inside of another.
+    """
+    running = asyncio.events._get_running_loop()
+    asyncio.events._set_running_loop(None)
+    try:
+        yield
+    finally:
+        asyncio.events._set_running_loop(running)
 
 
 def _marker(name: str) -> Node:

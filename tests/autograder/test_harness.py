@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import inspect
 import re
 import socket
@@ -62,6 +63,19 @@ class NoCleanup(Node):
 
     def destroy_node(self) -> None:
         pass
+
+
+class EndsItsLoop(Node):
+    """Its destroy_node() runs an event loop of its own to the end, as a program's may."""
+
+    def __init__(self) -> None:
+        super().__init__("looping")
+        self.loop = asyncio.new_event_loop()
+
+    def destroy_node(self) -> None:
+        self.loop.run_until_complete(asyncio.sleep(0))
+        self.loop.close()
+        super().destroy_node()
 
 
 class Exits(Node):
@@ -415,3 +429,27 @@ def test_a_callback_that_waits_by_the_wall_clock_is_seen_while_it_does(
     assert re.fullmatch(
         r"wait_for_service: Waiting\.wait of /waiting \(at line \d+: self\.asked.*\)", told
     )
+
+
+def test_the_event_loop_of_a_kernel_is_in_no_node_s_way(outside: Session) -> None:
+    def open_session(threads: int, sim_time: bool) -> Session:
+        return Session(domain_id=outside.domain_id, threads=threads, sim_time=sim_time)
+
+    ours, theirs = socket.socketpair()
+    kernel_s_own: list[bool] = []
+
+    async def cell() -> None:
+        loop = asyncio.get_running_loop()
+        Harness(open_session, {"EndsItsLoop": EndsItsLoop}).serve(Channel(theirs))
+        kernel_s_own.append(asyncio.get_running_loop() is loop)
+
+    kernel = threading.Thread(target=lambda: asyncio.run(cell()))
+    kernel.start()
+    subject = Subject(Channel(ours))
+    subject.start("EndsItsLoop")
+    subject.stop("EndsItsLoop", bare=True)
+    subject.release()
+    kernel.join(20)
+    ours.close()
+    theirs.close()
+    assert kernel_s_own == [True]
