@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from autograder import questions
 from autograder.gradebook import CourseGradebook, Grade
 from autograder.insight import InsightError, records
 from autograder.insight.records import Record, RecordError
+from autograder.intake_names import normal
 from autograder.nbgrader_bridge import WORK_FOLDER
 from autograder.questions import Question
 from autograder.submission import SubmissionError
@@ -112,7 +113,7 @@ def collect(root: Path, assignment: str) -> ClassData:
         )
     found, notes = _records(gradebook.root, assignment, grades)
     known = {grade.student for grade in grades}
-    handed_in = _submitted(gradebook.root, assignment)
+    handed_in = _submitted(gradebook.root, assignment, known)
     absent = people.keys() - known - set(handed_in)
     return ClassData(
         gradebook.root, assignment, max(grade.max_score for grade in grades), grades, people,
@@ -194,12 +195,14 @@ def _questions(gradebook: CourseGradebook, assignment: str) -> dict[str, dict[st
         return {}
 
 
-def _submitted(root: Path, assignment: str) -> list[str]:
+def _submitted(root: Path, assignment: str, known: Collection[str]) -> list[str]:
+    """Return who has a folder; a name that is ``known`` in another form of Unicode is that."""
     try:
         folders = [f for f in (root / "submitted").iterdir() if (f / assignment).is_dir()]
     except OSError:  # nothing is there (any more), so nothing waits there
         return []
-    return sorted(folder.name for folder in folders)
+    ids = {normal(student): student for student in known}
+    return sorted(ids.get(normal(folder.name), folder.name) for folder in folders)
 
 
 def _reason(error: SQLAlchemyError) -> str:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
-from autograder import questions, submission
+from autograder import questions, roster, submission
 from autograder.beside import files_beside
 from autograder.insight import similarity
 from autograder.insight.collect import ClassData
@@ -30,8 +30,8 @@ def texts_of(data: ClassData, given: GivenText) -> tuple[dict[str, dict[str, Own
     texts: defaultdict[str, dict[str, OwnText]] = defaultdict(dict)
     unread = []
     for grade in data.grades:
-        folder = data.root / "submitted" / grade.student / data.assignment
-        notebooks = _notebooks(folder, names)
+        folder = roster.folder(data.root, grade.student) / data.assignment
+        notebooks = {**_found_elsewhere(data, grade.student), **_notebooks(folder, names)}
         if not notebooks:
             unread.append(grade.student)
             continue
@@ -84,6 +84,13 @@ def _notebooks(folder: Path, names: list[str]) -> dict[str, NotebookNode]:
         except SubmissionError:
             continue  # "what needs a person" names it, and why it cannot be read
     return notebooks
+
+
+def _found_elsewhere(data: ClassData, student: str) -> dict[str, NotebookNode]:
+    """Return what was handed in under other names, as it was graded."""
+    records = data.records.get(student, {})
+    read = [name for name, record in records.items() if not record.unreadable]
+    return _notebooks(data.root / "autograded" / student / data.assignment, read)
 
 
 def _answers(
