@@ -298,6 +298,50 @@ def report(
 
 
 @app.command()
+def feedback(
+    assignment: str,
+    platform: Annotated[
+        str, typer.Option("--platform", help="Where it is uploaded: moodle or canvas.")
+    ],
+    names: Annotated[
+        Path,
+        typer.Option(
+            "--names",
+            help="What you downloaded there: the archive of submissions (or its folder), or "
+            "Moodle's grading worksheet.",
+        ),
+    ],
+    to: Annotated[Path | None, typer.Option("--zip", help="The archive to write.")] = None,
+    root: Root = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write all feedback on an assignment as an archive that Moodle or Canvas hands out.
+
+    Both know a student by numbers of their own, which stand in the names of what they let you
+    download, so that download is needed; whose is whose is found by the files themselves, or by
+    name, address or number. In Moodle: the assignment, “Upload multiple feedback files in a zip”
+    (feedback files have to be on). In Canvas: the assignment in SpeedGrader's menu or the
+    gradebook, “Upload Submissions”; only those who handed in a file can be given one back, under
+    the name of theirs.
+    """
+    from autograder import feedback_zip
+
+    if platform not in ("moodle", "canvas"):
+        raise typer.BadParameter("moodle or canvas", param_hint="--platform")
+    where = _root(root)
+    file = to or where / "reports" / assignment / f"feedback-{platform}.zip"
+    packed = feedback_zip.pack(where, assignment, platform, names, file)  # type: ignore[arg-type]
+    if as_json:
+        _print_json(vars(packed))
+        return
+    out.print(f"Feedback for {len(packed.students)} students: {file}", soft_wrap=True,
+              highlight=False, markup=False)  # fmt: skip
+    for why, who in packed.left_out.items():
+        out.print(f"Not in it, {why}: {', '.join(who)}.", soft_wrap=True, highlight=False,
+                  markup=False)  # fmt: skip
+
+
+@app.command()
 def demo(
     folder: Annotated[
         Path, typer.Option("--dir", help="Where to work; an earlier demo there is replaced.")

@@ -12,6 +12,9 @@ from rich.table import Table
 from autograder.insight import exports, report
 from autograder.insight.report import ClassReport
 
+MOST_NAMES = 20
+"""Students that are named on one line; the page names them all."""
+
 
 @dataclass(frozen=True)
 class Made:
@@ -68,5 +71,11 @@ def run(
     chosen = {"provisional": provisional, "zero_absent": zero_absent}
     files = report.write(made, column, **chosen)
     export = exports.canvas(made.data, column, **chosen)
-    remarks = [*made.notes, *report.export_remarks(export)]
+    remarks = [*_absent(made), *made.notes, *report.export_remarks(export)]
     return Made(made, files, remarks)
+
+
+def _absent(made: ClassReport) -> list[str]:
+    absent = [made.data.called(student) for student in made.data.absent]
+    more = f" and {len(absent) - MOST_NAMES} more" if len(absent) > MOST_NAMES else ""
+    return [f"Nothing handed in: {', '.join(absent[:MOST_NAMES])}{more}."] if absent else []

@@ -13,13 +13,11 @@ import keyword
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 
 from nbformat import NotebookNode
-from pygments.lexers.python import PythonLexer
-from pygments.token import Comment, Name, String, _TokenType
 
 from autograder import submission
 
@@ -32,6 +30,16 @@ MANY, COMMON = 10, 0.25
 
 RUN = 4
 """Words in a row that an answer shares with the question or its model only by repeating it."""
+
+_STRING = r"""\'\'\'.*?\'\'\'|\"\"\".*?\"\"\"|'(?:\\.|[^'\\\n])*'|"(?:\\.|[^"\\\n])*\""""
+_TOKEN = re.compile(
+    # Comments, and strings that stand for themselves: they document.
+    r"""(?P<nothing>\#[^\n]*|(?:(?<=\n)|\A)[ \t]*(?:\'\'\'.*?\'\'\'|\"\"\".*?\"\"\"))"""
+    rf"""|(?P<formatted>[rR]?[fF][rR]?(?P<inside>{_STRING}))"""
+    rf"""|(?P<string>[rRbBuU]{{0,2}}(?:{_STRING}))"""
+    r"""|(?P<name>[^\W\d]\w*)|(?P<number>\d[\w.]*)|(?P<operator>\S)""",
+    re.DOTALL,
+)
 
 OWN_NAME = "\N{OPEN BOX}"
 
@@ -67,9 +75,7 @@ class GivenText:
             if cell.cell_type == "code"
         ]
         self.lines = frozenset(bare(line) for s in sources + solved for line in s.splitlines())
-        self.names = frozenset(
-            text for s in sources for kind, text in _lex(s) if _within(kind, Name)
-        )
+        self.names = frozenset(text for s in sources for is_name, text in _lex(s) if is_name)
 
     def own(self, notebooks: Mapping[str, NotebookNode], files: Mapping[str, bytes]) -> OwnText:
         """Return what a student wrote in their notebooks, and in Python files beside them."""
@@ -134,25 +140,21 @@ def _words(text: str) -> tuple[str, ...]:
     return tuple(re.findall(r"\w+", text.casefold()))
 
 
-def _normal(text: str, chosen: set[str]) -> Iterable[str]:
-    for kind, token in _lex(text):
-        if _within(kind, Name) and token in chosen:
-            yield OWN_NAME
-        else:
-            yield token
+def _normal(text: str, chosen: set[str]) -> Iterator[str]:
+    for is_name, token in _lex(text):
+        yield OWN_NAME if is_name and token in chosen else token
 
 
-def _lex(text: str) -> Iterable[tuple[_TokenType, str]]:
-    """Yield (kind, text) of the tokens that mean something; never fails, whatever the text is."""
-    for kind, token in PythonLexer().get_tokens(text):
-        meaning = token.strip()
-        if meaning and not _within(kind, Comment) and not _within(kind, String.Doc):
-            yield kind, meaning
+def _lex(text: str) -> Iterator[tuple[bool, str]]:
+    """Yield (whether it is a name, token) for what means something; never fails on any text.
 
-
-def _within(kind: _TokenType, family: _TokenType) -> bool:
-    """Whether a kind of token belongs to a family: kinds are tuples that begin with it."""
-    return kind[: len(family)] == family
+    Five times as fast as pygments, which would take most of the time that a class is compared in.
+    """
+    for found in _TOKEN.finditer(text):
+        if found.lastgroup == "formatted":
+            yield from _lex(found["inside"].strip("'\""))  # names stand in it, too
+        elif found.lastgroup != "nothing":
+            yield found.lastgroup == "name", found[0]
 
 
 def _chosen_names(text: str) -> set[str]:

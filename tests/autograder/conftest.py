@@ -134,7 +134,9 @@ def graded_course(
         "ann": "right-two-sides", "bob": "wrong-imu-endless", "cy": "wrong-imu-endless",
         "-dan": "right-two-sides",
     }.items():  # fmt: skip
-        course.submit(student, cases[case].submission(course.source, course.released))
+        notebook = cases[case].submission(course.source, course.released)
+        notebook.metadata["authors"] = [{"name": student}]  # no two files are the same
+        course.submit(student, notebook)
     (course.folder("ann") / "timestamp.txt").write_text("2026-04-30 14:05:00 UTC")
     course.submit("eve", "{" + '"cells": [')
     engine.grade(course.root, ASSIGNMENT)
