@@ -7,8 +7,8 @@ from its grading worksheet. Who is meant is found by the files themselves, which
 
 Moodle (``mod/assign/feedback/file/importziplib.php``): a folder FULL NAME_NUMBER_TYPE_PLUGIN; the
 number is the participant's in this assignment. Canvas (``Assignment``,
-``infer_comment_context_from_filename``): the first two parts of a file name between underscores that
-are all digits are the user's number and that of the file that was handed in.
+``infer_comment_context_from_filename``): the first two parts of a file name, between underscores,
+that are all digits are the user's number and that of the file that was handed in.
 """
 
 from __future__ import annotations
