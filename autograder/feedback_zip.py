@@ -19,7 +19,7 @@ from typing import Literal
 import nbformat
 from nbformat.v4 import new_markdown_cell
 
-from autograder import platform_names, sheets, submission
+from autograder import platform_names, roster, sheets, submission
 from autograder.gradebook import CourseGradebook
 from autograder.insight import collect
 from autograder.platform_names import NamesError, Participant
@@ -97,7 +97,7 @@ def _for_canvas(root: Path, assignment: str) -> Callable[[str, Participant], Ite
         pages = _pages(root, student, assignment)
         if not pages:
             return
-        with gradebook.session() as book:
+        with gradebook.opened() as book:
             sheet = sheets.read(book, gradebook.coursedir, assignment, student)
         for file in participant.files:
             name = PurePosixPath(file.name).name
@@ -156,7 +156,7 @@ def _pages(root: Path, student: str, assignment: str) -> list[Path]:
 
 
 def _handed_in(root: Path, student: str, assignment: str) -> list[Path]:
-    folder = root / "submitted" / student / assignment
+    folder = roster.folder(root, student) / assignment
     files = (path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
     return [path for path in files if path.stat().st_size <= platform_names.MAX_FILE]
 

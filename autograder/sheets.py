@@ -172,9 +172,11 @@ def read(gradebook: Gradebook, coursedir: CourseDirectory, assignment: str, stud
     )
     person = submission.student
     name = " ".join(part for part in (person.first_name, person.last_name) if part)
+    # nbgrader itself cannot tell how late something is if it was extended and is never due.
+    due = submission.assignment.duedate
     return Sheet(
         assignment, student, name or student, tuple(exercises), submission.timestamp,
-        float(submission.total_seconds_late),
+        float(submission.total_seconds_late) if due is not None else 0.0,
     )  # fmt: skip
 
 

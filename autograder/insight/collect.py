@@ -113,7 +113,7 @@ def collect(root: Path, assignment: str) -> ClassData:
         )
     found, notes = _records(gradebook.root, assignment, grades)
     known = {grade.student for grade in grades}
-    handed_in = _submitted(gradebook.root, assignment, known)
+    handed_in = _submitted(gradebook.root, assignment, known | people.keys())
     absent = people.keys() - known - set(handed_in)
     return ClassData(
         gradebook.root, assignment, max(grade.max_score for grade in grades), grades, people,
