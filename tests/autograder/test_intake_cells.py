@@ -295,7 +295,19 @@ def test_a_stub_that_defines_nothing_is_known_by_its_place() -> None:
     assert notebook.cells[at(notebook, "solution")].source == WORK
 
 
-@pytest.mark.parametrize("source", ["", "x" * 200_000, "def (", "\x00", "%matplotlib\n!ls\n?help"])
+@pytest.mark.parametrize(
+    "source",
+    [
+        "",
+        "x" * 200_000,
+        "def (",
+        "\x00",
+        "(" * 5000,
+        "-" * 50_000 + "1",
+        "x = '\\d'",
+        "%matplotlib\n!ls\n?help",
+    ],
+)
 def test_whatever_stands_in_a_cell_stops_nothing(source: str) -> None:
     notebook = stripped(worked_on())
     notebook.cells += [new_code_cell(source), new_markdown_cell(source), new_raw_cell(source)]
