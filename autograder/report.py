@@ -87,8 +87,9 @@ class Report:
 
 
 def _outcome(check: CheckResult) -> str:
-    earned = f"{_points(check.points)}/{_points(check.max_points)}" if check.max_points else NEEDED
-    return f"{WORDS[check.status]}, {earned}"
+    if not check.max_points:
+        return f"{WORDS[check.status]}; {NEEDED}"
+    return f"{WORDS[check.status]}, {_points(check.points)}/{_points(check.max_points)}"
 
 
 def _points(value: float) -> str:

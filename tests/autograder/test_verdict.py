@@ -70,8 +70,8 @@ def test_the_report_escapes_what_came_from_a_subject() -> None:
 def test_a_check_without_points_says_why_it_was_made_all_the_same() -> None:
     start = replace(PASSED, points=0.0, max_points=0.0)
     report = Report(Verdict("qos", "visible", (start, FAILED)))
-    assert "✔ Nodes start (passed, needed for others, earns nothing by itself)" in repr(report)
-    assert "(passed, needed for others, earns nothing by itself)" in report._repr_html_()
+    assert "✔ Nodes start (passed; needed for others, earns nothing by itself)" in repr(report)
+    assert "(passed; needed for others, earns nothing by itself)" in report._repr_html_()
     assert "0/0" not in repr(report) + report._repr_html_()
     assert "(not yet, 0/2)" in repr(report)
 
