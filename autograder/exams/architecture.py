@@ -263,7 +263,7 @@ def links_connect(rig: ArchitectureRig) -> None:
     the mistake everywhere else.
     """
     faults = link_faults(rig.graph)
-    if not any(topic.connects for topic in rig.graph.topics.values()):
+    if not any(rig.graph.flows(("topic",))):
         faults.append("No topic leads from one node to another.")
     if faults:
         more = f" And {len(faults) - 4} more." if len(faults) > 4 else ""

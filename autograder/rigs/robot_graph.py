@@ -67,11 +67,6 @@ class Topic:
         """The nodes that subscribe to it."""
         return frozenset(end.node for end in self.readers)
 
-    @property
-    def connects(self) -> bool:
-        """Whether it leads from one node to another."""
-        return any(writer != reader for writer in self.written_by for reader in self.read_by)
-
 
 @dataclass
 class Offer:

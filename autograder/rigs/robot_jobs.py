@@ -231,12 +231,13 @@ class Jobs:
 
     @cached_property
     def goal_reaches(self) -> set[str]:
-        """The nodes that a goal can get to from the action's server; all of them without one.
+        """The nodes that a goal can get to from the action's server.
 
-        A design without that server fails the check that asks for it, and no other for its sake.
+        A design without that server fails the check that asks for it, and no other for its sake:
+        it is then every node to which anything leads from another.
         """
         if not self.navigators:
-            return set(self.graph.nodes)
+            return {target for _, target, _ in self.graph.flows(ONWARD)}
         return self.graph.reached(self.navigators, ONWARD)
 
     @cached_property

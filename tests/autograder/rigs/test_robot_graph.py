@@ -156,6 +156,14 @@ def test_a_map_is_known_by_topic_by_service_and_by_costmap() -> None:
     assert jobs.map_readers == {"/costmap", "/localization", "/planner", "/other"}
 
 
+def test_without_a_navigator_the_goal_gets_where_anything_leads_from_another_node() -> None:
+    command = topic("/motors/command", TWIST, "lone controller", "")
+    own = topic("/scan", SCAN, "lone", "lone")
+    jobs = Jobs(graph(own, topic("/velocity", TWIST, "planner", "controller"), command))
+    assert jobs.controllers == {"/lone", "/controller"}
+    assert jobs.goal_reaches == {"/controller"}
+
+
 def test_only_services_on_the_way_to_the_motors_are_named() -> None:
     jobs = Jobs(
         graph(

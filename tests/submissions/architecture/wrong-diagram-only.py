@@ -6,7 +6,7 @@
 # says: pose_published: No node publishes a topic with a pose type.
 # says: planner_service: No node reads /map.
 # says: motors_driven: Nobody publishes on /motors/command.
-# says: links_connect: No topic connects anything.
+# says: links_connect: No topic leads from one node to another.
 
 design = course.Design()
 for name in ("drivers", "obstacle_detection", "path_planner", "navigation", "controller"):
