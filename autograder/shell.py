@@ -129,35 +129,49 @@ class Kernel(IPythonKernel):
     compiler_class = Type(_Compiler)
     _supports_kernel_subshells = False
 
-    def __init__(self, recording: Recording, **traits: Any) -> None:
-        """Publish to a recording."""
-        self._recording = recording
-        publisher = Publisher()
-        session = _Session(recording=recording)
+    def __init__(self, **traits: Any) -> None:
+        """Make one that has not begun: it has no thread, no loop and no file."""
+        self._publisher = Publisher()
         super().__init__(
-            session=session,
-            iopub_thread=publisher,
-            iopub_socket=publisher.background_socket,
+            session=_Session(),
+            iopub_thread=self._publisher,
+            iopub_socket=self._publisher.background_socket,
             # All that it asks of this thread is which one runs the cells.
             shell_channel_thread=SimpleNamespace(parent_thread=threading.main_thread()),
             **traits,
         )
         self._execute_sleep = 0.0  # it gives its publishing thread a moment, which is none here
-        self._descriptors = streams(session, publisher, recording)
+
+    def begin(self, recording: Recording) -> None:
+        """Get ready to run cells, and publish to a recording what they show.
+
+        Standard output and error are the kernel's from now on.
+        """
+        self._recording = recording
+        self.session = _Session(recording=recording)
+        shell: Any = self.cells
+        shell.displayhook.session = shell.display_pub.session = self.session
+        self._descriptors = streams(self.session, self._publisher, recording)
         self._loop = asyncio.new_event_loop()
         asyncio.set_event_loop(self._loop)
         self._context = contextvars.copy_context()
+        app: Any = self.parent
+        # It may have been made where no home of a student's was.
+        self.cells.init_ipython_dir(None)
+        self.cells.init_profile_dir(None)
+        app.init_signal()
+        app.init_path()
         self._finish(self._begin())
+
+    async def _begin(self) -> None:
+        self.start()
+        self._forward_input()  # for the tasks of cells, and what the examiner starts, as well
 
     @property
     def cells(self) -> ZMQInteractiveShell:
         """The shell that runs the cells."""
         assert self.shell is not None
         return self.shell  # type: ignore[no-any-return]
-
-    async def _begin(self) -> None:
-        self.start()
-        self._forward_input()  # for the tasks of cells, and what the examiner starts, as well
 
     def run_cell(self, source: str, number: int) -> None:
         """Run one cell. Whatever it does, the next one can be run.
@@ -223,20 +237,21 @@ class Kernel(IPythonKernel):
         raise _NobodyTypesError("getpass.getpass")
 
 
-def make_kernel(recording: Recording) -> Kernel:
+def make_kernel() -> Kernel:
     """Return this process's kernel: what `ipykernel_launcher` makes, but for sockets and threads.
 
-    Standard output and error are the kernel's from now on.
+    It may be made before this process is forked, and must begin after that.
     """
+    if Kernel.initialized():
+        return Kernel.instance()
     log = logging.Logger("kernel", logging.CRITICAL + 1)  # nobody reads it
     config = Config()
     config.HistoryManager.enabled = False
+    config.InteractiveShell.colors = "NoColor"  # they take as long as the rest of a traceback
     app = IPKernelApp.instance(config=config, log=log)
     app.init_pdb()
-    app.init_signal()
-    kernel = Kernel.instance(recording, parent=app, log=log, user_ns=app.user_ns)
+    kernel = Kernel.instance(parent=app, log=log, user_ns=app.user_ns)
     app.kernel = kernel
-    app.init_path()
     app.init_shell()
     app.init_gui_pylab()
     app.init_extensions()

@@ -15,6 +15,7 @@ import socket
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 
 from autograder import stuck
@@ -30,8 +31,8 @@ from course.domains import reserve_domain
 SHELL = (
     "IPython.core.application", "IPython.core.completer", "IPython.core.completerlib",
     "IPython.core.crashhandler", "IPython.core.logger", "IPython.core.magics.extension",
-    "IPython.core.oinspect", "IPython.extensions.storemagic", "ipykernel.eventloops",
-    "ipywidgets", "pygments.formatters.terminal256", "stack_data",
+    "IPython.core.oinspect", "ipykernel.eventloops", "ipywidgets",
+    "pygments.formatters.terminal256", "stack_data", "tornado.platform.asyncio",
 )  # fmt: skip
 """What a kernel imports for its first cell and for its first traceback."""
 
@@ -41,9 +42,9 @@ PLOTS = ("matplotlib.backends.backend_agg", "matplotlib.pyplot")
 
 def run(engine: Channel, control: Channel, domain_id: int) -> None:
     """Run the engine's program cell by cell, and serve the examiner where it says so."""
-    recording = Recording()
+    kernel, recording = make_kernel(), Recording()
     # Up to here standard error told the grader why a subject does not start.
-    kernel = make_kernel(recording)
+    kernel.begin(recording)
     stuck.tell_when_asked(engine.fileno())
     engine.send({"ready": True})
 
@@ -75,12 +76,18 @@ def _tell(engine: Channel, message: dict[str, int], recording: Recording, exams:
 
 
 def preload() -> None:
-    """Import what a run is going to need: `autograder.warm` calls it before it forks subjects."""
+    """Import and make what a run needs: `autograder.warm` calls it before it forks subjects.
+
+    Without a folder to write to, each of them makes its kernel, and imports what it plots with.
+    """
     from autograder.warm import modules
 
-    with suppress(OSError), modules.matplotlib_folder():  # plots take longer, that is all
-        modules.import_all(PLOTS)
     modules.import_all((*SHELL, "autograder.notebook_check"))
+    with suppress(OSError), modules.scratch_folder("MPLCONFIGDIR", "IPYTHONDIR"):
+        for name in PLOTS:
+            import_module(name)
+        make_kernel()
+    modules.note_files()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

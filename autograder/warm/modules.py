@@ -44,22 +44,32 @@ def import_all(more: Iterable[str] = ()) -> None:
     for package, modules in INTERFACES.items():
         for module in modules:
             _load(import_module(f"{package}.{module}"))
-    # It notes the file of every module there is, once: IPython asks for each cell and traceback.
-    inspect.getmodule(import_all.__code__)
+
+
+def note_files() -> None:
+    """Have the file of every module noted, once: IPython asks for each cell and traceback."""
+    inspect.getmodule(note_files.__code__)
 
 
 @contextmanager
-def matplotlib_folder() -> Iterator[None]:
-    """Give matplotlib a folder to write to while it is imported: without one it is not.
+def scratch_folder(*variables: str) -> Iterator[None]:
+    """Name a folder in environment variables where modules can write while they are imported.
 
-    It lists the fonts of the machine, which takes half a second, and wants to keep the list.
+    A zygote has no home and nothing to write to. matplotlib lists the machine's fonts, which takes
+    half a second, and wants to keep the list; without a folder it cannot be imported at all.
+
+    Raises:
+        OSError: there is none to be had.
     """
+    before = {name: os.environ[name] for name in variables if name in os.environ}
     with TemporaryDirectory(dir="/dev/shm") as folder:
-        os.environ["MPLCONFIGDIR"] = folder
+        os.environ.update(dict.fromkeys(variables, folder))
         try:
             yield
         finally:
-            del os.environ["MPLCONFIGDIR"]
+            for name in variables:
+                del os.environ[name]
+            os.environ.update(before)
 
 
 def _load(interfaces: object) -> None:
