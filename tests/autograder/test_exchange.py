@@ -11,6 +11,7 @@ from pathlib import Path
 
 import nbformat
 import pytest
+from nbgrader.api import Gradebook
 
 from autograder import submission
 from autograder.corpus import Case
@@ -88,21 +89,11 @@ def test_work_and_feedback_go_through_the_exchange(
     work(people, "bob", course, cases["wrong-imu-single"], "What bob thinks.")
     both(people, "submit", ASSIGNMENT)
 
-    due = datetime.now(UTC) - timedelta(hours=1)
-    for command in (
-        (
-            *NBGRADER,
-            "db",
-            "assignment",
-            "add",
-            ASSIGNMENT,
-            f"--duedate={due:%Y-%m-%d %H:%M:%S} UTC",
-        ),
-        (*NBGRADER, "collect", ASSIGNMENT),
-        (*NBGRADER, "db", "student", "add", "ada"),
-        (*AUTOGRADER, "extend", ASSIGNMENT, "ada", "--hours", "24"),
-    ):
-        people.run("teacher", *command, cwd=root)
+    with Gradebook(f"sqlite:///{root / 'gradebook.db'}") as gradebook:
+        an_hour_ago = datetime.now(UTC).replace(tzinfo=None) - timedelta(hours=1)
+        gradebook.update_or_create_assignment(ASSIGNMENT, duedate=an_hour_ago)
+    people.run("teacher", *NBGRADER, "collect", ASSIGNMENT, cwd=root)
+    people.run("teacher", *AUTOGRADER, "extend", ASSIGNMENT, "ada", "--hours", "24", cwd=root)
     table = people.run("teacher", *AUTOGRADER, "grade", ASSIGNMENT, "--trust-submissions", cwd=root)
     assert "-1.5" in table
     people.run("teacher", *NBGRADER, "release_feedback", ASSIGNMENT, cwd=root)
