@@ -325,6 +325,7 @@ def feedback(
     the name of theirs.
     """
     from autograder import feedback_zip
+    from course.plain import counted
 
     if platform not in ("moodle", "canvas"):
         raise typer.BadParameter("moodle or canvas", param_hint="--platform")
@@ -334,7 +335,7 @@ def feedback(
     if as_json:
         _print_json(vars(packed))
         return
-    out.print(f"Feedback for {len(packed.students)} students: {file}", soft_wrap=True,
+    out.print(f"Feedback for {counted(len(packed.students), 'student')}: {file}", soft_wrap=True,
               highlight=False, markup=False)  # fmt: skip
     for why, who in packed.left_out.items():
         out.print(f"Not in it, {why}: {', '.join(who)}.", soft_wrap=True, highlight=False,

@@ -133,10 +133,12 @@ def _with_marks(root: Path, sheet: Sheet, notebook: str) -> bytes | None:
         graded = None
     if graded is None or exercise is None:
         return None
-    total = sheets.late(sheet.seconds_late, exercise.penalty)
-    lines = [f"# {exercise.title}: feedback", exercise.total, total, "", "| | |", "|---|---|"]
-    lines += [f"| {line.title} | {line.said} |" for line in exercise.lines]
-    cells = [new_markdown_cell("\n\n".join(lines[:3]) + "\n".join(lines[3:]))]  # type: ignore[no-untyped-call]
+    late = sheets.late(sheet.seconds_late, exercise.penalty)
+    rows = [f"| {line.title.replace('|', '')} | {line.said} |" for line in exercise.lines]
+    table = "\n".join(["| | |", "|---|---|", *rows])
+    parts = (f"# {exercise.title}: feedback", exercise.total, late, table)
+    top = "\n\n".join(part for part in parts if part)
+    cells = [new_markdown_cell(top)]  # type: ignore[no-untyped-call]
     by_id = {line.grade_id: line for line in exercise.lines}
     for cell in graded.cells:
         cells.append(cell)

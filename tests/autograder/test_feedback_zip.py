@@ -174,6 +174,6 @@ def test_the_command_says_where_it_is_and_who_is_not_in_it(graded: Path, tmp_pat
     )
     said = autograder("feedback", ASSIGNMENT, "--platform", "moodle", "--names", str(names),
                       "--root", str(graded), cwd=graded).stdout  # fmt: skip
-    assert "Feedback for 1 students" in said
+    assert "Feedback for 1 student:" in said
     assert "Not in it, not found in d.zip" in said
     assert (graded / "reports" / ASSIGNMENT / "feedback-moodle.zip").is_file()
