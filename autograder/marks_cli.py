@@ -12,8 +12,6 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from course.plain import counted
-
 app = typer.Typer(
     help="Mark one written question over a whole class.", no_args_is_help=True,
     add_completion=False,
@@ -95,6 +93,7 @@ def enter(
     """
     from autograder import marks
     from autograder.gradebook import CourseGradebook
+    from course.plain import counted
 
     entered = marks.enter(CourseGradebook(_root(root)), file)
     if as_json:
