@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import pytest
@@ -40,5 +41,7 @@ def report(name: str, part: str) -> str:
     ],
 )
 def test_the_report_reads_as_it_should(name: str, part: str) -> None:
-    text = report(name, part)
+    # When the stub's slow timer comes round depends on when the examiner begins to look.
+    late = r"become 0\.\d+, the last percentage was [\d.]*\d"
+    text = re.sub(late, "become 0.6, the last percentage was 0.95", report(name, part))
     assert text == golden(f"patterns-{name.removeprefix('wrong-')}-{part}", text)
