@@ -182,7 +182,6 @@ class Kernel(IPythonKernel):
         """
         self.cells.execution_count = number + 1
         self._finish(self._request(source, number))
-        self._descriptors.read(wait=True)
         if asyncio.all_tasks(self._loop):
             self._finish(asyncio.sleep(BETWEEN_CELLS_S))
 
@@ -205,6 +204,7 @@ class Kernel(IPythonKernel):
             self.send_response(self.iopub_socket, "error", failed)
         finally:
             self.post_handler_hook()
+            self._descriptors.read(wait=True)  # what is in there is still this cell's
 
     def _ask(self, source: str, number: int) -> Message:
         """Make the message that asks for a cell, from which on what is shown is that cell's."""

@@ -170,6 +170,14 @@ def test_a_cell_that_waits_for_input_says_that_nobody_types(source: str, functio
     assert output["traceback"] == [f"StdinNotImplementedError: {output['evalue']}"]
 
 
+def test_what_is_written_to_a_descriptor_is_shown_in_its_own_cell() -> None:
+    writes = [Cell(f"import os\nos.write(1, b'{number}');") for number in range(100)]
+    found = runner.run((*writes,)).outputs
+    assert [[output["text"] for output in cell] for cell in found] == [
+        [str(number)] for number in range(100)
+    ]
+
+
 def test_a_fork_of_a_cell_prints_into_the_cell() -> None:
     source = """
 import os
