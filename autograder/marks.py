@@ -18,10 +18,11 @@ from typing import Any
 
 from nbgrader.api import Assignment, BaseCell, Comment, Grade, Gradebook, Notebook
 
-from autograder import questions, submission
+from autograder import intake_asked, questions, submission
 from autograder.database import of_cells
 from autograder.gradebook import CourseGradebook
 from autograder.insight.exports import as_csv, guarded, is_formula
+from autograder.nbgrader_bridge import WORK_FOLDER
 from autograder.questions import Question
 from autograder.submission import SubmissionError
 from course.errors import CourseError
@@ -154,11 +155,16 @@ def collect(gradebook: CourseGradebook, assignment: str, question: Question) -> 
     with gradebook.opened() as book:
         grades = _grades(book, assignment, question)
         names = {s.id: " ".join(filter(None, (s.first_name, s.last_name))) for s in book.students}
+    asked = intake_asked.of_assignment(gradebook.root / WORK_FOLDER, assignment)
     answers: list[Answer] = []
     empty, unread = [], []
     for student, row in sorted(grades.items()):
         text = _text(gradebook, assignment, question, student)
-        if text is None:
+        unclear = asked.get(student, {}).get(question.notebook)
+        if text is None or (
+            # What stands in the graded copy is not what was handed in, as far as is known.
+            unclear is not None and question.grade_id in unclear.cells and row["needs_manual_grade"]
+        ):
             unread.append(student)
         elif row["manual_score"] is None and not row["needs_manual_grade"]:
             empty.append(student)  # nbgrader has seen that nothing was written

@@ -168,7 +168,7 @@ def _left_out(found: Answers) -> str:
     if found.empty:
         said.append(f"{counted(len(found.empty), 'student')} left it empty and have 0 points.")
     if found.unread:
-        said.append(f"No graded copy can be read of {escape(', '.join(found.unread))}.")
+        said.append(f"It is not known what {escape(', '.join(found.unread))} handed in.")
     return f"<p>{' '.join(said)}</p>" if said else ""
 
 
