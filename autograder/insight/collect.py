@@ -9,7 +9,7 @@ from pathlib import Path
 from nbgrader.api import Gradebook
 from sqlalchemy.exc import SQLAlchemyError
 
-from autograder import questions
+from autograder import questions, roster
 from autograder.gradebook import CourseGradebook, Grade
 from autograder.insight import InsightError, records
 from autograder.insight.records import Record, RecordError
@@ -180,7 +180,7 @@ def _left_out(
         results = [check for verdict in record.verdicts.values() for check in verdict.checks]
         if record.unreadable or any(check.status != "not_checked" for check in results):
             return False
-        return not (root / "submitted" / student / assignment / f"{notebook}.ipynb").exists()
+        return not (roster.folder(root, student) / assignment / f"{notebook}.ipynb").exists()
 
     return {
         student: frozenset(n for n, record in notebooks.items() if is_missing(student, n, record))
