@@ -181,7 +181,7 @@ set -e
 mount -t tmpfs -o size=64m none "$1"
 cp -r "$2/." "$1"
 rest=$(( $(stat -f -c '%a * %S' "$1") ))
-head -c $(( rest - 500000 )) /dev/zero > "$1/ballast"
+head -c $(( rest - 200000 )) /dev/zero > "$1/ballast"
 set +e
 autograder grade {assignment} --root "$1" 2>"$3/said"
 echo $? > "$3/code"
@@ -308,10 +308,10 @@ def test_whatever_goes_wrong_with_one_submission_stops_nobody(
             raise RecursionError("too deep")
         return of_folder(folder)
 
-    def fails_to_stage(folder: Path) -> list[str]:
+    def fails_to_stage(folder: Path, zone: str = "") -> list[str]:
         if "staged" in folder.parts:
             raise UnicodeError("no text")
-        return remarks(folder)
+        return remarks(folder, zone)
 
     def fails_to_enter(self: CourseGradebook, assignment: str, student: str) -> None:
         if student == "entered" and not refused:
