@@ -217,7 +217,7 @@ def test_what_did_not_change_is_not_run_again(
     grade(course, fresh=True)
     assert len(runs) == 2
     course.submit("right", cases["wrong-imu-single"].submission(course.source, course.released))
-    assert cells(grade(course)["right"])["qos-hidden"] == 4.0
+    assert cells(grade(course)["right"])["qos-hidden"] == 3.0
     assert len(runs) == 3
 
 
