@@ -68,11 +68,14 @@ def scores(course: Course) -> dict[str, str]:
 
 
 def exported(course: Course) -> tuple[set[str], set[str]]:
-    """Return who is in the files for Canvas and Moodle, even of grades that may still change."""
+    """Return who has a number in the files for Canvas and Moodle, be it one that may change."""
     data = collect(course.root, ASSIGNMENT)
     texts = [export(data, provisional=True).text for export in (exports.canvas, exports.moodle)]
     students = {grade.student for grade in data.grades}
-    canvas, moodle = ({s for s in students if s in text} for text in texts)
+    tables = [list(csv.reader(io.StringIO(text))) for text in texts]
+    canvas, moodle = (
+        {s for row in table if row[-1] for s in students if s in row} for table in tables
+    )
     return canvas, moodle
 
 
