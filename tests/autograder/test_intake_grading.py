@@ -134,7 +134,7 @@ def test_a_score_is_never_zero_because_of_a_name_or_lost_metadata(
     assert "is 'b\\n[/red].ipynb'" in claim(course, "two", NOTEBOOK, "b\\n[/red].ipynb")
     assert "was not handed in" in claim(course, "document", NOTEBOOK, "--nothing")
     found, problems = grade(course)
-    assert found["two"].cells[NOTEBOOK]["qos-hidden"] == 4.0
+    assert found["two"].cells[NOTEBOOK]["qos-hidden"] == 3.0
     assert found["document"].score == 0
     assert not found["document"].needs_manual_grade
     assert {**found["two"].asked, **found["document"].asked} == {}
