@@ -21,6 +21,7 @@ from nbgrader.api import Assignment, BaseCell, Comment, Grade, Gradebook, Notebo
 from autograder import intake_asked, questions, submission
 from autograder.database import of_cells
 from autograder.gradebook import CourseGradebook
+from autograder.insight import records
 from autograder.insight.exports import as_csv, guarded, is_formula
 from autograder.nbgrader_bridge import WORK_FOLDER
 from autograder.questions import Question
@@ -161,10 +162,10 @@ def collect(gradebook: CourseGradebook, assignment: str, question: Question) -> 
     for student, row in sorted(grades.items()):
         text = _text(gradebook, assignment, question, student)
         unclear = asked.get(student, {}).get(question.notebook)
-        if text is None or (
-            # What stands in the graded copy is not what was handed in, as far as is known.
-            unclear is not None and question.grade_id in unclear.cells and row["needs_manual_grade"]
-        ):
+        asked_about = unclear is not None and question.grade_id in unclear.cells
+        nothing_read = _is_unreadable(gradebook, assignment, question, student)
+        # Then what stands in the graded copy is ours, in place of what was handed in.
+        if text is None or (row["needs_manual_grade"] and (asked_about or nothing_read)):
             unread.append(student)
         elif row["manual_score"] is None and not row["needs_manual_grade"]:
             empty.append(student)  # nbgrader has seen that nothing was written
@@ -276,6 +277,18 @@ def _text(
         return None
     cells = (c for c in notebook.cells if submission.grade_id(c) == question.grade_id)
     return next((str(cell.source) for cell in cells), None)
+
+
+def _is_unreadable(
+    gradebook: CourseGradebook, assignment: str, question: Question, student: str
+) -> bool:
+    """Whether nothing of the notebook that was handed in could be read."""
+    work = gradebook.root / WORK_FOLDER
+    try:
+        record = records.load(work, assignment, student, question.notebook)
+    except records.RecordError:
+        return False
+    return record is not None and record.unreadable
 
 
 def _state(text: str, row: Mapping[str, Any]) -> str:

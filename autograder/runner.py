@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from autograder import outputs, sandbox, stuck
+from autograder import outputs, own_interfaces, sandbox, stuck
 from autograder.processes import ExaminerError, ExaminerProcess
 from autograder.sandbox import Place, RunningSubject
 from autograder.submission import Cell, Program
@@ -95,6 +95,7 @@ def run(
     Raises:
         SandboxError: the program is not trusted, and there is no working sandbox here.
     """
+    own_interfaces.build()
     started = time.monotonic()
     outcome = Outcome(outputs=[[] for _ in program])
     with ExitStack() as stack:

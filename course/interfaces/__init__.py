@@ -7,7 +7,7 @@ talks to any ROS 2 Jazzy system.
 """
 
 from course.interfaces.cache import root as cache_root
-from course.interfaces.defining import Source, define, ensure, status
+from course.interfaces.defining import Source, define, ensure, prepare, status
 from course.interfaces.errors import (
     BuildError,
     CompilerMissingError,
@@ -30,5 +30,6 @@ __all__ = [
     "define",
     "ensure",
     "install",
+    "prepare",
     "status",
 ]

@@ -49,6 +49,18 @@ def define(name: str, text: str) -> type:
     return in_use.type
 
 
+def prepare(name: str, text: str) -> None:
+    """Build the interface ``name`` from ``text`` into the cache if need be, without loading it.
+
+    For whoever must have it built beforehand; see `ensure`. ``text`` refers to installed messages
+    only. Raises as `define` does.
+    """
+    finder.install()
+    type_name = parse_name(name)
+    check_package(type_name)
+    cache.ensure(unit_of(define_text(type_name, text, [])))
+
+
 def unit_of(definition: Definition) -> Unit:
     """Return the unit of a learner's definition, on top of the messages it refers to."""
     package = definition.type_name.package

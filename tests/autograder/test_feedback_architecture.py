@@ -7,7 +7,7 @@ import pytest
 from autograder import corpus, exams, points
 from autograder.corpus import trials
 from autograder.report import Report
-from autograder.rigs.robot_types import NAVIGATE_TO, NAVIGATE_TO_TEXT
+from autograder.own_interfaces import DEFINITIONS, NAVIGATE_TO
 from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS
@@ -47,7 +47,7 @@ def test_the_examiner_has_the_action_that_the_notebook_gives(notebooks: trials.N
     source, _ = notebooks
     given = next(cell for cell in source.cells if cell.id == f"{EXAM}-given")
     assert f"'{NAVIGATE_TO}'" in given.source
-    assert NAVIGATE_TO_TEXT in given.source
+    assert DEFINITIONS[NAVIGATE_TO] in given.source
 
 
 def test_nothing_of_the_grader_is_in_what_a_student_reads() -> None:

@@ -88,7 +88,7 @@ CHANGING = {
     r"0x[0-9a-f]+": "0xADDRESS",
     r"/[^\s'\"]*/ipykernel_\d+/(?:\d+-)?\d+\.py": "CELL",
     r"\b(?:\d+-)?\d+\.py(?=, line)": "CELL",
-    r"[\d.]+ (?:ns|us|[\u00b5\u03bc]s|ms|s)\b": "TIME",
+    r"[\d.e+]+ (?:ns|us|[\u00b5\u03bc]s|ms|s)\b": "TIME",
     r"(?:/[^\s'\"]*/stock\d*|/home/student|~)(?=[/'\"\s]|$)": "HOME",
     r"\b[0-9a-f]{32}\b": "ID",
     r"Matplotlib is building the font cache; this may take a moment.\n": "",

@@ -1,7 +1,7 @@
 # title: Wrong profiles, and a node that answers the examiner on its own topics
 # told: It then worked through the last
 # told: Messages came that hardware/emergency_stop did not deliver
-# score: 5
+# score: 1
 
 import re
 
