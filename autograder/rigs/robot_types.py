@@ -12,6 +12,7 @@ from autograder.own_interfaces import DEFINITIONS
 from course.design import dye
 from course.interfaces import define
 
+
 class UnknownTypeError(Exception):
     """A type on the graph that is not installed where the examiner runs."""
 

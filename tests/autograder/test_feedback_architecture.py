@@ -6,8 +6,8 @@ import pytest
 
 from autograder import corpus, exams, points
 from autograder.corpus import trials
-from autograder.report import Report
 from autograder.own_interfaces import DEFINITIONS, NAVIGATE_TO
+from autograder.report import Report
 from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS
