@@ -163,9 +163,11 @@ def collect(gradebook: CourseGradebook, assignment: str, question: Question) -> 
         text = _text(gradebook, assignment, question, student)
         unclear = asked.get(student, {}).get(question.notebook)
         asked_about = unclear is not None and question.grade_id in unclear.cells
-        nothing_read = _is_unreadable(gradebook, assignment, question, student)
-        # Then what stands in the graded copy is ours, in place of what was handed in.
-        if text is None or (row["needs_manual_grade"] and (asked_about or nothing_read)):
+        # If either, what stands in the graded copy is ours, in place of what was handed in.
+        if text is None or (
+            row["needs_manual_grade"]
+            and (asked_about or _is_unreadable(gradebook, assignment, question, student))
+        ):
             unread.append(student)
         elif row["manual_score"] is None and not row["needs_manual_grade"]:
             empty.append(student)  # nbgrader has seen that nothing was written

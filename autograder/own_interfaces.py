@@ -41,6 +41,6 @@ def _build() -> None:
         for package in PACKAGES:
             interfaces.ensure(package)
         for name, text in DEFINITIONS.items():
-            interfaces.prepare(name, text)
+            interfaces.ensure_definition(name, text)
     except interfaces.InterfaceError:
         return  # the notebook says so, where it uses one

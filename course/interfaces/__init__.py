@@ -7,7 +7,7 @@ talks to any ROS 2 Jazzy system.
 """
 
 from course.interfaces.cache import root as cache_root
-from course.interfaces.defining import Source, define, ensure, prepare, status
+from course.interfaces.defining import Source, define, ensure, ensure_definition, status
 from course.interfaces.errors import (
     BuildError,
     CompilerMissingError,
@@ -29,7 +29,7 @@ __all__ = [
     "compiler_problem",
     "define",
     "ensure",
+    "ensure_definition",
     "install",
-    "prepare",
     "status",
 ]

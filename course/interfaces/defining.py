@@ -49,11 +49,11 @@ def define(name: str, text: str) -> type:
     return in_use.type
 
 
-def prepare(name: str, text: str) -> None:
+def ensure_definition(name: str, text: str) -> None:
     """Build the interface ``name`` from ``text`` into the cache if need be, without loading it.
 
-    For whoever must have it built beforehand; see `ensure`. ``text`` refers to installed messages
-    only. Raises as `define` does.
+    Like `ensure`, for a grader that runs programs without a compiler. ``text`` may use installed
+    messages only. Raises as `define` does.
     """
     finder.install()
     type_name = parse_name(name)

@@ -42,7 +42,7 @@ def test_a_session_comes_up_where_a_program_was_killed(state):
         with course.Session(domain_id=lease.domain_id) as session:
             session.run(Node, "survivor")
             (made,) = (port for port in ports if port.exists())
-            assert made.read_bytes()[:4] == (2).to_bytes(4, "little"), "made anew by DDS"
+            assert made.read_bytes()[:4] == (2).to_bytes(4, "little"), "DDS has made a new one"
     finally:
         for port in ports:
             port.unlink(missing_ok=True)
