@@ -39,6 +39,7 @@ MAX_VALUE = 64 * 1024
 MAX_TOLD = 500
 """Characters that are told of the error of a cell."""
 
+LAST_CALLBACKS_S = 1.5  # that callbacks of an exam's earlier session are given to end
 MOST_CLEANUPS = 100
 """Nodes whose cleanup may raise while a session is closed."""
 
@@ -307,7 +308,7 @@ def _close(session: Session) -> None:
         with suppress(
             Exception, SystemExit
         ):  # close() can be called again, and goes on where it was
-            session.close()
+            session.close(LAST_CALLBACKS_S)
             return
 
 

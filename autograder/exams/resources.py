@@ -65,7 +65,6 @@ from autograder.rigs.phrases import phrase
 from autograder.rigs.residue import (
     attempt,
     failing_starts,
-    failing_starts_memory,
     refuse_zooms,
     require_flat_refusals,
     require_flat_snapshots,
@@ -74,7 +73,7 @@ from autograder.rigs.residue import (
 EXAM: Exam[CameraRig] = Exam("resources", camera_rig)
 
 MANAGED = "ManagedCamera"
-FAILING_STARTS = 10
+FAILING_STARTS = 6
 TAKES = 3  # of an experiment in which the examiner may come too late
 FASTEST = 30.0  # Hz, the highest rate that is allowed
 
@@ -263,7 +262,7 @@ def failed_start(rig: CameraRig) -> None:
             device = rig.device(kind)
             attempt(rig, device)
             require_closed(rig, device, f"After CameraDriver({device!r}) has raised")
-            failing_starts(rig, kind, FAILING_STARTS)
+            failing_starts(rig, kind, FAILING_STARTS, memory=kind == "stuck")
         # A participant's endpoints are told in order: when those of a driver that works are known,
         # those of the failed starts before it are known, too.
         device = rig.device()
@@ -273,7 +272,6 @@ def failed_start(rig: CameraRig) -> None:
         attempt(rig, device)  # it can be open once
         rig.program.stop(DRIVER)
         require_gone(rig, device, "After failed starts, one that worked, and its end,", node)
-        failing_starts_memory(rig, "stuck", FAILING_STARTS)
 
 
 @EXAM.check(

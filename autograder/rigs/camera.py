@@ -24,6 +24,7 @@ from autograder.exam import Failed
 from autograder.rigs.camera_graph import CameraGraph
 from autograder.rigs.camera_node import ExaminerNode, Picture
 from autograder.rigs.camera_program import Program
+from autograder.rigs.patience import IDLE_S, SETTLE_S, Patience
 from autograder.rigs.phrases import phrase
 from autograder.rigs.process import Process
 from autograder.rigs.stillness import Stillness
@@ -66,6 +67,8 @@ class CameraRig:
         self._provoked = False
         self._clients: dict[str, Any] = {}
         self.requests = 0  # that were made of services so far
+        self.waited = 0.0  # s of wall time that the last wait took which had no time-out
+        self.passed = 0.0  # s of the robot's time that the last look took, see `see`
 
     # The subject.
 
@@ -153,24 +156,22 @@ class CameraRig:
         A response that goes out before its way back is known is lost: it is asked for again, so
         this is for requests that may be made twice. ``nudging``: a callback may await something.
         """
-        deadline = Deadline(SETTLE)
         client = self.client(service, name)
-        self.wait(client.service_is_ready, deadline.left)
+        self.wait(client.service_is_ready)
+        patience = self.patience()
         replies: list[Any] = []
-        while deadline.left:
+        while patience.lasts():
             replies.append(client.call_async(request))
             self.requests += 1
-            again = Deadline(min(RESEND, deadline.left))
-            while again.left:
-                self.wait(
-                    lambda: any(reply.done() for reply in replies),
-                    min(NUDGE if nudging else RESEND, again.left),
-                )
+            again = Deadline(RESEND)
+            while again.left and patience.lasts():
+                self.wait(lambda: any(reply.done() for reply in replies), NUDGE)
                 for reply in replies:
                     if reply.done():
                         return reply.result()
                 if nudging:
                     self.nudge()
+        self.waited = patience.spent
         return None
 
     def client(self, service: Any, name: str) -> Any:
@@ -181,12 +182,27 @@ class CameraRig:
 
     # What is seen.
 
-    def wait(self, condition: Callable[[], Any], timeout: float = SETTLE) -> bool:
-        """Wait until ``condition`` holds; return whether it did before the deadline."""
+    def wait(
+        self, condition: Callable[[], Any], timeout: float | None = None, idle: float = IDLE_S
+    ) -> bool:
+        """Wait until ``condition`` holds, for ``timeout`` s; return whether it did by then.
+
+        Without ``timeout`` as long as it may come: until all have slept for ``idle`` s, see
+        `Patience`. `waited` says afterwards for how long that was.
+        """
+        if timeout is None:
+            patience = self.patience(idle)
+            holds = patience.wait(self.session, condition)
+            self.waited = patience.spent
+            return holds
         with suppress(WaitTimeout):
             self.session.until(condition, timeout=timeout, what="an observation")
             return True
         return False
+
+    def patience(self, idle: float = IDLE_S, seconds: float = SETTLE_S) -> Patience:
+        """Begin to wait for as long as something may take: see `Patience`."""
+        return Patience(self._still, seconds, idle)
 
     def rest(self) -> bool:
         """Return True when all that was sent has been dealt with, False if a thread never rests."""
@@ -214,8 +230,10 @@ class CameraRig:
         Endpoints find each other in their own time, and what is sent before is lost.
         """
         condition = condition or (lambda: self.pictures(device))
-        for _ in range(int(SETTLE / PERIOD)):
+        patience, self.passed = self.patience(), 0.0
+        while patience.lasts():
             self.advance(PERIOD)
+            self.passed += PERIOD
             if self.wait(condition, PERIOD):
                 return True
         return False

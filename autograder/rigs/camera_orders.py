@@ -15,10 +15,9 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
 from autograder.exam import Failed
-from autograder.rigs.camera import PERIOD, SETTLE, CameraRig
+from autograder.rigs.camera import PERIOD, CameraRig
 from autograder.rigs.camera_node import IMAGE, SNAPSHOT, ZOOM
 from autograder.rigs.camera_rate import let_arrive
-from course.runtime.waiting import Deadline
 
 FURTHER = 3  # pictures: one may have been under way with another zoom
 BURST = 4  # snapshots that are asked for at once
@@ -37,8 +36,8 @@ def require_snapshot(rig: CameraRig, device: str, when: str, *, slow: bool = Fal
     if reply is None:
         raise Failed(
             expected=f"{when} the service {SNAPSHOT} answers, without waiting for the next tick.",
-            actual=f"No answer came within {SETTLE:.0f} s, in which the node's clock stood still"
-            f"{rig.raised()}.",
+            actual=f"No answer came within {rig.waited:.0f} s, in which the node's clock stood "
+            f"still{rig.raised()}.",
         )
     if not reply.success:
         raise Failed(
@@ -96,14 +95,14 @@ def require_snapshots_under_way(rig: CameraRig, device: str) -> Callable[[], int
         done = [reply.done() for reply in replies]
         return all(done) or (any(done) and sum(rig.cameras(device)) >= asked + 2)
 
-    deadline = Deadline(SETTLE)
-    while not rig.wait(next_one_waits, min(PERIOD, deadline.left)) and deadline.left:
+    patience = rig.patience()
+    while not rig.wait(next_one_waits, PERIOD) and patience.lasts():
         rig.node.zoom.publish(Int32(data=1))
         rig.nudge()
     if not any(reply.done() for reply in replies):
         raise Failed(
             expected=f"The service {SNAPSHOT} answers when the picture is there.",
-            actual=f"No answer came within {SETTLE:.0f} s{rig.raised()}.",
+            actual=f"No answer came within {patience.spent:.0f} s{rig.raised()}.",
         )
     return lambda: sum(not (reply.done() and reply.result().success) for reply in replies)
 
@@ -165,9 +164,11 @@ def _require_followed(
     rig: CameraRig, device: str, factor: int, when: str, expected: str, *, again: bool
 ) -> None:
     """Fail unless the zoom ``factor`` is seen soon; send it once, or ``again`` until it is."""
-    for number in range(int(SETTLE / PERIOD)):
-        if again or not number:
+    patience, sent = rig.patience(), False
+    while patience.lasts():
+        if again or not sent:
             rig.node.zoom.publish(Int32(data=factor))
+            sent = True
         require_snapshot(rig, device, when)
         if rig.wait(lambda: rig.pictures(device)[-1].zoom == factor, PERIOD):
             return

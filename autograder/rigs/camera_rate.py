@@ -7,20 +7,22 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from autograder.exam import Failed
-from autograder.rigs.camera import PERIOD, SETTLE, CameraRig
+from autograder.rigs.camera import PERIOD, CameraRig
 from course.runtime.waiting import Deadline
 
 STEPS = 10  # at least, in which a rate is counted
 LONGEST_STEP = 0.4  # s: a timer that is too fast would come just once in a longer one
-KEEP_UP = 0.25  # s of wall time that a picture which is due is waited for before time moves on
+KEEP_UP = 0.1  # s of wall time that a picture which is due is waited for before time moves on
+ARRIVES, ARRIVES_ASLEEP = 1.0, 0.6  # s, see `Patience`: a slow camera takes 0.3 s for a picture
 STANDSTILL = 0.5  # s of wall time without two pictures: they stand still
 BACKLOG = 3.0  # s of wall time in which pictures may come that had been ordered before
 AT_REST = 1  # picture in a step of time that begins and ends with all at rest
 AT_ONCE = 3  # pictures in a step in which one is due, and one of the step before may come
 PHASE = 2  # steps, in which pictures of before may come
+_SLOWLY = "the pace at which a rate was right"
 SLICES = 20  # of a period, in which time moves on where it does so by and by
-AGAIN = 2.0  # s of wall time for pictures that are late in all, where they can be counted again
-PACES = (0.0, 1.0, 2.0)  # s of wall time for a second of the robot's
+LATE_ASLEEP = 1.5  # s in all for pictures that are late in a count, while all sleep
+PACES = (0.0, 0.6, 2.0)  # s of wall time in which the robot's time passes that is counted
 
 
 class _Count(NamedTuple):
@@ -50,12 +52,15 @@ def require_rate(
 
     Where time jumps from one picture to the next, a thread that looks at the clock now and then
     loses what it sees too late. So a count that is not right is made again, as time passes on a
-    robot, and once more with twice as much time.
+    robot, and once more with twice as much time; and who has once needed that is given it at once.
     """
     for pace in PACES:
+        if pace < rig.memory.get(_SLOWLY, 0.0):
+            continue
         after()
         count = _count(rig, device, rate, seconds, pace)
         if count.right:
+            rig.memory[_SLOWLY] = pace
             return
     time = "one second" if seconds == 1 else f"{seconds} seconds"
     expected = f"In {time} {count.wanted:.0f} pictures come{when}."
@@ -79,17 +84,18 @@ def _count(rig: CameraRig, device: str, rate: float, seconds: int, pace: float) 
     wanted = rate * seconds
     steps = max(STEPS, round(wanted), math.ceil(seconds / LONGEST_STEP))
     before, late, most, last = len(rig.pictures(device)), 0, 0, 0
-    deadline = Deadline(SETTLE if pace == PACES[-1] else AGAIN)
+    patience = rig.patience(LATE_ASLEEP if pace else KEEP_UP)
 
     def came() -> int:
         return len(rig.pictures(device)) - before
 
     for step in range(1, steps + 1):
-        _move_on(rig, seconds / steps, 1 / rate / SLICES, pace)
+        _move_on(rig, seconds / steps, 1 / rate / SLICES, pace / steps)
         due = int(wanted * step / steps)
         # By its phase a design may be one picture behind, and stay so: it is not waited for twice.
-        if not rig.wait(lambda least=due - late: came() >= least, KEEP_UP):  # type: ignore[misc]
-            rig.wait(lambda least=due - 1: came() >= least, deadline.left)  # type: ignore[misc]
+        moment = KEEP_UP if patience.lasts() else 0.0
+        if not rig.wait(lambda least=due - late: came() >= least, moment):  # type: ignore[misc]
+            patience.wait(rig.session, lambda least=due - 1: came() >= least)  # type: ignore[misc]
         now = came()
         late = max(0, due - now)
         most = max(most, now - last) if step > PHASE else 0
@@ -100,13 +106,13 @@ def _count(rig: CameraRig, device: str, rate: float, seconds: int, pace: float) 
 
 
 def _move_on(rig: CameraRig, seconds: float, part: float, pace: float) -> None:
-    """Move simulated time on: at once, or with a ``pace`` by and by, each ``part`` of it."""
+    """Move simulated time on: at once, or part by part within ``pace`` s of wall time."""
     if not pace:
         rig.advance(seconds)
         return
     parts = max(1, round(seconds / part))
     for _ in range(parts):
-        clock = Deadline(pace * seconds / parts)
+        clock = Deadline(pace / parts)
         rig.advance(seconds / parts)
         rig.wait(lambda clock=clock: not clock.left, clock.left)  # type: ignore[misc]
 
@@ -121,7 +127,7 @@ def let_arrive(rig: CameraRig, device: str) -> None:
         newest = [picture.number for picture in rig.pictures(device)[-1:]]
         return newest >= [max(rig.cameras(device), default=0) - 1]
 
-    rig.wait(newest_is_here, 1.0)
+    rig.patience(ARRIVES_ASLEEP, ARRIVES).wait(rig.session, newest_is_here)
 
 
 def require_own_clock(rig: CameraRig, device: str) -> None:

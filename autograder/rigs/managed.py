@@ -13,7 +13,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 
 from autograder.exam import Failed
-from autograder.rigs.camera import RESEND, SETTLE, CameraRig
+from autograder.rigs.camera import RESEND, CameraRig
 from autograder.rigs.phrases import phrase
 
 TRANSITIONS = {
@@ -129,7 +129,7 @@ class Managed:
         if reply is None:
             raise Failed(
                 expected=f"Your node answers its service {self._node}/{name}.",
-                actual=f"No answer came within {SETTLE:.0f} s{self._rig.raised()}.",
+                actual=f"No answer came within {self._rig.waited:.0f} s{self._rig.raised()}.",
             )
         return reply
 

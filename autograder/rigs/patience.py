@@ -32,7 +32,8 @@ class Patience:
     def __init__(self, still: Stillness, seconds: float = SETTLE_S, idle: float = IDLE_S) -> None:
         """Begin now."""
         self._still = still
-        self._end = time.monotonic() + seconds
+        self._began = time.monotonic()
+        self._end = self._began + seconds
         self._idle = idle
         self._looked: float | None = None  # when all slept at the last look, else None
 
@@ -40,6 +41,11 @@ class Patience:
     def left(self) -> float:
         """Seconds left if nobody sleeps, not below 0."""
         return max(0.0, self._end - time.monotonic())
+
+    @property
+    def spent(self) -> float:
+        """Seconds since it began."""
+        return time.monotonic() - self._began
 
     def lasts(self) -> bool:
         """Whether there is some left; to be asked again and again, as it looks who sleeps."""
@@ -52,7 +58,7 @@ class Patience:
 
     def wait(self, session: Session, condition: Callable[[], Any]) -> bool:
         """Wait until ``condition`` holds; return whether it did before the patience was over."""
-        if _holds(session, condition, min(_AT_FIRST_S, self.left)):
+        if self.lasts() and _holds(session, condition, min(_AT_FIRST_S, self.left)):
             return True
         while self.lasts():
             if _holds(session, condition, min(_LOOK_S, self.left)):

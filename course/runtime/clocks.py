@@ -1,13 +1,20 @@
-"""A node's clock sleeps in the node's own context, and not at all until a time that has passed."""
+"""Sleeping by a node's clock: in the node's own context, and seen from the outside."""
 
 # mypy: allow-untyped-calls
 
 from __future__ import annotations
 
-from rclpy.clock import Clock
+import math
+import sys
+
+from rclpy.clock import Clock, ROSClock
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.time import Time
+
+from course.runtime.jobs import Job
+
+_RATE_DEPTH = 3  # frames from a lock of `threading` to the `Rate.sleep` that waits for it
 
 
 def sleeps_in_own_context(node: Node) -> None:
@@ -28,3 +35,37 @@ def sleeps_in_own_context(node: Node) -> None:
         return bool(Clock.sleep_until(clock, until, context))
 
     clock.sleep_until = sleep_until  # type: ignore[method-assign]
+
+
+def sleeps_until(job: Job) -> float | None:
+    """Return the simulated time (ns) at which a callback goes on that sleeps by its node's clock.
+
+    Infinity for one in `Rate.sleep`: a timer of its node wakes it. None: it does something else, or
+    its time has come.
+    """
+    if job.node is None or not isinstance(clock := job.node.get_clock(), ROSClock):
+        return None
+    if not clock.ros_time_is_active:
+        return None
+    frame = sys._current_frames().get(job.thread_id)
+    for depth in range(_RATE_DEPTH + 1):
+        if frame is None:
+            break
+        where = frame.f_globals.get("__name__"), frame.f_code.co_name
+        if where == ("rclpy.timer", "sleep"):
+            return math.inf
+        if where == ("rclpy.clock", "sleep_until") and not depth:
+            until = frame.f_locals.get("until")
+            if frame.f_locals.get("self") is clock and isinstance(until, Time):
+                return float(until.nanoseconds) if until > clock.now() else None
+            break
+        frame = frame.f_back
+    return None
+
+
+def sleeps(job: Job) -> bool:
+    """Return whether a callback does nothing until its node's clock moves on, by `sleep_until`.
+
+    Known from where it is: whether its thread has come to rest by now makes no difference.
+    """
+    return math.isfinite(sleeps_until(job) or math.inf)

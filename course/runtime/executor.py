@@ -26,6 +26,7 @@ from rclpy.node import Node
 from rclpy.task import Future, Task
 
 from course.runtime import qos_events, streams, taking
+from course.runtime.clocks import sleeps
 from course.runtime.families import Families
 from course.runtime.gate import Gate
 from course.runtime.idleness import Idleness
@@ -183,6 +184,8 @@ class BackgroundExecutor(Executor):
 
     @staticmethod
     def _blocked(job: Job) -> bool:
+        if sleeps(job):
+            return True
         if job.idleness is None:
             job.idleness = Idleness(job.thread_id)
         return job.idleness.blocked()

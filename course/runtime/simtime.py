@@ -9,6 +9,7 @@ fires then depends on nothing but the clock, whatever the machine's load.
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 
@@ -21,6 +22,7 @@ from rosgraph_msgs.msg import Clock
 
 from course.errors import SessionError, WaitTimeout
 from course.runtime import arguments
+from course.runtime.clocks import sleeps_until
 from course.runtime.crew import Crew
 from course.runtime.jobs import current_job
 from course.runtime.names import node_name
@@ -118,7 +120,8 @@ class SimulatedTime:
     def _stride(self, step_ns: int) -> int:
         """Return how far to move: one step, or several at once if no timer is due in between.
 
-        Nothing could tell the difference, unless others follow /clock or a callback waits for it.
+        Nothing could tell the difference, unless others follow /clock or a callback looks at it.
+        One that sleeps until a moment of the clock's, by rclpy's own means, is due like a timer.
         Callbacks that go on for ever, as a coroutine does that naps and looks again, can, but a few
         steps are no more to them than a nap that took longer.
         """
@@ -126,18 +129,25 @@ class SimulatedTime:
         if self._publisher.get_subscription_count() != len(followers):
             return step_ns
         most, executors = _LONGEST_STRIDE, self._crew.all()
-        if any(executor.running for executor in executors):
-            if not follow_each_other(executors):
-                return step_ns
+        waits: list[float] = []
+        running = [job for executor in executors for job in executor.running.copy()]
+        if running and follow_each_other(executors):
             most = _POLLED_STRIDE
-        waits = [
+        else:
+            for job in running:
+                if (wakes := sleeps_until(job)) is None:
+                    return step_ns
+                waits.append(wakes - self._now_ns)
+        waits += [
             wait
             for node in followers
             for timer in node.timers
             if timer.clock is node.get_clock()
             and (wait := timer.time_until_next_call()) is not None
+            and not (running and wait <= 0)  # it waits for a callback of its group to end
         ]
-        steps = -(-min(waits) // step_ns) if waits else most
+        soonest = min(waits, default=math.inf)
+        steps = most if soonest == math.inf else math.ceil(soonest / step_ns)
         return step_ns * min(max(1, steps), most)
 
     def _move_to(self, moment_ns: int, patience: float) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
-from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.duration import Duration
 from rclpy.executors import Executor
 from rclpy.node import Node
@@ -95,6 +95,33 @@ def test_a_clock_does_not_sleep_until_a_time_that_has_passed(lab):
     thread = threading.Thread(target=lambda: woke.append(clock.sleep_until(past)), daemon=True)
     thread.start()
     lab.until(lambda: woke == [True])  # nobody moves the clock
+
+
+def test_time_moves_at_once_to_the_moment_until_which_a_callback_sleeps():
+    """A callback that sleeps by the clock costs a step for each nap, and not one for each 10 ms."""
+
+    class Napper(Node):
+        def __init__(self):
+            super().__init__("napper")
+            self.woke = []
+            own = MutuallyExclusiveCallbackGroup()
+            self.create_timer(0.1, self.nap, callback_group=own)
+
+        def nap(self):
+            clock = self.get_clock()
+            while clock.sleep_for(Duration(seconds=0.25)):
+                self.woke.append(clock.now().nanoseconds)
+
+    with course.Session(sim_time=True, threads=2) as lab:
+        napper = lab.run(Napper)
+        moved = []
+        lab.sim.advance(0.1)
+        move_to = lab.sim._move_to
+        lab.sim._move_to = lambda *move: moved.append(move[0]) or move_to(*move)
+        lab.sim.advance(1.0)
+        due = [350_000_000, 600_000_000, 850_000_000, 1_100_000_000]
+        assert napper.woke == due
+        assert moved == [200_000_000, *due]  # its timer is due once more, and has to wait for it
 
 
 def test_a_recorder_stamps_in_simulated_time(lab):

@@ -34,8 +34,7 @@
 #
 # Over 50 lives the process keeps its number of threads and open files, and grows by less than
 # 100 KiB a life; a life with many snapshots and refused zooms leaves no thread and no open file
-# either. A driver that needs more than a second to start and end is given fewer of them, as
-# many as fit into 50 s but at least 26.
+# either. A driver that takes long to start and end is given fewer of them.
 #
 # ## The managed node: `ManagedCamera()`
 #
