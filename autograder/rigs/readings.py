@@ -114,8 +114,8 @@ class Sensor:
         delivered = self.message(tag, Time())
         if self.type is not String:
             delivered.header = message.header
-        # As text: a range that is not a number does not equal itself.
-        return repr(message) == repr(delivered)
+        # As text only if need be: a range that is not a number does not equal itself.
+        return bool(message == delivered) or repr(message) == repr(delivered)
 
 
 def _vectors(imu: Imu) -> tuple[Any, Any, Any]:
