@@ -65,6 +65,7 @@ from autograder.rigs.phrases import phrase
 from autograder.rigs.residue import (
     attempt,
     failing_starts,
+    failing_starts_memory,
     refuse_zooms,
     require_flat_refusals,
     require_flat_snapshots,
@@ -262,7 +263,7 @@ def failed_start(rig: CameraRig) -> None:
             device = rig.device(kind)
             attempt(rig, device)
             require_closed(rig, device, f"After CameraDriver({device!r}) has raised")
-            failing_starts(rig, kind, FAILING_STARTS, memory=kind == "stuck")
+            before = failing_starts(rig, kind, FAILING_STARTS)
         # A participant's endpoints are told in order: when those of a driver that works are known,
         # those of the failed starts before it are known, too.
         device = rig.device()
@@ -272,6 +273,7 @@ def failed_start(rig: CameraRig) -> None:
         attempt(rig, device)  # it can be open once
         rig.program.stop(DRIVER)
         require_gone(rig, device, "After failed starts, one that worked, and its end,", node)
+        failing_starts_memory(rig, kind, FAILING_STARTS, before)
 
 
 @EXAM.check(

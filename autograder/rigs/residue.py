@@ -7,6 +7,7 @@ are counted, and what is left is measured by their number.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from autograder.bench import StudentError
 from autograder.exam import Failed
@@ -95,25 +96,26 @@ def require_flat_refusals(rig: CameraRig, before: Usage) -> None:
     require_flat(rig, before, WORK, expected, "refused zooms and the end of the driver")
 
 
-def failing_starts(rig: CameraRig, kind: str, times: int, *, memory: bool) -> None:
-    """Fail unless the constructor raises, and the process keeps nothing of so many starts.
+def failing_starts(rig: CameraRig, kind: str, times: int) -> Usage:
+    """Fail unless the constructor raises, and the process keeps none of its threads and files.
 
-    Args:
-        rig: the rig.
-        kind: of device, that has something wrong with it.
-        times: how many starts there are.
-        memory: whether that counts as well as threads and files.
+    Return what the process held before.
     """
-
-    def some() -> None:
-        for _ in range(times):
-            attempt(rig, rig.device(kind))
-
     before = rig.process.usage()
-    some()
+    _attempts(rig, kind, times)
     require_flat(rig, before, times, NO_START, STARTS)
-    if memory:
-        require_flat_memory(rig, before, some, times, NO_START, STARTS)
+    return before
+
+
+def failing_starts_memory(rig: CameraRig, kind: str, times: int, before: Usage) -> None:
+    """Fail if since ``before`` the process has kept memory of so many starts that failed."""
+    again = partial(_attempts, rig, kind, times)
+    require_flat_memory(rig, before, again, times, NO_START, STARTS)
+
+
+def _attempts(rig: CameraRig, kind: str, times: int) -> None:
+    for _ in range(times):
+        attempt(rig, rig.device(kind))
 
 
 def attempt(rig: CameraRig, device: str) -> None:
