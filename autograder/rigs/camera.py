@@ -68,7 +68,6 @@ class CameraRig:
         self._clients: dict[str, Any] = {}
         self.requests = 0  # that were made of services so far
         self.waited = 0.0  # s of wall time that the last wait took which had no time-out
-        self.passed = 0.0  # s of the robot's time that the last look took, see `see`
 
     # The subject.
 
@@ -171,7 +170,6 @@ class CameraRig:
                         return reply.result()
                 if nudging:
                     self.nudge()
-        self.waited = patience.spent
         return None
 
     def client(self, service: Any, name: str) -> Any:
@@ -188,7 +186,7 @@ class CameraRig:
         """Wait until ``condition`` holds, for ``timeout`` s; return whether it did by then.
 
         Without ``timeout`` as long as it may come: until all have slept for ``idle`` s, see
-        `Patience`. `waited` says afterwards for how long that was.
+        `Patience`. `later` says afterwards when that was.
         """
         if timeout is None:
             patience = self.patience(idle)
@@ -199,6 +197,13 @@ class CameraRig:
             self.session.until(condition, timeout=timeout, what="an observation")
             return True
         return False
+
+    @property
+    def later(self) -> str:
+        """When the last wait without a time-out was over, as a phrase."""
+        if self.waited < SETTLE_S:
+            return "when nothing was at work any more"
+        return f"{SETTLE_S:.0f} s later"
 
     def patience(self, idle: float = IDLE_S, seconds: float = SETTLE_S) -> Patience:
         """Begin to wait for as long as something may take: see `Patience`."""
@@ -230,11 +235,10 @@ class CameraRig:
         Endpoints find each other in their own time, and what is sent before is lost.
         """
         condition = condition or (lambda: self.pictures(device))
-        patience, self.passed = self.patience(), 0.0
-        while patience.lasts():
+        patience = self.patience()
+        for _ in range(int(SETTLE / PERIOD)):
             self.advance(PERIOD)
-            self.passed += PERIOD
-            if self.wait(condition, PERIOD):
+            if self.wait(condition, PERIOD if patience.lasts() else 0.0):
                 return True
         return False
 

@@ -37,7 +37,7 @@ def require_picture(rig: CameraRig, device: str, when: str = "") -> None:
         pictures = f"{when} pictures" if when else "Pictures"
         raise Failed(
             expected=f"{pictures} of the camera {device!r} come on {IMAGE}.",
-            actual=f"In {rig.passed:.0f} s of the robot's time none came. {_who_could_send(rig)}"
+            actual=f"In {SETTLE:.0f} s of the robot's time none came. {_who_could_send(rig)}"
             f"{rig.raised()}.",
         )
 
@@ -76,7 +76,7 @@ def require_closed(rig: CameraRig, device: str, when: str) -> None:
     if not rig.wait(lambda: not rig.cameras(device), idle=ENDED):
         raise Failed(
             expected=f"{when} the camera is closed.",
-            actual=f"Your process still had the camera {device!r} open {rig.waited:.0f} s later.",
+            actual=f"Your process still had the camera {device!r} open {rig.later}.",
         )
 
 
@@ -84,14 +84,14 @@ def require_gone(rig: CameraRig, device: str, when: str, node: str = "") -> None
     """Fail if an endpoint or a node of the driver is on the graph: it may have made several."""
     if rig.wait(lambda: not rig.graph.left(node)):
         return
-    waited, left = rig.waited, rig.graph.left(node)
+    later, left = rig.later, rig.graph.left(node)
     before = len(rig.pictures(device))
     rig.advance(1.0)
     sent = len(rig.pictures(device)) - before
     more = f" In one more second it sent {pictures(sent)}." if sent else ""
     raise Failed(
         expected=f"{when} no endpoint of the driver is on the graph.",
-        actual=f"{waited:.0f} s later there still was {phrase(left)}.{more}",
+        actual=f"{later[0].upper()}{later[1:]} there still was {phrase(left)}.{more}",
     )
 
 
@@ -131,11 +131,11 @@ def require_callbacks_ended(rig: CameraRig, among: set[int], usual: int, when: s
 
     if rig.wait(lambda: not replaced()):
         return
-    waited = rig.waited
+    later = rig.later
     if _works(rig, rig.process.thread_ids() - among):
         raise Failed(
             expected=f"{when} every callback of the driver comes to its end.",
-            actual=f"One that waited for the camera was still waiting {waited:.0f} s later. The "
+            actual=f"One that waited for the camera was still waiting {later}. The "
             "thread that runs it is lost: a program with that one thread takes up no callback "
             "ever again.",
         )

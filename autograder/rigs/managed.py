@@ -129,7 +129,7 @@ class Managed:
         if reply is None:
             raise Failed(
                 expected=f"Your node answers its service {self._node}/{name}.",
-                actual=f"No answer came within {self._rig.waited:.0f} s{self._rig.raised()}.",
+                actual=f"No answer came{self._rig.raised()}.",
             )
         return reply
 
