@@ -31,8 +31,6 @@ from autograder.rigs.stillness import Stillness
 from course import WaitTimeout
 from course.runtime.waiting import Deadline
 
-SETTLE = 8.0
-"""Seconds that something expected may take: it takes milliseconds, on a busy machine a few s."""
 GHOSTS = 1.0
 """Seconds that endpoints of an earlier life are given to go off the graph."""
 RESEND = 1.0
@@ -147,7 +145,7 @@ class CameraRig:
         """Send a zoom that the camera does not have; it is with the driver when this returns."""
         self._provoked = True
         self.node.zoom.publish(Int32(data=factor))
-        self.node.zoom.wait_for_all_acked(Duration(seconds=SETTLE))
+        self.node.zoom.wait_for_all_acked(Duration(seconds=SETTLE_S))
 
     def ask(self, service: Any, name: str, request: Any, *, nudging: bool = False) -> Any:
         """Call a service; return its response, or None if none came in time.
@@ -236,7 +234,7 @@ class CameraRig:
         """
         condition = condition or (lambda: self.pictures(device))
         patience = self.patience()
-        for _ in range(int(SETTLE / PERIOD)):
+        for _ in range(int(SETTLE_S / PERIOD)):
             self.advance(PERIOD)
             if self.wait(condition, PERIOD if patience.lasts() else 0.0):
                 return True

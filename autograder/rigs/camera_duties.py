@@ -6,10 +6,11 @@ Each ``require_…`` returns if it was seen, and raises `Failed` with what was s
 from __future__ import annotations
 
 from autograder.exam import Failed
-from autograder.rigs.camera import SETTLE, CameraRig
+from autograder.rigs.camera import CameraRig
 from autograder.rigs.camera_graph import PUBLISHER
 from autograder.rigs.camera_node import IMAGE
-from autograder.rigs.phrases import phrase, pictures
+from autograder.rigs.patience import SETTLE_S
+from autograder.rigs.phrases import beginning, phrase, pictures
 from course.runtime.waiting import Deadline
 
 DRIVER = "CameraDriver"
@@ -37,7 +38,7 @@ def require_picture(rig: CameraRig, device: str, when: str = "") -> None:
         pictures = f"{when} pictures" if when else "Pictures"
         raise Failed(
             expected=f"{pictures} of the camera {device!r} come on {IMAGE}.",
-            actual=f"In {SETTLE:.0f} s of the robot's time none came. {_who_could_send(rig)}"
+            actual=f"In {SETTLE_S:.0f} s of the robot's time none came. {_who_could_send(rig)}"
             f"{rig.raised()}.",
         )
 
@@ -91,7 +92,7 @@ def require_gone(rig: CameraRig, device: str, when: str, node: str = "") -> None
     more = f" In one more second it sent {pictures(sent)}." if sent else ""
     raise Failed(
         expected=f"{when} no endpoint of the driver is on the graph.",
-        actual=f"{later[0].upper()}{later[1:]} there still was {phrase(left)}.{more}",
+        actual=f"{beginning(later)} there still was {phrase(left)}.{more}",
     )
 
 
@@ -102,7 +103,7 @@ def require_threads_ended(rig: CameraRig, among: set[int], when: str) -> None:
     def over() -> bool:
         return not new & rig.process.thread_ids()
 
-    deadline = Deadline(SETTLE)
+    deadline = Deadline(SETTLE_S)
     if rig.wait(over, ENDED):
         return
     # A busy machine may not have come to it yet. But when all is at rest, who is left just waits.
@@ -110,9 +111,9 @@ def require_threads_ended(rig: CameraRig, among: set[int], when: str) -> None:
     if left := len(new & rig.process.thread_ids()):
         raise Failed(
             expected=f"{when} every thread of the driver has ended, within a second.",
-            actual=f"{SETTLE - deadline.left:.1f} s later {left} of those that it had started went "
-            "on: whoever starts a thread tells it to end, and wakes it if it sleeps; whoever makes "
-            "a pool shuts it down.",
+            actual=f"{SETTLE_S - deadline.left:.1f} s later {left} of those that it had started "
+            "went on: whoever starts a thread tells it to end, and wakes it if it sleeps; whoever "
+            "makes a pool shuts it down.",
         )
 
 

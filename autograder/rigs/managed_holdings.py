@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections import Counter
 
 from autograder.exam import Failed
-from autograder.rigs.camera import GHOSTS, SETTLE, CameraRig
+from autograder.rigs.camera import GHOSTS, CameraRig
 from autograder.rigs.camera_duties import require_closed
 from autograder.rigs.camera_graph import NODE, SERVICE, SUBSCRIPTION, told
 from autograder.rigs.camera_node import IMAGE
 from autograder.rigs.managed import Managed
-from autograder.rigs.phrases import phrase
+from autograder.rigs.patience import SETTLE_S
+from autograder.rigs.phrases import beginning, phrase
 
 FOUND = 3.0  # s in which a node in another context is found, as a participant of its own
 
@@ -52,7 +53,7 @@ def require_nothing_held(rig: CameraRig, device: str, when: str) -> None:
     if not rig.wait(lambda: not rig.graph.publishers()):
         raise Failed(
             expected=f"{when} there is no publisher on {IMAGE}.",
-            actual=f"{_later(rig)} the number of publishers was {rig.graph.publishers()}.",
+            actual=f"{beginning(rig.later)} the number of publishers was {rig.graph.publishers()}.",
         )
 
 
@@ -64,13 +65,13 @@ def require_off_graph(rig: CameraRig, node: str, when: str) -> None:
     if name in rig.graph.endpoints(node):
         raise Failed(
             expected=f"{when} the node is off the graph.",
-            actual=f"{_later(rig)} {name} was still there: only the inherited "
+            actual=f"{beginning(rig.later)} {name} was still there: only the inherited "
             "destroy_node() takes it down.",
         )
     made = phrase([told(name) for name in rig.graph.nodes()])
     raise Failed(
         expected=f"{when} nothing that your node made is on the graph.",
-        actual=f"{_later(rig)} there still was {made}.",
+        actual=f"{beginning(rig.later)} there still was {made}.",
     )
 
 
@@ -112,7 +113,7 @@ def require_no_helper_finalized(rig: CameraRig, node: Managed) -> None:
         raise Failed(
             expected="After shutdown in the state active your node holds nothing, no other node "
             "that it has made for this state either.",
-            actual=f"{SETTLE:.0f} s later there still was "
+            actual=f"{SETTLE_S:.0f} s later there still was "
             f"{phrase([told(name) for name in still])}: "
             "on_shutdown() runs then, and neither on_deactivate() nor on_cleanup() before it.",
         )
@@ -123,7 +124,3 @@ def _made(rig: CameraRig) -> list[str]:
     rig.catch_up()
     rig.rest()  # the mark is in one context; what others have told is here when all is at rest
     return rig.graph.nodes(process=True)
-
-
-def _later(rig: CameraRig) -> str:
-    return rig.later[0].upper() + rig.later[1:]

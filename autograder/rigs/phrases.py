@@ -32,3 +32,8 @@ def ended(word: str) -> str:
 def callback_raised(error: str) -> str:
     """Return that a callback raised an ``error``, which says where, as a part of a sentence."""
     return f"a callback raised an error, in {error.rstrip('.')}"
+
+
+def beginning(text: str) -> str:
+    """Return a phrase as the beginning of a sentence."""
+    return text[:1].upper() + text[1:]

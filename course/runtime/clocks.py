@@ -63,7 +63,7 @@ def sleeps_until(job: Job) -> float | None:
     return None
 
 
-def sleeps(job: Job) -> bool:
+def sleeps_by_clock(job: Job) -> bool:
     """Return whether a callback does nothing until its node's clock moves on, by `sleep_until`.
 
     Known from where it is: whether its thread has come to rest by now makes no difference.

@@ -26,7 +26,7 @@ from rclpy.node import Node
 from rclpy.task import Future, Task
 
 from course.runtime import qos_events, streams, taking
-from course.runtime.clocks import sleeps
+from course.runtime.clocks import sleeps_by_clock
 from course.runtime.families import Families
 from course.runtime.gate import Gate
 from course.runtime.idleness import Idleness
@@ -184,7 +184,7 @@ class BackgroundExecutor(Executor):
 
     @staticmethod
     def _blocked(job: Job) -> bool:
-        if sleeps(job):
+        if sleeps_by_clock(job):
             return True
         if job.idleness is None:
             job.idleness = Idleness(job.thread_id)
