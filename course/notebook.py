@@ -24,6 +24,9 @@ def load_ipython_extension(shell: Any) -> None:
     magic.register(shell)
     ros_magic.register(shell)
     unload_ipython_extension(shell)
+    for session in closing.known():
+        if isinstance(session, Session) and session.closed:
+            _reported.news(session)  # of cells that ran before: no news of the next one
     shell.events.register("post_run_cell", _report)
 
 

@@ -38,7 +38,7 @@ from autograder.rigs.camera_rate import (
     require_rate,
     require_tick_zoom,
 )
-from autograder.rigs.lives import LIVES, MEMORY, growth
+from autograder.rigs.lives import MEMORY, growth
 from autograder.rigs.managed import Managed
 from autograder.rigs.managed_holdings import (
     require_no_helper_finalized,
@@ -189,7 +189,7 @@ def camera_given_back(rig: CameraRig) -> None:
     ),
     read=READ_NODES,
 )
-def lives_are_flat(rig: CameraRig) -> str:
+def lives_are_flat(rig: CameraRig) -> None:
     """Over 50 lives the driver's process keeps its threads, files and memory.
 
     A robot is switched on for weeks. What one life leaves behind, however little, adds up until a
@@ -205,9 +205,6 @@ def lives_are_flat(rig: CameraRig) -> str:
         )
     with rig.trying():
         require_flat_snapshots(rig)
-    if grown.made < LIVES:
-        return f"A life of your driver takes {grown.pace:.1f} s, so it was given {grown.made}."
-    return ""
 
 
 @EXAM.check(

@@ -58,7 +58,6 @@ class Growth(NamedTuple):
 
     usage: Usage
     lives: int
-    pace: float  # s that a life takes
 
     @property
     def made(self) -> int:
@@ -82,7 +81,7 @@ def growth(rig: CameraRig) -> Growth:
         min(first.files, second.files),
         min(first.memory, second.memory),
     )
-    return Growth(usage, lives, pace)
+    return Growth(usage, lives)
 
 
 def _grown(rig: CameraRig, lives: int) -> Usage:

@@ -232,3 +232,16 @@ def test_news_is_escaped():
     assert "<b>" not in page
     assert "&lt;b&gt;" in page
     assert "<i>" not in page
+
+
+def test_a_session_closed_before_the_extension_is_no_news(notebook):
+    _, shown = notebook.text(SETUP.replace("%load_ext course", ""))
+    _, shown = notebook.text(
+        "course.run(Talker)\ncourse.until(lambda: course.session().errors)\ncourse.close()"
+    )
+    status, shown = notebook.text("%load_ext course")
+    assert (status, shown) == ("ok", "")
+    status, shown = notebook.text("pass")
+    assert (status, shown) == ("ok", "")
+    _, shown = notebook.text("course.run(Talker)\ncourse.until(lambda: course.session().errors)")
+    assert "ValueError" in shown
