@@ -184,7 +184,7 @@ class CameraRig:
         """Wait until ``condition`` holds, for ``timeout`` s; return whether it did by then.
 
         Without ``timeout`` as long as it may come: until all have slept for ``idle`` s, see
-        `Patience`. `later` says afterwards when that was.
+        `Patience`. `end_of_wait` says afterwards when that was.
         """
         if timeout is None:
             patience = self.patience(idle)
@@ -197,7 +197,7 @@ class CameraRig:
         return False
 
     @property
-    def later(self) -> str:
+    def end_of_wait(self) -> str:
         """When the last wait without a time-out was over, as a phrase."""
         if self.waited < SETTLE_S:
             return "when nothing was at work any more"

@@ -10,7 +10,7 @@ from autograder.rigs.camera import CameraRig
 from autograder.rigs.camera_graph import PUBLISHER
 from autograder.rigs.camera_node import IMAGE
 from autograder.rigs.patience import SETTLE_S
-from autograder.rigs.phrases import beginning, phrase, pictures
+from autograder.rigs.phrases import capitalized, phrase, pictures
 from course.runtime.waiting import Deadline
 
 DRIVER = "CameraDriver"
@@ -77,7 +77,7 @@ def require_closed(rig: CameraRig, device: str, when: str) -> None:
     if not rig.wait(lambda: not rig.cameras(device), idle=ENDED):
         raise Failed(
             expected=f"{when} the camera is closed.",
-            actual=f"Your process still had the camera {device!r} open {rig.later}.",
+            actual=f"Your process still had the camera {device!r} open {rig.end_of_wait}.",
         )
 
 
@@ -85,14 +85,14 @@ def require_gone(rig: CameraRig, device: str, when: str, node: str = "") -> None
     """Fail if an endpoint or a node of the driver is on the graph: it may have made several."""
     if rig.wait(lambda: not rig.graph.left(node)):
         return
-    later, left = rig.later, rig.graph.left(node)
+    when_seen, left = rig.end_of_wait, rig.graph.left(node)
     before = len(rig.pictures(device))
     rig.advance(1.0)
     sent = len(rig.pictures(device)) - before
     more = f" In one more second it sent {pictures(sent)}." if sent else ""
     raise Failed(
         expected=f"{when} no endpoint of the driver is on the graph.",
-        actual=f"{beginning(later)} there still was {phrase(left)}.{more}",
+        actual=f"{capitalized(when_seen)} there still was {phrase(left)}.{more}",
     )
 
 
@@ -111,9 +111,9 @@ def require_threads_ended(rig: CameraRig, among: set[int], when: str) -> None:
     if left := len(new & rig.process.thread_ids()):
         raise Failed(
             expected=f"{when} every thread of the driver has ended, within a second.",
-            actual=f"{SETTLE_S - deadline.left:.1f} s later {left} of those that it had started "
-            "went on: whoever starts a thread tells it to end, and wakes it if it sleeps; whoever "
-            "makes a pool shuts it down.",
+            actual=f"{SETTLE_S - deadline.left:.1f} s later {left} of the threads that it had "
+            "started were still there. If you start a thread, tell it to end, and wake it if it "
+            "sleeps; if you make a thread pool, shut it down.",
         )
 
 
@@ -132,11 +132,11 @@ def require_callbacks_ended(rig: CameraRig, among: set[int], usual: int, when: s
 
     if rig.wait(lambda: not replaced()):
         return
-    later = rig.later
+    when_seen = rig.end_of_wait
     if _works(rig, rig.process.thread_ids() - among):
         raise Failed(
             expected=f"{when} every callback of the driver comes to its end.",
-            actual=f"One that waited for the camera was still waiting {later}. The "
+            actual=f"One that waited for the camera was still waiting {when_seen}. The "
             "thread that runs it is lost: a program with that one thread takes up no callback "
             "ever again.",
         )

@@ -11,7 +11,7 @@ from autograder.rigs.camera_graph import NODE, SERVICE, SUBSCRIPTION, told
 from autograder.rigs.camera_node import IMAGE
 from autograder.rigs.managed import Managed
 from autograder.rigs.patience import SETTLE_S
-from autograder.rigs.phrases import beginning, phrase
+from autograder.rigs.phrases import capitalized, phrase
 
 FOUND = 3.0  # s in which a node in another context is found, as a participant of its own
 
@@ -53,7 +53,8 @@ def require_nothing_held(rig: CameraRig, device: str, when: str) -> None:
     if not rig.wait(lambda: not rig.graph.publishers()):
         raise Failed(
             expected=f"{when} there is no publisher on {IMAGE}.",
-            actual=f"{beginning(rig.later)} the number of publishers was {rig.graph.publishers()}.",
+            actual=f"{capitalized(rig.end_of_wait)} the number of publishers was "
+            f"{rig.graph.publishers()}.",
         )
 
 
@@ -65,13 +66,13 @@ def require_off_graph(rig: CameraRig, node: str, when: str) -> None:
     if name in rig.graph.endpoints(node):
         raise Failed(
             expected=f"{when} the node is off the graph.",
-            actual=f"{beginning(rig.later)} {name} was still there: only the inherited "
+            actual=f"{capitalized(rig.end_of_wait)} {name} was still there: only the inherited "
             "destroy_node() takes it down.",
         )
     made = phrase([told(name) for name in rig.graph.nodes()])
     raise Failed(
         expected=f"{when} nothing that your node made is on the graph.",
-        actual=f"{beginning(rig.later)} there still was {made}.",
+        actual=f"{capitalized(rig.end_of_wait)} there still was {made}.",
     )
 
 

@@ -34,6 +34,6 @@ def callback_raised(error: str) -> str:
     return f"a callback raised an error, in {error.rstrip('.')}"
 
 
-def beginning(text: str) -> str:
-    """Return a phrase as the beginning of a sentence."""
+def capitalized(text: str) -> str:
+    """Return a phrase with a capital letter, to begin a sentence with."""
     return text[:1].upper() + text[1:]

@@ -235,8 +235,8 @@ def test_news_is_escaped():
 
 
 def test_a_session_closed_before_the_extension_is_no_news(notebook):
-    _, shown = notebook.text(SETUP.replace("%load_ext course", ""))
-    _, shown = notebook.text(
+    notebook.text(SETUP.replace("%load_ext course", ""))
+    notebook.text(
         "course.run(Talker)\ncourse.until(lambda: course.session().errors)\ncourse.close()"
     )
     status, shown = notebook.text("%load_ext course")
