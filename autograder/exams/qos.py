@@ -114,7 +114,7 @@ def readings_flow(rig: SensorRig) -> None:
             expected="Each of the four sensors' readings comes out at the consumer.",
             actual=_silence(rig, silent),
         )
-    require_each_at_once(rig)
+    rig.once(require_each_at_once)
     for sensor in SENSORS:
         if sensor.topic in rig.node.altered:
             raise altered(sensor)

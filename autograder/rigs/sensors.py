@@ -225,7 +225,7 @@ class SensorRig:
         return sum(number > 1 for number in numbers.values())
 
     def once(self, experiment: Callable[[SensorRig], Any]) -> Any:
-        """Run an experiment that several checks read, once a sitting."""
+        """Run an experiment that several checks, or parts, read, once a sitting."""
         name = experiment.__name__
         if name not in self._experiments:
             self._experiments[name] = experiment(self)

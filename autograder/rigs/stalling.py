@@ -17,12 +17,13 @@ from functools import partial
 from autograder.rigs.patience import SETTLE_S
 from autograder.rigs.pauses import BURST, Backlog, Burst
 from autograder.rigs.pursuit import pursue
-from autograder.rigs.readings import IMU, SENSORS, STOP, Sensor
+from autograder.rigs.readings import CAMERA, IMU, SENSORS, STOP, Sensor
 from autograder.rigs.sensor_node import LAG, Stream
 from autograder.rigs.sensors import CONSUMERS, SensorRig
 from autograder.rigs.singles import thinned
 
 PAUSE = 1.5  # s that the consumer is busy
+IMU_PAUSE = 0.9  # s of it in which IMU readings come in: nearly twice as many as may be kept
 EVENTS = 100  # stop events in that time
 LONGEST = 60  # s that these may take
 LULL = 0.06  # s without readings at its end: more than half of the time between two scans
@@ -38,7 +39,10 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     """Stall the consumer while readings come in, let it go on, and see what it passes on."""
     phase = "long pause"
     rig.subject.pause(CONSUMERS)
-    streams = {s.name: Stream(rig.node, s, phase, _limit(s)) for s in SENSORS}
+    streams = {s.name: Stream(rig.node, s, phase, _limit(s)) for s in SENSORS if s is not IMU}
+    early = CAMERA.rate * (PAUSE - IMU_PAUSE)
+    rig.wait(lambda: streams[CAMERA.name].sent >= early, LONGEST)
+    streams[IMU.name] = Stream(rig.node, IMU, phase)
     rig.wait(
         lambda: all(stream.sent >= _least(stream.sensor) for stream in streams.values()), LONGEST
     )
@@ -50,7 +54,7 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
         published = {s.name: _published(rig, s, phase, counts[s.name]) for s in SENSORS}
         # So that a reading is clearly on this side of a bound or on that one, whatever the jitter.
         rig.wait(lambda: _youngest(rig, phase, counts) >= LULL)
-        early = {s.name for s in SENSORS if rig.consumed(s, phase)}
+        came_early = {s.name for s in SENSORS if rig.consumed(s, phase)}
         resumed = time.time_ns()
         rig.subject.resume(CONSUMERS)
     # All but the events go on, as on a robot.
@@ -59,7 +63,7 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
 
     def left(sensor: Sensor) -> Backlog:
         name = sensor.name
-        return _left(rig, sensor, phase, counts[name], published[name], resumed, name in early)
+        return _left(rig, sensor, phase, counts[name], published[name], resumed, name in came_early)
 
     # What is decided is not watched any longer, and no more of it comes in.
     open_ones = [s for s in SENSORS if s is not STOP and not _is_decided(rig, left(s))]
@@ -121,7 +125,9 @@ def _youngest(rig: SensorRig, phase: str, counts: Mapping[str, int]) -> float:
 
 
 def _least(sensor: Sensor) -> int:
-    return EVENTS if sensor is STOP else int(sensor.rate * PAUSE)
+    if sensor is STOP:
+        return EVENTS
+    return int(sensor.rate * (IMU_PAUSE if sensor is IMU else PAUSE))
 
 
 def _limit(sensor: Sensor) -> int:

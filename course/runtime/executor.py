@@ -9,7 +9,7 @@ import functools
 import threading
 import time
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from typing import Any
 
 from rclpy.context import Context
@@ -25,12 +25,13 @@ from rclpy.executors import (
 from rclpy.node import Node
 from rclpy.task import Future, Task
 
-from course.runtime import qos_events, streams, taking
+from course.runtime import qos_events, streams
 from course.runtime.clocks import sleeps_by_clock
 from course.runtime.families import Families
 from course.runtime.gate import Gate
 from course.runtime.idleness import Idleness
 from course.runtime.jobs import Job, Report
+from course.runtime.ready import Ready, WaitList
 from course.runtime.tasks import CreatedTasks, find_owner
 from course.runtime.teardown import is_alive
 from course.runtime.threads import Threads
@@ -40,6 +41,10 @@ from course.runtime.workers import Workers
 
 def _never() -> bool:
     return False
+
+
+def _nothing() -> None:
+    """Wake nobody: the one thread has run the callback itself."""
 
 
 def _has_entities(node: Node) -> bool:
@@ -79,6 +84,7 @@ class BackgroundExecutor(Executor):
         `report` hears of each callback that raised, `pulse` of each that ended.
         """
         super().__init__(context=context)
+        self._wait_list = WaitList(self, super().wake if threads > 1 else _nothing)
         self.threads = threads
         self.session_key = session_key
         self.report = report
@@ -115,6 +121,7 @@ class BackgroundExecutor(Executor):
         See `Threads.join`. A thread that was given up is not waited for.
         """
         left = self._threads.join(deadline, self.running, self.given_up)
+        self._wait_list.clear()
         self._drop_what_never_began()
         return left
 
@@ -230,6 +237,11 @@ class BackgroundExecutor(Executor):
 
     # What rclpy's own executors override.
 
+    def wake(self) -> None:
+        """Wait anew: something was created or destroyed, or has changed in another way."""
+        self._wait_list.changed = True
+        super().wake()
+
     def add_node(self, node: Node) -> bool:
         """Add a node; one that a callback of another node adds belongs to that node."""
         with self._families.arrival(node):
@@ -239,6 +251,15 @@ class BackgroundExecutor(Executor):
         """Return the next job, its entity and its node; only the timeout matters."""
         job = self._next_job(args[0] if args else kwargs.get("timeout_sec"))
         return job, job.entity, job.node
+
+    def _wait_for_ready_callbacks(
+        self,
+        timeout_sec: Any = None,
+        nodes: list[Node] | None = None,
+        condition: Callable[[], bool] = _never,
+    ) -> Generator[Ready, None, None]:
+        timeout = getattr(timeout_sec, "timeout", timeout_sec)
+        return self._wait_list.ready(timeout, nodes, condition)
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Task:
         """Schedule a function, a coroutine function or a coroutine, as every executor does."""
@@ -356,8 +377,6 @@ class BackgroundExecutor(Executor):
         if job.unfinished is not None:
             streams.finish_lines(job)
         if failure is not None:
-            if taking.give_back(job, failure):
-                self.wake()
             self.report(job, failure)
         if job.entity is None and (job.task.done() or job.task.cancelled()):
             self._created.forget(job.task)

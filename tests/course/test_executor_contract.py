@@ -18,6 +18,7 @@ import rclpy
 from rclpy.action import ActionClient, ActionServer, CancelResponse
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
 from rclpy.context import Context
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import (
     Executor,
@@ -26,6 +27,7 @@ from rclpy.executors import (
     SingleThreadedExecutor,
 )
 from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
 from rclpy.timer import Timer
 from rclpy.waitable import NumberOfEntities, Waitable
@@ -553,6 +555,18 @@ def test_entities_come_and_go_while_their_node_spins(host):
         done = executor_of(node).create_task(node.destroy_subscription, subscription)
         wait(done.done)
         node.destroy_publisher(publisher)
+
+
+def test_an_event_is_told_while_callbacks_follow_each_other(host):
+    node, ticks, told = host.run(), threading.Event(), threading.Event()
+    node.create_timer(0.001, ticks.set)
+    assert ticks.wait(PATIENCE)
+    asked = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE)
+    offered = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    events = SubscriptionEventCallbacks(incompatible_qos=lambda _: told.set())
+    node.create_subscription(String, "words", lambda _: None, asked, event_callbacks=events)
+    node.create_publisher(String, "words", offered)
+    assert told.wait(PATIENCE)
 
 
 def test_a_cancelled_timer_stops_and_a_reset_one_goes_on(host):
