@@ -51,17 +51,15 @@ def _markdown(request: dict[str, Any]) -> dict[str, Any]:
 
 
 def _answer(request: dict[str, Any]) -> dict[str, Any]:
-    return {"made": screen.answer(request["text"], request["taken"], _elements)}
+    def elements(text: str) -> tuple[bool, list[str]]:
+        made = _made(text, request["attachments"])
+        strip_files_prefix(made)  # type: ignore[no-untyped-call]  # the formgrader does, for long
+        found = _Elements()
+        found.feed(made)
+        found.close()
+        return found.pair_up and not found.open, found.ids
 
-
-def _elements(text: str) -> tuple[bool, list[str]]:
-    """Return whether all elements of a Markdown text pair up, and their ids."""
-    made = _made(text, {})
-    strip_files_prefix(made)  # type: ignore[no-untyped-call]  # as the formgrader does: it takes time
-    found = _Elements()
-    found.feed(made)
-    found.close()
-    return found.pair_up and not found.open, found.ids
+    return {"made": screen.answer(request["text"], request["taken"], elements)}
 
 
 def _made(text: str, attachments: dict[str, Any]) -> str:

@@ -95,7 +95,7 @@ class FeedbackExporter(HTMLExporter):
         """Give nbconvert's filters, the slow ones made elsewhere and with bounds."""
         yield from super().default_filters()  # type: ignore[no-untyped-call]
         yield "markdown2html", self._formatted
-        yield "strip_files_prefix", str  # is done with the rest
+        yield "strip_files_prefix", _same  # it is done where the rest is done
 
     @pass_context
     def _formatted(self, context: Any, text: str) -> str:
@@ -132,8 +132,12 @@ class FeedbackExporter(HTMLExporter):
             cls().from_notebook_node(notebook)
 
 
+def _same(text: str) -> str:
+    return text
+
+
 def _as_typed(text: str) -> str:
-    return f"<p><em>{TOO_LONG}</em></p><pre>{html.escape(text)}</pre>"
+    return f"<p><em>{TOO_LONG}</em></p><pre>{html.escape(screen.shortened(text))}</pre>"
 
 
 class _AsItIs(str):

@@ -46,9 +46,11 @@ class Page:
         """Return Markdown as HTML, with the pictures of its ``attachments``; None if over time."""
         return self._ask("markdown", text, attachments=attachments)
 
-    def answer(self, text: str, taken: Collection[str]) -> str | None:
+    def answer(
+        self, text: str, taken: Collection[str], attachments: Mapping[str, Any]
+    ) -> str | None:
         """Return Markdown that may stand for an answer (`screen.answer`); None if over time."""
-        return self._ask("answer", text, taken=list(taken))
+        return self._ask("answer", text, taken=list(taken), attachments=attachments)
 
     def code(self, text: str, language: str = "ipython3") -> str | None:
         """Return code as coloured HTML; None if over time."""
@@ -79,7 +81,9 @@ class _Formatter:
         """Return the running process; what it imports takes it a second."""
         if self._owner != os.getpid():  # after a fork it is another process's
             self._process = None
-        if self._process is None or self._process.poll() is not None:
+        if self._process is not None and self._process.poll() is not None:
+            self.end()
+        if self._process is None:
             self._owner = os.getpid()
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "autograder.formatting"], stdin=subprocess.PIPE,

@@ -24,7 +24,7 @@ import nh3
 from nbformat import NotebookNode
 from pygments.token import STANDARD_TYPES
 
-from autograder import submission
+from autograder import outputs, submission
 
 if TYPE_CHECKING:
     from autograder.page_texts import Page
@@ -188,8 +188,23 @@ def _linked(text: str, place: int) -> str:
     return "]" if is_link(target, picture=True) else f"]{_JOINER}"
 
 
+MAX_PLAIN = 100_000
+"""Characters that are shown of a text that is not formatted; all of it stands in the submission."""
+
+_LINE = re.compile(r"[^\n]{200}(?=[^\n])")
+
+
+def shortened(text: str) -> str:
+    """Return what is shown of a text that is not formatted."""
+    return outputs.shortened_text(text[:MAX_PLAIN], max(len(text) - MAX_PLAIN, 0))
+
+
 def fenced(text: str) -> str:
-    """Return a text as one block of code: what takes too long to format reads the same in it."""
+    """Return a text as one block of code: what takes too long to format reads the same in it.
+
+    Its lines are short, because nbconvert looks for links in code, too, and slowly in long lines.
+    """
+    text = _LINE.sub(r"\g<0>\n", shortened(text))
     longest = max(map(len, re.findall(r"`{3,}", text)), default=2)
     fence = "`" * (longest + 1)
     return f"{fence}\n{_TAG_BEGINS.sub(f'<{_JOINER}', text)}\n{fence}"
@@ -212,13 +227,15 @@ def screen_texts(notebook: NotebookNode, released: NotebookNode, page: Page) -> 
         if cell.cell_type == "raw":
             cell.source = _TAG_BEGINS.sub(f"<{_JOINER}", cell.source)
         elif cell.cell_type == "markdown":
-            cell.source = _fit(cell.source, taken, page)
+            cell.source = _fit(cell.source, taken, page, cell.get("attachments", {}))
         elif cell.cell_type == "code" and page.code(cell.source) is None:
             cell.metadata["magics_language"] = "text"  # what nbconvert has for "not coloured"
 
 
-def _fit(text: str, taken: Collection[str], page: Page) -> str:
-    shown = page.answer(text, taken)
+def _fit(
+    text: str, taken: Collection[str], page: Page, attachments: Mapping[str, Any] | None = None
+) -> str:
+    shown = page.answer(text, taken, attachments or {})
     return fenced(text) if shown is None else shown
 
 
