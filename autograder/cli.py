@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from autograder import marks_cli, quiz_cli
 from autograder.interruption import Stopped
+from autograder.terminal import Terminal, visible_json
 from course.errors import CourseError
 
 EXIT_DIFFERENT = 1
@@ -29,8 +29,8 @@ app = typer.Typer(
 )
 app.add_typer(marks_cli.app, name="marks")
 app.add_typer(quiz_cli.app, name="quiz")
-out = Console()
-err = Console(stderr=True)
+out = Terminal()
+err = Terminal(stderr=True)
 
 Root = Annotated[
     Path | None,
@@ -125,7 +125,7 @@ def grade(
     else:
         _grades_table(grades, problems)
         places = (where / "gradebook.db", where / "feedback", where / "grades.csv")
-        out.print(f"Written: {', '.join(map(str, places))}", soft_wrap=True, highlight=False)
+        out.print(f"Written: {', '.join(map(str, places))}", soft_wrap=True)
     if any(not graded.entered for graded in done):
         raise typer.Exit(EXIT_DIFFERENT)
 
@@ -162,7 +162,7 @@ def claim(
     said = intake_command.claim(
         _root(root), assignment, student, notebook, file, nothing=nothing, withdraw=withdraw
     )
-    out.print(said, soft_wrap=True, highlight=False, markup=False)
+    out.print(said, soft_wrap=True)
 
 
 @app.command()
@@ -184,7 +184,7 @@ def extend(
             else f"run `autograder grade {assignment}`, and the penalty is reckoned again."
         )
         line = f"{due.student}: due {due.time:%Y-%m-%d %H:%M} UTC; {then}"
-        out.print(line, soft_wrap=True, highlight=False, markup=False)
+        out.print(line, soft_wrap=True)
 
 
 @app.command()
@@ -221,7 +221,7 @@ def corpus(
             f"{len(flips)} checks that changed between repeats."
         )
         for line in (*flips, *(f"{t.case.name}: {t.difference}" for t in different)):
-            out.print(f"  {line}", soft_wrap=True, highlight=False, markup=False)
+            out.print(f"  {line}", soft_wrap=True)
     if different or flips:
         raise typer.Exit(EXIT_DIFFERENT)
 
@@ -289,12 +289,11 @@ def report(
     _grades_table(list(grades), {})
     out.print(*made.tables(), sep="\n")
     for remark in made.remarks:
-        out.print(remark, soft_wrap=True, highlight=False, markup=False)
-    out.print(f"Written: {', '.join(map(str, made.files))}", soft_wrap=True, highlight=False,
-              markup=False)  # fmt: skip
+        out.print(remark, soft_wrap=True)
+    out.print(f"Written: {', '.join(map(str, made.files))}", soft_wrap=True)
     for quiz in quizzes:
         out.print(*quiz.tables(), sep="\n")
-        out.print(f"Written: {', '.join(map(str, quiz.files))}", soft_wrap=True, highlight=False)
+        out.print(f"Written: {', '.join(map(str, quiz.files))}", soft_wrap=True)
 
 
 @app.command()
@@ -335,11 +334,9 @@ def feedback(
     if as_json:
         _print_json(vars(packed))
         return
-    out.print(f"Feedback for {counted(len(packed.students), 'student')}: {file}", soft_wrap=True,
-              highlight=False, markup=False)  # fmt: skip
+    out.print(f"Feedback for {counted(len(packed.students), 'student')}: {file}", soft_wrap=True)
     for why, who in packed.left_out.items():
-        out.print(f"Not in it, {why}: {', '.join(who)}.", soft_wrap=True, highlight=False,
-                  markup=False)  # fmt: skip
+        out.print(f"Not in it, {why}: {', '.join(who)}.", soft_wrap=True)
 
 
 @app.command()
@@ -384,7 +381,7 @@ def _demo_table(done: Any) -> None:
         "formgrader": f"run `jupyter lab` in {done.root}",
     }
     for what, path in places.items():
-        out.print(f"{what:>11}: {path}", soft_wrap=True, highlight=False)
+        out.print(f"{what:>11}: {path}", soft_wrap=True)
 
 
 def _grades_table(grades: list[Any], problems: dict[str, str]) -> None:
@@ -398,7 +395,7 @@ def _say(silent: bool) -> Any:
 
 
 def _print_json(data: Any) -> None:
-    sys.stdout.write(json.dumps(data, default=str, ensure_ascii=False) + "\n")
+    sys.stdout.write(visible_json(json.dumps(data, default=str, ensure_ascii=False)) + "\n")
 
 
 def _root(root: Path | None) -> Path:
@@ -416,14 +413,14 @@ def main() -> None:
     try:
         app()
     except CourseError as error:
-        err.print(f"autograder: {error}", markup=False, highlight=False, soft_wrap=True)
+        err.print(f"autograder: {error}", soft_wrap=True)
         sys.exit(error.exit_code)
     except OSError as error:
         where = f" ({error.filename})" if error.filename else ""
         err.print(
             f"autograder: {error.strerror or error}{where}: make room or choose another folder, "
             "then run the same command again; what was graded so far is kept.",
-            markup=False, highlight=False, soft_wrap=True,
+            soft_wrap=True,
         )  # fmt: skip
         sys.exit(1)
     except Stopped as stop:

@@ -19,6 +19,7 @@ from autograder import (
     quiz_marks,
     roster,
     runner,
+    screen,
     staging,
     submission,
 )
@@ -32,6 +33,7 @@ from autograder.jobs import Job
 from autograder.ledger import Standing
 from autograder.marked import Marks
 from autograder.nbgrader_once import FeedbackExporter
+from autograder.page_texts import Page
 from autograder.runner import Outcome
 from autograder.submission import SubmissionError
 from autograder.verdict import Status, Verdict
@@ -146,6 +148,7 @@ class Desk:
                 said = f"{why} Say it with `{command}`, or with --nothing in place of the file."
                 work.problems.append(said)
                 bridge.ask(notebook, said, [cell])
+            screen.screen_texts(notebook, self._originals[name][1], Page())
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
             yield replace(piece, marks=quizzes.verdicts)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from autograder import files, roster, sandbox
+from autograder import files, page_texts, roster, sandbox
 from autograder import nbgrader_bridge as bridge
 from autograder.anew import Anew
 from autograder.class_run import ClassRun, Graded
@@ -95,6 +95,7 @@ def grade(
     if not trust and not scheduler:
         sandbox.warm_up()
         sandbox.require()
+    page_texts.warm_up()
     refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
     refused += [Graded(s, {}, problem=EXCLUDED) for s in found if s in gradebook.excluded]
     found = [s for s in found if s not in gradebook.excluded]

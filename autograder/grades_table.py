@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from rich.markup import escape
 from rich.table import Table
 
 from autograder.gradebook import Grade
@@ -30,8 +29,8 @@ def table(grades: Iterable[Grade], problems: Mapping[str, str]) -> Table:
             cells += [lateness(grade.seconds_late), f"-{grade.penalty:g}" if grade.penalty else ""]
         needs = "yes" if grade.needs_manual_grade else ""
         remark = problems.get(grade.student, "") or " ".join(grade.asked.values())
-        made.add_row(*map(escape, (*cells, needs, remark)))
+        made.add_row(*cells, needs, remark)
     for student in sorted(problems.keys() - {grade.student for grade in grades}):
         empty = ["" for _ in more]
-        made.add_row(*map(escape, (shown(student), "none", *empty, "yes", problems[student])))
+        made.add_row(shown(student), "none", *empty, "yes", problems[student])
     return made

@@ -8,15 +8,15 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
+
+from autograder.terminal import Terminal, visible_json
 
 app = typer.Typer(
     help="Mark one written question over a whole class.", no_args_is_help=True,
     add_completion=False,
 )  # fmt: skip
-out = Console()
+out = Terminal()
 
 Root = Annotated[
     Path | None,
@@ -73,11 +73,10 @@ def export(
     table = Table("Question", "Grade id", "Answers", "Waiting", "Empty")
     for a in found:
         counts = (str(len(a.answers)), str(a.waiting), str(len(a.empty)))
-        table.add_row(escape(a.question.title), a.question.grade_id, *counts)
+        table.add_row(a.question.title, a.question.grade_id, *counts)
     out.print(table)
     if files:
-        out.print(f"Written: {', '.join(map(str, files))}", soft_wrap=True, highlight=False,
-                  markup=False)  # fmt: skip
+        out.print(f"Written: {', '.join(map(str, files))}", soft_wrap=True)
 
 
 @app.command("import")
@@ -103,20 +102,20 @@ def enter(
             f"{entered.question}: {counted(len(entered.marked), 'mark')} entered, "
             f"{len(entered.already)} as they were, {len(entered.blank)} left blank."
         )
-        out.print(said, soft_wrap=True, highlight=False, markup=False)
+        out.print(said, soft_wrap=True)
         if entered.changed:
             who = ", ".join(entered.changed)
             out.print(
                 "Not entered, because the answer or its mark has changed since the export: "
                 f"{who}. Export the question again and mark these.",
-                soft_wrap=True, highlight=False, markup=False,
+                soft_wrap=True,
             )  # fmt: skip
     if entered.changed:
         raise typer.Exit(1)
 
 
 def _print_json(data: Any) -> None:
-    sys.stdout.write(json.dumps(data, default=str, ensure_ascii=False) + "\n")
+    sys.stdout.write(visible_json(json.dumps(data, default=str, ensure_ascii=False)) + "\n")
 
 
 def _root(root: Path | None) -> Path:

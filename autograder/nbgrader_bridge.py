@@ -22,11 +22,21 @@ from nbgrader.preprocessors import NbGraderPreprocessor
 from nbgrader.utils import parse_utc
 from traitlets import Bool
 
-from autograder import cells, intake_asked, intake_cells, intake_stock, outputs, roster, submission
+from autograder import (
+    cells,
+    intake_asked,
+    intake_cells,
+    intake_stock,
+    outputs,
+    roster,
+    screen,
+    submission,
+)
 from autograder.beside import files_beside
 from autograder.extensions import Waiting
 from autograder.insight import records
 from autograder.intake import Intake, UnclearError
+from autograder.page_texts import Page
 from autograder.report import Report
 from autograder.submission import SubmissionError
 from autograder.verdict import Verdict
@@ -106,6 +116,7 @@ class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ship
         folder, root = intake_stock.submitted(coursedir, assignment, student), Path(coursedir.root)
         for name, (why, command) in quiz_marks.questions(nb, folder, student, root).items():
             ask(nb, f"{why} Say it with `{command}`.", [name])
+        screen.screen_texts(nb, released, Page())
         # The grading steps read what is written here: nothing of a submission's own metadata is.
         nb.metadata[NOTES_KEY] = notes
         if UNREADABLE_KEY in resources:
@@ -129,12 +140,16 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         unreadable = str(nb.metadata.pop(UNREADABLE_KEY, ""))
         outcome = prepared.get(_names(resources)) or self._outcome(nb, resources, unreadable)
         outcome = runner.with_notes(outcome, notes)
+        texts = Page()
         code_cells = [cell for cell in nb.cells if cell.cell_type == "code"]
         for cell, shown in zip(code_cells, outcome.outputs, strict=True):
             verdict = outcome.verdicts.get(submission.grade_id(cell))
             if verdict is None:
                 shown = outputs.of_test(shown, float(submission.metadata(cell).get("points") or 0))
-                cell.outputs = [new_output(**output) for output in shown]  # type: ignore[no-untyped-call]
+                cell.outputs = [
+                    new_output(**screen.screened(output, texts))  # type: ignore[no-untyped-call]
+                    for output in shown
+                ]
             else:
                 # What stands here goes into the student's feedback: no hidden check, no key.
                 cell.source = cells.without_hidden(cell.source)

@@ -5,14 +5,14 @@ And what its database really raised: nbgrader itself passes on a log, in which a
 Its converters compile every HTML template for each student, and each of its many openings of the
 gradebook makes a database engine of its own, whose SQL is then compiled from nothing. Both took
 half of the time in which a student's scores and feedback are written. Half of what was left of
-feedback's went into a second reading of each page, which most pages do not need.
+feedback's went into a second reading of each page, which ours do not need.
 """
 
 from __future__ import annotations
 
-import re
+import html
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -20,14 +20,15 @@ from typing import Any
 import nbconvert.exporters.html
 import nbgrader.api
 import sqlalchemy
-from jinja2 import BytecodeCache, Environment
+from jinja2 import BytecodeCache, Environment, pass_context
 from jinja2.bccache import Bucket
 from nbconvert.exporters import HTMLExporter
-from nbformat import NotebookNode
+from nbformat import NotebookNode, from_dict
 from sqlalchemy.exc import DataError, IntegrityError
 from traitlets.config import Config
 
-from autograder import feedback_page
+from autograder import feedback_page, page_texts, screen
+from autograder.page_texts import Page
 from autograder.pictures import with_pictures
 
 
@@ -48,9 +49,7 @@ class _Compiled(BytecodeCache):
 _compiled = _Compiled()
 
 
-_TAG = re.compile(r"<[a-z/!?]", re.IGNORECASE)
-_PLAIN = {"text/plain", "text/vnd.mermaid"}
-"""Outputs that a page shows as text, character by character."""
+TOO_LONG = "It takes too long to format this text, so it is shown as it was typed."
 
 
 class FeedbackExporter(HTMLExporter):
@@ -72,18 +71,45 @@ class FeedbackExporter(HTMLExporter):
     ) -> tuple[Any, dict[str, Any]]:
         """Return the page, with the pictures that lie beside the notebook in it.
 
-        nbconvert parses each page that it has made, to give pictures a text to read aloud, and so
-        closes the tags that a student has left open. Where there can be neither, it need not.
+        nbconvert parses each page that it has made, to give pictures a text to read aloud and to
+        close the tags that were left open. What is formatted here has both already.
         """
-        with nullcontext() if _has_html_of_its_own(nb) else _pages_as_they_are():
+        self._texts = Page()
+        self.filters["highlight_code"] = self._coloured
+        with _pages_as_they_are():
             page, resources = super().from_notebook_node(nb, resources, **more)
         folder = resources.get("metadata", {}).get("path")
         return with_pictures(page, Path(folder)) if folder else page, resources
 
     def _preprocess(self, nb: NotebookNode, resources: Any) -> tuple[NotebookNode, Any]:
         nb, resources = super()._preprocess(nb, resources)  # type: ignore[no-untyped-call]
+        for cell in nb.cells:
+            if cell.cell_type == "raw":
+                cell.source = html.escape(cell.source)
+            elif cell.cell_type == "code" and not cell.metadata.get("nbgrader", {}).get("grade"):
+                cell.outputs = [self._screened(output) for output in cell.outputs]
         resources["feedback"] = feedback_page.describe(nb, resources, self.parent)
         return nb, resources
+
+    def default_filters(self) -> Iterator[tuple[str, Any]]:
+        """Give nbconvert's filters, the slow ones made elsewhere and with bounds."""
+        yield from super().default_filters()  # type: ignore[no-untyped-call]
+        yield "markdown2html", self._formatted
+        yield "strip_files_prefix", _same  # it is done where the rest is done
+
+    @pass_context
+    def _formatted(self, context: Any, text: str) -> str:
+        attachments = context.get("cell", {}).get("attachments", {})
+        made = self._texts.markdown(text, attachments)
+        return _as_typed(text) if made is None else made
+
+    def _coloured(self, text: str, language: Any = None, metadata: Any = None) -> str:
+        chosen = language or (metadata or {}).get("magics_language") or "ipython3"
+        made = self._texts.code(text or " ", str(chosen))
+        return _as_typed(text) if made is None else made
+
+    def _screened(self, output: NotebookNode) -> NotebookNode:
+        return from_dict(screen.screened(output, self._texts))  # type: ignore[no-untyped-call,no-any-return]
 
     def _create_environment(self) -> Environment:
         environment: Environment = super()._create_environment()  # type: ignore[no-untyped-call]
@@ -101,24 +127,17 @@ class FeedbackExporter(HTMLExporter):
 
         What highlights code and renders Markdown is warm then, too.
         """
+        page_texts.warm_up()
         with suppress(Exception):  # only time is lost: where it matters, nbgrader meets it, too
             cls().from_notebook_node(notebook)
 
 
-def _has_html_of_its_own(notebook: NotebookNode) -> bool:
-    """Whether a page has HTML in it that is neither a template's nor the autograder's."""
-    for cell in notebook.cells:
-        ours = cell.metadata.get("nbgrader", {})
-        if cell.cell_type != "code":
-            if not ours.get("locked") and _TAG.search(cell.source):
-                return True
-        elif not ours.get("grade") and any(map(_is_rich, cell.outputs)):
-            return True
-    return False
+def _same(text: str) -> str:
+    return text
 
 
-def _is_rich(output: NotebookNode) -> bool:
-    return bool(output.get("data", {}).keys() - _PLAIN)
+def _as_typed(text: str) -> str:
+    return f"<p><em>{TOO_LONG}</em></p><pre>{html.escape(screen.shortened(text))}</pre>"
 
 
 class _AsItIs(str):

@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
+from autograder.terminal import visible
+
 if TYPE_CHECKING:
     from autograder.class_run import Graded
 
@@ -106,7 +108,7 @@ class Lines(Progress):
 
     def say(self, line: str) -> None:
         """Print a line."""
-        self._out.print(line, markup=False, highlight=False, soft_wrap=True)
+        self._out.print(visible(line), markup=False, highlight=False, soft_wrap=True)
 
 
 class Live(Lines):

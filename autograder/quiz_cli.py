@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
+from autograder.terminal import Terminal
 from course.errors import CourseError
 
 if TYPE_CHECKING:
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 app = typer.Typer(
     help="Write quizzes, and exchange them with learning platforms.", no_args_is_help=True
 )
-out = Console()
-err = Console(stderr=True)
+out = Terminal()
+err = Terminal(stderr=True)
 
 _NAMES = "such as ch05 or one of the course's own (authoring/banks), or a bank's YAML file."
 Quiz = Annotated[str, typer.Argument(help=f"A quiz {_NAMES}")]
@@ -97,7 +97,7 @@ def lint(quizzes: Quizzes, root: Root = None) -> None:
 
 def _faults(quiz: str, error: BankError) -> None:
     if error.faults == (str(error),):  # it could not be read at all, or has a single fault
-        err.print(f"autograder: {error}", markup=False, highlight=False, soft_wrap=True)
+        err.print(f"autograder: {error}", soft_wrap=True)
         return
     then = "Its questions are read critically once these are mended."
     _say(f"{quiz}: {len(error.faults)} to mend", [*error.faults, then])
@@ -143,4 +143,4 @@ def as_course_errors() -> Iterator[None]:
 
 def _say(headline: str, notes: list[str]) -> None:
     for line in (headline, *(f"  {note}" for note in notes)):
-        out.print(line, markup=False, highlight=False, soft_wrap=True)
+        out.print(line, soft_wrap=True)

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from autograder import quiz_marks, submission
+from autograder import quiz_marks, quiz_sharing, submission
 from autograder.quiz_cli import QuizCommandError, as_course_errors
-from quizzes import record
+from quizzes import record, sharing
 
 if TYPE_CHECKING:
     from quizzes.bank import Bank
@@ -19,10 +19,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class QuizReport:
-    """What the attempts at one quiz say, and the files in which it stands."""
+    """What the attempts at one quiz say, and the files in which it stands.
+
+    ``shared`` are groups of learners who have handed in the same attempts.
+    """
 
     analysis: Analysis
     files: list[Path]
+    shared: tuple[tuple[str, ...], ...] = ()
 
     def as_data(self) -> dict[str, Any]:
         """Return the report for machines."""
@@ -36,11 +40,13 @@ class QuizReport:
                 {**vars(figures), "share": figures.share} for figures in analysis.beliefs
             ],
             "notes": list(analysis.notes),
+            "same_attempts": [list(group) for group in self.shared],
+            "cannot_know": sharing.CANNOT_KNOW,
             "files": [str(path) for path in self.files],
         }
 
-    def tables(self) -> tuple[Table, Table]:
-        """Return the items and the misconceptions that somebody holds, for a terminal."""
+    def tables(self) -> tuple[Table, ...]:
+        """Return the items, the misconceptions that somebody holds, and who shares attempts."""
         from quizzes.insight import report
 
         items = Table("Item", "Kind", "Learners", "p", "r", "Remark", padding=(0, 0))
@@ -55,7 +61,11 @@ class QuizReport:
             if figures.holders:
                 held = f"{figures.holders} of {figures.met}"
                 beliefs.add_row(figures.belief, held, f"{100 * figures.share:.0f} %")
-        return items, beliefs
+        shared = Table("The same attempts were handed in by")
+        shared.caption = sharing.CANNOT_KNOW
+        for group in self.shared or [("nobody",)]:
+            shared.add_row(", ".join(group))
+        return items, beliefs, shared
 
 
 def assignment_of(root: Path, name: str) -> str:
@@ -93,14 +103,20 @@ def of_assignment(root: Path, assignment: str) -> list[QuizReport]:
     for name in quiz_marks.names(root):
         if any((folder / record.filename(name)).exists() for folder in folders.values()):
             bank = quiz_marks.find_bank(root, name)
-            reports.append(_report(bank, folders, root / "reports" / assignment))
+            reports.append(_report(bank, folders, root, assignment))
     return reports
 
 
-def _report(bank: Bank, folders: dict[str, Path], target: Path) -> QuizReport:
+def _report(bank: Bank, folders: dict[str, Path], root: Path, assignment: str) -> QuizReport:
     from quizzes import insight  # plots take a moment to import
 
+    target = root / "reports" / assignment
     with as_course_errors():
         collected = insight.collect(bank, folders)
-        analysis = insight.analyse(bank, collected.results, collected.notes)
-        return QuizReport(analysis, insight.write(analysis, target))
+        shared = quiz_sharing.same_attempts(root, assignment, bank.quiz, folders)
+        notes = [
+            *(f"The same attempts were handed in by {', '.join(group)}." for group in shared),
+            *collected.notes,
+        ]
+        analysis = insight.analyse(bank, collected.results, notes)
+        return QuizReport(analysis, insight.write(analysis, target), tuple(shared))

@@ -15,6 +15,7 @@ from autograder.intake_times import UnclearTimeError
 from quizzes.record import read_plain
 
 GLOB = "*?[]"
+HTML = '<>"'
 LONGEST_ID = 128
 """Characters of a student id in nbgrader's gradebook."""
 
@@ -181,6 +182,11 @@ def _bad_id(student: str) -> str:
         return (
             f"nbgrader takes one of the characters {' '.join(GLOB)} in the folder name '{student}' "
             "for a pattern: rename the folder."
+        )
+    if set(student) & set(HTML):
+        return (
+            f"nbgrader's pages take one of the characters {' '.join(HTML)} in the folder name "
+            f"'{student}' for HTML: rename the folder."
         )
     if not student.isprintable():
         return (

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
 
-from autograder import roster
+from autograder import roster, screen
 from autograder.beside import named
 from autograder.files import walk
 from quizzes.record import read_plain
@@ -53,6 +53,7 @@ class _LeftOut:
     links: list[str] = field(default_factory=list)
     too_large: list[str] = field(default_factory=list)
     unreadable: list[str] = field(default_factory=list)
+    active: list[str] = field(default_factory=list)
     too_many: int = 0
 
     def sentences(self) -> list[str]:
@@ -66,6 +67,10 @@ class _LeftOut:
         if self.unreadable:
             found.append(
                 f"{named(self.unreadable)} is missing {what}: make it readable, then grade again."
+            )
+        if self.active:
+            found.append(
+                f"{named(self.active)} is missing {what}: a browser would run what stands in it."
             )
         if self.too_many:
             found.append(f"{self.too_many} files are missing {what}: {MAX_STAGED} are copied.")
@@ -119,6 +124,8 @@ def copy_files(
             left_out.too_many += 1
         elif not os.access(path, os.R_OK):
             left_out.unreadable.append(str(name))
+        elif not screen.may_lie_beside(name.name, path.read_bytes):
+            left_out.active.append(str(name))
         else:
             (staged / name.parent).mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, staged / name, follow_symlinks=False)
@@ -140,6 +147,8 @@ def copy_around(
         if name.is_absolute() or ".." in name.parts:
             continue
         if _is_passed_over(name, limits.ignored, pages):
+            continue
+        if not screen.may_lie_beside(name.name, lambda content=content: content):  # type: ignore[misc]
             continue
         if not any((staged / part).is_file() for part in (name, *name.parents)):
             (staged / name.parent).mkdir(parents=True, exist_ok=True)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from autograder.insight import exports, report
@@ -39,17 +38,17 @@ class Made:
         for check in self.report.checks:
             rate = "" if check.failure_rate is None else f"{100 * check.failure_rate:.0f} %"
             r = "" if check.discrimination is None else f"{check.discrimination:+.2f}"
-            checks.add_row(escape(check.title), str(check.examined), rate, r, check.advice)
+            checks.add_row(check.title, str(check.examined), rate, r, check.advice)
         means = Table("Exercise", "Mean", "n", "Waiting", padding=(0, 1))
         for mean in self.report.means.exercises:
             value = "" if mean.mean is None else f"{mean.mean:.1f} of {mean.max_points:g}"
-            means.add_row(escape(mean.about), value, str(mean.n), str(mean.waiting or ""))
+            means.add_row(mean.about, value, str(mean.n), str(mean.waiting or ""))
         needs = Table("Needs a person", "How many", "Who")
         for need in self.report.needs:
             named = [self.report.data.called(student) for student in need.students[:5]]
             who = ", ".join(named) + (", …" if len(need.students) > 5 else "")
             style = "bold" if need.urgent else None
-            needs.add_row(escape(need.why), str(len(need.students)), escape(who), style=style)
+            needs.add_row(need.why, str(len(need.students)), who, style=style)
         return [table for table in (means, checks, needs) if table.row_count]
 
 

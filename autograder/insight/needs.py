@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from autograder import quiz_marks, quiz_sharing
 from autograder.gradebook import Grade
 from autograder.insight import feedback
 from autograder.insight.collect import ClassData
@@ -36,8 +37,23 @@ def people_needed(data: ClassData) -> list[Need]:
             f"`autograder grade {data.assignment}`, which says why if it cannot be graded."
         )
         found.setdefault((True, why), set()).add(student)
-    needs = (Need(why, tuple(sorted(who)), urgent) for (urgent, why), who in found.items())
+    needs = [Need(why, tuple(sorted(who)), urgent) for (urgent, why), who in found.items()]
+    needs = [*needs, *_shared_attempts(data)]
     return sorted(needs, key=lambda need: (not need.urgent, -len(need.students), need.why))
+
+
+def _shared_attempts(data: ClassData) -> Iterator[Need]:
+    """Yield who has handed in the same attempts at a quiz: no points are taken for it."""
+    graded = {cell for grade in data.grades for cells in grade.cells.values() for cell in cells}
+    for name in sorted(cell for cell in graded if cell.startswith(quiz_marks.PREFIX)):
+        quiz = name.removeprefix(quiz_marks.PREFIX)
+        students = [grade.student for grade in data.grades]
+        for group in quiz_sharing.same_attempts(data.root, data.assignment, quiz, students):
+            why = (
+                f"The same attempts at the quiz {quiz} were handed in by several, who all have "
+                "their points: find out whose they are."
+            )
+            yield Need(why, group, True)
 
 
 def _reasons(data: ClassData, grade: Grade) -> Iterator[tuple[bool, str]]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from quizzes.errors import QuizError
 from quizzes.insight import plots
 from quizzes.insight.analysis import FEW, Analysis, ItemFigures
+from quizzes.sharing import CANNOT_KNOW
 
 ITEM_COLUMNS = ("item", "kind", "learners", "difficulty", "discrimination", "advice")
 BELIEF_COLUMNS = ("misconception", "belief", "holders", "met", "share")
@@ -102,7 +103,8 @@ def page(analysis: Analysis) -> str:
     parts += _beliefs(analysis) if analysis.beliefs else []
     if analysis.notes:
         items = "".join(f"<li>{escape(note)}</li>" for note in analysis.notes)
-        parts.append(f"<h2>Left out</h2><ul>{items}</ul>")
+        parts.append(f"<h2>Notes</h2><ul>{items}</ul>")
+    parts.append(f"<h2>What a quiz cannot know</h2><p>{escape(CANNOT_KNOW)}</p>")
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'

@@ -1,17 +1,28 @@
-"""Pages of feedback: nbconvert's own, though most are not parsed once more."""
+"""Pages that show a submission: nothing of it runs in them, and none takes long to make."""
 
 from __future__ import annotations
 
+import copy
+import re
+import time
 from collections.abc import Callable
 from typing import Any
 
 import nbconvert.exporters.html
 import pytest
 from nbconvert.exporters import HTMLExporter
-from nbformat import NotebookNode
-from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_output
+from nbformat import NotebookNode, from_dict
+from nbformat.v4 import (
+    new_code_cell,
+    new_markdown_cell,
+    new_notebook,
+    new_output,
+    new_raw_cell,
+)
 
-from autograder.nbgrader_once import FeedbackExporter
+from autograder import page_texts, screen
+from autograder.nbgrader_once import TOO_LONG, FeedbackExporter
+from autograder.page_texts import Page
 
 NBCONVERT: Any = nbconvert.exporters.html
 read: Callable[..., Any] = NBCONVERT.BeautifulSoup  # as nbconvert itself does
@@ -62,19 +73,188 @@ def test_a_page_without_html_of_the_students_is_not_parsed_and_says_the_same(
 
 
 @pytest.mark.parametrize(
-    "cell",
+    ("cell", "kept"),
     [
-        new_code_cell("plot()", outputs=[PICTURE]),
-        new_code_cell("table", outputs=[REPORT]),
-        new_markdown_cell("Look: <img src='https://example.org/x.png'>"),
-        new_markdown_cell("This is <b>mine."),
-        new_markdown_cell("<!-- and nothing behind it"),
+        (new_code_cell("plot()", outputs=[PICTURE]), 'src="data:image/png;base64,iVBORw0KGgo="'),
+        (new_code_cell("table", outputs=[REPORT]), "<p>right</p>"),
+        (
+            new_markdown_cell("Look: <img src='https://example.org/x.png'>"),
+            '<img alt="No description has been provided for this image" '
+            'src="https://example.org/x.png">',
+        ),
+        (new_markdown_cell("This is <b>mine."), "This is <b>mine.</b>"),
+        (new_markdown_cell("| a |\n|---|\n| $x<y$ |"), "<td>$x&lt;y$</td>"),
+        (
+            new_markdown_cell("<math><mfrac><mn>1</mn><mi>f</mi></mfrac></math>"),
+            "<math><mfrac><mn>1</mn><mi>f</mi></mfrac></math>",
+        ),
+        (new_markdown_cell("```python\nif x: pass\n```"), '<span class="k">if</span>'),
+        (new_markdown_cell("Code: `List<int>`, `<script>`"), "<code>&lt;script&gt;</code>"),
     ],
-    ids=["picture", "html output", "image tag", "open tag", "open comment"],
+    ids=["picture", "html output", "image tag", "open tag", "table", "mathml", "code", "types"],
 )
-def test_a_page_with_html_of_the_students_is_nbconverts_own(cell: NotebookNode) -> None:
-    notebook = new_notebook(cells=[cell, cell_of_the_grader(REPORT)])
-    ours = page(FeedbackExporter, notebook)
-    assert ours == page(HTMLExporter, notebook)
-    images = read(ours, features="html.parser").select("img")
-    assert all(image.get("alt") for image in images)
+def test_html_that_runs_nothing_is_kept_and_whole(cell: NotebookNode, kept: str) -> None:
+    ours = page(FeedbackExporter, new_notebook(cells=[cell, cell_of_the_grader(REPORT)]))
+    assert kept in ours
+    assert ours.count("<p>right</p>") >= 1
+
+
+SCRIPT = "fetch('/formgrader/api/grades')"
+HOSTILE = [
+    new_markdown_cell(f"<script>{SCRIPT}</script>"),
+    new_markdown_cell(f'<img src=x onerror="{SCRIPT}">'),
+    new_markdown_cell(f"[look](javascript:{SCRIPT})"),
+    new_markdown_cell(f"[look](&#106;ava&Tab;script:{SCRIPT})"),
+    new_markdown_cell(f"[look][1]\n\n[1]: javascript:{SCRIPT}"),
+    new_markdown_cell(f"<javascript:{SCRIPT}>"),
+    new_markdown_cell(f"```mermaid\n<img src=x onerror={SCRIPT}>\n```"),
+    new_markdown_cell(f"<svg onload={SCRIPT}></svg><iframe srcdoc='<script>{SCRIPT}</script>'>"),
+    new_markdown_cell(
+        "![a](attachment:a.png)",
+        attachments={"a.png": {f'image/png" onerror="{SCRIPT}': "x", "image/png": "%%"}},
+    ),
+    new_raw_cell(f"<script>{SCRIPT}</script>"),
+    *(
+        new_code_cell("x", outputs=[new_output("display_data", data={kind: text, "text/plain": "x"})])
+        for kind, text in {
+            "text/html": f"<b onclick={SCRIPT}>x</b><script>{SCRIPT}</script>",
+            "text/markdown": f"<script>{SCRIPT}</script>",
+            "text/latex": f"$x$<script>{SCRIPT}</script>",
+            "application/javascript": SCRIPT,
+            "image/svg+xml": f"<svg onload={SCRIPT}><script>{SCRIPT}</script></svg>",
+            "text/vnd.mermaid": f"graph TD\nclick A {SCRIPT}\nA[<img src=x onerror={SCRIPT}>]",
+            "application/vnd.jupyter.widget-view+json": {"model_id": f"</script>{SCRIPT}"},
+        }.items()
+    ),
+]
+
+
+def executable(page_: str) -> list[str]:
+    """Return what a browser would run of a page, if it was the script of a student."""
+    found = []
+    for element in read(page_, features="html.parser").find_all(True):
+        if element.name in ("script", "iframe", "object", "embed", "svg"):
+            found.append(str(element))
+        for name, value in element.attrs.items():
+            bare = "".join(str(value).split()).lower()
+            if name.startswith("on") or name == "srcdoc" or bare.startswith("javascript:"):
+                found.append(f"{name}={value}")
+    return [text for text in found if "formgrader/api" in text]
+
+
+@pytest.mark.parametrize("number", range(len(HOSTILE)))
+def test_nothing_of_a_submission_runs_in_a_page(number: int) -> None:
+    """Neither in feedback of any graded copy, nor where nbgrader itself shows what was written."""
+    hostile = new_notebook(cells=[copy.deepcopy(HOSTILE[number])])
+    assert not executable(page(FeedbackExporter, copy.deepcopy(hostile)))
+    written = copy.deepcopy(hostile)
+    screen.screen_texts(written, new_notebook(), Page())
+    for cell in written.cells:
+        cell.outputs = [
+            from_dict(screen.screened(output, Page())) for output in cell.get("outputs", [])
+        ]
+    assert not executable(page(HTMLExporter, written))
+
+
+def test_the_same_texts_would_run_if_they_were_not_screened() -> None:
+    ran = [bool(executable(page(HTMLExporter, new_notebook(cells=[cell])))) for cell in HOSTILE]
+    assert sum(ran) >= len(HOSTILE) - 4  # nbconvert sees to some of them itself
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# explain-depth", "# **explain**-depth", "explain-depth\n===", "# explain-depth-comment",
+        "<div>", "</div></div>", "<table>", "```\n<div>\n```\n</div>",
+    ],
+)  # fmt: skip
+def test_an_answer_cannot_take_the_place_of_a_part_of_the_formgraders_page(text: str) -> None:
+    graded = new_markdown_cell("x", metadata={"nbgrader": {"grade_id": "explain-depth"}})
+    written = new_notebook(cells=[new_markdown_cell(text), graded])
+    screen.screen_texts(written, new_notebook(), Page())
+    shown = page(HTMLExporter, written)
+    found = read(shown, features="html.parser").find_all(id=re.compile("^explain-depth"))
+    assert not found
+    assert shown.count("<div") == shown.count("</div>")
+    letters = "".join(re.findall(r"\w+", text))
+    assert letters in "".join(re.findall(r"\w+", written.cells[0].source))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Depth 10, `List<int>` and *so* on: a < b, [0](https://example.org/?a=b)", "<b>x</b><br/>",
+        "![a](picture.png) ![b](attachment:b.png)", "| a | b |\n|---|---|\n| 1 | 2 |", "x[0]: 3",
+        '<img src="a.png" width="300"> <span style="color: red">r</span>', "[there](#Heading)",
+        "<details><summary>More</summary>\n\ntext\n\n</details>", "<https://example.org>",
+        "$$\\frac{a}{b}$$ <math><mi>x</mi></math>", "```python\nx = 1 < 2\n```", "me <a@b.org>",
+    ],
+)  # fmt: skip
+def test_an_ordinary_answer_is_written_as_it_was_typed(text: str) -> None:
+    attachments = {"b.png": {"image/png": "iVBORw0KGgo="}}
+    written = new_notebook(cells=[new_markdown_cell(text, attachments=attachments)])
+    screen.screen_texts(written, new_notebook(), Page())
+    assert written.cells[0].source.replace("\N{WORD JOINER}", "") == text
+    if "List<" not in text:
+        assert written.cells[0].source == text
+
+
+SLOW = {
+    "brackets": new_markdown_cell("[" * 100_000),
+    "stars": new_markdown_cell("*a_" * 30_000),
+    "twenty megabytes": new_markdown_cell("[" * 20_000_000),
+    "code that never runs": new_code_cell("%%script false\n" + "(" * 200_000),
+    "tags in an output": new_code_cell(
+        "x", outputs=[new_output("display_data", data={"text/html": "<svg " * 100_000})]
+    ),
+    "markdown in an output": new_code_cell(
+        "x", outputs=[new_output("display_data", data={"text/markdown": "[" * 100_000})]
+    ),
+    "colours": new_code_cell(
+        "x", outputs=[new_output("stream", name="stdout", text="\x1b[31m" * 10_000)] * 20
+    ),
+}
+
+
+@pytest.mark.parametrize("what", SLOW)
+def test_what_takes_too_long_is_shown_as_it_was_typed(what: str) -> None:
+    notebook = new_notebook(cells=[copy.deepcopy(SLOW[what]), new_markdown_cell("*all* the rest")])
+    begun = time.process_time()
+    shown = page(FeedbackExporter, copy.deepcopy(notebook))
+    assert time.process_time() - begun < 10, "it was made in this process"
+    if SLOW[what].cell_type == "markdown":
+        assert TOO_LONG in shown
+    assert "<em>all</em> the rest" in shown  # the others are formatted all the same
+    screen.screen_texts(notebook, new_notebook(), Page())
+    for cell in notebook.cells:
+        cell.outputs = [
+            from_dict(screen.screened(output, Page())) for output in cell.get("outputs", [])
+        ]
+    begun = time.process_time()
+    page(HTMLExporter, notebook)  # as the formgrader does, in the server that all windows share
+    assert time.process_time() - begun < 20
+
+
+def test_the_process_that_formats_is_started_anew_if_it_is_lost() -> None:
+    assert Page().markdown("*a*", {}) == "<p><em>a</em></p>\n"
+    page_texts._formatter._process.kill()
+    page_texts._formatter._process.wait()
+    assert Page().markdown("*b*", {}) == "<p><em>b</em></p>\n"
+
+
+def test_files_beside_a_notebook_run_nothing_where_they_are_served() -> None:
+    def may(name: str, content: bytes = b"") -> bool:
+        return screen.may_lie_beside(name, lambda: content)
+
+    svg = b'<svg xmlns="http://www.w3.org/2000/svg">%s</svg>'
+    assert all(map(may, ("plot.png", "data.csv", "node.py", "notes.txt", "report.docx")))
+    assert may("drawing.svg", svg % b'<g><path d="M0 0"/></g>')
+    for name in ("page.html", "page.XHTML", "feed.xml", "sheet.xsl", "letter.mht"):
+        assert not may(name), name
+    for inside in (
+        b"<script>1</script>", b'<g onload="1"/>', b"<foreignObject/>", b'<a href="javascript:1"/>',
+        b'<x:script xmlns:x="http://www.w3.org/1999/xhtml">1</x:script>',
+        b'<use href="data:text/html,x"/>', b"<g>",
+    ):  # fmt: skip
+        assert not may("drawing.svg", svg % inside), inside
+    assert not may("drawing.svg", b'<!DOCTYPE svg [<!ENTITY x "y">]>' + svg % b"")

@@ -12,7 +12,10 @@ from zipfile import ZipFile
 import pytest
 
 from autograder import cli, quiz_report
-from quizzes import loader, marking, model, record, schema
+from autograder.gradebook import Grade
+from autograder.insight import needs
+from autograder.insight.collect import ClassData
+from quizzes import loader, marking, model, record, schema, sharing
 from quizzes.record import Attempt, Given
 
 BANK = loader.load_bank("ch05")
@@ -41,8 +44,8 @@ def autograder(
     return run
 
 
-def hand_in(root: Path, student: str) -> None:
-    """Hand in an attempt in which everything is right."""
+def hand_in(root: Path, student: str) -> Path:
+    """Hand in an attempt in which everything is right; return its file."""
     paper = model.draw(BANK, student, 1)
     result = marking.mark_paper(paper, {i.concept.id: model.key(i) for i in paper.items})
     given = {m.item.concept.id: Given(m.item.variant.id, m.answer) for m in result.marks}
@@ -50,7 +53,9 @@ def hand_in(root: Path, student: str) -> None:
                       given, 0.0, 0, False)  # fmt: skip
     folder = root / "submitted" / student / "ch05-quiz"
     folder.mkdir(parents=True)
-    (folder / record.filename("ch05")).write_text(attempt.to_json() + "\n", encoding="utf-8")
+    file = folder / record.filename("ch05")
+    file.write_text(attempt.to_json() + "\n", encoding="utf-8")
+    return file
 
 
 def test_there_and_back_again(tmp_path: Path, autograder: Run) -> None:
@@ -198,7 +203,7 @@ def test_a_classs_quiz_is_analysed(tmp_path: Path) -> None:
         "quiz-ch05-misconceptions.csv",
         "quiz-ch05-report.html",
     ]
-    items, beliefs = report.tables()
+    items, beliefs, _ = report.tables()
     dealt = {i.variant.id for s in ("ann", "ben") for i in model.draw(BANK, s, 1).items}
     assert items.row_count == len(BANK.concepts) + len(dealt)
     assert beliefs.row_count == 0
@@ -208,3 +213,41 @@ def test_an_assignment_without_a_quiz_has_no_report(tmp_path: Path) -> None:
     (tmp_path / "submitted" / "ann" / "ch05").mkdir(parents=True)
     assert quiz_report.of_assignment(tmp_path, "ch05") == []
     assert not (tmp_path / "reports").exists()
+
+
+def test_who_hands_in_the_same_attempts_is_named_and_keeps_the_points(tmp_path: Path) -> None:
+    ann = hand_in(tmp_path, "ann")
+    for student in ("cem", "dora"):  # a friend's whole file, one of them under another name
+        folder = tmp_path / "submitted" / student / "ch05-quiz"
+        folder.mkdir(parents=True)
+        (folder / ann.name).write_bytes(ann.read_bytes())
+    (folder / ann.name).rename(folder / "my attempts.jsonl")
+    hand_in(tmp_path, "ben")  # as good, and his own
+    [report] = quiz_report.of_assignment(tmp_path, "ch05-quiz")
+    data = json.loads(json.dumps(report.as_data()))
+    assert data["same_attempts"] == [["ann", "cem", "dora"]]
+    assert "cannot know who answered" in data["cannot_know"]
+    assert data["notes"][0] == "The same attempts were handed in by ann, cem, dora."
+    page = (tmp_path / "reports" / "ch05-quiz" / "quiz-ch05-report.html").read_text()
+    assert "handed in by ann, cem, dora" in page
+    assert "What a quiz cannot know" in page
+    cell = "quiz-ch05"
+    grades = [
+        Grade(name, 5.0, 5.0, False, {"quiz": {cell: 5.0}})
+        for name in ("ann", "ben", "cem", "dora")
+    ]
+    [need] = needs.people_needed(ClassData(tmp_path, "ch05-quiz", 5.0, tuple(grades)))
+    assert need.students == ("ann", "cem", "dora")
+    assert need.urgent
+    assert "the quiz ch05 were handed in by several" in need.why
+
+
+def test_equal_answers_at_another_time_are_nobodys_copy(tmp_path: Path) -> None:
+    content = hand_in(tmp_path, "ann").read_bytes()
+    line = json.loads(content.splitlines()[-1])
+    later = json.dumps({**line, "submitted": "2026-11-28T12:00:01+00:00"}).encode()
+    assert sharing.same_attempts("ch05", {"ann": content, "ben": later}) == []
+    assert sharing.same_attempts("other", {"ann": content, "ben": content}) == []
+    assert sharing.same_attempts("ch05", {"ann": content, "ben": b"{}\n" + content}) == [
+        ("ann", "ben")
+    ]
