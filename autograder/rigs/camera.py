@@ -246,6 +246,7 @@ class CameraRig:
         A participant's endpoints are told in order: those of a mark that is made now come last.
         """
         mark = f"mark_{secrets.token_hex(4)}"
+        self.graph.note_mark(mark)
         self.subject.mark(mark)
         self.wait(lambda: self.node.count_publishers(mark) and self.node.count_subscribers(mark))
 
