@@ -25,10 +25,10 @@ if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
     from autograder.sandbox.place import Process
 
 MAX_ANSWER = 1024 * 1024
-EXAM_TIMEOUT = 180.0
+EXAM_TIMEOUT = 240.0
 """Seconds one part of an exam may take in all: its own deadlines end it long before.
 
-The longest is that of a camera driver which needs a second to start and another one to end.
+The longest is that of the subject's replies (`autograder.bench.ALL_REPLIES_TIMEOUT`).
 """
 
 LAST_WORDS = 65536
@@ -39,6 +39,10 @@ Spawn = Callable[..., "Process"]
 
 class ExaminerError(CourseError):
     """The examiner process failed; it is never the student's fault."""
+
+
+class ExaminerFloodedError(ExaminerError):
+    """The examiner ran out of memory under what it was sent: that is the subject's doing."""
 
 
 class ExaminerProcess:
@@ -120,7 +124,7 @@ class ExaminerProcess:
             self._process.stdin.write(line)
             self._process.stdin.flush()
         except BrokenPipeError:
-            raise ExaminerError(f"The examiner ended at once: {self._last_words()}") from None
+            raise self._ended("The examiner ended at once") from None
 
     def verdict(self, timeout: float = EXAM_TIMEOUT) -> Verdict:
         """Return the verdict of the part that was asked for.
@@ -141,7 +145,7 @@ class ExaminerProcess:
                 )
             chunk = os.read(stream, 65536)
             if not chunk or len(self._buffer) > MAX_ANSWER:
-                raise ExaminerError(f"The examiner ended without a verdict: {self._last_words()}")
+                raise self._ended("The examiner ended without a verdict")
             self._buffer += chunk
         line, self._buffer = self._buffer.split(b"\n", 1)
         try:
@@ -180,13 +184,19 @@ class ExaminerProcess:
             frames = stuck.of_first_thread(self._said.decode(errors="replace"), stuck.EXAMINER)
         return f" ({stuck.told(frames)})" if frames else ""
 
-    def _last_words(self) -> str:
+    def _ended(self, when: str) -> ExaminerError:
         self._kill()
         assert self._process.stderr is not None
         while self._process.stderr.fileno() in self._wait(0.0):
             pass
         if b"bad_alloc" in self._said or b"MemoryError" in self._said:
-            return "it ran out of memory, as under a flood of messages"
+            return ExaminerFloodedError(
+                f"{when}: it ran out of memory, as under a flood of messages. Do your nodes send "
+                "more than anybody can read?"
+            )
+        return ExaminerError(f"{when}: {self._last_words()}")
+
+    def _last_words(self) -> str:
         lines = self._said.decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else f"exit code {self._process.returncode}"
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from autograder import outputs, own_interfaces, sandbox, stuck
-from autograder.processes import ExaminerError, ExaminerProcess
+from autograder.processes import ExaminerError, ExaminerFloodedError, ExaminerProcess
 from autograder.sandbox import Place, RunningSubject
 from autograder.submission import Cell, Program
 from autograder.verdict import Status, Verdict
@@ -48,7 +48,8 @@ class Outcome:
 
     ``outputs`` has one list of notebook outputs a code cell, in the program's order; ``verdicts``
     maps the grade id of an exam's cell to its verdict; ``notes`` are remarks for the student.
-    ``seconds`` is wall time. ``unreadable`` says that there was nothing to run at all.
+    ``seconds`` is wall time. ``unreadable`` says that there was nothing to run at all, ``begun``
+    that some of the program has run: what comes of another run may then be the program's doing.
     """
 
     outputs: list[list[dict[str, Any]]] = field(default_factory=list)
@@ -56,11 +57,17 @@ class Outcome:
     notes: list[str] = field(default_factory=list)
     seconds: float = 0.0
     unreadable: bool = False
+    begun: bool = False
 
     @property
     def spoilt(self) -> bool:
         """Whether the grader itself failed somewhere."""
         return any(verdict.spoilt for verdict in self.verdicts.values())
+
+    @property
+    def may_be_tried_again(self) -> bool:
+        """Whether the grader failed before anything of the program could have had it fail."""
+        return self.spoilt and not self.begun
 
     def to_json(self) -> str:
         """Return the outcome as JSON."""
@@ -72,7 +79,10 @@ class Outcome:
         """Read an outcome written by `to_json`; raises ValueError or VerdictError if it is none."""
         data = json.loads(text)
         verdicts = {name: Verdict.from_data(item) for name, item in data["verdicts"].items()}
-        return cls(data["outputs"], verdicts, data["notes"], data["seconds"], data["unreadable"])
+        return cls(
+            data["outputs"], verdicts, data["notes"], data["seconds"], data["unreadable"],
+            data["begun"],
+        )  # fmt: skip
 
 
 def run(
@@ -140,6 +150,7 @@ def _follow(
     moved_on, number, shown = True, 0, outputs.Notebook(outcome.outputs)
     try:
         _await(channel, subject)
+        outcome.begun = True
         channel.send({"cells": [_shown(cell) for cell in program]})
         for number, cell in enumerate(program):
             was_cut = shown.cut
@@ -161,8 +172,8 @@ def _follow(
                 _note_error(outcome, number)
     except ChannelTimeout:
         frames = stuck.ask(subject.pid, channel)
-        reason, status = _stuck(program, number, cell_timeout, frames)
-        _give_up(program, outcome, reason, status, reached=number)
+        reason = _stuck(program, number, cell_timeout, frames)
+        _give_up(program, outcome, reason, reached=number)
     except ChannelBroken as error:
         _give_up(
             program,
@@ -174,16 +185,16 @@ def _follow(
         fate = f"The notebook's process ended: {subject.fate()}."
         status = "grader_error" if subject.unwatched else "not_checked"
         _give_up(program, outcome, fate, status, reached=number)
+    except ExaminerFloodedError as error:
+        _give_up(program, outcome, str(error), reached=number)
     except ExaminerError as error:
         _give_up(program, outcome, str(error), "grader_error", reached=number)
 
 
-def _stuck(
-    program: Program, number: int, seconds: float, frames: list[stuck.Frame]
-) -> tuple[str, Status]:
-    """Return what a program is stuck in that has not answered for ``number``, and who is to blame.
+def _stuck(program: Program, number: int, seconds: float, frames: list[stuck.Frame]) -> str:
+    """Return what a program is stuck in that has not answered for ``number``.
 
-    ``frames`` are where it is, if it has said so.
+    ``frames`` are where it says that it is, if it does: an explanation, never evidence.
     """
     theirs = stuck.students(frames)
     where = f" ({stuck.line_of(theirs, program)})" if theirs else ""
@@ -192,17 +203,14 @@ def _stuck(
             f"Code cell {number + 1} was still running after {seconds:.0f} s{where}, so nothing "
             "after it was examined: a cell that never ends (rclpy.spin, an endless loop) blocks a "
             "notebook."
-        ), "not_checked"
+        )
     # No cell of the student's: what it waits for is the end of the last examination.
     if frames and not theirs:
-        return (
-            f"The nodes were still being taken down {seconds:.0f} s after an examination, and it "
-            f"was not in the student's code ({stuck.told(frames)})."
-        ), "grader_error"
+        where = f" (in {stuck.told(frames)})"
     return (
         f"Your nodes were still being taken down {seconds:.0f} s after an examination{where}, so "
         "nothing after it was examined: does a destroy_node() of yours wait for ever?"
-    ), "not_checked"
+    )
 
 
 def _await(channel: Channel, subject: RunningSubject) -> None:

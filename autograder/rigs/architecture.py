@@ -14,6 +14,7 @@ from typing import Any
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from autograder.bench import Bench, StudentError
+from autograder.exam import Failed
 from autograder.rigs.errands import SETTLE, WAYPOINT, marked
 from autograder.rigs.participants import NO_NODE, node_of, of_others
 from autograder.rigs.patience import Patience
@@ -69,7 +70,12 @@ class ArchitectureRig:
         mark = f"_mark_{secrets.token_hex(4)}"
         self._marks.add(f"/{mark}")
         self.subject.mark(mark)
-        self._session.until(partial(self._has_seen, mark), 4 * SETTLE, "the mark on the graph")
+        if not self.wait(partial(self._has_seen, mark), 4 * SETTLE):
+            raise Failed(
+                expected="What your program makes comes up on the ROS graph.",
+                actual=f"A small node that was made beside yours did not within {4 * SETTLE:.0f} "
+                "s: does something in the notebook keep the process from talking to others?",
+            )
         graph = read_graph(self.node, self._marks)
         if NO_NODE in graph.nodes:  # each participant tells its names in its own time
             self.wait(lambda: NO_NODE not in read_graph(self.node, self._marks).nodes, SETTLE)

@@ -77,10 +77,14 @@ def attack_of(file: Path) -> Attack:
     fields: dict[str, list[str]] = {}
     for key, value in re.findall(r"^# (\w+): (.*)$", text, re.MULTILINE):
         fields.setdefault(key, []).append(value)
+
+    def first(key: str, default: str) -> str:
+        return fields.get(key, [default])[0]
+
     return Attack(
         file.stem, fields["title"][0], text, fields.get("told", []), fields.get("prints", []),
-        fields.get("exercise", ["qos"])[0], fields.get("base", [EMPTY])[0], fields.get("score", ["0"])[0],
-        float(fields.get("seconds", [CELL_TIMEOUT])[0]),
+        first("exercise", "qos"), first("base", EMPTY), first("score", "0"),
+        float(first("seconds", str(CELL_TIMEOUT))),
     )  # fmt: skip
 
 
