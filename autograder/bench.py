@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+from autograder.draws import USUAL_SEED, Draws
 from autograder.starving import kept_waiting
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 from course import Session
@@ -364,6 +365,7 @@ class Bench:
         memory: dict[str, Any],
         key: Mapping[str, Any] | None = None,
         own_network: bool = False,
+        seed: int = USUAL_SEED,
     ) -> None:
         """Put both within a check's reach.
 
@@ -371,9 +373,11 @@ class Bench:
         as long as the notebook has not moved on since. ``key`` is the answer key that the part's
         hidden cell carries, if it has one: the subject never sees it. ``own_network`` says that
         nobody but these two is on their network, so that a check may make it lose packets.
+        ``seed`` is what the numbers of the exam are drawn from.
         """
         self.session = session
         self.subject = subject
         self.memory = memory
         self.key: Mapping[str, Any] = key or {}
         self.own_network = own_network
+        self.draws = Draws(seed)

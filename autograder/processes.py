@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from autograder import stuck
 from autograder.descriptors import readable
+from autograder.draws import fresh_seed
 from autograder.starving import FairDeadline
 from autograder.verdict import Verdict, VerdictError
 from autograder.wire import parse
@@ -100,6 +101,7 @@ class ExaminerProcess:
         pid: int,
         moved_on: bool = True,
         key: Mapping[str, Any] | None = None,
+        seed: int | None = None,
     ) -> None:
         """Ask for a part of an exam; its verdict comes with `verdict`.
 
@@ -110,6 +112,7 @@ class ExaminerProcess:
             moved_on: False if the notebook ran nothing since the last part: then what failed
                 there need not be tried again.
             key: the answer key of the part's hidden cell.
+            seed: what the exam's numbers are drawn from; one that nobody knows if left out.
         """
         assert self._process.stdin is not None
         asked = {
@@ -118,6 +121,7 @@ class ExaminerProcess:
             "moved_on": moved_on,
             "key": dict(key or {}),
             "pid": pid,
+            "seed": fresh_seed() if seed is None else seed,
         }
         line = json.dumps(asked).encode() + b"\n"
         try:

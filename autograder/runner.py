@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from autograder import outputs, own_interfaces, sandbox, stuck
+from autograder.draws import fresh_seed
 from autograder.processes import ExaminerError, ExaminerFloodedError, ExaminerProcess
 from autograder.sandbox import Place, RunningSubject
 from autograder.submission import Cell, Program
@@ -92,6 +93,7 @@ def run(
     cell_timeout: float = CELL_TIMEOUT,
     trust: bool = False,
     hidden: Iterable[Path] = (),
+    seed: int | None = None,
 ) -> Outcome:
     """Run a program in a subject of its own and have its exams sat; never raises for its sake.
 
@@ -101,6 +103,7 @@ def run(
         cell_timeout: seconds that one cell may run.
         trust: run it outside of a sandbox, with the rights of this process.
         hidden: folders that a sandboxed program must never see (the course root).
+        seed: what the numbers of its exams are drawn from; one that nobody knows if left out.
 
     Raises:
         SandboxError: the program is not trusted, and there is no working sandbox here.
@@ -123,7 +126,8 @@ def run(
             )
         )
         subject = stack.enter_context(_start(place, subject_engine, subject_control, files))
-        _follow(program, channel, examiner, subject, outcome, cell_timeout)
+        seed = fresh_seed() if seed is None else seed
+        _follow(program, channel, examiner, subject, outcome, cell_timeout, seed)
     outcome.seconds = round(time.monotonic() - started, 2)
     return outcome
 
@@ -144,6 +148,7 @@ def _follow(
     subject: RunningSubject,
     outcome: Outcome,
     cell_timeout: float,
+    seed: int,
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
     status: Status
@@ -159,8 +164,9 @@ def _follow(
                 outcome.notes.append(TOO_MUCH)
             if cell.exam:
                 examiner.request(
-                    cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key
-                )
+                    cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key,
+                    seed=seed,
+                )  # fmt: skip
                 outcome.verdicts[cell.grade_id] = examiner.verdict()
                 moved_on = False
                 if examiner.hangs:
