@@ -61,6 +61,7 @@ class CameraRig:
         self.graph = CameraGraph(node)
         self.program = Program(bench.subject, self.graph)
         self.memory = bench.memory
+        self.draws = bench.draws
         self._clean = False
         self._provoked = False
         self._clients: dict[str, Any] = {}
