@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
+from autograder.draws import USUAL_SEED, Draws
+from autograder.starving import kept_waiting
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 from course import Session
 
 REPLY_TIMEOUT = 10.0
 """Seconds a subject may take over one request (making a node, say) before it counts as hung."""
+
+ALL_REPLIES_TIMEOUT = 150.0
+"""Seconds that all replies of an examination may take together: the slowest right driver that is
+known, which needs a second to start and another one to end, comes to 85 s; most come to 10 s."""
 
 MAX_REPLY = 512 * 1024
 """Bytes of a reply that are received; a harness cuts values and errors well below it."""
@@ -69,6 +77,7 @@ class Subject:
         """Talk to the harness over ``channel``; ``pid`` is the subject's process as seen here."""
         self._channel = channel
         self._gone: str | None = None
+        self._left = ALL_REPLIES_TIMEOUT
         self.hangs = ""
         self.pid = pid
 
@@ -271,7 +280,8 @@ class Subject:
         doing = doing or f"{operation.replace('_', ' ')} {what}"
         try:
             self._channel.send({"op": operation, "name": what, **more})
-            reply = self._channel.receive_fairly(timeout, self.pid)
+            with self._counting():
+                reply = self._channel.receive_fairly(min(timeout, self._left), self.pid)
         except ChannelBroken as error:
             raise self._broken(str(error)) from None
         except ChannelClosed:
@@ -281,6 +291,10 @@ class Subject:
             self._gone = (
                 f"Your program did not answer within {timeout:.0f} s when it was asked to "
                 f"{doing}: does a constructor, a callback or a cleanup wait for ever?"
+                if self._left
+                else f"Your program took {ALL_REPLIES_TIMEOUT:.0f} s in all for what it was asked "
+                f"to do, the last of which was to {doing}: which constructor, callback or cleanup "
+                "takes so long each time?"
             )
             self.hangs = self._gone
             raise SubjectGone(self._gone) from None
@@ -291,6 +305,20 @@ class Subject:
             raised = self._read(lambda: _text(reply["error"], MAX_ERROR))
             raise StudentError(raised, self._read(lambda: _text(reply.get("trace", ""), MAX_TRACE)))
         return reply
+
+    @contextmanager
+    def _counting(self) -> Iterator[None]:
+        """Count the time of the block, as far as the subject was not kept from running by others.
+
+        At least a third of it counts: a reply can be put off no further.
+        """
+        began, kept = time.monotonic(), kept_waiting(self.pid)
+        try:
+            yield
+        finally:
+            took = time.monotonic() - began
+            took = max(took / 3, took - (kept_waiting(self.pid) - kept))
+            self._left = max(0.0, self._left - took)
 
     def _read(self, found: Callable[[], T]) -> T:
         """Return what is found in a reply, if it is one of the harness's.
@@ -337,6 +365,7 @@ class Bench:
         memory: dict[str, Any],
         key: Mapping[str, Any] | None = None,
         own_network: bool = False,
+        seed: int = USUAL_SEED,
     ) -> None:
         """Put both within a check's reach.
 
@@ -344,9 +373,11 @@ class Bench:
         as long as the notebook has not moved on since. ``key`` is the answer key that the part's
         hidden cell carries, if it has one: the subject never sees it. ``own_network`` says that
         nobody but these two is on their network, so that a check may make it lose packets.
+        ``seed`` is what the numbers of the exam are drawn from.
         """
         self.session = session
         self.subject = subject
         self.memory = memory
         self.key: Mapping[str, Any] = key or {}
         self.own_network = own_network
+        self.draws = Draws(seed)

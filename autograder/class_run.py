@@ -30,7 +30,7 @@ MOST_STARTS = 3
 """Times that a notebook is started in vain before the run ends with the reason."""
 
 MOST_TRIES = 2
-"""Times that a notebook is run if the grader itself fails; then a person is told."""
+"""Times that a notebook is run if the grader fails before it has begun; then a person is told."""
 
 
 @dataclass(frozen=True)
@@ -203,7 +203,7 @@ class ClassRun:
         if passes(done.error):
             self._refusals[done.key] += 1
             again = self._refusals[done.key] < MOST_STARTS
-        elif done.result is not None and done.result.outcome.spoilt:
+        elif done.result is not None and done.result.outcome.may_be_tried_again:
             self._failures[done.key] += 1
             again = self._failures[done.key] < MOST_TRIES
         if again:

@@ -195,6 +195,15 @@ def corpus(
     case: Annotated[list[str] | None, typer.Option("--case", help="Only this case.")] = None,
     repeat: Annotated[int, typer.Option("--repeat", min=1, help="Runs of each case.")] = 1,
     load: Annotated[int, typer.Option("--load", min=0, help="Busy loops beside it.")] = 0,
+    seed: Annotated[
+        int,
+        typer.Option(
+            "--seed",
+            min=0,
+            help="What the numbers of an exam are drawn from, as a verdict tells it. What cases "
+            "must say is worded for 0, so with another seed look at right cases.",
+        ),
+    ] = 0,
     jobs: Jobs = IN_FLIGHT,
     as_json: AsJson = False,
     as_table: Annotated[
@@ -208,8 +217,9 @@ def corpus(
         sys.stdout.write(tables.matrix(command.cases(exercise)))
         return
     trials = command.run(
-        exercise, only=case or (), repeat=repeat, jobs=jobs, load=load, say=_say(as_json)
-    )
+        exercise, only=case or (), repeat=repeat, jobs=jobs, load=load, seed=seed,
+        say=_say(as_json),
+    )  # fmt: skip
     different = [trial for trial in trials if trial.difference]
     flips = tables.all_flips(trials)
     if as_json:

@@ -1,11 +1,11 @@
 """The examiner process: sits exams on a subject that it can only see over DDS.
 
 Started as ``python -m autograder.examiner --control FD --domain N``. It reads requests
-``{"exam": ..., "part": ..., "moved_on": ..., "key": ..., "pid": ...}`` from standard input, one
-JSON object a line, and answers each with ``{"verdict": ..., "hangs": ...}`` on standard output;
-``hangs`` says why the subject cannot be expected to go on, if so. ``moved_on`` says that the
-notebook ran cells since, ``key`` is the answer key of the part's hidden cell, ``pid`` the subject's
-process.
+``{"exam": ..., "part": ..., "moved_on": ..., "key": ..., "pid": ..., "seed": ...}`` from standard
+input, one JSON object a line, and answers each with ``{"verdict": ..., "hangs": ...}`` on standard
+output; ``hangs`` says why the subject cannot be expected to go on, if so. ``moved_on`` says that
+the notebook ran cells since, ``key`` is the answer key of the part's hidden cell, ``pid`` the
+subject's process, ``seed`` what the exam's numbers are drawn from.
 File descriptor ``FD`` is the control channel to the subject's harness. With ``--own-network`` the
 two are alone on their network.
 """
@@ -51,7 +51,9 @@ def sit(
     sitting = sittings.setdefault(request["exam"], Sitting())
     subject.pid = int(request["pid"])
     try:
-        bench = Bench(session, subject, sitting.memory, request["key"], own_network)
+        bench = Bench(
+            session, subject, sitting.memory, request["key"], own_network, int(request["seed"])
+        )
         exam = exams.load(request["exam"])
         return exam.sit(request["part"], bench, sitting.failed)
     finally:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from autograder import stuck
 from autograder.descriptors import readable
+from autograder.draws import fresh_seed
 from autograder.starving import FairDeadline
 from autograder.verdict import Verdict, VerdictError
 from autograder.wire import parse
@@ -25,10 +26,10 @@ if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
     from autograder.sandbox.place import Process
 
 MAX_ANSWER = 1024 * 1024
-EXAM_TIMEOUT = 180.0
+EXAM_TIMEOUT = 240.0
 """Seconds one part of an exam may take in all: its own deadlines end it long before.
 
-The longest is that of a camera driver which needs a second to start and another one to end.
+The longest is that of the subject's replies (`autograder.bench.ALL_REPLIES_TIMEOUT`).
 """
 
 LAST_WORDS = 65536
@@ -39,6 +40,10 @@ Spawn = Callable[..., "Process"]
 
 class ExaminerError(CourseError):
     """The examiner process failed; it is never the student's fault."""
+
+
+class ExaminerFloodedError(ExaminerError):
+    """The examiner ran out of memory under what it was sent: that is the subject's doing."""
 
 
 class ExaminerProcess:
@@ -96,6 +101,7 @@ class ExaminerProcess:
         pid: int,
         moved_on: bool = True,
         key: Mapping[str, Any] | None = None,
+        seed: int | None = None,
     ) -> None:
         """Ask for a part of an exam; its verdict comes with `verdict`.
 
@@ -106,6 +112,7 @@ class ExaminerProcess:
             moved_on: False if the notebook ran nothing since the last part: then what failed
                 there need not be tried again.
             key: the answer key of the part's hidden cell.
+            seed: what the exam's numbers are drawn from; one that nobody knows if left out.
         """
         assert self._process.stdin is not None
         asked = {
@@ -114,13 +121,14 @@ class ExaminerProcess:
             "moved_on": moved_on,
             "key": dict(key or {}),
             "pid": pid,
+            "seed": fresh_seed() if seed is None else seed,
         }
         line = json.dumps(asked).encode() + b"\n"
         try:
             self._process.stdin.write(line)
             self._process.stdin.flush()
         except BrokenPipeError:
-            raise ExaminerError(f"The examiner ended at once: {self._last_words()}") from None
+            raise self._ended("The examiner ended at once") from None
 
     def verdict(self, timeout: float = EXAM_TIMEOUT) -> Verdict:
         """Return the verdict of the part that was asked for.
@@ -141,7 +149,7 @@ class ExaminerProcess:
                 )
             chunk = os.read(stream, 65536)
             if not chunk or len(self._buffer) > MAX_ANSWER:
-                raise ExaminerError(f"The examiner ended without a verdict: {self._last_words()}")
+                raise self._ended("The examiner ended without a verdict")
             self._buffer += chunk
         line, self._buffer = self._buffer.split(b"\n", 1)
         try:
@@ -180,13 +188,19 @@ class ExaminerProcess:
             frames = stuck.of_first_thread(self._said.decode(errors="replace"), stuck.EXAMINER)
         return f" ({stuck.told(frames)})" if frames else ""
 
-    def _last_words(self) -> str:
+    def _ended(self, when: str) -> ExaminerError:
         self._kill()
         assert self._process.stderr is not None
         while self._process.stderr.fileno() in self._wait(0.0):
             pass
         if b"bad_alloc" in self._said or b"MemoryError" in self._said:
-            return "it ran out of memory, as under a flood of messages"
+            return ExaminerFloodedError(
+                f"{when}: it ran out of memory, as under a flood of messages. Do your nodes send "
+                "more than anybody can read?"
+            )
+        return ExaminerError(f"{when}: {self._last_words()}")
+
+    def _last_words(self) -> str:
         lines = self._said.decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else f"exit code {self._process.returncode}"
 

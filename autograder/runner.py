@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from autograder import outputs, own_interfaces, sandbox, stuck
-from autograder.processes import ExaminerError, ExaminerProcess
+from autograder.draws import fresh_seed
+from autograder.processes import ExaminerError, ExaminerFloodedError, ExaminerProcess
 from autograder.sandbox import Place, RunningSubject
 from autograder.submission import Cell, Program
 from autograder.verdict import Status, Verdict
@@ -48,7 +49,8 @@ class Outcome:
 
     ``outputs`` has one list of notebook outputs a code cell, in the program's order; ``verdicts``
     maps the grade id of an exam's cell to its verdict; ``notes`` are remarks for the student.
-    ``seconds`` is wall time. ``unreadable`` says that there was nothing to run at all.
+    ``seconds`` is wall time. ``unreadable`` says that there was nothing to run at all, ``begun``
+    that some of the program has run: what comes of another run may then be the program's doing.
     """
 
     outputs: list[list[dict[str, Any]]] = field(default_factory=list)
@@ -56,11 +58,17 @@ class Outcome:
     notes: list[str] = field(default_factory=list)
     seconds: float = 0.0
     unreadable: bool = False
+    begun: bool = False
 
     @property
     def spoilt(self) -> bool:
         """Whether the grader itself failed somewhere."""
         return any(verdict.spoilt for verdict in self.verdicts.values())
+
+    @property
+    def may_be_tried_again(self) -> bool:
+        """Whether the grader failed before anything of the program could have had it fail."""
+        return self.spoilt and not self.begun
 
     def to_json(self) -> str:
         """Return the outcome as JSON."""
@@ -72,7 +80,10 @@ class Outcome:
         """Read an outcome written by `to_json`; raises ValueError or VerdictError if it is none."""
         data = json.loads(text)
         verdicts = {name: Verdict.from_data(item) for name, item in data["verdicts"].items()}
-        return cls(data["outputs"], verdicts, data["notes"], data["seconds"], data["unreadable"])
+        return cls(
+            data["outputs"], verdicts, data["notes"], data["seconds"], data["unreadable"],
+            data["begun"],
+        )  # fmt: skip
 
 
 def run(
@@ -82,6 +93,7 @@ def run(
     cell_timeout: float = CELL_TIMEOUT,
     trust: bool = False,
     hidden: Iterable[Path] = (),
+    seed: int | None = None,
 ) -> Outcome:
     """Run a program in a subject of its own and have its exams sat; never raises for its sake.
 
@@ -91,6 +103,7 @@ def run(
         cell_timeout: seconds that one cell may run.
         trust: run it outside of a sandbox, with the rights of this process.
         hidden: folders that a sandboxed program must never see (the course root).
+        seed: what the numbers of its exams are drawn from; one that nobody knows if left out.
 
     Raises:
         SandboxError: the program is not trusted, and there is no working sandbox here.
@@ -113,7 +126,8 @@ def run(
             )
         )
         subject = stack.enter_context(_start(place, subject_engine, subject_control, files))
-        _follow(program, channel, examiner, subject, outcome, cell_timeout)
+        seed = fresh_seed() if seed is None else seed
+        _follow(program, channel, examiner, subject, outcome, cell_timeout, seed)
     outcome.seconds = round(time.monotonic() - started, 2)
     return outcome
 
@@ -134,12 +148,14 @@ def _follow(
     subject: RunningSubject,
     outcome: Outcome,
     cell_timeout: float,
+    seed: int,
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
     status: Status
     moved_on, number, shown = True, 0, outputs.Notebook(outcome.outputs)
     try:
         _await(channel, subject)
+        outcome.begun = True
         channel.send({"cells": [_shown(cell) for cell in program]})
         for number, cell in enumerate(program):
             was_cut = shown.cut
@@ -148,8 +164,9 @@ def _follow(
                 outcome.notes.append(TOO_MUCH)
             if cell.exam:
                 examiner.request(
-                    cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key
-                )
+                    cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key,
+                    seed=seed,
+                )  # fmt: skip
                 outcome.verdicts[cell.grade_id] = examiner.verdict()
                 moved_on = False
                 if examiner.hangs:
@@ -161,8 +178,8 @@ def _follow(
                 _note_error(outcome, number)
     except ChannelTimeout:
         frames = stuck.ask(subject.pid, channel)
-        reason, status = _stuck(program, number, cell_timeout, frames)
-        _give_up(program, outcome, reason, status, reached=number)
+        reason = _stuck(program, number, cell_timeout, frames)
+        _give_up(program, outcome, reason, reached=number)
     except ChannelBroken as error:
         _give_up(
             program,
@@ -174,16 +191,16 @@ def _follow(
         fate = f"The notebook's process ended: {subject.fate()}."
         status = "grader_error" if subject.unwatched else "not_checked"
         _give_up(program, outcome, fate, status, reached=number)
+    except ExaminerFloodedError as error:
+        _give_up(program, outcome, str(error), reached=number)
     except ExaminerError as error:
         _give_up(program, outcome, str(error), "grader_error", reached=number)
 
 
-def _stuck(
-    program: Program, number: int, seconds: float, frames: list[stuck.Frame]
-) -> tuple[str, Status]:
-    """Return what a program is stuck in that has not answered for ``number``, and who is to blame.
+def _stuck(program: Program, number: int, seconds: float, frames: list[stuck.Frame]) -> str:
+    """Return what a program is stuck in that has not answered for ``number``.
 
-    ``frames`` are where it is, if it has said so.
+    ``frames`` are where it says that it is, if it does: an explanation, never evidence.
     """
     theirs = stuck.students(frames)
     where = f" ({stuck.line_of(theirs, program)})" if theirs else ""
@@ -192,17 +209,14 @@ def _stuck(
             f"Code cell {number + 1} was still running after {seconds:.0f} s{where}, so nothing "
             "after it was examined: a cell that never ends (rclpy.spin, an endless loop) blocks a "
             "notebook."
-        ), "not_checked"
+        )
     # No cell of the student's: what it waits for is the end of the last examination.
     if frames and not theirs:
-        return (
-            f"The nodes were still being taken down {seconds:.0f} s after an examination, and it "
-            f"was not in the student's code ({stuck.told(frames)})."
-        ), "grader_error"
+        where = f" (in {stuck.told(frames)})"
     return (
         f"Your nodes were still being taken down {seconds:.0f} s after an examination{where}, so "
         "nothing after it was examined: does a destroy_node() of yours wait for ever?"
-    ), "not_checked"
+    )
 
 
 def _await(channel: Channel, subject: RunningSubject) -> None:

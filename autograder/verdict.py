@@ -52,12 +52,16 @@ class CheckResult:
 
 @dataclass(frozen=True)
 class Verdict:
-    """The results of one part of one exam on one subject."""
+    """The results of one part of one exam on one subject.
+
+    ``seed`` is what the examination's numbers were drawn from; 0 if it was not sat.
+    """
 
     exam: str
     part: str
     checks: tuple[CheckResult, ...]
     notes: tuple[str, ...] = ()
+    seed: int = 0
     version: int = field(default=VERSION)
 
     @property
@@ -104,7 +108,7 @@ class Verdict:
                 )
             checks = tuple(_check(item) for item in data["checks"])
             notes = tuple(str(note) for note in data["notes"])
-            return cls(str(data["exam"]), str(data["part"]), checks, notes)
+            return cls(str(data["exam"]), str(data["part"]), checks, notes, int(data["seed"]))
         except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise VerdictError(
                 f"A verdict is damaged ({type(error).__name__}: {error}): grade it again."

@@ -9,6 +9,7 @@ from autograder import exams, sandbox
 from autograder.corpus import files, trials
 from autograder.corpus.case import Case, CorpusError
 from autograder.corpus.trials import Trial
+from autograder.draws import USUAL_SEED
 from course.content import corpus_root
 
 
@@ -30,6 +31,7 @@ def run(
     repeat: int = 1,
     jobs: int = 2,
     load: int = 0,
+    seed: int = USUAL_SEED,
     say: Callable[[str], None] = lambda _line: None,
 ) -> list[Trial]:
     """Run the corpus of ``exam`` (of all exams if it is empty).
@@ -40,6 +42,7 @@ def run(
         repeat: how often each case is run.
         jobs: how many run at a time.
         load: how many busy loops run beside them.
+        seed: what the numbers of an exam are drawn from; what cases say is worded for the usual.
         say: is told a line a run.
 
     Raises:
@@ -53,7 +56,7 @@ def run(
         for name, own in chosen.items():
             source, released = trials.notebooks(name)
             done += trials.run(
-                own, source, released, jobs=jobs, repeat=repeat, trust=trust,
+                own, source, released, jobs=jobs, repeat=repeat, trust=trust, seed=seed,
                 done=lambda trial: say(_line(trial)),
             )  # fmt: skip
     return done

@@ -17,6 +17,7 @@ from nbformat import NotebookNode
 from autograder import exams, points, runner, submission
 from autograder.build import build
 from autograder.corpus.case import Case
+from autograder.draws import USUAL_SEED
 from autograder.release import release
 from autograder.runner import Outcome
 from course.content import content_root, copy_authoring
@@ -78,18 +79,19 @@ def run(
     jobs: int = 2,
     repeat: int = 1,
     trust: bool = False,
+    seed: int = USUAL_SEED,
     done: Callable[[Trial], None] = lambda _trial: None,
 ) -> list[Trial]:
     """Run every case ``repeat`` times, ``jobs`` at a time, and compare.
 
-    ``trust`` is that of `runner.run`.
+    ``trust`` and ``seed`` are those of `runner.run`; what cases say is worded for the usual seed.
     """
 
     def one(case: Case) -> Trial:
         handed_in = case.submission(source, released)
         notebook, _ = submission.restore(handed_in, source, released)
         program = submission.program(notebook)
-        outcome = runner.run(program, cell_timeout=case.cell_timeout, trust=trust)
+        outcome = runner.run(program, cell_timeout=case.cell_timeout, trust=trust, seed=seed)
         trial = Trial(case, outcome, case.verdict_of(outcome))
         done(trial)
         return trial

@@ -9,7 +9,6 @@ comes from the hidden cell.
 from __future__ import annotations
 
 import math
-import secrets
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -30,15 +29,14 @@ EXAM: Exam[RobotRig] = Exam("patterns", robot_rig)
 
 RATE, RATE_WINDOW = (9.0, 11.0), 2.0  # Hz, s
 FROZEN = 0.6  # s on the wall
-POSITION, FURTHER = 0.3, range(4, 10)  # m before the first drive; tenths of it to draw from
+POSITIONS = ((0.3, 0.2, 0.4), (0.6, 0.5, 0.7), (0.9, 0.8, 0.95))
+"""Metres before the first drive: the usual ones, and from what to what they are drawn."""
 LEVEL_AGE, TICK = 1.0, 0.05  # s
-SPEEDS = ((0.3, 5.0), (0.8, 0.05))  # m/s: a limit, and one that is refused after it
 SPEED_AT_START = 0.5  # m/s
-GOOD_SPEEDS = (1.0, 0.1, 0.37, 0.3)  # m/s, the bounds among them, and one that is not round
+LOWEST, HIGHEST = 0.1, 1.0  # m/s
 MISTYPED = 5.0  # m/s
-BAD_SPEEDS = (-0.5, 0.0, 0.05, MISTYPED, 1.1)  # m/s
-LEVELS = (0.6, 0.4, 0.38, 0.8)  # great changes and a small one, falling and rising
-START, WAY, FAR = 1, 3, 50  # the station from which it drives first; stations to drive
+START, MOST_STARTS = 1, 6  # the stations from which it may drive first
+WAY, FAR = 3, (50, 40, 60)  # stations to drive; of a drive that is called off
 STOPS, PASSING = 0.5, 0.3  # s
 QUIET, COARSE = 8.0, 0.5
 """Seconds of the node's clock after which a change is long past, and between two moments of it."""
@@ -161,9 +159,8 @@ def position_answered(rig: RobotRig) -> str:
     if not rig.listens_to("position"):
         raise Failed(expected=needed, actual="Your node does not listen to hardware/position.")
     asker = odometry.asker_by(rig, pattern)
-    # Nobody can know the later ones beforehand.
-    later = sorted(secrets.SystemRandom().sample(FURTHER, 2))  # the robot never goes back
-    for position in (POSITION, *(tenths / 10 for tenths in later)):
+    for number, metres in enumerate(POSITIONS):  # the robot never goes back
+        position = rig.draws.number(f"position {number}", *metres)
         rig.report("position", position)
         if answer := odometry.fault(rig, asker, position):
             raise Failed(
@@ -217,14 +214,14 @@ def parameter_changes(rig: RobotRig) -> str:
                 actual=f"Before anybody has changed it, it is {first:g} m/s.",
             )
     with meanwhile.standing(rig):
-        for good in GOOD_SPEEDS:
+        for good in _good_speeds(rig):
             taken, reason = offers.set_speed_limit(rig, good)
             if not taken:
                 raise Failed(
                     expected=f"{needed} {good:g} m/s is a good value: from 0.1 to 1.0 all are.",
                     actual=f"It was refused, {with_reason(reason)}.",
                 )
-    for bad in BAD_SPEEDS:
+    for bad in _bad_speeds(rig):
         taken, reason = offers.set_speed_limit(rig, bad)
         if taken:
             offers.set_speed_limit(rig, good)  # with this one no robot can drive on
@@ -254,6 +251,37 @@ def parameter_changes(rig: RobotRig) -> str:
     )
 
 
+def _good_speeds(rig: RobotRig) -> tuple[float, ...]:
+    """Return speed limits in m/s: both bounds, one that is not round, and the one that stays."""
+    odd = rig.draws.number("a good speed", 0.37, 0.21, 0.89)
+    return HIGHEST, LOWEST, odd, _limits(rig)[0][0]
+
+
+def _bad_speeds(rig: RobotRig) -> tuple[float, ...]:
+    draw = rig.draws.number
+    return (
+        draw("a speed below 0", -0.5, -0.9, -0.1),
+        0.0,
+        draw("a speed that is too low", 0.05, 0.01, 0.09),
+        MISTYPED,
+        draw("a speed that is too high", 1.1, 1.01, 1.3),
+    )
+
+
+def _limits(rig: RobotRig) -> tuple[tuple[float, float], ...]:
+    """Return speed limits in m/s, each with one that is refused after it."""
+    slow = rig.draws.number("a low speed limit", 0.3, 0.2, 0.4)
+    fast = rig.draws.number("a high speed limit", 0.8, 0.6, 0.9)
+    return (slow, MISTYPED), (fast, _bad_speeds(rig)[2])
+
+
+def _levels(rig: RobotRig) -> tuple[float, ...]:
+    """Return battery levels: great changes and a small one, falling and rising."""
+    high = rig.draws.number("a high level", 0.6, 0.55, 0.69)
+    low = rig.draws.number("a low level", 0.4, 0.3, 0.45)
+    return high, low, round(low - 0.02, 2), rig.draws.number("a higher level", 0.8, 0.71, 0.94)
+
+
 @EXAM.check(
     needs=("node_starts",),
     hints=(
@@ -274,7 +302,7 @@ def battery_broadcast(rig: RobotRig) -> None:
     if not rig.listens_to("charge"):
         raise Failed(expected=needed, actual="Your node does not listen to hardware/charge.")
     acquaint(rig)
-    for level in LEVELS:
+    for level in _levels(rig):
         rig.report("charge", level)
         if not rig.wait_stepping(lambda level=level: rig.told_level(level), LEVEL_AGE):  # type: ignore[misc]
             raise Failed(
@@ -300,7 +328,7 @@ def battery_late_joiner(rig: RobotRig) -> str:
     A display that is switched on later shows an empty field until the level changes next: perhaps
     too late.
     """
-    level = 0.7
+    level = rig.draws.number("the last level", 0.7, 0.1, 0.24)
     rig.report("charge", level)
     needed = f"Whoever joins late knows the level within {LEVEL_AGE:g} s, without a change."
     # Everything that this change set off is over before anyone joins.
@@ -370,7 +398,8 @@ def navigation_drives(rig: RobotRig) -> None:
 
 def _next_start(rig: RobotRig) -> int:
     """Return the station from which a drive begins: the robot is never carried back."""
-    return max(START, math.ceil(rig.position))
+    first = rig.draws.whole("the first station", START, START, MOST_STARTS)
+    return max(first, math.ceil(rig.position))
 
 
 def _drive_again(rig: RobotRig, position: float, before: str) -> None:
@@ -418,7 +447,7 @@ def speed_takes_effect(rig: RobotRig) -> None:
             f"up to {first:g} m/s.",
         )
     position = float(_next_start(rig))
-    for limit, refused in SPEEDS:
+    for limit, refused in _limits(rig):
         offers.set_speed_limit(rig, limit)
         offers.set_speed_limit(rig, refused)  # the good one stays
         expected = f"With max_speed at {limit:g} m/s, and {refused:g} m/s refused after that,"
@@ -450,7 +479,7 @@ def navigation_cancel(rig: RobotRig) -> None:
     station first has not understood.
     """
     start = _next_start(rig)
-    with Drive(rig, start, start + FAR) as drive:
+    with Drive(rig, start, start + rig.draws.whole("a long way", *FAR)) as drive:
         drive.require_driving()
         drive.roll_on()
         stations.require_report(drive)

@@ -116,8 +116,9 @@ def driver_runs(rig: CameraRig) -> None:
         require_picture(rig, device)
         require_own_clock(rig, device)
         require_rate(rig, device, 1 / PERIOD)
-        require_zoom(rig, device, 3, "While the driver runs")
-        require_zoom_kept(rig, device, 3, "After a zoom of 3")
+        zoom = rig.draws.whole("a zoom", 3, 2, 6)
+        require_zoom(rig, device, zoom, "While the driver runs")
+        require_zoom_kept(rig, device, zoom, f"After a zoom of {zoom}")
         require_one_picture_each(rig, device, "While the driver runs")
         require_rate(
             rig,
@@ -126,8 +127,9 @@ def driver_runs(rig: CameraRig) -> None:
             " after a snapshot",
             after=lambda: require_snapshot(rig, device, "While the driver runs"),
         )
-        require_zoom_at_once(rig, device, 8, "While the driver runs")
-        require_tick_zoom(rig, device, 8, "After a zoom of 8")
+        zoom = rig.draws.whole("a higher zoom", 8, 7, 8)
+        require_zoom_at_once(rig, device, zoom, "While the driver runs")
+        require_tick_zoom(rig, device, zoom, f"After a zoom of {zoom}")
     require_default_device(rig, DRIVER)
 
 
@@ -368,9 +370,10 @@ def managed_gives_back(rig: CameraRig) -> None:
         node = Managed(rig, name)
         require_no_publisher_yet(rig)
         node.require_defaults()
-        require_configuration(rig, node, 10.0, later=20.0)
-        require_configuration(rig, node, FASTEST)
-        require_configuration(rig, node, 1.5, seconds=6)  # neither 1 nor 2 Hz
+        require_configuration(rig, node, 10.0, later=float(rig.draws.whole("later", 20, 15, 25)))
+        slow = rig.draws.whole("a slow rate", 1, 1, 4) + 0.5  # Hz, and neither 1 nor 2
+        for rate in rig.draws.shuffled("rates", (FASTEST, slow)):
+            require_configuration(rig, node, rate, seconds=1 if rate == FASTEST else 6)
         require_flat_rounds(rig, node)
         require_no_thread_inactive(rig, node)
 
@@ -393,7 +396,10 @@ def configure_refused(rig: CameraRig) -> None:
     """
     with rig.life(MANAGED) as name:
         node = Managed(rig, name)
-        require_refusals(rig, node, (0.0, -5.0, FASTEST + 0.5, 1000.0))
+        draw = rig.draws.number
+        below = draw("a rate below 0", -5.0, -9.0, -0.5)
+        above = draw("a rate that is too high", FASTEST + 0.5, FASTEST + 0.2, FASTEST + 3.0)
+        require_refusals(rig, node, (0.0, below, above, 1000.0))
         node.require(device=rig.device(), rate=0.5)  # slow, and allowed
         node.go("configure", "cleanup")
         device = rig.device()
@@ -507,10 +513,11 @@ def callback_raises(rig: CameraRig) -> None:
     device = rig.device()
     with rig.life(DRIVER, device) as node:
         require_endpoints(rig, node)
-        require_zoom(rig, device, 2, "While the driver runs")
-        for factor in (99, 0, -1):
+        zoom = rig.draws.whole("a zoom before one that is refused", 2, 2, 8)
+        require_zoom(rig, device, zoom, "While the driver runs")
+        for factor in (rig.draws.whole("a zoom that is too high", 99, 9, 200), 0, -1):
             rig.refused_zoom(factor)
-            require_zoom_kept(rig, device, 2, f"After a zoom of {factor}")
+            require_zoom_kept(rig, device, zoom, f"After a zoom of {factor}")
         require_zoom_at_once(rig, device, 1, "After a zoom of -1")
         require_rate(
             rig,
@@ -582,5 +589,6 @@ def _destroyed_during_a_snapshot(rig: CameraRig, usual: int) -> bool:
         require_callbacks_ended(rig, threads, usual, when)
         again = rig.device()
         rig.program.start(DRIVER, again)
-        require_zoom(rig, again, 4, "After a restart")
+        zoom = rig.draws.whole("a zoom after a restart", 4, 2, 8)
+        require_zoom(rig, again, zoom, "After a restart")
     return once and 0 < before == left()

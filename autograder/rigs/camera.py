@@ -61,6 +61,7 @@ class CameraRig:
         self.graph = CameraGraph(node)
         self.program = Program(bench.subject, self.graph)
         self.memory = bench.memory
+        self.draws = bench.draws
         self._clean = False
         self._provoked = False
         self._clients: dict[str, Any] = {}
@@ -246,6 +247,7 @@ class CameraRig:
         A participant's endpoints are told in order: those of a mark that is made now come last.
         """
         mark = f"mark_{secrets.token_hex(4)}"
+        self.graph.note_mark(mark)
         self.subject.mark(mark)
         self.wait(lambda: self.node.count_publishers(mark) and self.node.count_subscribers(mark))
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 
 from autograder.rigs.camera_node import IMAGE, SNAPSHOT, ZOOM, ExaminerNode
+from autograder.rigs.participants import GUID_PREFIX_BYTES, NAMELESS
 from autograder.rigs.phrases import phrase
 from course.runtime.names import full_name
 
@@ -15,12 +16,10 @@ PUBLISHER = f"a publisher on {IMAGE}"
 SUBSCRIPTION = f"a subscription to {ZOOM}"
 SERVICE = f"a service {SNAPSHOT}"
 NODE = "the node "
-GUID_PREFIX = 12
-"""Bytes of an endpoint's GUID that name its participant (DDSI-RTPS 2.3, 9.3.1)."""
 GUID_PROCESS = 8
 """Of these, the bytes that all participants of one process share, as Fast DDS makes them."""
-NAMELESS = "_NODE_NAME_UNKNOWN_"
-"""How the graph calls the node of an endpoint that no node is known to have (rmw_dds_common)."""
+SESSIONS_OWN = re.compile(r"/_course_\d+_[0-9a-f]+")
+"""The one hidden node that a session of the course has (`course.runtime.probe`)."""
 TYPES = {
     PUBLISHER: "sensor_msgs/msg/Image",
     SUBSCRIPTION: "std_msgs/msg/Int32",
@@ -50,6 +49,7 @@ class CameraGraph:
         self._ghosts: set[bytes] = set()
         self._started: set[str] = set()
         self._participants: set[bytes] = set()
+        self._marks: set[str] = set()
 
     def disregard(self) -> None:
         """Take what is there by now for ghosts."""
@@ -58,6 +58,10 @@ class CameraGraph:
     def note_started(self, node: str) -> None:
         """Note that ``node`` is one of the subject's: so is its participant."""
         self._started.add(node)
+
+    def note_mark(self, node: str) -> None:
+        """Note that ``node`` was made because the examiner asked for it."""
+        self._marks.add(f"/{node}")
 
     def publishers(self) -> int:
         """Return how many publishers there are on the image topic."""
@@ -72,17 +76,24 @@ class CameraGraph:
     def nodes(self, *, process: bool = False) -> list[str]:
         """Return the nodes that were made since this check began, in the driver's participant.
 
-        Not those of ours, and none that the ROS tools hide. With ``process`` also those of other
-        contexts in the driver's process: there is a node that a callback makes without a context.
+        Not those of ours, nor the one hidden node that each session has. With ``process`` also
+        those of other contexts in the driver's process: there is a node that a callback makes
+        without a context.
         """
-        size = GUID_PROCESS if process else GUID_PREFIX
+        size = GUID_PROCESS if process else GUID_PREFIX_BYTES
         ours = {participant[:size] for participant in self._participants}
-        there = [
-            what.removeprefix(NODE)
-            for what, end in self._endpoints()
-            if what.startswith(NODE) and end not in self._ghosts and end[:size] in ours
-        ]
-        return [name for name in there if not re.match(r"/(_|mark_[0-9a-f]{8}$)", name)]
+        sessions: set[bytes] = set()
+        made = []
+        for what, end in self._endpoints():
+            name = what.removeprefix(NODE)
+            if not what.startswith(NODE) or end in self._ghosts or end[:size] not in ours:
+                continue
+            participant = end[:GUID_PREFIX_BYTES]
+            if SESSIONS_OWN.fullmatch(name) and participant not in sessions:
+                sessions.add(participant)
+            elif name not in self._marks:
+                made.append(name)
+        return made
 
     def left(self, node: str) -> list[str]:
         """Return what is left of the driver on the graph: endpoints, ``node``, helper nodes."""
@@ -121,5 +132,5 @@ class CameraGraph:
             name = full_name(end.node_name, end.node_namespace)
             found.setdefault(f"{NODE}{name}", []).append(end)
             if name in self._started:
-                self._participants.add(bytes(end.endpoint_gid)[:GUID_PREFIX])
+                self._participants.add(bytes(end.endpoint_gid)[:GUID_PREFIX_BYTES])
         return [(what, bytes(end.endpoint_gid)) for what, ends in found.items() for end in ends]

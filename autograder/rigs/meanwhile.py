@@ -17,7 +17,9 @@ from autograder.rigs.robot import RobotRig
 
 FILMED = (8.0, 12.0)
 """Pictures a second, as far as such a short time tells."""
-LEVEL, LATER, LEVEL_AGE = 0.55, 0.35, 1.0  # s
+LEVEL, LATER = (0.55, 0.46, 0.65), (0.35, 0.25, 0.45)
+"""Battery levels in a drive and after one: the usual ones, and from what to what they are drawn."""
+LEVEL_AGE = 1.0  # s
 HOLDS_UP = "the drive holds nobody up."
 
 
@@ -55,12 +57,13 @@ def require_battery(rig: RobotRig, where: str) -> None:
     """Fail if a new level does not reach who listens."""
     if not rig.broadcasts:
         return
-    rig.report("charge", LEVEL)
-    if not rig.wait_stepping(lambda: rig.told_level(LEVEL), LEVEL_AGE):
+    level = rig.draws.number("the level in a drive", *LEVEL)
+    rig.report("charge", level)
+    if not rig.wait_stepping(lambda: rig.told_level(level), LEVEL_AGE):
         raise Failed(
             expected="While the robot drives, too, whoever listens to robot/battery knows a new "
             f"level within {LEVEL_AGE:g} s: {HOLDS_UP}",
-            actual=f"{where}, the level became {LEVEL:g}, and {LEVEL_AGE:g} s later "
+            actual=f"{where}, the level became {level:g}, and {LEVEL_AGE:g} s later "
             f"{last_level(rig)}{rig.because()}.",
         )
 
@@ -115,11 +118,12 @@ def require_the_same_after(rig: RobotRig, position: float, before: str) -> None:
         if answer := odometry.fault(rig, asker, position):
             raise Failed(expected=expected, actual=f"With the robot at {position:g} m, {answer}")
     if rig.memory.get("broadcasts"):
-        rig.report("charge", LATER)
-        if not rig.wait_stepping(lambda: rig.told_level(LATER), LEVEL_AGE):
+        level = rig.draws.number("the level after a drive", *LATER)
+        rig.report("charge", level)
+        if not rig.wait_stepping(lambda: rig.told_level(level), LEVEL_AGE):
             raise Failed(
                 expected=expected,
-                actual=f"The level became {LATER:g}, and {LEVEL_AGE:g} s later "
+                actual=f"The level became {level:g}, and {LEVEL_AGE:g} s later "
                 f"{last_level(rig)}{rig.because()}.",
             )
 

@@ -10,6 +10,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 
 from autograder.exam import Failed
+from autograder.rigs.participants import of_others
 from autograder.rigs.robot import SETTLE, RobotRig
 from autograder.rigs.scenarios import NAMES, SCENARIOS, Scenario, would_mean
 
@@ -31,15 +32,12 @@ def seen(rig: RobotRig, scenario: Scenario) -> Patterns:
     """Return the patterns that the subject offers for a scenario now, with their types."""
     name = f"/{NAMES[scenario]}"
     found = {}
-    others = [
-        end
-        for ends in (
-            rig.node.get_publishers_info_by_topic(name),
-            rig.node.get_subscriptions_info_by_topic(name),
-        )
-        for end in ends
-        if end.node_name != rig.node.get_name()
-    ]
+    others = of_others(
+        [
+            *rig.node.get_publishers_info_by_topic(name),
+            *rig.node.get_subscriptions_info_by_topic(name),
+        ]
+    )
     if others:
         found["topic"] = str(others[0].topic_type)
     services = dict(rig.node.get_service_names_and_types())

@@ -68,6 +68,7 @@ class RobotRig:
         self.session = bench.session
         self.key = bench.key
         self.memory = bench.memory
+        self.draws = bench.draws
         node = bench.session.run(ExaminerNode)
         assert isinstance(node, ExaminerNode)
         self.node = node

@@ -8,18 +8,16 @@ every question about a design's structure is a function of these data.
 
 from __future__ import annotations
 
+import re
 from collections import Counter, deque
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 
-from rclpy.action.graph import (
-    get_action_client_names_and_types_by_node,
-    get_action_server_names_and_types_by_node,
-)
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from autograder.rigs.participants import NO_NODE, node_of, of_others, participant_of
 from course.runtime.names import full_name
 
 KINDS = ("topic", "request", "response", "goal", "feedback")
@@ -167,68 +165,107 @@ def _pairs(
     yield from ((s, t, by) for s in sources for t in targets if s != t)
 
 
-def read_graph(node: Node) -> RobotGraph:
-    """Return what `node` sees on the ROS graph besides itself and hidden nodes."""
-    names = [
-        (name, namespace)
-        for name, namespace in node.get_node_names_and_namespaces()
-        if not name.startswith("_") and name != node.get_name()
-    ]
-    count = Counter(full_name(name, space) for name, space in names)
-    graph = RobotGraph(
-        nodes=frozenset(count), namesakes=frozenset(name for name in count if count[name] > 1)
-    )
+def read_graph(node: Node, marks: Collection[str] = ()) -> RobotGraph:
+    """Return what `node` sees on the ROS graph besides the examiner's own endpoints.
+
+    Hidden nodes count as others do, as soon as they have an endpoint here; so do endpoints that no
+    node is known to have. ``marks`` are topics that the examiner has asked for.
+    """
+    reader = _Reader(node)
+    graph = RobotGraph()
     for topic, _ in node.get_topic_names_and_types():
-        if topic not in INFRASTRUCTURE and "/_" not in topic:
-            found = Topic(
-                topic,
-                _ends(node.get_publishers_info_by_topic(topic), graph.nodes),
-                _ends(node.get_subscriptions_info_by_topic(topic), graph.nodes),
-            )
+        if topic not in INFRASTRUCTURE and topic not in marks and not _OF_ACTION.fullmatch(topic):
+            found = reader.topic(topic, topic)
             if found.readers or found.types not in ((), (_TRANSITIONS,)):
                 graph.topics[topic] = found
-    for name, space in dict.fromkeys(names):
-        _add_offers(graph, node, name, space)
-    for offer in [*graph.services.values()]:
-        if offer.servers and offer.type.startswith(_OF_EVERY_NODE):
-            del graph.services[offer.name]
-        else:
-            offer.ways = _ways(offer.name, node, graph.nodes)
+    for raw, _ in node.get_topic_names_and_types(no_demangle=True):
+        if request := _REQUEST.fullmatch(raw):
+            _add_offer(graph, reader, request["name"])
+    # A node has no endpoint itself: of those without any that counts, the name is all there is.
+    count = reader.count_names()
+    graph.nodes = frozenset(
+        {name for name in count if "/_" not in name}
+        | {end.node for topic in graph.topics.values() for end in (*topic.writers, *topic.readers)}
+        | {
+            node
+            for offer in (*graph.services.values(), *graph.actions.values())
+            for node in offer.servers | offer.clients
+        }
+    )
+    apart = reader.names_apart()
+    graph.namesakes = frozenset(name for name in graph.nodes if max(count[name], apart[name]) > 1)
     return graph
 
 
-def _add_offers(graph: RobotGraph, node: Node, name: str, space: str) -> None:
-    full = full_name(name, space)
-    for offers, serves, found in (
-        (graph.services, True, node.get_service_names_and_types_by_node(name, space)),
-        (graph.services, False, node.get_client_names_and_types_by_node(name, space)),
-        (graph.actions, True, get_action_server_names_and_types_by_node(node, name, space)),
-        (graph.actions, False, get_action_client_names_and_types_by_node(node, name, space)),
-    ):
-        for offer_name, types in found:
-            if "/_action/" not in offer_name:
-                offer = offers.setdefault(offer_name, Offer(offer_name, types[0]))
-                (offer.servers if serves else offer.clients).add(full)
+_OF_ACTION = re.compile(r".*/_action/(feedback|status)")
+_REQUEST = re.compile(r"rq(?P<name>/.+)Request")
+_SEND_GOAL = "/_action/send_goal"
+_OTHER_SERVICES_OF_ACTION = ("/_action/cancel_goal", "/_action/get_result")
+_REQUEST_TYPE = re.compile(r"(\w+)::(srv|action)::dds_::(\w+?)(_SendGoal)?_Request_")
 
 
-def _ways(service: str, node: Node, nodes: frozenset[str]) -> tuple[Topic, ...]:
-    """Return the two topics of a service, by the names that ROS 2 gives them on DDS.
+class _Reader:
+    """Reads endpoints off the graph through one node."""
 
-    See https://design.ros2.org/articles/topic_and_service_names.html. A middleware that has others
-    shows no endpoints there.
-    """
-    return tuple(
-        Topic(
-            service,
-            _ends(node.get_publishers_info_by_topic(name, no_mangle=True), nodes),
-            _ends(node.get_subscriptions_info_by_topic(name, no_mangle=True), nodes),
+    def __init__(self, node: Node) -> None:
+        self._node = node
+        self._participants: dict[str, set[bytes]] = {}
+
+    def topic(self, name: str, raw: str, *, no_mangle: bool = False) -> Topic:
+        """Return a topic as ``name``; ``raw`` is what it is called, on DDS with ``no_mangle``."""
+        return Topic(
+            name,
+            self._ends(self._node.get_publishers_info_by_topic(raw, no_mangle)),
+            self._ends(self._node.get_subscriptions_info_by_topic(raw, no_mangle)),
         )
-        for name in (f"rq{service}Request", f"rr{service}Reply")
-    )
+
+    def _ends(self, infos: Iterable[TopicEndpointInfo]) -> tuple[End, ...]:
+        ends = []
+        for info in of_others(infos):
+            node = node_of(info)
+            if node != NO_NODE:
+                self._participants.setdefault(node, set()).add(participant_of(info))
+            ends.append(End(node, info.topic_type, info.qos_profile))
+        return tuple(ends)
+
+    def count_names(self) -> Counter[str]:
+        """Return how many nodes there are of each full name, without the reading one."""
+        count = Counter(
+            full_name(name, space) for name, space in self._node.get_node_names_and_namespaces()
+        )
+        count[self._node.get_fully_qualified_name()] -= 1  # another of this name is not ours
+        return +count
+
+    def names_apart(self) -> Counter[str]:
+        """Return in how many participants each name has endpoints."""
+        return Counter({name: len(found) for name, found in self._participants.items()})
 
 
-def _ends(infos: Iterable[TopicEndpointInfo], nodes: frozenset[str]) -> tuple[End, ...]:
-    ends = (
-        End(full_name(i.node_name, i.node_namespace), i.topic_type, i.qos_profile) for i in infos
+def _add_offer(graph: RobotGraph, reader: _Reader, name: str) -> None:
+    """Add a service or an action, by the topics that ROS 2 makes of it on DDS.
+
+    See https://design.ros2.org/articles/topic_and_service_names.html. So each end of it is known by
+    its endpoint, as those of topics are.
+    """
+    if name.endswith(_OTHER_SERVICES_OF_ACTION):
+        return
+    ways = (
+        reader.topic(name, f"rq{name}Request", no_mangle=True),
+        reader.topic(name, f"rr{name}Reply", no_mangle=True),
     )
-    return tuple(end for end in ends if end.node in nodes)
+    requests = ways[0]
+    types = [_service_type(end.type) for end in (*requests.readers, *requests.writers)]
+    if not types or (requests.readers and types[0].startswith(_OF_EVERY_NODE)):
+        return
+    servers, clients = set(requests.read_by), set(requests.written_by)
+    if name.endswith(_SEND_GOAL):
+        action = name.removesuffix(_SEND_GOAL)
+        graph.actions[action] = Offer(action, types[0], servers, clients)
+    else:
+        graph.services[name] = Offer(name, types[0], servers, clients, ways)
+
+
+def _service_type(dds_type: str) -> str:
+    """Return the ROS type of a service or an action of which DDS knows the type of its requests."""
+    found = _REQUEST_TYPE.fullmatch(dds_type)
+    return f"{found[1]}/{found[2]}/{found[3]}" if found else dds_type

@@ -31,7 +31,7 @@ class WallWait(Failed):
 
 
 class Robot:
-    """One of the student's nodes at work."""
+    """One of the student's nodes at work; ``draws`` are the numbers of the examination."""
 
     def __init__(self, bench: Bench, name: str, player: Player, still: Stillness) -> None:
         """Make the node of class ``name`` in the subject's present session.
@@ -39,6 +39,7 @@ class Robot:
         Raises:
             Failed: it cannot be made, or lacks an endpoint of the task.
         """
+        self.draws = bench.draws
         self.name, self._bench, self._player, self._still = name, bench, player, still
         self._unserved = False
         self._goes_on = False  # a callback that was there at the end of the last stride

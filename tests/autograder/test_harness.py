@@ -12,6 +12,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,11 +28,11 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from autograder import harness
+from autograder import bench, harness
 from autograder.bench import StudentError, Subject, SubjectGone
 from autograder.harness import Harness
 from autograder.raised import MUST_NOT_SPIN
-from autograder.wire import Channel, ChannelTimeout
+from autograder.wire import Channel, ChannelClosed, ChannelTimeout
 from course import Session
 from course.runtime.context import default_context_beside
 
@@ -307,6 +308,34 @@ def test_a_node_that_does_not_come_up_is_named() -> None:
     subject = Subject(Silent())  # type: ignore[arg-type]
     with pytest.raises(SubjectGone, match="bring up the nodes of `robot`, and bob did not come up"):
         subject.start_all("robot")
+
+
+def test_replies_that_each_come_in_time_may_not_take_for_ever(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(bench, "ALL_REPLIES_TIMEOUT", 0.2)
+    ours, theirs = (Channel(end) for end in socket.socketpair())
+    answered = threading.Event()
+
+    def answer_slowly() -> None:
+        with suppress(ChannelClosed):
+            while True:
+                theirs.receive()
+                answered.wait(0.05)
+                theirs.send({"ok": True})
+
+    thread = threading.Thread(target=answer_slowly)
+    thread.start()
+    subject = Subject(ours)
+    try:
+        collect_often = partial(deque, (subject.collect() for _ in range(100)), maxlen=0)
+        with pytest.raises(SubjectGone, match=r"took 0 s in all .* to collect garbage: which"):
+            collect_often()
+        assert subject.hangs
+    finally:
+        ours.close()
+        theirs.close()
+        thread.join()
 
 
 @pytest.mark.parametrize("sim_time", [False, True])

@@ -15,27 +15,30 @@ EARLY = 0.3  # s of a drive before its first mark
 THIRD = 2.9  # s of a drive up to most of its third metre
 COMMAND = 0.5  # s between two commands to the wheels
 SLACK = 1.0  # s by which a drive of some seconds may be longer or shorter
-BAD = (0, -2, 11)
+BACKWARDS, TOO_FAR = (-2, -9, -1), (11, 11, 99)  # m: the usual ones, and bounds
 SPEED, SPEED_TOLERANCE = 1.0, 0.05  # m/s
-METRES = 4  # of the drive that is watched to its end
+METRES = (4, 3, 5)  # of the drive that is watched to its end: the usual ones, and bounds
 
 
 def arrives(rig: RobotRig) -> None:
-    """Bad goals, then one of 4 m and one of 1 m."""
+    """Bad goals, then one of some metres and one of 1 m."""
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
-        for order in BAD:
+        draw = robot.draws.whole
+        metres = draw("metres of the drive", *METRES)
+        bad = (0, draw("a goal behind", *BACKWARDS), draw("a goal too far away", *TOO_FAR))
+        for order in robot.draws.shuffled("bad goals", bad):
             _rejected(robot, dispatcher, order)
-        drive = sending.driving(robot, dispatcher, METRES)
-        sending.ends(robot, drive, f"A goal of {METRES} m", "succeeded", METRES + SLACK)
-        if dispatcher.now - drive.began < METRES - SLACK:
+        drive = sending.driving(robot, dispatcher, metres)
+        sending.ends(robot, drive, f"A goal of {metres} m", "succeeded", metres + SLACK)
+        if dispatcher.now - drive.began < metres - SLACK:
             raise Failed(
-                expected=f"A goal of {METRES} m takes {METRES} s, at 1 m/s.",
+                expected=f"A goal of {metres} m takes {metres} s, at 1 m/s.",
                 actual=f"It was over after {dispatcher.now - drive.began:.1f} s.",
             )
-        marks = list(range(1, METRES + 1))
+        marks = list(range(1, metres + 1))
         if drive.result != marks:
             raise Failed(
-                expected=f"The result of a goal of {METRES} m is {marks}.",
+                expected=f"The result of a goal of {metres} m is {marks}.",
                 actual=f"The result was {drive.result}.",
             )
         _require_feedback(dispatcher, drive, marks)

@@ -26,8 +26,8 @@ BREATH = 1.5  # s between the feedbacks of a navigator that is slow, not dead
 ALLOWED = 0.2  # s more or less that do no harm
 TOLERANCE = ALLOWED + STRIDE  # s: what the task allows, and a node that looks by a timer
 AFTER = 2.5  # s in which a second outcome would show
-METRES = 3  # of a drive whose length does not matter; others differ, lest one be remembered
-FAR = 40  # m
+METRES = (3, 2, 7)  # of a drive whose length does not matter: the usual ones, and bounds
+FAR = (40, 20, 90)  # m
 # Marks in the feedbacks of a slow drive, which takes longer than anyone would wait for the whole.
 # Once it stands still in between: the same feedback again is a sign of life, too.
 BREATHS = (1, 2, 3, 3, 4, 5, 6, 7)
@@ -47,11 +47,18 @@ def _user(rig: RobotRig, navigator: bool = True) -> Iterator[tuple[Robot, Naviga
                 yield robot, user
 
 
-def _accepted(
-    robot: Robot, user: NavigatorUser, metres: int = METRES, *, ponders: bool = False
-) -> None:
+def _metres(robot: Robot, more: int = 0) -> int:
+    """Return the length of a drive in m; ones with ``more`` differ, lest one be remembered."""
+    return robot.draws.whole("metres of a drive", *METRES) + more
+
+
+def _far(robot: Robot) -> int:
+    return robot.draws.whole("metres of a long drive", *FAR)
+
+
+def _accepted(robot: Robot, user: NavigatorUser, metres: int = 0, *, ponders: bool = False) -> None:
     """Ask for a drive, and wait until its goal has been accepted; see `NavigatorUser.request`."""
-    user.request(metres, ponders=ponders)
+    user.request(metres or _metres(robot), ponders=ponders)
     _sent(robot, user)
     if not robot.run(lambda: user.goals, PROMPT):
         raise RuntimeError("the examiner's navigator did not accept a goal")
@@ -103,22 +110,33 @@ def _once(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
 def ended(rig: RobotRig) -> None:
     """Goals that succeed, are rejected, are aborted; nothing of them is left behind."""
     with _user(rig) as (robot, user):
-        _accepted(robot, user)
-        user.feedback(1)
-        user.end(ServerGoalHandle.succeed)
-        _ends(robot, user, "When the goal succeeded", "arrived")
-        user.request(FAR, accepts=False, hesitates=True)
-        _sent(robot, user)
-        user.speeds.clear()  # what came with the request is no answer to the rejection
-        user.decide()
-        _ends(robot, user, "When the navigator rejected the goal", "rejected")
-        _accepted(robot, user, METRES - 1)
-        user.feedback(1)
-        robot.rest()
-        user.speeds.clear()  # nor is what came with the acceptance one to the abort
-        user.end(ServerGoalHandle.abort)
-        _ends(robot, user, "When the navigator aborted the goal", "aborted")
+        for ends in robot.draws.shuffled("ends of goals", (_succeeds, _is_rejected, _is_aborted)):
+            ends(robot, user)
         robot.require_no_errors()
+
+
+def _succeeds(robot: Robot, user: NavigatorUser) -> None:
+    _accepted(robot, user)
+    user.feedback(1)
+    user.end(ServerGoalHandle.succeed)
+    _ends(robot, user, "When the goal succeeded", "arrived")
+
+
+def _is_rejected(robot: Robot, user: NavigatorUser) -> None:
+    user.request(_far(robot), accepts=False, hesitates=True)
+    _sent(robot, user)
+    user.speeds.clear()  # what came with the request is no answer to the rejection
+    user.decide()
+    _ends(robot, user, "When the navigator rejected the goal", "rejected")
+
+
+def _is_aborted(robot: Robot, user: NavigatorUser) -> None:
+    _accepted(robot, user, _metres(robot, -1))
+    user.feedback(1)
+    robot.rest()
+    user.speeds.clear()  # what came with the acceptance is no answer to the abort
+    user.end(ServerGoalHandle.abort)
+    _ends(robot, user, "When the navigator aborted the goal", "aborted")
 
 
 def _ends(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
@@ -190,7 +208,7 @@ def _canceled(robot: Robot, user: NavigatorUser, event: str = "its acceptance") 
 
 def _slowly_refused(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive that is accepted late, but in time, and its cancel refused the same way."""
-    user.request(FAR, obeys=False, hesitates=True, ponders=True)
+    user.request(_far(robot), obeys=False, hesitates=True, ponders=True)
     _sent(robot, user)
     _answers_slowly(robot, user, "the goal")
     robot.run(lambda: user.goals, PROMPT)
@@ -211,7 +229,7 @@ def _answers_slowly(robot: Robot, user: NavigatorUser, what: str, aside: str = "
 
 def _too_late(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive whose goal is accepted, and reached, when it has been given up."""
-    user.request(METRES, hesitates=True)
+    user.request(_metres(robot), hesitates=True)
     _sent(robot, user)
     user.speeds.clear()  # what came with the request does not answer the silence
     when = f"When the navigator did not answer the goal for {ANSWER:g} s"
@@ -225,7 +243,7 @@ def _too_late(robot: Robot, user: NavigatorUser) -> None:
 
 def _cancel_too_late(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive whose cancel is accepted when it has been given up."""
-    _accepted(robot, user, METRES + 1, ponders=True)
+    _accepted(robot, user, _metres(robot, 1), ponders=True)
     _canceled(robot, user)
     when = f"When the navigator did not answer the request to cancel for {ANSWER:g} s"
     _outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
@@ -252,7 +270,7 @@ def lost(rig: RobotRig) -> None:
         limit = SILENCE + ANSWER + 2 * ALLOWED + STRIDE
         _outcome(robot, user, when, "lost", limit)
         _once(robot, user, when, "lost")
-        user.request(METRES)
+        user.request(_metres(robot))
         when = "When there was no navigator"
         _outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
     with _user(rig) as (robot, user):
@@ -266,7 +284,7 @@ def lost(rig: RobotRig) -> None:
 def _soon_after(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive that is accepted late, but in time, while a time-out of the last may run."""
     robot.spend(APART)
-    user.request(METRES - 1, hesitates=True)
+    user.request(_metres(robot, -1), hesitates=True)
     _sent(robot, user)
     aside = (
         f" The goal before was sent {APART:g} s before this one, and answered at once: is its "

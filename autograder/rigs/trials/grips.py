@@ -44,8 +44,9 @@ SHORTEST = 4.5 - 5 * ALLOWED - STRIDE  # s: three tries and two pauses, each as 
 def carried_out(rig: RobotRig) -> None:
     """The gripper answers, at once and within the time of a try."""
     with client(rig) as (robot, user):
-        _carries_out(robot, user, True, 0.0)
-        once(robot, user, _carries_out(robot, user, False, SLOW))
+        close = robot.draws.flag("the grip that is carried out")
+        _carries_out(robot, user, close, 0.0)
+        once(robot, user, _carries_out(robot, user, not close, SLOW))
 
 
 def _carries_out(robot: Robot, user: GripUser, close: bool, delay: float, aside: str = "") -> str:
@@ -72,9 +73,12 @@ def _carries_out(robot: Robot, user: GripUser, close: bool, delay: float, aside:
 def refused(rig: RobotRig) -> None:
     """The gripper answers that it will not: to the first try, and to the second."""
     with client(rig) as (robot, user):
-        tried(robot, user, True)
+        for grip in range(robot.draws.whole("grips before a refusal", 0, 0, 2)):
+            _carries_out(robot, user, robot.draws.flag(f"grip {grip} before a refusal"), 0.0)
+        close = robot.draws.flag("the grip that is refused")
+        tried(robot, user, close)
         _refuses(robot, user, "When the gripper answered success=False")
-        tried(robot, user, False)
+        tried(robot, user, not close)
         with suppress(WallWait):
             robot.run(lambda: len(user.tries) > 1 or user.outcomes, LONGEST, COARSE)
         tries_again = len(user.tries) > 1
@@ -113,11 +117,12 @@ def unanswered(rig: RobotRig) -> None:
     So it does with the next request, too: the tries and pauses of that one begin anew.
     """
     with client(rig) as (robot, user):
-        _given_up(robot, user, True, held=True)
+        close = robot.draws.flag("the grip without an answer")
+        _given_up(robot, user, close, held=True)
         user.tries[2].reply(True)
         once(robot, user, f"{GIVEN_UP}, and a late answer to the third")
         try:
-            _given_up(robot, user, False)
+            _given_up(robot, user, not close)
         except Failed as failed:
             raise Failed(expected=failed.expected, actual=f"{failed.actual}{SECOND}") from None
         _soon_after(robot, user)

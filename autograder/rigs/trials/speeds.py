@@ -10,6 +10,7 @@ from typing import Any
 
 from rcl_interfaces.msg import Parameter
 
+from autograder.draws import Draws
 from autograder.exam import Failed
 from autograder.rigs.gripper import (
     Operator,
@@ -30,45 +31,60 @@ PATIENCE = 1.0  # s for an answer; a service callback may await something
 LATER = 1.5  # s in which a request that was refused might be made up for
 SAME = 1e-6  # limits that differ by less are equal
 
-NONSENSE: tuple[tuple[str, list[Parameter]], ...] = (
-    ("linear = NaN", [double("linear", math.nan)]),
-    ("angular = NaN", [double("angular", math.nan)]),
-    ("linear = infinity", [double("linear", math.inf)]),
-    ("angular = minus infinity", [double("angular", -math.inf)]),
-    ("linear = -0.1", [double("linear", -0.1)]),
-    ("linear = 1.5", [double("linear", 1.5)]),
-    ("linear = 1.01", [double("linear", 1.01)]),
-    ("angular = -0.1", [double("angular", -0.1)]),
-    ("angular = 2.5", [double("angular", 2.5)]),
-    ("linear = “fast”, a string", [text("linear", "fast")]),
-    ("linear = 1, an integer", [whole("linear", 1)]),
-    ("angular = true, a bool", [flag("angular", True)]),
-    ("linear = [0.5], an array of doubles", [doubles("linear", 0.5)]),
-    ("linear without a type", [unset("linear")]),
-    ("a limit named “warp”", [double("warp", 0.5)]),
-    ("a limit named “Linear”", [double("Linear", 0.5)]),
-    (
-        "linear = 0.2, angular = 0.5 and a limit named “warp”",
-        [double("linear", 0.2), double("angular", 0.5), double("warp", 0.5)],
-    ),
-    (
-        "linear = 0.2 and angular = “fast”, a string",
-        [double("linear", 0.2), text("angular", "fast")],
-    ),
-    ("linear = NaN, then linear = 0.2", [double("linear", math.nan), double("linear", 0.2)]),
-    ("an empty list", []),
-)
+
+def _nonsense(draws: Draws) -> list[tuple[str, list[Parameter]]]:
+    """Return requests of which something is wrong, and what that is in words."""
+    below = draws.number("a limit below 0", -0.1, -0.9, -0.01)
+    above = draws.number("a linear limit that is too high", 1.5, 1.05, 3.0)
+    turning = draws.number("an angular limit that is too high", 2.5, 2.01, 4.0)
+    linear = draws.number("the good half of a request", 0.2, 0.05, 0.95)
+    angular = draws.number("the other good half", 0.5, 0.05, 1.95)
+    return [
+        ("linear = NaN", [double("linear", math.nan)]),
+        ("angular = NaN", [double("angular", math.nan)]),
+        ("linear = infinity", [double("linear", math.inf)]),
+        ("angular = minus infinity", [double("angular", -math.inf)]),
+        (f"linear = {below:g}", [double("linear", below)]),
+        (f"linear = {above:g}", [double("linear", above)]),
+        ("linear = 1.01", [double("linear", 1.01)]),
+        (f"angular = {below:g}", [double("angular", below)]),
+        (f"angular = {turning:g}", [double("angular", turning)]),
+        ("linear = “fast”, a string", [text("linear", "fast")]),
+        ("linear = 1, an integer", [whole("linear", 1)]),
+        ("angular = true, a bool", [flag("angular", True)]),
+        ("linear = [0.5], an array of doubles", [doubles("linear", 0.5)]),
+        ("linear without a type", [unset("linear")]),
+        ("a limit named “warp”", [double("warp", angular)]),
+        ("a limit named “Linear”", [double("Linear", angular)]),
+        (
+            f"linear = {linear:g}, angular = {angular:g} and a limit named “warp”",
+            [double("linear", linear), double("angular", angular), double("warp", angular)],
+        ),
+        (
+            f"linear = {linear:g} and angular = “fast”, a string",
+            [double("linear", linear), text("angular", "fast")],
+        ),
+        (
+            f"linear = NaN, then linear = {linear:g}",
+            [double("linear", math.nan), double("linear", linear)],
+        ),
+        ("an empty list", []),
+    ]
 
 
 def good(rig: RobotRig) -> None:
     """Good requests: the first one, both limits, one at a time, at its bounds, the same again."""
+    draw = rig.bench.draws.number
+    first = draw("the first angular limit", 0.8, 0.3, 1.9)
+    both = draw("a linear limit", 0.33, 0.26, 0.45), draw("an angular limit", 0.66, 0.3, 1.2)
+    again = draw("the next linear limit", 0.21, 0.11, 0.25), draw("the next", 1.3, 1.25, 1.8)
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
-        _accepted(robot, operator, "At first", (0.5, 0.8), angular=0.8)
-        _accepted(robot, operator, "Then", (0.33, 0.66), linear=0.33, angular=0.66)
-        _accepted(robot, operator, "Then", (0.33, 2.0), angular=2.0)
+        _accepted(robot, operator, "At first", (0.5, first), angular=first)
+        _accepted(robot, operator, "Then", both, linear=both[0], angular=both[1])
+        _accepted(robot, operator, "Then", (both[0], 2.0), angular=2.0)
         # Of a request that names both, each has to be kept: only one might be.
-        _accepted(robot, operator, "Then", (0.21, 1.3), linear=0.21, angular=1.3)
-        _accepted(robot, operator, "Then", (0.0, 1.3), linear=0.0)
+        _accepted(robot, operator, "Then", again, linear=again[0], angular=again[1])
+        _accepted(robot, operator, "Then", (0.0, again[1]), linear=0.0)
         _accepted(robot, operator, "Then", (0.0, 2.0), angular=2.0)
         _accepted(robot, operator, "Then", (1.0, 2.0), linear=1.0)
         when = "When linear and angular have these values already,"
@@ -76,23 +92,39 @@ def good(rig: RobotRig) -> None:
 
 
 def bad(rig: RobotRig) -> None:
-    """Everything that can be wrong with a request, and a good one after each."""
+    """Everything that can be wrong with a request, and good ones now and then."""
+    draws = rig.bench.draws
+    linear = draws.number("a linear limit after nonsense", 0.4, 0.05, 0.95)
+    angular = draws.number("an angular limit after nonsense", 0.8, 0.05, 1.95)
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
-        for what, parameters in NONSENSE:
+
+        def be_told_something_good() -> None:
+            due = linear, angular
+            _accepted(robot, operator, "After nonsense", due, linear=linear, angular=angular)
+
+        for what, parameters in draws.shuffled("nonsense", _nonsense(draws)):
             _refused(robot, operator, what, parameters)
-        _accepted(robot, operator, "After nonsense", (0.4, 0.8), linear=0.4, angular=0.8)
+            if draws.flag(f"something good after {what}", usual=False):
+                be_told_something_good()
+        be_told_something_good()
         robot.require_no_errors()
 
 
 def atomic(rig: RobotRig) -> None:
     """Requests that are good in part, and wheels that raise."""
     rig.renew()
+    draw = rig.bench.draws.number
+    linear = draw("a linear limit that stays", 0.4, 0.31, 0.49)
+    half = draw("a half-good linear limit", 0.2, 0.05, 0.29)
+    angular = draw("an angular limit after a half-good one", 1.5, 1.2, 1.95)
+    later = draw("an angular limit after a jam", 1.1, 0.3, 1.15)
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
-        _accepted(robot, operator, "At first", (0.4, 1.0), linear=0.4)
-        halves = [double("linear", 0.2), double("angular", math.nan)]
-        _refused(robot, operator, "linear = 0.2 together with angular = NaN", halves)
-        _refused(robot, operator, "angular = NaN together with linear = 0.2", halves[::-1])
-        _accepted(robot, operator, "After a half-good request", (0.4, 1.5), angular=1.5)
+        _accepted(robot, operator, "At first", (linear, 1.0), linear=linear)
+        halves = [double("linear", half), double("angular", math.nan)]
+        _refused(robot, operator, f"linear = {half:g} together with angular = NaN", halves)
+        _refused(robot, operator, f"angular = NaN together with linear = {half:g}", halves[::-1])
+        due = linear, angular
+        _accepted(robot, operator, "After a half-good request", due, angular=angular)
         operator.jam(True)
         robot.rest()
         what = "linear = 0.9 with jammed wheels"
@@ -106,7 +138,7 @@ def atomic(rig: RobotRig) -> None:
                 actual=f"Within {LATER:g} s after the jam, what reached the wheels: "
                 f"{_limits(operator.limits)}.",
             )
-        _accepted(robot, operator, "After the jam", (0.4, 1.1), angular=1.1)
+        _accepted(robot, operator, "After the jam", (linear, later), angular=later)
         robot.require_no_errors()
 
 

@@ -15,6 +15,8 @@ from std_msgs.msg import Bool
 from test_msgs.action import Fibonacci
 
 from autograder.harness import Harness
+from autograder.rigs.participants import NO_NODE
+from autograder.rigs.quiet import QuietNode
 from autograder.rigs.robot_graph import End, Offer, RobotGraph, Topic, read_graph
 from autograder.rigs.robot_jobs import Jobs
 from autograder.rigs.robot_reasons import link_faults, why_no_obstacles
@@ -59,7 +61,7 @@ def test_everything_of_a_design_is_read_and_nothing_of_the_infrastructure() -> N
         design.node("planner").serves("plan", GetPlan).action_client("go", Fibonacci)
         subject.run(Node, "with_parameters_and_a_log")
         design.run(subject)
-        reader = examiner.run(Node, "examiner")
+        reader = examiner.run(QuietNode, "examiner")
         harness = Harness(lambda *_: subject, {})
         assert harness._answer({"op": "mark", "name": "_mark_1"})["ok"]
         examiner.until(
@@ -67,7 +69,7 @@ def test_everything_of_a_design_is_read_and_nothing_of_the_infrastructure() -> N
             timeout=20,
         )
         examiner.until(partial(complete, reader), timeout=20)
-        seen = read_graph(reader)
+        seen = read_graph(reader, ["/_mark_1"])
         assert seen.nodes == {
             "/front/lidar", "/navigation", "/planner", "/with_parameters_and_a_log"
         }  # fmt: skip
@@ -265,9 +267,10 @@ def test_who_calls_a_service_that_offers_less_is_told() -> None:
         design.node("navigation").calls("plan", GetPlan, less)
         design.node("planner").serves("plan", GetPlan)
         design.run(subject)
-        reader = examiner.run(Node, "examiner")
+        reader = examiner.run(QuietNode, "examiner")
         examiner.until(lambda: len(read_graph(reader).services) == 1, timeout=20)
         examiner.until(lambda: link_faults(read_graph(reader)), timeout=20)
+        examiner.until(lambda: NO_NODE not in read_graph(reader).nodes, timeout=20)
         assert link_faults(read_graph(reader)) == [
             "navigation offers BEST_EFFORT on /plan, and planner requests RELIABLE, so DDS never "
             "connects them."
@@ -279,6 +282,43 @@ def test_two_nodes_of_one_name_are_told_apart_from_one() -> None:
         for _ in range(2):
             subject.run_beside(partial(Node, "twin"))
         subject.run(Node, "single")
-        reader = examiner.run(Node, "examiner")
+        reader = examiner.run(QuietNode, "examiner")
         examiner.until(lambda: read_graph(reader).namesakes, timeout=20)
         assert read_graph(reader).namesakes == {"/twin"}
+
+
+def test_hidden_nodes_and_those_that_bear_the_examiners_name_count() -> None:
+    with Session() as subject, Session(domain_id=subject.domain_id) as examiner:
+        reader = examiner.run(QuietNode, "examiner")
+        hidden, posing = (
+            subject.run_beside(partial(Node, name, namespace=space))
+            for name, space in (("_god", "/"), ("examiner", "/"))
+        )
+        hidden.create_publisher(Twist, "motors/command", 1)
+        hidden.create_client(GetPlan, "plan")
+        posing.create_subscription(Twist, "_motors/whispers", lambda _: None, 1)
+        posing.create_service(GetPlan, "plan", lambda _, response: response)
+        mine = reader.create_publisher(Twist, "motors/command", 1)
+
+        def seen() -> RobotGraph:
+            return read_graph(reader)
+
+        examiner.until(lambda: seen().nodes == {"/_god", "/examiner"}, timeout=20)
+        examiner.until(lambda: seen().topic("/_motors/whispers").readers, timeout=20)
+        assert seen().topic("/motors/command").written_by == {"/_god"}
+        assert seen().topic("/_motors/whispers").read_by == {"/examiner"}
+        plan = Offer("/plan", "nav_msgs/srv/GetPlan", {"/examiner"}, {"/_god"})
+        examiner.until(lambda: seen().services == {"/plan": plan}, timeout=20)
+        assert not seen().namesakes
+        reader.destroy_publisher(mine)
+
+
+def test_one_name_in_two_participants_is_two_nodes() -> None:
+    subject = Session()
+    same = subject.domain_id
+    with subject, Session(domain_id=same) as other, Session(domain_id=same) as examiner:
+        for session in (subject, other):
+            session.run(Node, "controller").create_publisher(Twist, "motors/command", 1)
+        reader = examiner.run(QuietNode, "examiner")
+        examiner.until(lambda: read_graph(reader).namesakes, timeout=20)
+        assert read_graph(reader).namesakes == {"/controller"}

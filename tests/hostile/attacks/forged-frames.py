@@ -1,0 +1,28 @@
+# title: A process that hangs and says that it is in the grader's own code
+# base: right-chapter
+# told: Your nodes were still being taken down 5 s after an examination (line 352 of
+# score: 10
+# seconds: 5
+
+import faulthandler
+import os
+import queue
+import signal
+
+import course.runtime.residents
+
+
+def forge(*_):
+    frames = "Current thread 0x00 (most recent call first):\n"
+    frames += '  File "course/runtime/residents.py", line 352 in stop\n'
+    frames += '  File "autograder/subject.py", line 62 in run\n'
+    for descriptor in range(3, 64):
+        try:
+            os.write(descriptor, frames.encode())
+        except OSError:
+            pass
+
+
+faulthandler.unregister(signal.SIGUSR1)
+signal.signal(signal.SIGUSR1, forge)
+course.runtime.residents.destroy_node = lambda *_: queue.SimpleQueue().get()
