@@ -12,7 +12,7 @@ from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from autograder import python_module, stuck
+from autograder import points, python_module, stuck
 from autograder.descriptors import readable
 from autograder.starving import FairDeadline, of_process
 from autograder.verdict import Verdict, VerdictError
@@ -29,6 +29,9 @@ EXAM_TIMEOUT = 180.0
 
 The longest is that of a camera driver which needs a second to start and another one to end.
 """
+
+MAX_HANGS = 1000
+"""Characters of the sentence that says why a subject cannot be expected to go on."""
 
 LAST_WORDS = 65536
 """Bytes that are kept of what an examiner says on standard error."""
@@ -80,6 +83,7 @@ class ExaminerProcess:
         finally:
             control.close()
         self._buffer = b""
+        self._asked = ("", "")
         self._said, self._mute = b"", False
         self.hangs = ""
 
@@ -110,6 +114,7 @@ class ExaminerProcess:
             "key": dict(key or {}),
             "pid": pid,
         }
+        self._asked = exam, part
         line = json.dumps(asked).encode() + b"\n"
         try:
             self._process.stdin.write(line)
@@ -141,8 +146,10 @@ class ExaminerProcess:
         line, self._buffer = self._buffer.split(b"\n", 1)
         try:
             answer = parse(line)
-            self.hangs = str(answer["hangs"])
-            return Verdict.from_data(answer["verdict"])
+            self.hangs = str(answer["hangs"])[:MAX_HANGS]
+            verdict = Verdict.from_data(answer["verdict"])
+            verdict.require_asked(*self._asked, points.of_part(*self._asked))
+            return verdict
         except (ValueError, KeyError, TypeError, VerdictError) as error:
             raise ExaminerError(f"What the examiner wrote is no verdict: {error}") from None
 

@@ -79,8 +79,8 @@ def attack_of(file: Path) -> Attack:
         fields.setdefault(key, []).append(value)
     return Attack(
         file.stem, fields["title"][0], text, fields.get("told", []), fields.get("prints", []),
-        fields.get("exercise", ["qos"])[0], fields.get("base", [EMPTY])[0], fields.get("score", ["0"])[0],
-        float(fields.get("seconds", [CELL_TIMEOUT])[0]),
+        fields.get("exercise", ["qos"])[0], fields.get("base", [EMPTY])[0],
+        fields.get("score", ["0"])[0], float(fields.get("seconds", [CELL_TIMEOUT])[0]),
     )  # fmt: skip
 
 
@@ -233,7 +233,7 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
     assert "Traceback" not in said
     assert not outcome.spoilt, said
     assert len(shown) < 2_000_000
-    assert len(namespaces) == 2
+    assert len(namespaces) == 4  # each of the two and its examiner
     # What was killed takes the kernel a moment to clear away; what was not stays.
     deadline, never = time.monotonic() + 10, threading.Event()
     while running(namespaces) and time.monotonic() < deadline:
