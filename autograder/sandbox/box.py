@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, Self
 from autograder import python_module
 from autograder.files import scratch_folder
 from autograder.sandbox import environment, network, seccomp, view, warmth
-from autograder.sandbox.boxed import BoxedSubject, Warden, WarmSubject
+from autograder.sandbox.boxed import BoxedSubject, Warden, WarmSubject, end
 from autograder.sandbox.host import tethered, write_files
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.place import Process
@@ -120,6 +120,7 @@ class Box:
             enclosed.require_holder()
             as_user = user if network.is_root() else None
             examiner = warmth.examiner(arguments, fds, enclosed.handle, as_user, limits.data)
+            self._held.callback(end, examiner)
             return examiner, init
 
     def start_subject(

@@ -25,6 +25,16 @@ KILL_TIMEOUT = 10.0
 """Seconds until a killed subject must have ended: the kernel takes a moment for its memory."""
 
 
+def end(process: Process) -> None:
+    """End a process if it has not ended.
+
+    The first process of a sandbox cannot go before everybody has, and been taken note of.
+    """
+    process.kill()
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(KILL_TIMEOUT)
+
+
 class Warden:
     """A running warden (`autograder.outside.warden`), as the engine sees it."""
 
@@ -52,8 +62,7 @@ class Warden:
 
     def __exit__(self, *_: object) -> None:
         """End it."""
-        self._process.kill()
-        self._process.wait()
+        end(self._process)
         for stream in (self._process.stdin, self._process.stdout, self._process.stderr):
             if stream is not None:
                 stream.close()

@@ -40,15 +40,13 @@ print(json.dumps({
     "root": tries(lambda: os.listdir(root)),
     "writes": tries(lambda: open(module, "a")),
     "writes beside": tries(lambda: Path(module).with_name("mine").write_text("x")),
-    "homes": tries(lambda: os.listdir("/root")),
     "processes": sorted(int(name) for name in os.listdir("/proc") if name.isdecimal()),
     "capabilities": int(status["CapEff"], 16),
     "filtered": status["Seccomp"],
     "networks": [name for _, name in socket.if_nameindex()],
     "token": "SECRET_TOKEN" in os.environ,
     "path": sys.path[0],
-}))
-sys.stdin.read()
+}), flush=True)
 """
 
 
@@ -62,21 +60,17 @@ def test_an_examiner_reaches_nothing_of_ours(
     ours = Path(runner.__file__)
     command = [sys.executable, "-P", "-c", EXAMINED, str(tmp_path), str(ours)]
     with Box(hidden=[tmp_path], warm=warm) as box:
-        examiner = box.spawn(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        examiner = box.spawn(command, stdout=subprocess.PIPE)
         assert examiner.stdout is not None
-        found = json.loads(examiner.stdout.readline())
-    assert found == {
-        "root": "FileNotFoundError",
-        "writes": "OSError",
-        "writes beside": "OSError",
-        "homes": "FileNotFoundError" if not str(sys.prefix).startswith("/root") else found["homes"],
-        "processes": found["processes"],
-        "capabilities": 0,
-        "filtered": "2",
-        "networks": ["lo"],
-        "token": False,
-        "path": found["path"],
-    }
+        with examiner.stdout:
+            found = json.loads(examiner.stdout.read())
+    refused = ("PermissionError", "OSError")  # of another user; read-only
+    assert found["root"] == "FileNotFoundError"
+    assert found["writes"] in refused
+    assert found["writes beside"] in refused
+    assert (found["capabilities"], found["filtered"]) == (0, "2")
+    assert found["networks"] == ["lo"]
+    assert not found["token"]
     assert max(found["processes"]) < 10
     assert found["path"] not in ("", str(Path.cwd()))
 
@@ -87,16 +81,17 @@ def test_a_forked_examiner_is_where_its_sandbox_is() -> None:
     with Box(warm=True) as box:
         command = [sys.executable, "-P", "-m", "autograder.examiner", "--control", "0"]
         examiner = box.spawn([*command, "--domain", "1"])
+        status = Path(f"/proc/{examiner.pid}/status")
+        assert poll(lambda: "Seccomp:\t2" in status.read_text(), 30.0, Pulse())
         for kind in ("mnt", "pid", "net", "ipc", "uts"):
             theirs, own = (Path(f"/proc/{who}/ns/{kind}") for who in (examiner.pid, os.getpid()))
             assert theirs.stat().st_ino != own.stat().st_ino, kind
-        status = Path(f"/proc/{examiner.pid}/status").read_text()
-        assert "CapEff:\t0000000000000000" in status
-        assert "Seccomp:\t2" in status
+        assert "CapEff:\t0000000000000000" in status.read_text()
         if os.geteuid() == 0:
-            assert "Uid:\t0" not in status
-        examiner.kill()
-        examiner.wait()
+            assert "Uid:\t0" not in status.read_text()
+        for stream in (examiner.stdin, examiner.stdout, examiner.stderr):
+            assert stream is not None
+            stream.close()
 
 
 @needs_sandbox
