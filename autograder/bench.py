@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from autograder.draws import USUAL_SEED, Draws
-from autograder.starving import kept_waiting
+from autograder.outside.asking import Outside
+from autograder.starving import RunDelay, of_process
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 from course import Session
 
@@ -18,6 +19,9 @@ REPLY_TIMEOUT = 10.0
 ALL_REPLIES_TIMEOUT = 150.0
 """Seconds that all replies of an examination may take together: the slowest right driver that is
 known, which needs a second to start and another one to end, comes to 85 s; most come to 10 s."""
+
+QUICK_REPLY_S = 0.5
+"""Seconds in which most replies come, of which a budget in all needs no account."""
 
 MAX_REPLY = 512 * 1024
 """Bytes of a reply that are received; a harness cuts values and errors well below it."""
@@ -73,13 +77,13 @@ class Subject:
     ``hangs`` says in a sentence that the subject did not answer in time, once it did not.
     """
 
-    def __init__(self, channel: Channel, pid: int = 0) -> None:
-        """Talk to the harness over ``channel``; ``pid`` is the subject's process as seen here."""
+    def __init__(self, channel: Channel) -> None:
+        """Talk to the harness over ``channel``."""
         self._channel = channel
         self._gone: str | None = None
         self._left = ALL_REPLIES_TIMEOUT
         self.hangs = ""
-        self.pid = pid
+        self.delay: RunDelay = of_process(0)  # by which its deadlines are put off
 
     def open(self, *, threads: int = 1, sim_time: bool = False) -> None:
         """Begin a new session on the subject's side; nodes of an earlier one are stopped.
@@ -281,7 +285,7 @@ class Subject:
         try:
             self._channel.send({"op": operation, "name": what, **more})
             with self._counting():
-                reply = self._channel.receive_fairly(min(timeout, self._left), self.pid)
+                reply = self._channel.receive_fairly(min(timeout, self._left), self.delay)
         except ChannelBroken as error:
             raise self._broken(str(error)) from None
         except ChannelClosed:
@@ -310,14 +314,16 @@ class Subject:
     def _counting(self) -> Iterator[None]:
         """Count the time of the block, as far as the subject was not kept from running by others.
 
-        At least a third of it counts: a reply can be put off no further.
+        At least a third of it counts: a reply can be put off no further. Of a quick one all counts,
+        as to ask takes as long.
         """
-        began, kept = time.monotonic(), kept_waiting(self.pid)
+        began, mark = time.monotonic(), self.delay.mark()
         try:
             yield
         finally:
             took = time.monotonic() - began
-            took = max(took / 3, took - (kept_waiting(self.pid) - kept))
+            if took > QUICK_REPLY_S:
+                took = max(took / 3, took - self.delay.since(mark))
             self._left = max(0.0, self._left - took)
 
     def _read(self, found: Callable[[], T]) -> T:
@@ -362,22 +368,21 @@ class Bench:
         self,
         session: Session,
         subject: Subject,
+        outside: Outside,
         memory: dict[str, Any],
         key: Mapping[str, Any] | None = None,
-        own_network: bool = False,
         seed: int = USUAL_SEED,
     ) -> None:
         """Put both within a check's reach.
 
-        ``memory`` outlives this bench: what an experiment found in an earlier part of the exam,
-        as long as the notebook has not moved on since. ``key`` is the answer key that the part's
-        hidden cell carries, if it has one: the subject never sees it. ``own_network`` says that
-        nobody but these two is on their network, so that a check may make it lose packets.
-        ``seed`` is what the numbers of the exam are drawn from.
+        ``outside`` looks at the subject's processes. ``memory`` outlives this bench: what an
+        experiment found in an earlier part of the exam, as long as the notebook has not moved on
+        since. ``key`` is the answer key that the part's hidden cell carries, if it has one: the
+        subject never sees it. ``seed`` is what the numbers of the exam are drawn from.
         """
         self.session = session
         self.subject = subject
         self.memory = memory
         self.key: Mapping[str, Any] = key or {}
-        self.own_network = own_network
+        self.outside = outside
         self.draws = Draws(seed)

@@ -58,7 +58,7 @@ class SensorRig:
         self.node = node
         self._experiments = bench.memory
         self._probes = 0  # how often probed
-        self._still = Stillness(bench.subject.pid)
+        self._still = Stillness(bench.outside)
 
     def offered(self, topic: str) -> list[TopicEndpointInfo]:
         """Return the publishers on ``topic`` that are not the examiner's."""

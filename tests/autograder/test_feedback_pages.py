@@ -115,7 +115,9 @@ HOSTILE = [
     ),
     new_raw_cell(f"<script>{SCRIPT}</script>"),
     *(
-        new_code_cell("x", outputs=[new_output("display_data", data={kind: text, "text/plain": "x"})])
+        new_code_cell(
+            "x", outputs=[new_output("display_data", data={kind: text, "text/plain": "x"})]
+        )
         for kind, text in {
             "text/html": f"<b onclick={SCRIPT}>x</b><script>{SCRIPT}</script>",
             "text/markdown": f"<script>{SCRIPT}</script>",
