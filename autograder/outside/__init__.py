@@ -1,0 +1,1 @@
+"""What is done to a submission from outside of its sandbox, where its code reaches nothing."""
