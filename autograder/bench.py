@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from functools import partial
 from typing import Any, TypeVar
 
+from autograder.outside.holding import Held, beside, held
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 from course import Session
 
@@ -146,7 +149,10 @@ class Subject:
         self._ask("collect", "garbage")
 
     def pause(self, name: str) -> None:
-        """Stop executing the node's callbacks while its endpoints go on receiving."""
+        """Stop executing the node's callbacks while its endpoints go on receiving.
+
+        The student's process hears of it, and can do otherwise: see `Bench.hold`.
+        """
         self._ask("pause", name)
 
     def resume(self, name: str) -> None:
@@ -350,3 +356,18 @@ class Bench:
         self.memory = memory
         self.key: Mapping[str, Any] = key or {}
         self.own_network = own_network
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether the subject can be held: nobody holds the threads of a student's own kernel."""
+        return self.own_network
+
+    def hold(self) -> AbstractContextManager[Held]:
+        """Hold the subject's threads from outside while DDS goes on receiving, for one block.
+
+        The subject is not asked, and does not hear of it.
+
+        Raises:
+            HoldError: this machine does not let us.
+        """
+        return held(partial(beside, self.subject.pid))

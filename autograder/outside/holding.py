@@ -25,9 +25,9 @@ from course.runtime.waiting import Deadline
 
 HOLD_TIMEOUT_S = 5.0
 """Seconds within which all threads must stand still."""
-CALM_S = 0.5
-"""Seconds in which a moment is looked for when no thread is computing: one that does might have a
-lock that DDS needs for receiving."""
+CALM_S = 1.0
+"""Seconds in which a moment is looked for when no thread is at work: one that is might have a lock
+that DDS needs for receiving."""
 LOOK_S = 0.002
 """Seconds between two looks at threads that are to stop, and between two tries."""
 REAP_S = 0.02
@@ -36,7 +36,10 @@ REAP_S = 0.02
 DDS_THREADS = b"dds."
 """What the names of Fast DDS's threads begin with."""
 
-_DETACH, _SEIZE, _INTERRUPT = 17, 0x4206, 0x4207
+_GET_REGISTERS, _DETACH, _SEIZE, _INTERRUPT = 12, 17, 0x4206, 0x4207
+_REGISTERS, _RESULT, _CALL = 27, 10, 15  # struct user_regs_struct of x86-64: rax, orig_rax
+_TAKEN_OUT = {2**64 - number for number in (4, 512, 513, 514, 516)}  # EINTR, ERESTART...
+_FUTEX, _FUTEX_WAIT, _CONTENDED = 202, 0, 2  # the value of a mutex of glibc that others wait for
 _EVENT_STOP = 128
 _NO_THREAD_OF_OTHERS = 0x20000000 | 0x40000000  # __WNOTHREAD | __WALL: of this thread's tracees
 _ENDED, _BLOCKED = (b"Z", b"X"), b"D"
@@ -49,9 +52,42 @@ class HoldError(CourseError):
     """Threads cannot be held here; the message says why, and what helps."""
 
 
+def beside(pid: int) -> list[int]:
+    """Return all processes of the process namespace that ``pid`` is in; none, if that has ended."""
+    found = []
+    with suppress(OSError):
+        namespace = _namespace(pid)
+        for folder in Path("/proc").iterdir():
+            with suppress(OSError, ValueError):
+                if _namespace(int(folder.name)) == namespace:
+                    found.append(int(folder.name))
+    return found
+
+
+def _namespace(pid: int) -> str:
+    return os.readlink(f"/proc/{pid}/ns/pid")  # noqa: PTH115 - pathlib makes a path of it
+
+
+@dataclass(frozen=True)
+class Held:
+    """What is held: how many threads, and a look at those of DDS, which go on."""
+
+    threads: int
+    processes: Processes
+
+    def jams(self) -> bool:
+        """Return whether DDS cannot receive just now, as one of its threads waits for a lock.
+
+        Who has the lock is held, so that it waits until the end: what the queues keep then tells
+        nothing of them. `held` looks for a moment when that is not so, and may not find one.
+        """
+        dds = _threads(self.processes(), of_dds=True)
+        return any(map(_waits_for_a_lock, dds))
+
+
 @contextmanager
-def held(processes: Processes) -> Iterator[int]:
-    """Hold all threads but those of DDS for the length of the block; yield how many there are.
+def held(processes: Processes) -> Iterator[Held]:
+    """Hold all threads but those of DDS for the length of the block.
 
     Args:
         processes: whose threads. New processes and threads are held as well, until there is none
@@ -64,7 +100,7 @@ def held(processes: Processes) -> Iterator[int]:
     thread = threading.Thread(target=hold.run, name="hold")
     thread.start()
     try:
-        yield hold.wait()
+        yield Held(hold.wait(), processes)
     finally:
         hold.over.set()
         thread.join()
@@ -106,7 +142,7 @@ class _Hold:
         calm = Deadline(CALM_S)
         while True:
             self._hold_all()
-            if not calm.left or not any(map(_computes, self._stopped)):
+            if not calm.left or not any(map(_is_at_work, self._stopped)):
                 return
             self._let_go()
             self.over.wait(LOOK_S)
@@ -177,14 +213,14 @@ class _Hold:
                 threading.Event().wait(LOOK_S)
 
 
-def _threads(processes: Iterable[int]) -> Iterator[int]:
-    """Yield the threads that are to be held."""
+def _threads(processes: Iterable[int], *, of_dds: bool = False) -> Iterator[int]:
+    """Yield the threads that are to be held, or those of DDS."""
     for pid in processes:
         with suppress(OSError):
             for task in Path(f"/proc/{pid}/task").iterdir():
                 with suppress(OSError):
                     is_dds = (task / "comm").read_bytes().startswith(DDS_THREADS)
-                    if not is_dds and not _has_ended(int(task.name)):
+                    if is_dds is of_dds and not _has_ended(int(task.name)):
                         yield int(task.name)
 
 
@@ -199,10 +235,29 @@ def _has_ended(tid: int) -> bool:
     return _state(tid) in _ENDED
 
 
-def _computes(tid: int) -> bool:
-    """Return whether a held thread was stopped in its own code, and not while it waited."""
-    with suppress(OSError):
-        return Path(f"/proc/{tid}/syscall").read_text(encoding="ascii").startswith("-1 ")
+def _is_at_work(tid: int) -> bool:
+    """Return whether a held thread was stopped at work, and not while it waited.
+
+    One that waited has been taken out of a system call, which is to be begun again. One that waits
+    for a lock may have another, and stands where the owner of it may let go at any moment.
+    """
+    registers = (ctypes.c_ulonglong * _REGISTERS)()
+    with suppress(ProcessLookupError):
+        _ptrace(_GET_REGISTERS, tid, ctypes.addressof(registers))
+        waited = registers[_RESULT] in _TAKEN_OUT and registers[_CALL] < 2**63
+        return not waited or _waits_for_a_lock(tid)
+    return False
+
+
+def _waits_for_a_lock(tid: int) -> bool:
+    """Return whether a thread is in the C library's wait for a mutex.
+
+    Waits for a condition, a semaphore or a time are other operations on a futex, or other values.
+    """
+    with suppress(OSError, ValueError):
+        text = Path(f"/proc/{tid}/syscall").read_text(encoding="ascii")
+        call, _, operation, value, *_ = (int(word, 0) for word in text.split())
+        return call == _FUTEX and operation & 0x7F == _FUTEX_WAIT and value == _CONTENDED
     return False
 
 

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from itertools import count
 from typing import Any
 
-from rclpy.qos import ReliabilityPolicy
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import Bench
@@ -80,6 +80,51 @@ class SensorRig:
             )
             qos = lossless() if reliable else undemanding()
             self.node.listen(sensor, topic, qos, self.node.consumed)
+
+    @contextmanager
+    def busy(self, name: str) -> Iterator[Callable[[], bool]]:
+        """Keep the node of a class busy for the length of the block; its endpoints go on.
+
+        Yields a look at whether they do not, by an accident that `Held.jams` tells of.
+        Where all its threads are held, the drivers are busy as well: see `stand_ins`.
+        """
+        if self.bench.can_hold:
+            with self.bench.hold() as held, self.node.standing_in():
+                yield held.jams
+            return
+        self.subject.pause(name)
+        try:
+            yield lambda: False
+        finally:
+            self.subject.resume(name)
+
+    @contextmanager
+    def stand_ins(self, sensors: Sequence[Sensor]) -> Iterator[None]:
+        """Be ready to publish in the drivers' stead while these are held with the consumers.
+
+        They stay for the length of the block: with a publisher goes what waits for a reader.
+        """
+        if not self.bench.can_hold:
+            yield
+            return
+        with self.node.stand_ins({sensor.name: self._offer(sensor) for sensor in sensors}):
+            with self.node.standing_in():
+                self.probe(sensors, self.node.consumed)
+            yield
+
+    def _offer(self, sensor: Sensor) -> QoSProfile:
+        """Return what the driver of a sensor offers: of several, the one that most can hear.
+
+        How many readings a publisher keeps cannot be seen; a consumer's queue does not rest on it.
+        """
+        offers = [end.qos_profile for end in self.offered(sensor.topic)]
+        best = max(offers, key=lambda qos: (-qos.reliability.value, -qos.durability.value))
+        return QoSProfile(
+            history=HistoryPolicy.KEEP_ALL, reliability=best.reliability,
+            durability=best.durability, lifespan=best.lifespan, deadline=best.deadline,
+            liveliness=best.liveliness,
+            liveliness_lease_duration=best.liveliness_lease_duration,
+        )  # fmt: skip
 
     def wait(self, condition: Callable[[], Any], timeout: float | None = None) -> bool:
         """Wait until ``condition`` holds; return whether it did before the deadline.
