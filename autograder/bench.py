@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
-from functools import partial
 from typing import Any, TypeVar
 
-from autograder.outside.holding import Held, beside, held
+from autograder.outside.asking import Outside
+from autograder.starving import RunDelay, of_process
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 from course import Session
 
@@ -68,12 +67,12 @@ class Subject:
     ``hangs`` says in a sentence that the subject did not answer in time, once it did not.
     """
 
-    def __init__(self, channel: Channel, pid: int = 0) -> None:
-        """Talk to the harness over ``channel``; ``pid`` is the subject's process as seen here."""
+    def __init__(self, channel: Channel) -> None:
+        """Talk to the harness over ``channel``."""
         self._channel = channel
         self._gone: str | None = None
         self.hangs = ""
-        self.pid = pid
+        self.delay: RunDelay = of_process(0)  # by which its deadlines are put off
 
     def open(self, *, threads: int = 1, sim_time: bool = False) -> None:
         """Begin a new session on the subject's side; nodes of an earlier one are stopped.
@@ -149,10 +148,7 @@ class Subject:
         self._ask("collect", "garbage")
 
     def pause(self, name: str) -> None:
-        """Stop executing the node's callbacks while its endpoints go on receiving.
-
-        The student's process hears of it, and can do otherwise: see `Bench.hold`.
-        """
+        """Stop executing the node's callbacks while its endpoints go on receiving."""
         self._ask("pause", name)
 
     def resume(self, name: str) -> None:
@@ -277,7 +273,7 @@ class Subject:
         doing = doing or f"{operation.replace('_', ' ')} {what}"
         try:
             self._channel.send({"op": operation, "name": what, **more})
-            reply = self._channel.receive_fairly(timeout, self.pid)
+            reply = self._channel.receive_fairly(timeout, self.delay)
         except ChannelBroken as error:
             raise self._broken(str(error)) from None
         except ChannelClosed:
@@ -340,34 +336,19 @@ class Bench:
         self,
         session: Session,
         subject: Subject,
+        outside: Outside,
         memory: dict[str, Any],
         key: Mapping[str, Any] | None = None,
-        own_network: bool = False,
     ) -> None:
         """Put both within a check's reach.
 
-        ``memory`` outlives this bench: what an experiment found in an earlier part of the exam,
-        as long as the notebook has not moved on since. ``key`` is the answer key that the part's
-        hidden cell carries, if it has one: the subject never sees it. ``own_network`` says that
-        nobody but these two is on their network, so that a check may make it lose packets.
+        ``outside`` looks at the subject's processes. ``memory`` outlives this bench: what an
+        experiment found in an earlier part of the exam, as long as the notebook has not moved on
+        since. ``key`` is the answer key that the part's hidden cell carries, if it has one: the
+        subject never sees it.
         """
         self.session = session
         self.subject = subject
         self.memory = memory
         self.key: Mapping[str, Any] = key or {}
-        self.own_network = own_network
-
-    @property
-    def can_hold(self) -> bool:
-        """Whether the subject can be held: nobody holds the threads of a student's own kernel."""
-        return self.own_network
-
-    def hold(self) -> AbstractContextManager[Held]:
-        """Hold the subject's threads from outside while DDS goes on receiving, for one block.
-
-        The subject is not asked, and does not hear of it.
-
-        Raises:
-            HoldError: this machine does not let us.
-        """
-        return held(partial(beside, self.subject.pid))
+        self.outside = outside

@@ -1,13 +1,14 @@
 """The examiner process: sits exams on a subject that it can only see over DDS.
 
-Started as ``python -m autograder.examiner --control FD --domain N``. It reads requests
+Started as ``python -P -m autograder.examiner --control FD --domain N``. It reads requests
 ``{"exam": ..., "part": ..., "moved_on": ..., "key": ..., "pid": ...}`` from standard input, one
 JSON object a line, and answers each with ``{"verdict": ..., "hangs": ...}`` on standard output;
 ``hangs`` says why the subject cannot be expected to go on, if so. ``moved_on`` says that the
 notebook ran cells since, ``key`` is the answer key of the part's hidden cell, ``pid`` the subject's
 process.
-File descriptor ``FD`` is the control channel to the subject's harness. With ``--own-network`` the
-two are alone on their network.
+File descriptor ``FD`` is the control channel to the subject's harness. In a sandbox it also has
+``--outside FD``, its channel to a warden (`autograder.outside`), and is alone with the subject on
+their network.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from typing import Any, TextIO
 
 from autograder import exams, stuck
 from autograder.bench import MAX_REPLY, Bench, Subject
+from autograder.outside.asking import Afar, Here, Outside
 from autograder.verdict import CheckResult, Verdict
 from autograder.wire import Channel
 from course import Session
@@ -43,15 +45,14 @@ def sit(
     request: dict[str, Any],
     session: Session,
     subject: Subject,
+    outside: Outside,
     sittings: Sittings,
-    *,
-    own_network: bool = False,
 ) -> Verdict:
     """Run one part of an exam, let the subject go on, and return the verdict."""
     sitting = sittings.setdefault(request["exam"], Sitting())
-    subject.pid = int(request["pid"])
+    subject.delay = outside.delay
     try:
-        bench = Bench(session, subject, sitting.memory, request["key"], own_network)
+        bench = Bench(session, subject, outside, sitting.memory, request["key"])
         exam = exams.load(request["exam"])
         return exam.sit(request["part"], bench, sitting.failed)
     finally:
@@ -63,16 +64,16 @@ def serve(
     answers: TextIO,
     session: Session,
     subject: Subject,
-    *,
-    own_network: bool = False,
+    outside: Outside | None = None,
 ) -> None:
-    """Answer requests until standard input ends."""
+    """Answer requests until standard input ends; without ``outside``, look at the subject here."""
     sittings: Sittings = {}
     for line in requests:
         request = json.loads(line)
         if request["moved_on"]:
             sittings.clear()
-        verdict = sit(request, session, subject, sittings, own_network=own_network)
+        outside = outside or Here(int(request["pid"]))
+        verdict = sit(request, session, subject, outside, sittings)
         answer = {"verdict": verdict.as_data(), "hangs": subject.hangs}
         answers.write(json.dumps(answer) + "\n")
         answers.flush()
@@ -80,6 +81,7 @@ def serve(
 
 def preload() -> None:
     """Import every exam: `autograder.warm` calls it before it forks examiners."""
+    from autograder.outside import warden  # noqa: F401 - forked from the same process
     from autograder.warm import modules
 
     modules.import_all()
@@ -92,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="autograder.examiner")
     parser.add_argument("--control", type=int, required=True, help="file descriptor of the channel")
     parser.add_argument("--domain", type=int, required=True, help="the subject's domain id")
-    parser.add_argument("--own-network", action="store_true", help="the network may be disturbed")
+    parser.add_argument("--outside", type=int, help="file descriptor of the channel to a warden")
     options = parser.parse_args(arguments)
     # Verdicts go out over a private copy of standard output: whatever a library prints must not
     # end up among them.
@@ -100,9 +102,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     stuck.tell_when_asked(sys.stderr.fileno())
     subject = Subject(Channel(socket.socket(fileno=options.control), MAX_REPLY))
+    outside = None
+    if options.outside is not None:
+        outside = Afar(socket.socket(fileno=options.outside))
     with Session(domain_id=options.domain) as session:
         session.explains = False  # it asks whether something comes, and says itself what it means
-        serve(sys.stdin, verdicts, session, subject, own_network=options.own_network)
+        serve(sys.stdin, verdicts, session, subject, outside)
     return 0
 
 

@@ -7,15 +7,14 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from autograder import stuck
+from autograder import points, python_module, stuck
 from autograder.descriptors import readable
-from autograder.starving import FairDeadline
+from autograder.starving import FairDeadline, of_process
 from autograder.verdict import Verdict, VerdictError
 from autograder.wire import parse
 from course.errors import CourseError
@@ -30,6 +29,9 @@ EXAM_TIMEOUT = 180.0
 
 The longest is that of a camera driver which needs a second to start and another one to end.
 """
+
+MAX_HANGS = 1000
+"""Characters of the sentence that says why a subject cannot be expected to go on."""
 
 LAST_WORDS = 65536
 """Bytes that are kept of what an examiner says on standard error."""
@@ -53,7 +55,6 @@ class ExaminerProcess:
         domain_id: int,
         *,
         env: Mapping[str, str] | None = None,
-        own_network: bool = False,
         spawn: Spawn = subprocess.Popen,
     ) -> None:
         """Start the process.
@@ -62,14 +63,11 @@ class ExaminerProcess:
             control: its end of the channel to the subject; closed here.
             domain_id: the subject's domain.
             env: its environment; this process's if left out.
-            own_network: nobody but it and the subject is on its network, so that it may make the
-                network lose packets.
             spawn: starts it, as `subprocess.Popen` does.
         """
         command = [
-            sys.executable, "-m", "autograder.examiner",
+            *python_module.command("autograder.examiner"),
             "--control", str(control.fileno()), "--domain", str(domain_id),
-            *(["--own-network"] if own_network else []),
         ]  # fmt: skip
         try:
             # What the examiner's libraries print on stderr must never reach a graded cell.
@@ -85,6 +83,7 @@ class ExaminerProcess:
         finally:
             control.close()
         self._buffer = b""
+        self._asked = ("", "")
         self._said, self._mute = b"", False
         self.hangs = ""
 
@@ -102,7 +101,7 @@ class ExaminerProcess:
         Args:
             exam: the exam's name.
             part: the part's name.
-            pid: the subject's process, as the examiner sees it: its threads, files and memory.
+            pid: the subject's process, for an examiner that looks at it itself.
             moved_on: False if the notebook ran nothing since the last part: then what failed
                 there need not be tried again.
             key: the answer key of the part's hidden cell.
@@ -115,6 +114,7 @@ class ExaminerProcess:
             "key": dict(key or {}),
             "pid": pid,
         }
+        self._asked = exam, part
         line = json.dumps(asked).encode() + b"\n"
         try:
             self._process.stdin.write(line)
@@ -130,7 +130,7 @@ class ExaminerProcess:
                 is no verdict.
         """
         assert self._process.stdout is not None
-        deadline = FairDeadline(timeout, self._process.pid)
+        deadline = FairDeadline(timeout, of_process(self._process.pid))
         stream = self._process.stdout.fileno()
         while b"\n" not in self._buffer:
             if stream not in self._wait(deadline.left):
@@ -146,8 +146,10 @@ class ExaminerProcess:
         line, self._buffer = self._buffer.split(b"\n", 1)
         try:
             answer = parse(line)
-            self.hangs = str(answer["hangs"])
-            return Verdict.from_data(answer["verdict"])
+            self.hangs = str(answer["hangs"])[:MAX_HANGS]
+            verdict = Verdict.from_data(answer["verdict"])
+            verdict.require_asked(*self._asked, points.of_part(*self._asked))
+            return verdict
         except (ValueError, KeyError, TypeError, VerdictError) as error:
             raise ExaminerError(f"What the examiner wrote is no verdict: {error}") from None
 

@@ -107,11 +107,7 @@ def run(
         for end in (engine, subject_engine, control, subject_control):
             stack.enter_context(end)
         channel = Channel(engine)
-        examiner = stack.enter_context(
-            ExaminerProcess(
-                control, place.domain_id, own_network=place.own_network, spawn=place.spawn
-            )
-        )
+        examiner = stack.enter_context(ExaminerProcess(control, place.domain_id, spawn=place.spawn))
         subject = stack.enter_context(_start(place, subject_engine, subject_control, files))
         _follow(program, channel, examiner, subject, outcome, cell_timeout)
     outcome.seconds = round(time.monotonic() - started, 2)
@@ -234,7 +230,7 @@ def _await_cell(
     """
     reached = {"exam" if program[number].exam else "ran": number}
     seen: set[int] = set()
-    while (message := channel.receive_fairly(timeout, subject.pid)) != reached:
+    while (message := channel.receive_fairly(timeout, subject.delay)) != reached:
         match message:
             case {"shows": int() as place, "outputs": list() as given} if (
                 0 <= place <= number and place not in seen

@@ -48,6 +48,16 @@ It is about what passes in a kernel that is told to run all cells.
 """
 
 
+def _put_folder_on_path() -> None:
+    """Let cells import files beside the notebook, as in a kernel: after the standard library.
+
+    IPython does so itself, but not in a process of ours, which is started with ``-P``.
+    """
+    if "" not in sys.path:
+        parts = [Path(entry).name in ("site-packages", "dist-packages") for entry in sys.path]
+        sys.path.insert(parts.index(True) if True in parts else 0, "")
+
+
 class _NobodyTypesError(StdinNotImplementedError):
     """What a cell that waits for input raises."""
 
@@ -160,7 +170,7 @@ class Kernel(IPythonKernel):
         self.cells.init_ipython_dir(None)
         self.cells.init_profile_dir(None)
         app.init_signal()
-        app.init_path()
+        _put_folder_on_path()
         self._finish(self._begin())
 
     async def _begin(self) -> None:

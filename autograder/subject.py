@@ -1,7 +1,7 @@
 """The subject process: hosts one student's code while an examiner watches it from outside.
 
-Started as ``python -m autograder.subject --engine FD --control FD --domain N``. It says that it is
-ready; the engine sends the program over its channel, the examiner drives the harness over the
+Started as ``python -P -m autograder.subject --engine FD --control FD --domain N``. It says that it
+is ready; the engine sends the program over its channel, the examiner drives the harness over the
 control channel whenever the program comes to an exam. Nothing that this process says about itself
 earns a point.
 """

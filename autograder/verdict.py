@@ -8,12 +8,16 @@ needs had failed), was *not examined* (this machine cannot: a person decides), o
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal, get_args
 
 from course.errors import CourseError
 
 VERSION = 1
+
+MAX_TEXT, MOST_TEXTS = 10_000, 1000
+"""Characters of a text that an examiner may send, and how many texts."""
 
 Status = Literal["passed", "failed", "not_checked", "not_examined", "grader_error"]
 STATUSES: tuple[Status, ...] = get_args(Status)
@@ -48,6 +52,11 @@ class CheckResult:
     def passed(self) -> bool:
         """Whether the behaviour was seen and right."""
         return self.status == "passed"
+
+    def texts(self) -> Iterator[str]:
+        """Yield all that it says in words."""
+        yield from (self.name, self.title, self.rationale, self.expected, self.actual)
+        yield from (*self.hints, self.read, self.note)
 
 
 @dataclass(frozen=True)
@@ -89,6 +98,32 @@ class Verdict:
         """Return the verdict as JSON knows it."""
         return asdict(self)
 
+    def require_asked(self, exam: str, part: str, points: Mapping[str, float]) -> None:
+        """Require that it answers what was asked, with texts that can be shown.
+
+        An examiner takes in what a stranger's program sends, so its verdict is data, too.
+
+        Args:
+            exam: the exam that was asked for.
+            part: its part.
+            points: {check: points} of that part.
+
+        Raises:
+            VerdictError: it is about something else, or its texts are too long.
+        """
+        worth = {check.name: check.max_points for check in self.checks}
+        if (self.exam, self.part) != (exam, part) or len(self.checks) != len(worth):
+            raise VerdictError("it is not about what was asked")
+        if worth != dict(points):
+            raise VerdictError("its checks and their points are not those of the exam")
+        if any(check.points not in (0.0, check.max_points) for check in self.checks):
+            raise VerdictError("a check has a part of its points")
+        if any(check.points and check.status != "passed" for check in self.checks):
+            raise VerdictError("a check has points and did not pass")
+        texts = [*self.notes, *(text for check in self.checks for text in check.texts())]
+        if any(len(text) > MAX_TEXT for text in texts) or len(texts) > MOST_TEXTS:
+            raise VerdictError("it says more than a verdict does")
+
     @classmethod
     def from_data(cls, data: Any) -> Verdict:
         """Read what `as_data` returned, after a way through JSON.
@@ -117,5 +152,8 @@ def _check(item: dict[str, Any]) -> CheckResult:
     points, max_points = float(item["points"]), float(item["max_points"])
     if not 0 <= points <= max_points:
         raise ValueError(f"{points} points of {max_points}")
-    return CheckResult(**{**item, "points": points, "max_points": max_points,
-                          "hints": tuple(item["hints"])})  # fmt: skip
+    hints = tuple(item["hints"])
+    result = CheckResult(**{**item, "points": points, "max_points": max_points, "hints": hints})
+    if not all(isinstance(text, str) for text in result.texts()):
+        raise TypeError("something else where a text belongs")
+    return result

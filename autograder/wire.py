@@ -12,7 +12,7 @@ import time
 from contextlib import suppress
 from typing import Any
 
-from autograder.starving import FairDeadline
+from autograder.starving import FairDeadline, RunDelay
 
 MAX_LINE = 2 * 1024 * 1024
 """Largest message in bytes: the outputs of one cell are the largest, and are cut well below it."""
@@ -98,12 +98,12 @@ class Channel:
             raise ChannelBroken("a message that is not a JSON object was sent")
         return message
 
-    def receive_fairly(self, timeout: float, pid: int) -> dict[str, Any]:
-        """Do `receive`, where time in which the process ``pid`` got no processor does not count.
+    def receive_fairly(self, timeout: float, delay: RunDelay) -> dict[str, Any]:
+        """Do `receive`, where time in which others kept a program from running does not count.
 
         That other programs keep a subject from running is no fault of the student's.
         """
-        deadline = FairDeadline(timeout, pid)
+        deadline = FairDeadline(timeout, delay)
         while True:
             try:
                 return self.receive(deadline.left)

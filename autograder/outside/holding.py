@@ -52,22 +52,6 @@ class HoldError(CourseError):
     """Threads cannot be held here; the message says why, and what helps."""
 
 
-def beside(pid: int) -> list[int]:
-    """Return all processes of the process namespace that ``pid`` is in; none, if that has ended."""
-    found = []
-    with suppress(OSError):
-        namespace = _namespace(pid)
-        for folder in Path("/proc").iterdir():
-            with suppress(OSError, ValueError):
-                if _namespace(int(folder.name)) == namespace:
-                    found.append(int(folder.name))
-    return found
-
-
-def _namespace(pid: int) -> str:
-    return os.readlink(f"/proc/{pid}/ns/pid")  # noqa: PTH115 - pathlib makes a path of it
-
-
 @dataclass(frozen=True)
 class Held:
     """What is held: how many threads, and a look at those of DDS, which go on."""

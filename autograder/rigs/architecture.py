@@ -38,6 +38,7 @@ class ArchitectureRig:
         """Bring up the examiner's node; the design is started by its first check."""
         self.subject = bench.subject
         self._session = bench.session
+        self._outside = bench.outside
         self.node = bench.session.run(QuietNode, f"examiner_{secrets.token_hex(4)}")
         self.graph = RobotGraph()
         self.jobs = Jobs(self.graph)
@@ -114,7 +115,7 @@ class ArchitectureRig:
         Without ``timeout`` (s) that is when it would have come: see `Patience`.
         """
         if timeout is None:
-            return Patience(Stillness(self.subject.pid)).wait(self._session, condition)
+            return Patience(Stillness(self._outside)).wait(self._session, condition)
         with suppress(WaitTimeout):
             self._session.until(condition, timeout, "an observation")
             return True

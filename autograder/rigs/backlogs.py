@@ -19,7 +19,7 @@ def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
     """
     backlogs: dict[str, Backlog] = rig.once(busy_consumer)
     found = backlogs[sensor.name]
-    if found.early and not rig.bench.can_hold:
+    if found.early and not rig.can_hold:
         raise NotExaminable(
             "Your consumer went on while its callbacks were held back: a thread or an executor of "
             "its own does its work, and that cannot be held back here, only where your work is "

@@ -52,8 +52,8 @@ class CameraRig:
         """
         self.subject = bench.subject
         self.session = bench.session
-        self.process = Process(bench.subject.pid)
-        self._still = Stillness(bench.subject.pid)
+        self.process = Process(bench.outside)
+        self._still = Stillness(bench.outside)
         node = bench.memory.get(ExaminerNode.__name__) or bench.session.run(ExaminerNode)
         assert isinstance(node, ExaminerNode)
         bench.memory[ExaminerNode.__name__] = node

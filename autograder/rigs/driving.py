@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import importlib
 from contextlib import suppress
 from typing import Any
 
@@ -15,6 +14,7 @@ from autograder.exam import Failed
 from autograder.rigs.listening import acquaint, hear_out
 from autograder.rigs.phrases import ended
 from autograder.rigs.robot import GRAIN, SETTLE, STEP, RobotRig
+from autograder.rigs.robot_types import load_type
 from autograder.rigs.scenarios import NAMES
 from course import GoalRun, WaitTimeout
 
@@ -57,7 +57,7 @@ class Drive:
         self.heard: list[list[int]] = []
         self.rig = rig
         self.move(float(position))
-        action = _action_type(rig.memory["offers"]["navigation"]["action"])
+        action = load_type(rig.memory["offers"]["navigation"]["action"])
         self._listener = rig.node.listen(action.Impl.FeedbackMessage, FEEDBACK, self._hear)
         acquaint(rig)
         rig.node.speeds.clear()
@@ -214,8 +214,3 @@ def _require_feedback_for_all(rig: RobotRig) -> None:
             actual=f"The goal could not be sent: the feedback of {NAME} is BEST_EFFORT, and an "
             "ordinary client asks for RELIABLE.",
         )
-
-
-def _action_type(name: str) -> Any:
-    package, kind, cls = name.split("/")
-    return getattr(importlib.import_module(f"{package}.{kind}"), cls)

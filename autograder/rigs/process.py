@@ -1,75 +1,42 @@
-"""The subject's process as anybody on the machine sees it: its threads, open files and memory.
-
-Linux keeps these under ``/proc/<pid>`` (proc(5)): ``task``, ``fd``, ``fdinfo`` and ``statm``.
-"""
+"""The subject's processes as seen from outside: their threads, open files and memory."""
 
 from __future__ import annotations
 
-import resource
 from collections.abc import Iterable
-from contextlib import suppress
-from dataclasses import dataclass
-from pathlib import Path
 
+from autograder.outside.asking import Outside
+from autograder.outside.usage import Usage
 
-@dataclass(frozen=True)
-class Usage:
-    """What a process holds: numbers of threads and open files, and resident memory in KiB."""
-
-    threads: int
-    files: int
-    memory: int
-
-    def grown(self, since: Usage) -> Usage:
-        """Return by how much it has grown since an earlier look."""
-        return Usage(
-            self.threads - since.threads, self.files - since.files, self.memory - since.memory
-        )
+__all__ = ["Process", "Usage"]
 
 
 class Process:
-    """A process, looked at from outside."""
+    """The subject, looked at from outside, with all processes that it has started."""
 
-    def __init__(self, pid: int) -> None:
-        """Look at the process ``pid``."""
-        self._proc = Path("/proc") / str(pid)
+    def __init__(self, outside: Outside) -> None:
+        """Look through ``outside``."""
+        self._outside = outside
 
     def threads(self) -> int:
         """Return how many threads it has."""
-        return len(self.thread_ids())
+        return self.usage().threads
 
     def thread_ids(self) -> set[int]:
         """Return the kernel's numbers of its threads."""
-        return {int(task.name) for task in (self._proc / "task").iterdir()}
+        return set(self._outside.ask("threads"))
 
     def naps(self, threads: Iterable[int]) -> dict[int, int]:
-        """Return how often each of these threads, if it is there, has gone to sleep of itself.
-
-        So which of them works: one that waits for ever goes to sleep just once.
-        """
-        found = {}
-        for thread in threads:
-            with suppress(FileNotFoundError, ProcessLookupError):
-                status = (self._proc / "task" / str(thread) / "status").read_text("ascii")
-                found[thread] = int(status.partition("\nvoluntary_ctxt_switches:")[2].split()[0])
-        return found
+        """Return how often each of these threads, if it is there, has gone to sleep of itself."""
+        return dict(self._outside.ask("naps", threads=[*threads]))
 
     def usage(self) -> Usage:
         """Return what it holds now."""
-        pages = int((self._proc / "statm").read_text(encoding="ascii").split()[1])
-        files = sum(1 for _ in (self._proc / "fd").iterdir())
-        return Usage(self.threads(), files, pages * resource.getpagesize() // 1024)
+        return Usage(*self._outside.ask("usage"))
 
     def positions(self, name: str) -> list[int]:
-        """Return the file positions of its descriptors of a file that has been unlinked.
+        """Return the file positions of its descriptors of a file that has been unlinked."""
+        return list(self._outside.ask("positions", file=name))
 
-        Only the last part of the path is compared: the rest depends on the mount namespace.
-        """
-        found = []
-        for descriptor in (self._proc / "fd").iterdir():
-            # It may be closed while we look.
-            with suppress(FileNotFoundError, ProcessLookupError):
-                if descriptor.readlink().name == f"{name} (deleted)":
-                    info = (self._proc / "fdinfo" / descriptor.name).read_text("ascii")
-                    found.append(int(info.split()[1]))  # "pos:  <number>" comes first
-        return found
+    def others(self) -> list[str]:
+        """Return the names of the processes that it has started."""
+        return list(self._outside.ask("others"))

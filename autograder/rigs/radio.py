@@ -1,9 +1,10 @@
 """A consumer at the far end of a radio link that breaks down for a moment: real packet loss.
 
-The far end is a DDS participant of its own. To break the link, nftables drops every UDP packet that
-is sent to this participant's ports, in the network namespace that examiner and subject have to
-themselves. Everything is lost for as long as the gap lasts, and nothing outside of it: so a design
-that recovers always does, one that does not never does, and chance has no part in it.
+The far end is a DDS participant of its own. To break the link, every UDP packet is dropped that is
+sent to this participant's ports, in the network namespace that examiner and subject have to
+themselves (`autograder.outside`). Everything is lost for as long as the gap lasts, and nothing
+outside of it: so a design that recovers always does, one that does not never does, and chance has
+no part in it.
 """
 
 # mypy: allow-untyped-calls
@@ -11,7 +12,6 @@ that recovers always does, one that does not never does, and chance has no part 
 
 from __future__ import annotations
 
-import subprocess
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -21,12 +21,13 @@ from rclpy.qos import QoSProfile
 
 from autograder.bench import Bench
 from autograder.exam import NotExaminable
+from autograder.outside.asking import Outside
+from autograder.outside.requests import CannotLoseError
 from autograder.rigs.quiet import QuietNode
 from autograder.rigs.readings import Heard, Sensor
 from autograder.rigs.sensor_node import ExaminerNode
-from course import Session, tools
+from course import Session
 
-TABLE = "inet ros2_course_radio"
 NOT_HERE = (
     "What becomes of lost packets could not be examined on this machine, which cannot make a "
     "network that loses them{why}. After a hand-in a person looks at it."
@@ -36,9 +37,9 @@ NOT_HERE = (
 class Radio:
     """The far end of a radio link."""
 
-    def __init__(self, near: ExaminerNode, domain_id: int) -> None:
+    def __init__(self, near: ExaminerNode, domain_id: int, outside: Outside) -> None:
         """Bring it up on ``domain_id``; it listens for readings that ``near`` sends."""
-        self._near = near
+        self._near, self._outside = near, outside
         before = _own_ports()
         self.session = Session(domain_id=domain_id)
         self._node = self.session.run(QuietNode, f"{near.get_name()}_far")
@@ -59,16 +60,15 @@ class Radio:
         Raises:
             NotExaminable: this machine cannot.
         """
-        ports = ", ".join(map(str, self._ports))
-        _nft(
-            f"add table {TABLE}",
-            f"add chain {TABLE} air {{ type filter hook input priority 0; policy accept; }}",
-            f"add rule {TABLE} air udp dport {{ {ports} }} drop",
-        )
+        try:
+            self._outside.ask("lose", ports=self._ports)
+        except CannotLoseError as error:
+            why = f" ({error})" if str(error) else ""
+            raise NotExaminable(NOT_HERE.format(why=why)) from None
         try:
             yield
         finally:
-            _nft(f"delete table {TABLE}")
+            self._outside.ask("deliver")
 
 
 @contextmanager
@@ -78,24 +78,13 @@ def radio(bench: Bench, near: ExaminerNode) -> Iterator[Radio]:
     Raises:
         NotExaminable: the network is not the subject's own: others' packets must not get lost.
     """
-    if not bench.own_network:
+    if not bench.outside.own_network:
         raise NotExaminable(NOT_HERE.format(why=""))
-    link = Radio(near, bench.session.domain_id)
+    link = Radio(near, bench.session.domain_id, bench.outside)
     try:
         yield link
     finally:
         link.session.close()
-
-
-def _nft(*commands: str) -> None:
-    tool = tools.find("nft")
-    if tool is None:
-        raise NotExaminable(NOT_HERE.format(why=" (nftables is not installed)"))
-    rules = "\n".join(commands).encode()
-    ran = subprocess.run([tool, "-f", "-"], input=rules, capture_output=True, check=False)
-    if ran.returncode:
-        said = ran.stderr.decode(errors="replace").strip().splitlines()
-        raise NotExaminable(NOT_HERE.format(why=f" (nft: {said[0]})" if said else ""))
 
 
 def _own_ports() -> set[int]:

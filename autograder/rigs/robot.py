@@ -81,7 +81,7 @@ class RobotRig:
         self.broadcasts = False
         self.limit: float | None = None
         self.obeyed: float | None = None
-        self._threads = Stillness(bench.subject.pid)
+        self._threads = Stillness(bench.outside)
         self._steps = [(0, 0.0)]
         self._beside = ThreadPoolExecutor(thread_name_prefix="asking")
         self._clients: dict[str, Any] = {}

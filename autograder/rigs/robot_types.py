@@ -4,12 +4,13 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterable
 from typing import Any
 
 from autograder.own_interfaces import DEFINITIONS
+from course import types
 from course.design import dye
+from course.errors import CourseError
 from course.interfaces import define
 
 
@@ -25,10 +26,9 @@ def load_type(name: str) -> Any:
     """
     if name in DEFINITIONS:
         return define(name, DEFINITIONS[name])
-    package, kind, cls = name.split("/")
     try:
-        return getattr(importlib.import_module(f"{package}.{kind}"), cls)
-    except (ImportError, AttributeError):
+        return types.load_named(name)
+    except (LookupError, CourseError):
         raise UnknownTypeError(name) from None
 
 

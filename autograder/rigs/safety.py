@@ -32,7 +32,7 @@ class RobotRig:
         self._robot: Robot | None = None
         self._player: Player | None = None
         self._fresh = False
-        self._still = Stillness(bench.subject.pid)
+        self._still = Stillness(bench.outside)
 
     @contextmanager
     def robot(self, name: str, player: type[PlayerT]) -> Iterator[tuple[Robot, PlayerT]]:

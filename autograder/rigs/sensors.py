@@ -13,7 +13,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import count
 from typing import Any
@@ -22,6 +22,8 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import Bench
+from autograder.exam import NotExaminable
+from autograder.outside.holding import HoldError
 from autograder.rigs.patience import Patience
 from autograder.rigs.phrases import callback_raised
 from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor
@@ -58,7 +60,7 @@ class SensorRig:
         self.node = node
         self._experiments = bench.memory
         self._probes = 0  # how often probed
-        self._still = Stillness(bench.subject.pid)
+        self._still = Stillness(bench.outside)
 
     def offered(self, topic: str) -> list[TopicEndpointInfo]:
         """Return the publishers on ``topic`` that are not the examiner's."""
@@ -85,18 +87,45 @@ class SensorRig:
     def busy(self, name: str) -> Iterator[Callable[[], bool]]:
         """Keep the node of a class busy for the length of the block; its endpoints go on.
 
-        Yields a look at whether they do not, by an accident that `Held.jams` tells of.
+        What is yielded lets it go on before the end of the block. It returns whether its endpoints
+        did not receive, by an accident that `Held.jams` tells of.
         Where all its threads are held, the drivers are busy as well: see `stand_ins`.
         """
-        if self.bench.can_hold:
-            with self.bench.hold() as held, self.node.standing_in():
-                yield held.jams
+        if self.can_hold:
+            with self._held() as let_go, self.node.standing_in():
+                yield let_go
             return
-        self.subject.pause(name)
+        with ExitStack() as paused:
+            self.subject.pause(name)
+            paused.callback(self.subject.resume, name)
+
+            def let_go() -> bool:
+                paused.close()
+                return False
+
+            yield let_go
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether the subject is in a sandbox, where all its threads can be held from outside."""
+        return self.bench.outside.own_network
+
+    @contextmanager
+    def _held(self) -> Iterator[Callable[[], bool]]:
+        """Hold the subject's threads for the length of the block; it is not asked."""
+        outside = self.bench.outside
         try:
-            yield lambda: False
-        finally:
-            self.subject.resume(name)
+            outside.ask("hold")
+        except HoldError as error:
+            raise NotExaminable(f"{error} After a hand-in a person looks at it.") from None
+        with ExitStack() as held:
+            held.callback(outside.ask, "release")
+
+            def let_go() -> bool:
+                held.pop_all()
+                return bool(outside.ask("release"))
+
+            yield let_go
 
     @contextmanager
     def stand_ins(self, sensors: Sequence[Sensor]) -> Iterator[None]:
@@ -104,7 +133,7 @@ class SensorRig:
 
         They stay for the length of the block: with a publisher goes what waits for a reader.
         """
-        if not self.bench.can_hold:
+        if not self.can_hold:
             yield
             return
         with self.node.stand_ins({sensor.name: self._offer(sensor) for sensor in sensors}):

@@ -51,8 +51,7 @@ def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
 
 def _busy_consumer(rig: SensorRig, phase: str) -> dict[str, Backlog] | None:
     """Return what was found; None if DDS could not receive meanwhile."""
-    with ExitStack() as busy:
-        jams = busy.enter_context(rig.busy(CONSUMERS))
+    with rig.busy(CONSUMERS) as let_go:
         streams = {s.name: Stream(rig.node, s, phase, _limit(s)) for s in SENSORS}
         rig.wait(
             lambda: all(stream.sent >= _least(stream.sensor) for stream in streams.values()),
@@ -67,8 +66,8 @@ def _busy_consumer(rig: SensorRig, phase: str) -> dict[str, Backlog] | None:
             # So that a reading is clearly on this side of a bound or on that one, despite jitter.
             rig.wait(lambda: _youngest(rig, phase, counts) >= LULL)
             early = {s.name for s in SENSORS if rig.consumed(s, phase)}
-            resumed, jammed = time.time_ns(), jams()
-            busy.close()
+            resumed = time.time_ns()
+            jammed = let_go()
     if jammed:
         for stream in streams.values():
             stream.stop()
@@ -200,10 +199,10 @@ def short_pause(rig: SensorRig) -> Burst:
 
 def _burst(rig: SensorRig, phase: str, patience: float | None) -> Burst:
     rig.rest()  # what still waits for the consumer would be ahead of the burst
-    with rig.busy(CONSUMERS) as jams:
+    with rig.busy(CONSUMERS) as let_go:
         stream = Stream(rig.node, IMU, phase, BURST)
         published = len(_published(rig, IMU, phase, BURST))
-        jammed = jams()
+        jammed = let_go()
     rig.wait(lambda: BURST - 1 in rig.consumed(IMU, phase), patience)
     stream.stop()
     handed = dict(rig.handed(IMU, phase)).get(BURST - 1)

@@ -1,34 +1,34 @@
 """The sandbox of one submission: a network of its own with an examiner in it, and a subject.
 
-The outer part is a network namespace with nothing but a loopback that DDS can discover over; the
-examiner runs there and sees files and processes as ever. The subject joins that network in
-namespaces of its own for processes, files, IPC and, unless root grades, users. Root instead gives
-each subject a user id that nobody else has, because the kernel does not count root's processes.
+The outer part is a network namespace with nothing but a loopback that DDS can discover over. The
+subject joins that network in namespaces of its own for processes, files, IPC and, unless root
+grades, users; so does the examiner, who parses what the subject sends, in others. Root instead
+gives each a user id that nobody else has, because the kernel does not count root's processes. What
+an examiner needs to know of the subject's processes, a warden tells it, who is in the network only.
 """
 
 from __future__ import annotations
 
 import os
 import secrets
+import socket
 import subprocess
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
+from autograder import python_module
 from autograder.files import scratch_folder
 from autograder.sandbox import environment, network, seccomp, view, warmth
-from autograder.sandbox.boxed import BoxedSubject, WarmSubject
+from autograder.sandbox.boxed import BoxedSubject, Warden, WarmSubject
 from autograder.sandbox.host import tethered, write_files
-from autograder.sandbox.limits import MIB, Limits
+from autograder.sandbox.limits import Limits
 from autograder.sandbox.place import Process
 from course.domains import MAX_DOMAIN
 
 USER = 1000
 """The subject's user id as it sees it, where it has a user namespace."""
-
-EXAMINER_DATA = 3 * 1024 * MIB
-"""Bytes of writable memory that an examiner may reserve."""
 
 HOLDER = ("sh", "-c", "echo up; exec sleep infinity >/dev/null 2>&1")
 """What holds a sandbox open for a subject: it says that the sandbox is there, and only waits."""
@@ -38,7 +38,6 @@ class Box:
     """The namespaces of one submission."""
 
     domain_id = MAX_DOMAIN  # all are ours alone here; a program that names one names another
-    own_network = True
 
     def __init__(
         self, limits: Limits | None = None, hidden: Iterable[Path] = (), *, warm: bool = False
@@ -47,31 +46,81 @@ class Box:
 
         Args:
             limits: what the submission may use.
-            hidden: folders that it must not see even if they lie within this Python's folders.
+            hidden: folders that must not be seen even if they lie within this Python's folders.
             warm: examiner and subject are forked from processes that have imported everything.
         """
         self._limits = limits or Limits()
         self._hidden = tuple(hidden)
         self._warm = warm
         self._namespaces: dict[str, int] = {}
+        self._held = ExitStack()
+        self._warden: Warden | None = None
 
     def spawn(self, command: Sequence[str], **options: Any) -> Process:
-        """Make the network and start the examiner in it.
+        """Make the network, and start the warden and the examiner.
+
+        Raises:
+            BoxError: there is no such network to be had, or the sandbox's tools refuse.
+        """
+        self._make_network()
+        asked, asks = socket.socketpair()
+        with asked, asks:
+            warden = self._start_warden(asked)
+            command = [*command, "--outside", str(asks.fileno())]
+            fds = [*options.pop("pass_fds", ()), asks.fileno()]
+            examiner, init = self._start_examiner(command, fds, options)
+        self._warden = self._held.enter_context(Warden(warden, init))
+        return examiner
+
+    def join(self, command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+        """Run a command of ours in the network, and else as everything of ours runs.
 
         Raises:
             BoxError: there is no such network to be had.
         """
-        owner = warmth.subjects().pid if self._warm else None
-        self._namespaces = network.make(owner)
-        variables = {**(options.pop("env", None) or os.environ), **environment.DDS}
-        # A flood of messages ends the examiner, not the machine.
-        if self._warm and (arguments := warmth.arguments_of(command, warmth.EXAMINER)) is not None:
-            return warmth.examiner(
-                arguments, options["pass_fds"], variables, self._namespaces, EXAMINER_DATA
+        self._make_network()
+        joined = [*network.joining(self._namespaces), *tethered(command)]
+        return network.start(joined, **options)
+
+    def _make_network(self) -> None:
+        if not self._namespaces:
+            owner = warmth.subjects().pid if self._warm else None
+            self._namespaces = network.make(owner)
+
+    def _start_warden(self, asked: socket.socket) -> Process:
+        arguments = ["--examiner", str(asked.fileno())]
+        if self._warm:
+            return warmth.warden(arguments, [asked.fileno()], self._namespaces)
+        return self.join(
+            [*python_module.command(warmth.WARDEN), *arguments], pass_fds=[asked.fileno()],
+            stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+
+    def _start_examiner(
+        self, command: Sequence[str], fds: Sequence[int], options: Mapping[str, Any]
+    ) -> tuple[Process, int]:
+        """Start the examiner in a sandbox of its own; return it, and the sandbox's process 1."""
+        limits = Limits.of_examiner()
+        arguments = warmth.arguments_of(command, warmth.EXAMINER) if self._warm else None
+        bound = ["prlimit", f"--data={limits.data}", "--"]
+        with ExitStack() as stack:
+            user, holder = _user(), _user()
+            sandbox = _Sandbox(limits, environment.examiner(), None)
+            if arguments is None:
+                streams = {name: options.get(name) for name in ("stdin", "stdout", "stderr")}
+                process, init = self._enclose([*bound, *command], user, user, sandbox, stack, fds,
+                                              **streams)  # fmt: skip
+                self._held.push(BoxedSubject(process, init, limits, stack.pop_all()))
+                return process, init
+            process, init = self._enclose(
+                HOLDER, user, holder, sandbox, stack, (), stdout=subprocess.PIPE
             )
-        bound = ["prlimit", f"--data={EXAMINER_DATA}", "--"]
-        joined = [*network.joining(self._namespaces), *tethered([*bound, *command])]
-        return network.start(joined, env=variables, **options)
+            enclosed = BoxedSubject(process, init, limits, stack.pop_all())
+            self._held.push(enclosed)
+            enclosed.require_holder()
+            as_user = user if network.is_root() else None
+            examiner = warmth.examiner(arguments, fds, enclosed.handle, as_user, limits.data)
+            return examiner, init
 
     def start_subject(
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
@@ -93,9 +142,9 @@ class Box:
         with ExitStack() as stack:
             user = _user()
             process, init = self._enclose(
-                command, user, user, files, _Given(stack), fds, stdout=subprocess.DEVNULL
+                command, user, user, self._subjects(files), stack, fds, stdout=subprocess.DEVNULL
             )
-            return BoxedSubject(process, init, self._limits, stack.pop_all())
+            return BoxedSubject(process, init, self._limits, stack.pop_all(), self._warden)
 
     def _fork(
         self, arguments: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
@@ -105,46 +154,52 @@ class Box:
             user = _user()
             # Root's subject is another user than what holds its sandbox, and cannot touch that.
             process, init = self._enclose(
-                HOLDER, user, _user(), files, _Given(stack), (), stdout=subprocess.PIPE
+                HOLDER, user, _user(), self._subjects(files), stack, (), stdout=subprocess.PIPE
             )
-            subject = WarmSubject(process, init, self._limits, stack.pop_all())
+            subject = WarmSubject(process, init, self._limits, stack.pop_all(), self._warden)
             stack.push(subject)
             subject.fork(arguments, fds, user if network.is_root() else None)
             stack.pop_all()
             return subject
+
+    def _subjects(self, files: Mapping[str, bytes]) -> _Sandbox:
+        return _Sandbox(self._limits, environment.submission(), files)
 
     def _enclose(
         self,
         command: Sequence[str],
         named: int,
         user: int,
-        files: Mapping[str, bytes],
-        given: _Given,
+        sandbox: _Sandbox,
+        stack: ExitStack,
         fds: Sequence[int],
         *,
-        stdout: int,
+        stdin: int | None = subprocess.DEVNULL,
+        stdout: int | None = None,
+        stderr: int | None = subprocess.PIPE,
     ) -> tuple[subprocess.Popen[bytes], int]:
-        """Start a command in the sandbox; return bwrap's process and the sandbox's process 1.
+        """Start a command in a sandbox; return bwrap's process and the sandbox's process 1.
 
         ``named`` is the user id that its files call the student's, ``user`` that of the command.
         """
+        given = _Given(stack)
         # Through a descriptor, so that the sandbox's process 1 does not tell them.
-        arguments = given.file("\0".join(self._arguments(given, named, files)).encode())
+        arguments = given.file("\0".join(self._arguments(given, named, sandbox)).encode())
         info, info_end = os.pipe()
-        sandbox = ["bwrap", "--args", arguments, "--info-fd", str(info_end), "--"]
-        command = [*sandbox, *(_as_user(user) if network.is_root() else []), *command]
+        bwrap = ["bwrap", "--args", arguments, "--info-fd", str(info_end), "--"]
+        command = [*bwrap, *(_as_user(user) if network.is_root() else []), *command]
         try:
             process = network.start(
                 [*network.joining(self._namespaces), *command],
                 env={"PATH": os.environ.get("PATH", os.defpath)}, start_new_session=True,
                 pass_fds=[*given.descriptors, info_end, *fds],
-                stdin=subprocess.DEVNULL, stdout=stdout, stderr=subprocess.PIPE,
+                stdin=stdin, stdout=stdout, stderr=stderr,
             )  # fmt: skip
         finally:
             os.close(info_end)
         return process, network.child(info, process)
 
-    def _arguments(self, given: _Given, user: int, files: Mapping[str, bytes]) -> Iterator[str]:
+    def _arguments(self, given: _Given, user: int, sandbox: _Sandbox) -> Iterator[str]:
         """Yield bwrap's arguments."""
         yield from network.own_user(USER)
         yield from ("--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try")
@@ -152,8 +207,9 @@ class Box:
         yield from ("--perms", "0755", "--dir", "/etc")
         for path, text in view.written(user).items():
             yield from ("--perms", "0644", "--ro-bind-data", given.file(text.encode()), path)
-        yield from view.arguments(self._limits, given.folder(files), self._hidden)
-        for name, value in environment.submission().items():
+        folder = None if sandbox.files is None else given.folder(sandbox.files)
+        yield from view.arguments(sandbox.limits, folder, self._hidden)
+        for name, value in sandbox.variables.items():
             yield from ("--setenv", name, value)
         yield from ("--seccomp", given.file(seccomp.program()))
 
@@ -162,9 +218,18 @@ class Box:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let the network go; it ends with the last process in it."""
+        """Let everything go; the network ends with the last process in it."""
+        self._held.close()
         while self._namespaces:
             os.close(self._namespaces.popitem()[1])
+
+
+class _Sandbox(NamedTuple):
+    """What makes a sandbox the subject's or the examiner's; ``files`` are those handed in."""
+
+    limits: Limits
+    variables: Mapping[str, str]
+    files: Mapping[str, bytes] | None
 
 
 class _Given:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -10,32 +11,75 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Self
 
+from autograder.outside.processes import Sandboxed, number_inside
 from autograder.sandbox import network, warmth
 from autograder.sandbox.host import fate_of
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.network import BoxError
-from autograder.sandbox.place import END_TIMEOUT
+from autograder.sandbox.place import END_TIMEOUT, Process
 from autograder.sandbox.watch import Watch
+from autograder.starving import RunDelay, SeenDelay, of_process
 from autograder.warm import ForkedProcess, ZygoteError
 
 KILL_TIMEOUT = 10.0
 """Seconds until a killed subject must have ended: the kernel takes a moment for its memory."""
 
 
+class Warden:
+    """A running warden (`autograder.outside.warden`), as the engine sees it."""
+
+    def __init__(self, process: Process, examiner: int) -> None:
+        """Have one that answers an examiner, by the first process of that one's sandbox."""
+        self._process, self._examiner = process, examiner
+
+    def tell(self, init: int, pid: int, ours: list[int]) -> None:
+        """Tell it whom to look at.
+
+        Args:
+            init: the first process of the subject's sandbox.
+            pid: the subject, by its number in there.
+            ours: what else is in there, by such numbers.
+        """
+        told = {"subject": init, "examiner": self._examiner, "pid": pid, "ours": ours}
+        assert self._process.stdin is not None
+        with suppress(BrokenPipeError):  # without an answer the examiner reports a grader's error
+            self._process.stdin.write(json.dumps(told).encode() + b"\n")
+            self._process.stdin.flush()
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End it."""
+        self._process.kill()
+        self._process.wait()
+        for stream in (self._process.stdin, self._process.stdout, self._process.stderr):
+            if stream is not None:
+                stream.close()
+
+
 class BoxedSubject:
-    """A running subject in its sandbox."""
+    """A running process in its sandbox: a subject, or an examiner."""
 
     def __init__(
-        self, process: subprocess.Popen[bytes], init: int, limits: Limits, held: ExitStack
+        self,
+        process: subprocess.Popen[bytes],
+        init: int,
+        limits: Limits,
+        held: ExitStack,
+        warden: Warden | None = None,
     ) -> None:
-        """Watch over the process namespace whose process 1 is ``init``."""
+        """Watch over the process namespace whose process 1 is ``init``; a warden learns of it."""
         self._process = process
         self._init = init
+        self._warden = warden
         self._held = held
-        self._handle = os.pidfd_open(init)  # unlike its number, never another process's
-        held.callback(os.close, self._handle)
-        self._watch = Watch(init, self._handle, limits)
+        self.handle = os.pidfd_open(init)  # unlike its number, never another process's
+        held.callback(os.close, self.handle)
+        self._watch = Watch(init, self.handle, limits)
         self.pid = 0
+        self.delay: RunDelay = of_process(0)
 
     @property
     def unwatched(self) -> bool:
@@ -43,9 +87,26 @@ class BoxedSubject:
         return self._watch.failed
 
     def ready(self) -> None:
-        """Find the subject's process: the only one that process 1 has, as yet."""
-        children = Path(f"/proc/{self._init}/task/{self._init}/children").read_text().split()
-        self.pid = int(children[0]) if children else 0
+        """Find the subject's process, and tell the warden whom to look at."""
+        if not self.pid:  # it is the only one that process 1 has, as yet
+            children = Path(f"/proc/{self._init}/task/{self._init}/children").read_text().split()
+            self.pid = int(children[0]) if children else 0
+        pid = number_inside(self.pid)
+        ours = [number for number in Sandboxed(self._init).inside() if number != pid]
+        self.delay = SeenDelay(Sandboxed(self._init, ours), pid)
+        if self._warden is not None:
+            self._warden.tell(self._init, pid, ours)
+
+    def require_holder(self) -> None:
+        """Wait until what holds the sandbox says that it is there.
+
+        Raises:
+            BoxError: the sandbox's tools refuse, or its watch has ended it already.
+        """
+        assert self._process.stdout is not None
+        network.require_word(self._process.stdout, self._process)
+        if not self._process.stdout.readline():
+            raise BoxError(self.failed())
 
     def fate(self, timeout: float = END_TIMEOUT) -> str:
         """Return in words how the process ended, or that it has not within ``timeout`` seconds."""
@@ -83,7 +144,7 @@ class BoxedSubject:
 
     def _kill(self) -> None:
         with suppress(ProcessLookupError):
-            signal.pidfd_send_signal(self._handle, signal.SIGKILL)
+            signal.pidfd_send_signal(self.handle, signal.SIGKILL)
 
 
 class WarmSubject(BoxedSubject):
@@ -98,20 +159,14 @@ class WarmSubject(BoxedSubject):
             BoxError: the sandbox's tools refuse, or its watch has ended it already.
             ZygoteError: there is no fork to be had.
         """
-        assert self._process.stdout is not None
-        network.require_word(self._process.stdout, self._process)
-        if not self._process.stdout.readline():
-            raise BoxError(self.failed())
+        self.require_holder()
         try:
-            self._forked = warmth.subject(arguments, fds, self._handle, user)
+            self._forked = warmth.subject(arguments, fds, self.handle, user)
         except ZygoteError as error:
             if self._watch.reason:  # there is nothing left to fork into
                 raise BoxError(self._watch.reason) from error
             raise
         self.pid = self._forked.pid
-
-    def ready(self) -> None:
-        """Need nothing: the process is the one that was forked."""
 
     def fate(self, timeout: float = END_TIMEOUT) -> str:
         """Return in words how the process ended, or that it has not within ``timeout`` seconds."""

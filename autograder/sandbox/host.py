@@ -14,13 +14,12 @@ from typing import Any, Self
 from autograder.files import scratch_folder
 from autograder.sandbox.environment import INLINE
 from autograder.sandbox.place import END_TIMEOUT, Process
+from autograder.starving import RunDelay, of_process
 from course.domains import lease_domain
 
 
 class Host:
     """This machine as it is: only the ROS domain is the submission's own."""
-
-    own_network = False
 
     def __init__(self) -> None:
         """Lease a domain."""
@@ -68,6 +67,7 @@ class HostSubject:
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         self.pid = self._process.pid
+        self.delay: RunDelay = of_process(self.pid)
 
     def ready(self) -> None:
         """Need nothing: the process is the one that was started."""

@@ -14,6 +14,9 @@ from pathlib import Path
 
 MIB = 1024 * 1024
 
+EXAMINER_MEMORY = 3 * 1024 * MIB
+"""Bytes of writable memory that an examiner may reserve."""
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -46,6 +49,14 @@ class Limits:
     all_files: int = 2048
     scratch: int = 64 * MIB
     wall: int = 900
+
+    @classmethod
+    def of_examiner(cls) -> Limits:
+        """Return those of an examiner: a flood of messages ends it, not the machine."""
+        return cls(
+            memory=EXAMINER_MEMORY, data=EXAMINER_MEMORY, processes=8, cpu=900, scratch=16 * MIB,
+            wall=1200,
+        )  # fmt: skip
 
     def to_json(self) -> str:
         """Return the limits as JSON."""

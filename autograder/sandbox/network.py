@@ -50,8 +50,7 @@ def make(owner: int | None = None) -> Namespaces:
     command = ["unshare", "--net", "--", "sh", "-c", _SET_UP]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     if owner is not None and not is_root():
-        enter = ["nsenter", f"--user=/proc/{owner}/ns/user", "--preserve-credentials", "--"]
-        command = [*enter, *command]
+        command = [*entering(owner), *command]
     elif not is_root():
         command = [*owning("--die-with-parent", "--dev-bind", "/", "/"), *command]
     with start(command, **pipes) as holder:
@@ -70,6 +69,11 @@ def joining(namespaces: Mapping[str, int]) -> list[str]:
     # Not by inheritance: a submission must not find these descriptors among its own.
     kinds = [f"--{kind}=/proc/{os.getpid()}/fd/{fd}" for kind, fd in namespaces.items()]
     return ["nsenter", *kinds, *([] if is_root() else ["--preserve-credentials"]), "--"]
+
+
+def entering(owner: int) -> list[str]:
+    """Return what goes before a command to run it in the user namespace of a process."""
+    return ["nsenter", f"--user=/proc/{owner}/ns/user", "--preserve-credentials", "--"]
 
 
 @cache

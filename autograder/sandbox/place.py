@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import socket
-import sys
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import IO, Any, Protocol, Self
+
+from autograder import python_module
+from autograder.starving import RunDelay
 
 END_TIMEOUT = 5.0
 """Seconds in which a subject that says no more must have ended."""
@@ -37,7 +39,7 @@ class Process(Protocol):
 def subject_command(engine: socket.socket, control: socket.socket, domain_id: int) -> list[str]:
     """Return the command of a subject, which gets its ends of these two channels."""
     return [
-        sys.executable, "-m", "autograder.subject", "--engine", str(engine.fileno()),
+        *python_module.command("autograder.subject"), "--engine", str(engine.fileno()),
         "--control", str(control.fileno()), "--domain", str(domain_id),
     ]  # fmt: skip
 
@@ -47,7 +49,11 @@ class RunningSubject(Protocol):
 
     @property
     def pid(self) -> int:
-        """Its process id as the examiner sees it; known once it has said that it is ready."""
+        """Its process id as seen from here; known once it has said that it is ready."""
+
+    @property
+    def delay(self) -> RunDelay:
+        """For how long others have kept it from running."""
 
     @property
     def unwatched(self) -> bool:
@@ -79,11 +85,12 @@ class Place(Protocol):
 
     domain_id: int
     """The ROS domain of both."""
-    own_network: bool
-    """Whether the network is theirs alone, so that the examiner may make it lose packets."""
 
     def spawn(self, command: Sequence[str], **options: Any) -> Process:
-        """Start the examiner; ``options`` are those of `subprocess.Popen`."""
+        """Start the examiner; ``options`` are those of `subprocess.Popen`.
+
+        It is told how to reach a warden (`autograder.outside`) if it does not see the subject.
+        """
 
     def start_subject(
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]

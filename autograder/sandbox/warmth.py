@@ -1,16 +1,16 @@
 """Warm starts of examiners and subjects: which zygotes there are, and what is forked from them.
 
-The subjects' zygote lives where nothing can be written, so that no way back to the files it was
-loaded from is one to change them. Who is not root has it in a user namespace with every right,
-which is the parent of all that the submissions get.
+Both zygotes live where nothing can be written, so that no way back to the files they were loaded
+from is one to change them. Who is not root has them in a user namespace with every right, which is
+the parent of all that the sandboxes get. Wardens, who run in none, are forked like examiners.
 """
 
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping, Sequence
 
+from autograder import python_module
 from autograder.sandbox import environment, network, seccomp, view
 from autograder.warm import ForkedProcess, Zygote, shared
 from autograder.warm.forked import pipe_in, pipe_out
@@ -18,6 +18,8 @@ from autograder.warm.task import Task
 
 SUBJECT = "autograder.subject"
 EXAMINER = "autograder.examiner"
+WARDEN = "autograder.outside.warden"
+_READ_ONLY = ("--ro-bind", "/", "/", "--dev-bind", "/dev", "/dev")
 
 
 def subjects() -> Zygote:
@@ -26,8 +28,7 @@ def subjects() -> Zygote:
     Raises:
         ZygoteError: it does not start.
     """
-    read_only = network.owning("--ro-bind", "/", "/", "--dev-bind", "/dev", "/dev")
-    return shared.zygote(SUBJECT, environment.submission(), read_only)
+    return shared.zygote(SUBJECT, environment.submission(), network.owning(*_READ_ONLY))
 
 
 def examiners() -> Zygote:
@@ -36,12 +37,15 @@ def examiners() -> Zygote:
     Raises:
         ZygoteError: it does not start.
     """
-    return shared.zygote(EXAMINER, environment.examiners())
+    before: list[str] = []
+    if not network.is_root():
+        before = [*network.entering(subjects().pid), "bwrap", *_READ_ONLY, "--cap-add", "ALL", "--"]
+    return shared.zygote(EXAMINER, environment.examiner(), before)
 
 
 def arguments_of(command: Sequence[str], module: str) -> Sequence[str] | None:
     """Return the arguments of a command that runs ``module``; None if it runs something else."""
-    start = [sys.executable, "-m", module]
+    start = python_module.command(module)
     return command[len(start) :] if list(command[: len(start)]) == start else None
 
 
@@ -75,28 +79,39 @@ def subject(
 
 
 def examiner(
-    arguments: Sequence[str],
-    fds: Sequence[int],
-    variables: Mapping[str, str],
-    namespaces: Mapping[str, int],
-    data: int,
+    arguments: Sequence[str], fds: Sequence[int], process: int, user: int | None, data: int
 ) -> ForkedProcess:
-    """Fork an examiner into a network, with pipes to its standard streams.
+    """Fork an examiner into the namespaces of a process, with pipes to its standard streams.
 
     Args:
         arguments: of its command.
         fds: descriptors that it gets, under the same numbers.
-        variables: its environment.
-        namespaces: descriptors of what it joins.
+        process: a process in its sandbox, by a pidfd.
+        user: the user id that it takes on, if root grades.
         data: bytes of writable memory that it may reserve.
     """
     task = Task(
-        EXAMINER, list(arguments), [0, 1, 2, *fds], namespaces=list(namespaces),
-        environment=dict(variables), data=data,
+        EXAMINER, list(arguments), [0, 1, 2, *fds], process=True, user=user, data=data,
+        calls=seccomp.program().hex(), folder=str(view.HOME),
     )  # fmt: skip
+    return _with_streams(task, [process], fds)
+
+
+def warden(
+    arguments: Sequence[str], fds: Sequence[int], namespaces: Mapping[str, int]
+) -> ForkedProcess:
+    """Fork a warden into a network, by descriptors of the ``namespaces`` that it joins."""
+    task = Task(
+        WARDEN, list(arguments), [0, 1, 2, *fds], namespaces=list(namespaces),
+        environment=dict(os.environ),
+    )  # fmt: skip
+    return _with_streams(task, [*namespaces.values()], fds)
+
+
+def _with_streams(task: Task, joined: Sequence[int], fds: Sequence[int]) -> ForkedProcess:
     (reads, stdin), (writes, stdout), (errors, stderr) = pipe_in(), pipe_out(), pipe_out()
     try:
-        forked = examiners().fork(task, [*namespaces.values(), reads, writes, errors, *fds])
+        forked = examiners().fork(task, [*joined, reads, writes, errors, *fds])
     except BaseException:
         for stream in (stdin, stdout, stderr):
             stream.close()

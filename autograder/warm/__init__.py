@@ -4,7 +4,7 @@ Starting Python and importing rclpy, IPython and the course takes a second of pr
 is most of what grading a submission costs. A zygote does it once. It has one thread, opens no DDS
 participant and never sees a submission; all it ever does is fork. A fork joins the namespaces that
 it is told to, gives up every right, and only then runs a module's ``main``, as
-``python -m MODULE`` would. See unshare(2), setns(2) and pid_namespaces(7).
+``python -P -m MODULE`` would. See unshare(2), setns(2) and pid_namespaces(7).
 """
 
 from autograder.warm.forked import ForkedProcess, ZygoteError

@@ -7,13 +7,13 @@ import json
 import os
 import socket
 import subprocess
-import sys
 import tempfile
 import threading
 from collections.abc import Mapping, Sequence
 from typing import IO
 from weakref import WeakSet
 
+from autograder import python_module
 from autograder.warm.forked import ForkedProcess, ZygoteError
 from autograder.warm.task import Task
 
@@ -39,12 +39,12 @@ class Zygote:
         """
         self.module = module
         self.environment = dict(environment)
+        self.before = list(before)
         self._tasks, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._sending = threading.Lock()
         self._forked: WeakSet[ForkedProcess] = WeakSet()
-        command = [
-            sys.executable, "-P", "-m", "autograder.warm.zygote", "--socket", str(theirs.fileno()),
-        ]  # fmt: skip
+        command = python_module.command("autograder.warm.zygote")
+        command += ["--socket", str(theirs.fileno())]
         with theirs, tempfile.TemporaryFile() as said:
             try:
                 self._process = subprocess.Popen(
@@ -132,7 +132,7 @@ class Nursery:
     def zygote(
         self, module: str, environment: Mapping[str, str], before: Sequence[str] = ()
     ) -> Zygote:
-        """Return the zygote of a module; another one if it has ended or its environment changed.
+        """Return the zygote of a module; another one if it has ended, or was started otherwise.
 
         Raises:
             ZygoteError: it did not start.
@@ -143,7 +143,8 @@ class Nursery:
             starting = self._starting.setdefault(module, threading.Lock())
         with starting:
             known = self._zygotes.get(module)
-            if known is None or not known.alive or known.environment != environment:
+            wanted = (dict(environment), list(before))
+            if known is None or not known.alive or (known.environment, known.before) != wanted:
                 if known is not None:
                     self._zygotes.pop(module).close()
                 known = self._zygotes[module] = Zygote(module, environment, before)

@@ -66,7 +66,9 @@ class Task:
             linux.join(pidfd, _differing(pidfd))
         for kind in self.namespaces:
             namespace, *handed = handed
-            linux.join(namespace, linux.NAMESPACES[kind])
+            # The kernel lets nobody join the user namespace that it is in.
+            if os.fstat(namespace).st_ino != Path(f"/proc/self/ns/{kind}").stat().st_ino:
+                linux.join(namespace, linux.NAMESPACES[kind])
         return handed, pidfd
 
     def become(self, handed: list[int]) -> None:
@@ -99,7 +101,6 @@ class Task:
     def run(self) -> int:
         """Run the module's ``main``; return its exit code."""
         sys.argv = [self.module, *self.arguments]
-        sys.path.insert(0, os.getcwd())  # noqa: PTH109 - as it would be with python -m
         if "numpy.random" in sys.modules:
             # Python's own generator is seeded anew in a fork; this one must not be everybody's.
             sys.modules["numpy.random"].seed()

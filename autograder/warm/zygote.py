@@ -1,7 +1,7 @@
 """The zygote: a process that imports what others need, and then only forks.
 
-Started as ``python -m autograder.warm.zygote --socket FD MODULE``. It says when it is ready; each
-packet that follows is a `Task`, with descriptors: first one to report over, then what the task
+Started as ``python -P -m autograder.warm.zygote --socket FD MODULE``. It says when it is ready;
+each packet that follows is a `Task`, with descriptors: first one to report over, then what the task
 names. A fork (the keeper) joins the namespaces, because a process that joins a process namespace
 is itself not in it, forks once more, reports that process and, when it has ended, how.
 """

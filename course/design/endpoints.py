@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -14,6 +13,7 @@ from rclpy.expand_topic_name import expand_topic_name
 from rclpy.qos import QoSProfile, qos_profile_services_default
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
+from course import types
 from course.errors import CourseError
 from course.runtime.names import type_name
 
@@ -118,11 +118,9 @@ def _type(where: str, role: Role, ros_type: object) -> Any:
 
 
 def _load(where: str, name: str) -> Any:
-    package, _, rest = name.partition("/")
-    kind, _, cls = rest.partition("/")
     try:
-        return getattr(importlib.import_module(f"{package}.{kind}"), cls)
-    except (ImportError, AttributeError, ValueError):
+        return types.load_named(name)
+    except types.UnknownTypeError:
         raise DesignError(
             f"{where}: there is no type {name!r} here; a type is written like "
             "'sensor_msgs/msg/LaserScan'."

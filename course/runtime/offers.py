@@ -5,11 +5,10 @@
 from __future__ import annotations
 
 import difflib
-import importlib
-import importlib.util
 import re
 from collections import defaultdict
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any
 
 from rclpy.exceptions import NameValidationException
@@ -24,8 +23,8 @@ from rclpy.qos import (
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
-from course import plain
-from course.errors import CourseError, SessionError, WaitTimeout
+from course import plain, types
+from course.errors import SessionError, WaitTimeout
 from course.runtime import arguments
 from course.runtime.names import full_name, node_name, type_name
 
@@ -110,9 +109,9 @@ def type_on(node: Node, topic: str) -> Any | None:
     Raises:
         SessionError: its type is not installed here.
     """
-    for name, types in node.get_topic_names_and_types():
+    for name, offered in node.get_topic_names_and_types():
         if name == topic:
-            return load_type(types[0], topic)
+            return load_type(offered[0], topic)
     return None
 
 
@@ -220,36 +219,14 @@ def load_type(name: str, who: str = "", kind: str = "") -> Any:
     package, actual, cls = found["package"], found["kind"] or kind or "msg", found["name"]
     if kind and actual != kind:
         raise SessionError(f"{name} is no {kind} type: name one such as {_EXAMPLES[kind]}.")
-    try:
-        # An interface package is a folder: a file of the learner's that has its name stays unread.
-        spec = importlib.util.find_spec(package)
-        if spec is not None and spec.submodule_search_locations is not None:
-            interface = _member(importlib.import_module(f"{package}.{actual}"), cls)
-            if any(hasattr(interface, part) for part in _PARTS):
-                return interface
-    except CourseError:
-        raise  # a package of the learner's own that is not built yet: it says what to do
-    except (ImportError, AttributeError, ValueError):
-        pass
+    with suppress(types.UnknownTypeError):
+        return types.load(package, actual, cls)
     why = (
         f"{who} carries {name}, which is not installed here" if who else f"There is no {name} here"
     )
     raise SessionError(
         f"{why}: install its package, or define it with `%%interface {package}/{actual}/{cls}`."
     )
-
-
-def _member(module: Any, name: str) -> Any:
-    """Return an interface of a module, or a part of one, as ``Fibonacci_FeedbackMessage`` is."""
-    found = getattr(module, name, None)
-    if found is not None:
-        return found
-    first, *parts = name.split("_")
-    found = getattr(module, first)
-    for part in parts:
-        holder = found if hasattr(found, part) else getattr(found, "Impl", found)
-        found = getattr(holder, part, None) or getattr(holder, f"{part}Service")
-    return found
 
 
 _TYPE_NAME = re.compile(
@@ -260,4 +237,3 @@ _EXAMPLES = {
     "srv": "std_srvs/srv/SetBool",
     "action": "example_interfaces/action/Fibonacci",
 }
-_PARTS = ("get_fields_and_field_types", "Request", "Goal")

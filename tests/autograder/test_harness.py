@@ -299,7 +299,7 @@ def test_a_node_that_does_not_come_up_is_named() -> None:
         def send(self, request: dict[str, Any]) -> None:
             pass
 
-        def receive_fairly(self, timeout: float, pid: int) -> dict[str, Any]:
+        def receive_fairly(self, timeout: float, delay: object) -> dict[str, Any]:
             if not self.answers:
                 raise ChannelTimeout
             return self.answers.pop(0)

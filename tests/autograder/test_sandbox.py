@@ -126,7 +126,7 @@ tempfile.TemporaryFile().write(b"x" * 1000)
 
 
 @needs_sandbox
-def test_the_examiner_sees_the_subjects_process() -> None:
+def test_a_subjects_process_is_seen_from_outside() -> None:
     with sandbox.place() as place:
         examiner = place.spawn(["sh", "-c", "read -r _"], stdin=subprocess.PIPE)
         program = "import os, sys; os.write(int(sys.argv[1]), b'up'); os.read(int(sys.argv[2]), 1)"
@@ -141,7 +141,8 @@ def test_the_examiner_sees_the_subjects_process() -> None:
             assert list((process / "task").iterdir())
             assert list((process / "fd").iterdir())
             assert int((process / "statm").read_text().split()[1]) > 0
-        examiner.communicate(b"\n")
+        assert examiner.stdin is not None
+        examiner.stdin.close()
         for descriptor in (up, stay, stay_end):
             os.close(descriptor)
     assert not process.exists()

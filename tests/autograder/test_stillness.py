@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import threading
@@ -11,8 +12,9 @@ from contextlib import contextmanager
 import pytest
 
 from autograder.descriptors import readable
-from autograder.rigs import stillness
-from autograder.rigs.stillness import ENDLESS, RESTLESS, Stillness
+from autograder.outside import stillness
+from autograder.outside.processes import Single
+from autograder.outside.stillness import ENDLESS, RESTLESS, Stillness
 
 BUSY = "import sys; print(flush=True)\nwhile True: pass"
 # Two threads: one computes from the first line of input on to the second, the other answers "?".
@@ -52,14 +54,18 @@ def process(program: str) -> Iterator[subprocess.Popen[bytes]]:
             running.kill()
 
 
+def watching(other: subprocess.Popen[bytes]) -> Stillness:
+    return Stillness(Single(other.pid), Single(os.getpid()))
+
+
 def test_two_processes_that_sleep_are_still() -> None:
     with process(ASLEEP) as other:
-        assert Stillness(other.pid).reached(timeout=30.0)
+        assert watching(other).reached(timeout=30.0)
 
 
 def test_a_process_that_computes_is_not() -> None:
     with process(BUSY) as other:
-        assert not Stillness(other.pid).reached(timeout=0.2)
+        assert not watching(other).reached(timeout=0.2)
 
 
 def test_a_thread_of_the_examiners_own_counts() -> None:
@@ -73,10 +79,10 @@ def test_a_thread_of_the_examiners_own_counts() -> None:
     thread.start()
     try:
         with process(ASLEEP) as other:
-            assert not Stillness(other.pid).reached(timeout=0.2)
+            assert not watching(other).reached(timeout=0.2)
             stop.set()
             thread.join()
-            assert Stillness(other.pid).reached(timeout=30.0)
+            assert watching(other).reached(timeout=30.0)
     finally:
         stop.set()
         thread.join()
@@ -92,7 +98,7 @@ def test_a_thread_that_takes_the_place_of_an_ended_one_counts() -> None:
     first = threading.Thread(target=stop.wait)
     first.start()
     with process(ASLEEP) as other:
-        still = Stillness(other.pid)
+        still = watching(other)
         assert still.reached(timeout=30.0)
         stop.set()
         first.join()
@@ -112,7 +118,7 @@ def test_a_kernel_that_keeps_no_account_of_run_times_tells_enough(
 ) -> None:
     monkeypatch.setattr(stillness, "_COUNTS", "status")
     with process(BESIDE) as other:
-        still = Stillness(other.pid)
+        still = watching(other)
         require_that_answers_are_waited_for(still, other)
         tell(other, "compute")
         assert rests_not_reached(still) > 0
@@ -121,7 +127,7 @@ def test_a_kernel_that_keeps_no_account_of_run_times_tells_enough(
 def test_a_process_that_has_ended_leaves_the_examiners_own() -> None:
     with process(ASLEEP) as other:
         pass
-    assert Stillness(other.pid).reached(timeout=30.0)
+    assert watching(other).reached(timeout=30.0)
 
 
 def tell(other: subprocess.Popen[bytes], line: str) -> None:
@@ -145,7 +151,7 @@ def require_that_answers_are_waited_for(still: Stillness, other: subprocess.Pope
 
 def test_a_thread_that_computes_for_ever_costs_the_patience_but_once() -> None:
     with process(BUSY) as other:
-        still = Stillness(other.pid)
+        still = watching(other)
         assert 0 < rests_not_reached(still) <= ENDLESS / RESTLESS + 1
         assert rests_not_reached(still) == 0
 
@@ -153,7 +159,7 @@ def test_a_thread_that_computes_for_ever_costs_the_patience_but_once() -> None:
 def test_beside_a_thread_that_computes_for_ever_others_are_waited_for() -> None:
     with process(BESIDE) as other:
         tell(other, "compute")
-        still = Stillness(other.pid)
+        still = watching(other)
         rests_not_reached(still)
         require_that_answers_are_waited_for(still, other)
 
@@ -161,7 +167,7 @@ def test_beside_a_thread_that_computes_for_ever_others_are_waited_for() -> None:
 def test_a_thread_that_has_fallen_asleep_counts_again() -> None:
     with process(BESIDE) as other:
         tell(other, "compute")
-        still = Stillness(other.pid)
+        still = watching(other)
         assert rests_not_reached(still) > 0
         tell(other, "sleep")
         assert rests_not_reached(still) == 0

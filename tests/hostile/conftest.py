@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-TITLES = ("attack", "what the grade says", "points", "neighbour's points")
+TITLES = ("attack", "what the grade says", "points got / deserved", "neighbour's points")
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -5,8 +5,9 @@ Each ``attacks/<name>.py`` is a cell that a student hands in, under a header of 
     # title: what it tries
     # told: a fragment of what the grade says about it (any number of them)
     # prints: a fragment of what the cell itself must print, an error included
+    # exercise: whose solution the cell stands behind; qos if left out
     # base: the corpus case that the rest of the submission is; an empty solution if left out
-    # score: its automatic points; 0 if left out, "any" if they do not matter
+    # score: the automatic points that it deserves; 0 if left out, "any" if they do not matter
     # seconds: what a cell of it may take, if not as long as always
 
 While it runs, so does a neighbour's right submission, which must get what it gets in quiet.
@@ -33,10 +34,10 @@ import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell
 
-from autograder import corpus, engine, runner, submission
+from autograder import corpus, engine, points, runner, submission
 from autograder.build import build
 from autograder.corpus import Case
-from autograder.corpus.trials import one_notebook
+from autograder.corpus.trials import notebooks_of
 from autograder.gradebook import CourseGradebook
 from autograder.release import release
 from autograder.runner import CELL_TIMEOUT, Outcome
@@ -61,6 +62,7 @@ class Attack:
     text: str
     told: list[str] = field(default_factory=list)
     prints: list[str] = field(default_factory=list)
+    exercise: str = "qos"
     base: str = EMPTY
     score: str = "0"
     seconds: float = CELL_TIMEOUT
@@ -77,39 +79,42 @@ def attack_of(file: Path) -> Attack:
         fields.setdefault(key, []).append(value)
     return Attack(
         file.stem, fields["title"][0], text, fields.get("told", []), fields.get("prints", []),
-        fields.get("base", [EMPTY])[0], fields.get("score", ["0"])[0],
-        float(fields.get("seconds", [CELL_TIMEOUT])[0]),
+        fields.get("exercise", ["qos"])[0], fields.get("base", [EMPTY])[0],
+        fields.get("score", ["0"])[0], float(fields.get("seconds", [CELL_TIMEOUT])[0]),
     )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Class:
     root: Path
-    source: NotebookNode
-    released: NotebookNode
-    cases: dict[str, Case]
+    notebooks: dict[str, tuple[NotebookNode, NotebookNode]]
+    cases: dict[tuple[str, str], Case]
 
-    def program(self, base: str, attack: str = "") -> Program:
-        notebook = self.cases[base].submission(self.source, self.released)
+    def program(self, base: str, attack: str = "", exercise: str = "qos") -> Program:
+        source, released = self.notebooks[exercise]
+        notebook = self.cases[exercise, base].submission(source, released)
         if attack:
             place = next(
                 number for number, cell in enumerate(notebook.cells)
-                if submission.grade_id(cell) == "qos-solution"
+                if submission.grade_id(cell) == f"{exercise}-solution"
             )  # fmt: skip
             notebook.cells.insert(place + 1, new_code_cell(attack))
-        return submission.program(submission.restore(notebook, self.source, self.released)[0])
+        return submission.program(submission.restore(notebook, source, released)[0])
 
 
 @pytest.fixture(scope="module")
 def class_(tmp_path_factory: pytest.TempPathFactory) -> Class:
-    root = one_notebook(tmp_path_factory.mktemp("course"), "qos")
+    exercises = sorted({attack.exercise for attack in attacks()} | {"qos"})
+    root = notebooks_of(tmp_path_factory.mktemp("course"), exercises)
     build(root)
     release(root, "ch05")
-    source, released = (
-        submission.read(root / step / "ch05" / "qos-design.ipynb") for step in ("source", "release")
-    )
-    cases = {case.name: case for case in corpus.load(HERE.parent / "submissions", "qos")}
-    return Class(root, source, released, cases)
+    notebooks, cases = {}, {}
+    for name in exercises:
+        file = f"ch05/{points.table()[name].notebook}.ipynb"
+        source, released = (submission.read(root / step / file) for step in ("source", "release"))
+        notebooks[name] = source, released
+        cases.update({(name, c.name): c for c in corpus.load(HERE.parent / "submissions", name)})
+    return Class(root, notebooks, cases)
 
 
 @pytest.fixture
@@ -205,14 +210,14 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
     with ThreadPoolExecutor(2) as pool:
         neighbour = pool.submit(runner.run, class_.program("right-chapter"), hidden=[class_.root])
         hostile = pool.submit(
-            runner.run, class_.program(attack.base, text), hidden=[class_.root],
+            runner.run, class_.program(attack.base, text, attack.exercise), hidden=[class_.root],
             cell_timeout=attack.seconds,
         )  # fmt: skip
         outcome, beside = hostile.result(), neighbour.result()
     for name, value in {
         "attack": f"{attack.name}: {attack.title}",
         "what the grade says": gist(outcome),
-        "points": f"{score(outcome):g} of {FULL:g}",
+        "points got / deserved": f"{score(outcome):g} / {attack.score}",
         "neighbour's points": f"{score(beside):g} of {FULL:g}",
     }.items():
         record_property(name, value)
@@ -226,8 +231,9 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
     for fragment in attack.prints:
         assert fragment in shown
     assert "Traceback" not in said
+    assert not outcome.spoilt, said
     assert len(shown) < 2_000_000
-    assert len(namespaces) == 2
+    assert len(namespaces) == 4  # each of the two and its examiner
     # What was killed takes the kernel a moment to clear away; what was not stays.
     deadline, never = time.monotonic() + 10, threading.Event()
     while running(namespaces) and time.monotonic() < deadline:
@@ -238,7 +244,7 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
 
 
 def test_odd_files_in_a_submission_folder(class_: Class) -> None:
-    right = class_.cases["right-chapter"].submission(class_.source, class_.released)
+    right = class_.cases["qos", "right-chapter"].submission(*class_.notebooks["qos"])
 
     def folder(student: str) -> Path:
         path = class_.root / "submitted" / student / "ch05"

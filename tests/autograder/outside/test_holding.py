@@ -123,8 +123,9 @@ def test_own_threads_and_children_stand_still_and_go_on(tmp_path: Path) -> None:
         for _ in range(3):
             first = counts()
             assert soon(lambda first=first: all_grow(first))  # type: ignore[misc]
-            with held(lambda: family(running.pid)) as threads:
-                assert threads >= 4
+            with held(lambda: family(running.pid)) as hold:
+                assert hold.threads >= 4
+                assert not hold.jams()
                 before = counts()
                 threading.Event().wait(0.05)  # fifty turns of each
                 assert counts() == before

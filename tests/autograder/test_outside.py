@@ -1,0 +1,236 @@
+"""What an examiner in its sandbox can reach, and what is told to it from outside."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from autograder import runner
+from autograder.outside import requests
+from autograder.outside.asking import Here
+from autograder.outside.processes import Sandboxed, number_inside
+from autograder.outside.requests import CannotLoseError, RequestError
+from autograder.sandbox.box import Box
+from autograder.submission import Cell
+from autograder.verdict import Verdict, VerdictError
+from course.runtime.waiting import Pulse, poll
+from tests.machine import needs_sandbox, needs_warm_starts
+
+EXAMINED = """
+import json, os, socket, sys
+from pathlib import Path
+
+def tries(what):
+    try:
+        return repr(what())
+    except Exception as error:
+        return type(error).__name__
+
+root, module = sys.argv[1:3]
+status = dict(line.split(":\\t") for line in open("/proc/self/status").read().splitlines())
+print(json.dumps({
+    "root": tries(lambda: os.listdir(root)),
+    "writes": tries(lambda: open(module, "a")),
+    "writes beside": tries(lambda: Path(module).with_name("mine").write_text("x")),
+    "homes": tries(lambda: os.listdir("/root")),
+    "processes": sorted(int(name) for name in os.listdir("/proc") if name.isdecimal()),
+    "capabilities": int(status["CapEff"], 16),
+    "filtered": status["Seccomp"],
+    "networks": [name for _, name in socket.if_nameindex()],
+    "token": "SECRET_TOKEN" in os.environ,
+    "path": sys.path[0],
+}))
+sys.stdin.read()
+"""
+
+
+@pytest.mark.parametrize("warm", [False, pytest.param(True, marks=needs_warm_starts)])
+@needs_sandbox
+def test_an_examiner_reaches_nothing_of_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, warm: bool
+) -> None:
+    monkeypatch.setenv("SECRET_TOKEN", "secret")
+    (tmp_path / "gradebook.db").write_text("grades")
+    ours = Path(runner.__file__)
+    command = [sys.executable, "-P", "-c", EXAMINED, str(tmp_path), str(ours)]
+    with Box(hidden=[tmp_path], warm=warm) as box:
+        examiner = box.spawn(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert examiner.stdout is not None
+        found = json.loads(examiner.stdout.readline())
+    assert found == {
+        "root": "FileNotFoundError",
+        "writes": "OSError",
+        "writes beside": "OSError",
+        "homes": "FileNotFoundError" if not str(sys.prefix).startswith("/root") else found["homes"],
+        "processes": found["processes"],
+        "capabilities": 0,
+        "filtered": "2",
+        "networks": ["lo"],
+        "token": False,
+        "path": found["path"],
+    }
+    assert max(found["processes"]) < 10
+    assert found["path"] not in ("", str(Path.cwd()))
+
+
+@needs_warm_starts
+def test_a_forked_examiner_is_where_its_sandbox_is() -> None:
+    """It is in no namespace of this process's but the time's, and has no right."""
+    with Box(warm=True) as box:
+        command = [sys.executable, "-P", "-m", "autograder.examiner", "--control", "0"]
+        examiner = box.spawn([*command, "--domain", "1"])
+        for kind in ("mnt", "pid", "net", "ipc", "uts"):
+            theirs, own = (Path(f"/proc/{who}/ns/{kind}") for who in (examiner.pid, os.getpid()))
+            assert theirs.stat().st_ino != own.stat().st_ino, kind
+        status = Path(f"/proc/{examiner.pid}/status").read_text()
+        assert "CapEff:\t0000000000000000" in status
+        assert "Seccomp:\t2" in status
+        if os.geteuid() == 0:
+            assert "Uid:\t0" not in status
+        examiner.kill()
+        examiner.wait()
+
+
+@needs_sandbox
+def test_no_process_of_ours_imports_from_the_folder_that_it_is_started_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("json", "socket", "rclpy", "course", "autograder"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('imported')")
+    monkeypatch.chdir(tmp_path)
+    outcome = runner.run((Cell("print('ran')"), Cell("", "qos-visible", "qos", "visible")))
+    assert outcome.outputs[0][0]["text"] == "ran\n"
+    assert not outcome.spoilt
+
+
+@contextmanager
+def sandboxed(program: str) -> Iterator[tuple[Sandboxed, subprocess.Popen[bytes]]]:
+    """Run a program in a sandbox; give the processes of its namespace once it has said a word."""
+    command = ["bwrap", "--unshare-pid", "--ro-bind", "/", "/", "--dev", "/dev", "--proc", "/proc"]
+    info, info_end = os.pipe()
+    with subprocess.Popen(
+        [*command, "--info-fd", str(info_end), "--", sys.executable, "-c", program],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, pass_fds=[info_end],
+    ) as running:  # fmt: skip
+        os.close(info_end)
+        with os.fdopen(info) as stream:
+            init = int(json.load(stream)["child-pid"])
+        try:
+            assert running.stdout is not None
+            running.stdout.readline()
+            yield Sandboxed(init), running
+        finally:
+            running.kill()
+
+
+CHILD = """
+import os, sys, threading
+if os.fork() == 0:
+    open("/proc/self/comm", "w").write("hoard\\x1b[2J")
+    files = [open(os.devnull) for _ in range(50)]
+    for _ in range(10):
+        threading.Thread(target=threading.Event().wait, daemon=True).start()
+    os.setsid()
+    print(flush=True)
+sys.stdin.read()
+"""
+
+
+@needs_sandbox
+def test_what_a_child_holds_counts_and_it_is_named() -> None:
+    from autograder.outside import usage
+
+    with sandboxed(CHILD) as (processes, _):
+        held = usage.usage(processes)
+        assert held.threads >= 12
+        assert held.files >= 50
+        assert len(usage.thread_ids(processes)) == held.threads
+        assert usage.names(processes, 2) == [repr("hoard\x1b[2J")]
+        seen = processes.outside()
+        assert len(seen) == len(processes.inside()) == 2
+        assert sorted(map(number_inside, seen)) == sorted(processes.inside())
+
+
+@needs_sandbox
+def test_a_sandbox_that_has_ended_is_never_taken_for_another() -> None:
+    with sandboxed(CHILD) as (processes, running):
+        pass
+    running.wait()
+    assert poll(lambda: not processes.folders(), 10.0, Pulse())
+    assert processes.outside() == []
+
+
+@pytest.mark.parametrize(
+    ("what", "given"),
+    [
+        ("open", {"path": "/etc/passwd"}),
+        (["rest"], {}),
+        ("positions", {"file": "../gradebook.db"}),
+        ("positions", {"file": "x" * 1000}),
+        ("positions", {}),
+        ("naps", {"threads": ["1; drop"]}),
+        ("naps", {"threads": list(range(10**4))}),
+        ("rest", {"restless": 0.1, "timeout": 1e9}),
+        ("rest", {"restless": "long", "timeout": 1}),
+        ("rest", {"restless": float("nan"), "timeout": 1}),
+        ("kept", {"since": None}),
+        ("lose", {"ports": []}),
+        ("lose", {"ports": [70000]}),
+        ("lose", {"ports": ["1 } accept; #"]}),
+        ("lose", {"ports": [True]}),
+    ],
+)
+def test_a_request_that_is_none_is_refused(what: Any, given: dict[str, Any]) -> None:
+    scene = Here(os.getpid())._scene
+    with pytest.raises(RequestError):
+        requests.answer(scene, what, given)
+
+
+def test_a_network_that_others_use_loses_nothing() -> None:
+    with pytest.raises(CannotLoseError):
+        Here(os.getpid()).ask("lose", ports=[1])
+
+
+def verdict_of(**changes: Any) -> dict[str, Any]:
+    check = {
+        "name": "start", "title": "Nodes start", "status": "passed", "points": 1.0,
+        "max_points": 1.0, "hints": [],
+    }  # fmt: skip
+    verdict = {"exam": "qos", "part": "visible", "version": 1, "checks": [check], "notes": []}
+    check.update({name: value for name, value in changes.items() if name in check})
+    verdict.update({name: value for name, value in changes.items() if name in verdict})
+    return verdict
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"exam": "safety"},
+        {"part": "hidden"},
+        {"name": "another"},
+        {"max_points": 100.0, "points": 100.0},
+        {"points": 0.5},
+        {"status": "failed"},
+        {"title": "x" * 20_000},
+        {"title": ["no", "text"]},
+        {"hints": ["one"] * 2000},
+        {"notes": ["x" * 20_000]},
+        {"checks": []},
+        {"checks": [verdict_of()["checks"][0]] * 2},
+    ],
+)
+def test_a_verdict_on_something_else_is_none(changes: dict[str, Any]) -> None:
+    with pytest.raises(VerdictError):
+        Verdict.from_data(verdict_of(**changes)).require_asked("qos", "visible", {"start": 1.0})
+
+
+def test_a_verdict_on_what_was_asked_is_one() -> None:
+    Verdict.from_data(verdict_of()).require_asked("qos", "visible", {"start": 1.0})
