@@ -9,6 +9,7 @@ import time
 from typing import Any, Protocol
 
 from autograder.outside import requests
+from autograder.outside.holding import HoldError
 from autograder.outside.processes import Single
 from autograder.outside.requests import CannotLoseError, RequestError, Scene
 from autograder.starving import RunDelay, of_process
@@ -32,6 +33,7 @@ class Outside(Protocol):
         Raises:
             RequestError: there is none.
             CannotLoseError: this machine cannot make a network lose packets.
+            HoldError: this machine does not let threads be held.
         """
 
 
@@ -70,6 +72,8 @@ class Afar:
             reply = self._channel.receive(ANSWER_TIMEOUT)
         if "cannot" in reply:
             raise CannotLoseError(reply["cannot"])
+        if "no_hold" in reply:
+            raise HoldError(reply["no_hold"])
         if "error" in reply:
             raise RequestError(reply["error"])
         return reply["answer"]

@@ -10,10 +10,12 @@ import subprocess
 import time
 from bisect import bisect_right
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from typing import Any
 
 from autograder.outside import usage
-from autograder.outside.processes import Processes
+from autograder.outside.holding import Held, held
+from autograder.outside.processes import Processes, Sandboxed
 from autograder.outside.stillness import HANGS, Stillness
 from autograder.starving import SeenDelay
 from course import tools
@@ -43,6 +45,8 @@ class Scene:
         """Look at these; ``pid`` is the subject's own process, by its number for itself."""
         self.subject, self.pid, self.examiner = subject, pid, examiner
         self.still = Stillness(subject, examiner)
+        self.hold = ExitStack()
+        self.held: Held | None = None
         self._delay = SeenDelay(subject, pid)
         self._moments, self._marks = [time.monotonic()], [self._delay.mark()]
 
@@ -66,6 +70,7 @@ def answer(scene: Scene, what: str, given: Given) -> Any:
     Raises:
         RequestError: it is none.
         CannotLoseError: this machine cannot make a network lose packets.
+        HoldError: this machine does not let threads be held.
     """
     known = REQUESTS.get(what) if isinstance(what, str) else None
     if known is None:
@@ -114,6 +119,23 @@ def _kept(scene: Scene, given: Given) -> float:
     return scene.kept_since(_number(given, "since"))
 
 
+def _hold(scene: Scene, given: Given) -> int:
+    """Hold the subject's threads until "release"; return how many there are."""
+    if not isinstance(scene.subject, Sandboxed):
+        raise RequestError("who is not in a sandbox cannot be held")
+    scene.hold.close()
+    scene.held = scene.hold.enter_context(held(scene.subject.outside))
+    return scene.held.threads
+
+
+def _release(scene: Scene, given: Given) -> bool:
+    """Let them go on; return whether DDS could not receive meanwhile (`Held.jams`)."""
+    jams = scene.held is not None and scene.held.jams()
+    scene.held = None
+    scene.hold.close()
+    return jams
+
+
 def _lose(scene: Scene, given: Given) -> None:
     """Drop all that is sent to some UDP ports of the submission's network."""
     ports = _numbers(given, "ports", MOST_PORTS)
@@ -140,6 +162,8 @@ REQUESTS: Mapping[str, Callable[[Scene, Given], Any]] = {
     "positions": _positions,
     "others": _others,
     "kept": _kept,
+    "hold": _hold,
+    "release": _release,
     "lose": _lose,
     "deliver": _deliver,
 }

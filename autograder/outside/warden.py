@@ -18,6 +18,7 @@ from typing import Any
 
 from autograder.descriptors import readable
 from autograder.outside import requests
+from autograder.outside.holding import HoldError
 from autograder.outside.processes import Sandboxed
 from autograder.outside.requests import CannotLoseError, RequestError, Scene
 from autograder.wire import Channel, ChannelClosed
@@ -60,6 +61,8 @@ def _reply(scene: Scene | None, request: dict[str, Any]) -> dict[str, Any]:
         return {"error": str(error)}
     except CannotLoseError as error:
         return {"cannot": str(error)}
+    except HoldError as error:
+        return {"no_hold": str(error)}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

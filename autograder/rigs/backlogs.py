@@ -19,11 +19,16 @@ def backlog(rig: SensorRig, sensor: Sensor) -> Backlog:
     """
     backlogs: dict[str, Backlog] = rig.once(busy_consumer)
     found = backlogs[sensor.name]
+    if found.early and not rig.can_hold:
+        raise NotExaminable(
+            "Your consumer went on while its callbacks were held back: a thread or an executor of "
+            "its own does its work, and that cannot be held back here, only where your work is "
+            "graded in the sandbox."
+        )
     if found.early:
         raise Failed(
-            expected="Only callbacks of your consumer, which ROS 2 calls, hand readings on.",
-            actual="Your consumer went on while its callbacks were held back: does a thread, or "
-            "another executor, do its work?",
+            expected="While none of its threads runs, your consumer hands nothing on.",
+            actual="It went on: does a thread bear a name that those of DDS have?",
         )
     if found.altered or sensor.topic in rig.node.altered:
         raise altered(sensor)

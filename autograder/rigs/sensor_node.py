@@ -9,7 +9,7 @@ import secrets
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -53,6 +53,8 @@ class ExaminerNode(QuietNode):
         self.hardware = {
             s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless()) for s in SENSORS
         }
+        self._stand_ins: Mapping[str, Any] = {}
+        self._ends: Mapping[str, Any] = self.hardware  # that readings are fed into
         self.consumed: Heard = defaultdict(list)
         self.witnessed: Heard = defaultdict(list)
         self.altered: set[str] = set()  # topics with readings that the hardware did not deliver so
@@ -114,17 +116,39 @@ class ExaminerNode(QuietNode):
             for guest in set(self.subscriptions) - before:
                 self.destroy_subscription(guest)
 
+    @contextmanager
+    def stand_ins(self, offers: Mapping[str, QoSProfile]) -> Iterator[None]:
+        """Have publishers for the length of the block that offer what the drivers of these do."""
+        types = {sensor.name: (sensor.type, sensor.topic) for sensor in SENSORS}
+        made = {name: self.create_publisher(*types[name], qos) for name, qos in offers.items()}
+        self._stand_ins = made
+        try:
+            yield
+        finally:
+            self._stand_ins = {}
+            for publisher in made.values():
+                self.destroy_publisher(publisher)
+
+    @contextmanager
+    def standing_in(self) -> Iterator[None]:
+        """Publish readings by `stand_ins`, as far as there are any, for the length of the block."""
+        self._ends = {**self.hardware, **self._stand_ins}
+        try:
+            yield
+        finally:
+            self._ends = self.hardware
+
     def phase(self, name: str) -> int:
         """Return the number of a phase of the exam."""
         return self._phases.setdefault(name, len(self._phases) + 1)
 
     def publish(self, sensor: Sensor, phase: str, index: int) -> None:
-        """Feed one reading, taken now, into a sensor's hardware."""
+        """Feed one reading, taken now, into a sensor's hardware, or stand in for its driver."""
         tag = Tag(self.nonce, self.phase(phase), index)
         now = self.get_clock().now()
         self._stamps[sensor.name, now.nanoseconds] = tag
         self.sent[sensor.name, tag.phase][index] = now.nanoseconds
-        self.hardware[sensor.name].publish(sensor.message(tag, now))
+        self._ends[sensor.name].publish(sensor.message(tag, now))
 
     def _tag(self, sensor: Sensor, message: Any) -> Tag | None:
         """Return the tag of a reading, by its stamp if nothing else is left of it.

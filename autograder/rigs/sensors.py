@@ -12,16 +12,18 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import count
 from typing import Any
 
-from rclpy.qos import ReliabilityPolicy
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.bench import Bench
+from autograder.exam import NotExaminable
+from autograder.outside.holding import HoldError
 from autograder.rigs.patience import Patience
 from autograder.rigs.phrases import callback_raised
 from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor
@@ -80,6 +82,78 @@ class SensorRig:
             )
             qos = lossless() if reliable else undemanding()
             self.node.listen(sensor, topic, qos, self.node.consumed)
+
+    @contextmanager
+    def busy(self, name: str) -> Iterator[Callable[[], bool]]:
+        """Keep the node of a class busy for the length of the block; its endpoints go on.
+
+        What is yielded lets it go on before the end of the block. It returns whether its endpoints
+        did not receive, by an accident that `Held.jams` tells of.
+        Where all its threads are held, the drivers are busy as well: see `stand_ins`.
+        """
+        if self.can_hold:
+            with self._held() as let_go, self.node.standing_in():
+                yield let_go
+            return
+        with ExitStack() as paused:
+            self.subject.pause(name)
+            paused.callback(self.subject.resume, name)
+
+            def let_go() -> bool:
+                paused.close()
+                return False
+
+            yield let_go
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether the subject is in a sandbox, where all its threads can be held from outside."""
+        return self.bench.outside.own_network
+
+    @contextmanager
+    def _held(self) -> Iterator[Callable[[], bool]]:
+        """Hold the subject's threads for the length of the block; it is not asked."""
+        outside = self.bench.outside
+        try:
+            outside.ask("hold")
+        except HoldError as error:
+            raise NotExaminable(f"{error} After a hand-in a person looks at it.") from None
+        with ExitStack() as held:
+            held.callback(outside.ask, "release")
+
+            def let_go() -> bool:
+                held.pop_all()
+                return bool(outside.ask("release"))
+
+            yield let_go
+
+    @contextmanager
+    def stand_ins(self, sensors: Sequence[Sensor]) -> Iterator[None]:
+        """Be ready to publish in the drivers' stead while these are held with the consumers.
+
+        They stay for the length of the block: with a publisher goes what waits for a reader.
+        """
+        if not self.can_hold:
+            yield
+            return
+        with self.node.stand_ins({sensor.name: self._offer(sensor) for sensor in sensors}):
+            with self.node.standing_in():
+                self.probe(sensors, self.node.consumed)
+            yield
+
+    def _offer(self, sensor: Sensor) -> QoSProfile:
+        """Return what the driver of a sensor offers: of several, the one that most can hear.
+
+        How many readings a publisher keeps cannot be seen; a consumer's queue does not rest on it.
+        """
+        offers = [end.qos_profile for end in self.offered(sensor.topic)]
+        best = max(offers, key=lambda qos: (-qos.reliability.value, -qos.durability.value))
+        return QoSProfile(
+            history=HistoryPolicy.KEEP_ALL, reliability=best.reliability,
+            durability=best.durability, lifespan=best.lifespan, deadline=best.deadline,
+            liveliness=best.liveliness,
+            liveliness_lease_duration=best.liveliness_lease_duration,
+        )  # fmt: skip
 
     def wait(self, condition: Callable[[], Any], timeout: float | None = None) -> bool:
         """Wait until ``condition`` holds; return whether it did before the deadline.

@@ -14,6 +14,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
 
+from autograder.exam import NotExaminable
 from autograder.rigs.patience import SETTLE_S
 from autograder.rigs.pauses import BURST, Backlog, Burst
 from autograder.rigs.pursuit import pursue
@@ -37,33 +38,51 @@ TURNS = BURST + 2  # of a driver, after which a consumer has had one for each re
 
 def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     """Stall the consumer while readings come in, let it go on, and see what it passes on."""
-    phase = "long pause"
-    rig.subject.pause(CONSUMERS)
-    streams = {s.name: Stream(rig.node, s, phase, _limit(s)) for s in SENSORS if s is not IMU}
-    early = CAMERA.rate * (PAUSE - IMU_PAUSE)
-    rig.wait(lambda: streams[CAMERA.name].sent >= early, LONGEST)
-    streams[IMU.name] = Stream(rig.node, IMU, phase)
-    rig.wait(
-        lambda: all(stream.sent >= _least(stream.sensor) for stream in streams.values()), LONGEST
+    with rig.stand_ins(SENSORS):
+        for number in range(TRIES):
+            found = _busy_consumer(rig, f"long pause {number}")
+            if found is not None:
+                return found
+            rig.rest()
+    raise NotExaminable(
+        "Your consumer was at work at each moment in which the examiner tried to keep it busy from "
+        "outside, so that nothing could be received either. After a hand-in a person looks at it."
     )
-    with _held(streams.values()):
+
+
+def _busy_consumer(rig: SensorRig, phase: str) -> dict[str, Backlog] | None:
+    """Return what was found; None if DDS could not receive meanwhile."""
+    with rig.busy(CONSUMERS) as let_go:
+        streams = {s.name: Stream(rig.node, s, phase, _limit(s)) for s in SENSORS if s is not IMU}
+        before_imu = CAMERA.rate * (PAUSE - IMU_PAUSE)
+        rig.wait(lambda: streams[CAMERA.name].sent >= before_imu, LONGEST)
+        streams[IMU.name] = Stream(rig.node, IMU, phase)
+        rig.wait(
+            lambda: all(stream.sent >= _least(stream.sensor) for stream in streams.values()),
+            LONGEST,
+        )
+        with _held(streams.values()):
+            for stream in streams.values():
+                stream.spare()
+            streams[STOP.name].stop()
+            counts = {name: stream.sent for name, stream in streams.items()}
+            published = {s.name: _published(rig, s, phase, counts[s.name]) for s in SENSORS}
+            # So that a reading is clearly on this side of a bound or on that one, despite jitter.
+            rig.wait(lambda: _youngest(rig, phase, counts) >= LULL)
+            early = {s.name for s in SENSORS if rig.consumed(s, phase)}
+            resumed = time.time_ns()
+            jammed = let_go()
+    if jammed:
         for stream in streams.values():
-            stream.spare()
-        streams[STOP.name].stop()
-        counts = {name: stream.sent for name, stream in streams.items()}
-        published = {s.name: _published(rig, s, phase, counts[s.name]) for s in SENSORS}
-        # So that a reading is clearly on this side of a bound or on that one, whatever the jitter.
-        rig.wait(lambda: _youngest(rig, phase, counts) >= LULL)
-        came_early = {s.name for s in SENSORS if rig.consumed(s, phase)}
-        resumed = time.time_ns()
-        rig.subject.resume(CONSUMERS)
+            stream.stop()
+        return None
     # All but the events go on, as on a robot.
     for sensor in SENSORS:
         _drain(rig, sensor, phase, counts[sensor.name], streams.values())
 
     def left(sensor: Sensor) -> Backlog:
         name = sensor.name
-        return _left(rig, sensor, phase, counts[name], published[name], resumed, name in came_early)
+        return _left(rig, sensor, phase, counts[name], published[name], resumed, name in early)
 
     # What is decided is not watched any longer, and no more of it comes in.
     open_ones = [s for s in SENSORS if s is not STOP and not _is_decided(rig, left(s))]
@@ -175,20 +194,21 @@ def short_pause(rig: SensorRig) -> Burst:
     Tried again while readings are missing that a slow machine may have let grow old, or that the
     driver has lost.
     """
-    for number in range(TRIES):
-        patience = None if number == TRIES - 1 else PROMPT
-        burst = _burst(rig, f"short pause {number}", patience)
-        if burst.telling:
-            break
+    with rig.stand_ins([IMU]):
+        for number in range(TRIES):
+            patience = None if number == TRIES - 1 else PROMPT
+            burst = _burst(rig, f"short pause {number}", patience)
+            if burst.telling:
+                break
     return burst
 
 
 def _burst(rig: SensorRig, phase: str, patience: float | None) -> Burst:
     rig.rest()  # what still waits for the consumer would be ahead of the burst
-    rig.subject.pause(CONSUMERS)
-    stream = Stream(rig.node, IMU, phase, BURST)
-    published = len(_published(rig, IMU, phase, BURST))
-    rig.subject.resume(CONSUMERS)
+    with rig.busy(CONSUMERS) as let_go:
+        stream = Stream(rig.node, IMU, phase, BURST)
+        published = len(_published(rig, IMU, phase, BURST))
+        jammed = let_go()
     rig.wait(lambda: BURST - 1 in rig.consumed(IMU, phase), patience)
     stream.stop()
     handed = dict(rig.handed(IMU, phase)).get(BURST - 1)
@@ -196,7 +216,7 @@ def _burst(rig: SensorRig, phase: str, patience: float | None) -> Burst:
     rig.wait(lambda: len(set(rig.consumed(IMU, phase))) == BURST, PROMPT)
     rig.rest()  # one that hands on a reading again is heard out: how many there are is told
     aged = decided - rig.published(IMU, phase, 0) > YOUNG * 1e9
-    return Burst(rig.consumed(IMU, phase), published, aged)
+    return Burst(rig.consumed(IMU, phase), published, aged or jammed)
 
 
 def _decided(rig: SensorRig, phase: str) -> int:

@@ -72,11 +72,10 @@ def _press(rig: SensorRig) -> bool:
 
     How many of a few quick ones wait in its queue would otherwise be a matter of chance.
     """
-    rig.subject.pause(DRIVERS)
-    for index in range(EVENTS - 1):
-        rig.node.publish(STOP, "event", index)
-    rig.node.hardware[STOP.name].wait_for_all_acked(Duration(seconds=SETTLE_S))
-    rig.subject.resume(DRIVERS)
+    with rig.busy(DRIVERS):
+        for index in range(EVENTS - 1):
+            rig.node.publish(STOP, "event", index)
+        rig.node.hardware[STOP.name].wait_for_all_acked(Duration(seconds=SETTLE_S))
     rig.wait(lambda: rig.taken(STOP, "event", EVENTS - 2), LAG)
     rig.node.publish(STOP, "event", EVENTS - 1)
     return rig.wait(lambda: rig.taken(STOP, "event", EVENTS - 1))

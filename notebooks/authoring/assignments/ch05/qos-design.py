@@ -39,9 +39,6 @@
 # Each node has all its publishers and subscriptions once its constructor has returned, whether or
 # not anybody listens yet.
 #
-# Leave the threads to ROS 2: the examiner keeps your consumer busy by holding back its callbacks. A
-# consumer that goes on all the same fails what is examined by a pause.
-#
 # Your work is examined by what your nodes **do**. Another process plays the hardware, keeps your
 # consumer busy, joins late, and listens on the wire. How you write it is your choice; every design
 # that does what the table says gets full marks.

@@ -1,0 +1,272 @@
+"""Hold a submission's threads from outside, while those of DDS go on receiving.
+
+A consumer that is busy shows what its queues keep. Whoever asks a process to be busy tells it that
+it is being looked at; a thread that the kernel stops (ptrace(2)) hears nothing of it. Threads of
+Fast DDS are told by their names and left alone, so that what comes in is received meanwhile.
+
+The kernel lets only that thread act on a held one which has stopped it, and lets all go when that
+thread ends. So each hold has a thread of its own.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import errno
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from queue import Empty, SimpleQueue
+
+from course.errors import CourseError
+from course.runtime.waiting import Deadline
+
+HOLD_TIMEOUT_S = 5.0
+"""Seconds within which all threads must stand still."""
+CALM_S = 1.0
+"""Seconds in which a moment is looked for when no thread is at work: one that is might have a lock
+that DDS needs for receiving."""
+LOOK_S = 0.002
+"""Seconds between two looks at threads that are to stop, and between two tries."""
+REAP_S = 0.02
+"""Seconds after which a held thread that was killed is given back to the kernel."""
+
+DDS_THREADS = b"dds."
+"""What the names of Fast DDS's threads begin with."""
+
+_GET_REGISTERS, _DETACH, _SEIZE, _INTERRUPT = 12, 17, 0x4206, 0x4207
+_REGISTERS, _RESULT, _CALL = 27, 10, 15  # struct user_regs_struct of x86-64: rax, orig_rax
+_TAKEN_OUT = {2**64 - number for number in (4, 512, 513, 514, 516)}  # EINTR, ERESTART...
+_FUTEX, _FUTEX_WAIT, _CONTENDED = 202, 0, 2  # the value of a mutex of glibc that others wait for
+_EVENT_STOP = 128
+_NO_THREAD_OF_OTHERS = 0x20000000 | 0x40000000  # __WNOTHREAD | __WALL: of this thread's tracees
+_ENDED, _BLOCKED = (b"Z", b"X"), b"D"
+
+Processes = Callable[[], Iterable[int]]
+"""Returns the processes whose threads are to be held, as far as there are any by now."""
+
+
+class HoldError(CourseError):
+    """Threads cannot be held here; the message says why, and what helps."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """What is held: how many threads, and a look at those of DDS, which go on."""
+
+    threads: int
+    processes: Processes
+
+    def jams(self) -> bool:
+        """Return whether DDS cannot receive just now, as one of its threads waits for a lock.
+
+        Who has the lock is held, so that it waits until the end: what the queues keep then tells
+        nothing of them. `held` looks for a moment when that is not so, and may not find one.
+        """
+        dds = _threads(self.processes(), of_dds=True)
+        return any(map(_waits_for_a_lock, dds))
+
+
+@contextmanager
+def held(processes: Processes) -> Iterator[Held]:
+    """Hold all threads but those of DDS for the length of the block.
+
+    Args:
+        processes: whose threads. New processes and threads are held as well, until there is none
+            left that could make another.
+
+    Raises:
+        HoldError: this process has no right to hold them, or one does not stop.
+    """
+    hold = _Hold(processes)
+    thread = threading.Thread(target=hold.run, name="hold")
+    thread.start()
+    try:
+        yield Held(hold.wait(), processes)
+    finally:
+        hold.over.set()
+        thread.join()
+
+
+@dataclass
+class _Hold:
+    """One hold; `run` belongs to its thread. ``stopped`` maps each to a signal that it is owed."""
+
+    processes: Processes
+    over: threading.Event = field(default_factory=threading.Event)
+    _seized: set[int] = field(default_factory=set)
+    _stopped: dict[int, int] = field(default_factory=dict)
+    _outcome: SimpleQueue[int | HoldError] = field(default_factory=SimpleQueue)
+
+    def wait(self) -> int:
+        """Return how many threads are held, once all are."""
+        with suppress(Empty):
+            outcome = self._outcome.get(timeout=4 * HOLD_TIMEOUT_S)
+            if isinstance(outcome, HoldError):
+                raise outcome
+            return outcome
+        raise HoldError("The threads of the submission could not be held: nothing stopped in time.")
+
+    def run(self) -> None:
+        """Hold, until it is over; the end of this thread lets go of what could not be let go of."""
+        try:
+            self._hold_in_a_calm_moment()
+        except HoldError as error:
+            self._let_go()
+            self._outcome.put(error)
+            return
+        self._outcome.put(len(self._stopped))
+        while not self.over.wait(REAP_S):
+            self._reap()
+        self._let_go()
+
+    def _hold_in_a_calm_moment(self) -> None:
+        calm = Deadline(CALM_S)
+        while True:
+            self._hold_all()
+            if not calm.left or not any(map(_is_at_work, self._stopped)):
+                return
+            self._let_go()
+            self.over.wait(LOOK_S)
+
+    def _hold_all(self) -> None:
+        deadline = Deadline(HOLD_TIMEOUT_S)
+        while new := [tid for tid in _threads(self.processes()) if tid not in self._seized]:
+            for tid in new:
+                self._seize(tid)
+            self._await_stops(deadline)
+
+    def _seize(self, tid: int) -> None:
+        try:
+            _ptrace(_SEIZE, tid)
+            _ptrace(_INTERRUPT, tid)
+        except ProcessLookupError:
+            return  # it has just ended
+        except PermissionError:
+            if _has_ended(tid):
+                return
+            raise HoldError(_refusal()) from None
+        self._seized.add(tid)
+
+    def _await_stops(self, deadline: Deadline) -> None:
+        """Wait until each seized thread stands still, or for what the kernel does not interrupt."""
+        while True:
+            self._reap()
+            moving = self._seized - self._stopped.keys()
+            if all(_state(tid) == _BLOCKED for tid in moving):
+                return
+            if not deadline.left:
+                raise HoldError(
+                    f"The threads of the submission could not be held: {len(moving)} of them did "
+                    f"not stop within {HOLD_TIMEOUT_S:.0f} s."
+                )
+            self.over.wait(LOOK_S)
+
+    def _reap(self) -> None:
+        """Note which have stopped or ended; who was killed goes only when that has been noted."""
+        while True:
+            try:
+                tid, status = os.waitpid(-1, os.WNOHANG | _NO_THREAD_OF_OTHERS)
+            except ChildProcessError:  # a parent of the last one has noted its end
+                self._seized.clear()
+                self._stopped.clear()
+                return
+            if tid == 0:
+                return
+            if os.WIFSTOPPED(status):
+                # One that was about to get a signal stops for that, and gets it afterwards.
+                asked = status >> 16 == _EVENT_STOP
+                self._stopped[tid] = 0 if asked else os.WSTOPSIG(status)
+            else:
+                self._seized.discard(tid)
+                self._stopped.pop(tid, None)
+
+    def _let_go(self) -> None:
+        """Let all go on; whoever still has to stop for it does so when others have gone on."""
+        deadline = Deadline(HOLD_TIMEOUT_S)
+        while self._seized and deadline.left:
+            for tid, owed in list(self._stopped.items()):
+                with suppress(ProcessLookupError):  # it was killed
+                    _ptrace(_DETACH, tid, owed)
+                    self._seized.discard(tid)
+                del self._stopped[tid]
+            self._reap()
+            if self._seized - self._stopped.keys():
+                threading.Event().wait(LOOK_S)
+
+
+def _threads(processes: Iterable[int], *, of_dds: bool = False) -> Iterator[int]:
+    """Yield the threads that are to be held, or those of DDS."""
+    for pid in processes:
+        with suppress(OSError):
+            for task in Path(f"/proc/{pid}/task").iterdir():
+                with suppress(OSError):
+                    is_dds = (task / "comm").read_bytes().startswith(DDS_THREADS)
+                    if is_dds is of_dds and not _has_ended(int(task.name)):
+                        yield int(task.name)
+
+
+def _state(tid: int) -> bytes:
+    with suppress(OSError):
+        # The name of a thread may hold anything.
+        return Path(f"/proc/{tid}/stat").read_bytes().rpartition(b") ")[2][:1]
+    return _ENDED[0]
+
+
+def _has_ended(tid: int) -> bool:
+    return _state(tid) in _ENDED
+
+
+def _is_at_work(tid: int) -> bool:
+    """Return whether a held thread was stopped at work, and not while it waited.
+
+    One that waited has been taken out of a system call, which is to be begun again. One that waits
+    for a lock may have another, and stands where the owner of it may let go at any moment.
+    """
+    registers = (ctypes.c_ulonglong * _REGISTERS)()
+    with suppress(ProcessLookupError):
+        _ptrace(_GET_REGISTERS, tid, ctypes.addressof(registers))
+        waited = registers[_RESULT] in _TAKEN_OUT and registers[_CALL] < 2**63
+        return not waited or _waits_for_a_lock(tid)
+    return False
+
+
+def _waits_for_a_lock(tid: int) -> bool:
+    """Return whether a thread is in the C library's wait for a mutex.
+
+    Waits for a condition, a semaphore or a time are other operations on a futex, or other values.
+    """
+    with suppress(OSError, ValueError):
+        text = Path(f"/proc/{tid}/syscall").read_text(encoding="ascii")
+        call, _, operation, value, *_ = (int(word, 0) for word in text.split())
+        return call == _FUTEX and operation & 0x7F == _FUTEX_WAIT and value == _CONTENDED
+    return False
+
+
+_libc = ctypes.CDLL(None, use_errno=True)
+_libc.ptrace.restype = ctypes.c_long
+_libc.ptrace.argtypes = [ctypes.c_long, ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
+
+
+def _ptrace(request: int, tid: int, data: int = 0) -> None:
+    if _libc.ptrace(request, tid, None, data) == -1:
+        number = ctypes.get_errno()
+        raise OSError(number, f"ptrace: {os.strerror(number)}")
+
+
+def _refusal() -> str:
+    """Return one sentence about why threads cannot be held."""
+    yama = Path("/proc/sys/kernel/yama/ptrace_scope")
+    scope = ""
+    with suppress(OSError):
+        scope = yama.read_text(encoding="ascii").strip()
+    if scope in ("2", "3"):
+        helps = f"{yama} is {scope}: set it to 1 with `sudo sysctl kernel.yama.ptrace_scope=1`"
+    else:
+        helps = "allow it (docker run --cap-add SYS_PTRACE, for instance)"
+    return (
+        "The threads of a submission cannot be held here because this machine does not let the "
+        f"grader trace processes ({os.strerror(errno.EPERM)}): {helps}."
+    )
