@@ -159,7 +159,7 @@ def test_nothing_of_a_submission_runs_in_a_page(number: int) -> None:
 
 def test_the_same_texts_would_run_if_they_were_not_screened() -> None:
     ran = [bool(executable(page(HTMLExporter, new_notebook(cells=[cell])))) for cell in HOSTILE]
-    assert sum(ran) >= len(HOSTILE) - 4  # nbconvert sees to some of them itself
+    assert sum(ran) >= 10  # nbconvert itself sees to some of the others
 
 
 @pytest.mark.parametrize(
