@@ -84,6 +84,8 @@ def parse(text: str, name: str) -> NotebookNode:
             f"{name} is nested more than {bounds.MAX_NESTING} levels deep: clear its outputs, or "
             "begin with a new copy of the notebook, and hand it in again."
         )
+    if excess := bounds.excess_of_parts(data):
+        raise SubmissionError(f"{name} {excess}")
     try:
         # Half of a surrogate pair is legal in JSON, but no text that anything could write again.
         clean = json.dumps(data, ensure_ascii=False).encode("utf-8", "replace").decode()

@@ -31,7 +31,8 @@ MANY, COMMON = 10, 0.25
 RUN = 4
 """Words in a row that an answer shares with the question or its model only by repeating it."""
 
-_STRING = r"""\'\'\'.*?\'\'\'|\"\"\".*?\"\"\"|'(?:\\.|[^'\\\n])*'|"(?:\\.|[^"\\\n])*\""""
+# A quote that nothing closes goes to the end of its line: looked for from each one, it takes long.
+_STRING = r"""\'\'\'.*?\'\'\'|\"\"\".*?\"\"\"|'(?:\\.|[^'\\\n])*+'?|"(?:\\.|[^"\\\n])*+\"?"""
 _TOKEN = re.compile(
     # Comments, and strings that stand for themselves: they document.
     r"""(?P<nothing>\#[^\n]*|(?:(?<=\n)|\A)[ \t]*(?:\'\'\'.*?\'\'\'|\"\"\".*?\"\"\"))"""

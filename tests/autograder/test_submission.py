@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from typing import Any
 
 import nbformat
 import pytest
@@ -257,3 +258,29 @@ def test_cells_that_were_moved_are_noted() -> None:
     nb.cells[2], nb.cells[3] = nb.cells[3], nb.cells[2]
     _, notes = restored(nb)
     assert notes == ["The cells of the assignment had been moved; they were run as they stood."]
+
+
+def _many(**cell: Any) -> str:
+    cells = [{"cell_type": "code", "metadata": {}, "source": "x", "outputs": [], **cell}]
+    return json.dumps({"nbformat": 4, "nbformat_minor": 5, "metadata": {}, "cells": cells})
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        _many(outputs=[{"output_type": "stream", "name": "stdout", "text": ""}] * 100_000),
+        _many(outputs=[{"output_type": "none"}] * 100_000),
+        _many(metadata={str(number): number for number in range(100_000)}),
+        _many(metadata={"x": [{}] * 100_000}),
+        json.dumps({"nbformat": 4, "nbformat_minor": 5, "metadata": {}, "cells": [{}] * 100_000}),
+    ],
+    ids=["outputs", "wrong outputs", "metadata", "objects", "cells"],
+)
+def test_what_takes_long_to_compare_with_the_format_is_not_compared(text: str) -> None:
+    with pytest.raises(SubmissionError, match=r"has (more than 1000 outputs|100000 cells)"):
+        submission.parse(text, "x.ipynb")
+
+
+def test_tags_that_take_long_to_compare_are_no_reason_to_refuse_a_notebook() -> None:
+    text = _many(id="a", execution_count=None, metadata={"tags": [{} for _ in range(20_000)]})
+    assert submission.parse(text, "x.ipynb").cells[0].metadata == {}
