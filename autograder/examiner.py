@@ -18,7 +18,7 @@ import os
 import socket
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TextIO
 
 from autograder import exams, stuck
@@ -55,7 +55,8 @@ def sit(
             session, subject, sitting.memory, request["key"], own_network, int(request["seed"])
         )
         exam = exams.load(request["exam"])
-        return exam.sit(request["part"], bench, sitting.failed)
+        verdict = exam.sit(request["part"], bench, sitting.failed)
+        return replace(verdict, seed=bench.draws.seed)
     finally:
         subject.release()
 
