@@ -15,7 +15,8 @@ T = TypeVar("T")
 USUAL_SEED = 0
 """The seed that draws nothing: each number is then the usual one, which the corpus expects."""
 
-MAX_SEED = 2**32
+MAX_SEED = 2**53
+"""So many that nobody finds it by trying, from the numbers seen so far; JSON holds it."""
 
 
 def fresh_seed() -> int:

@@ -135,8 +135,7 @@ class Exam(Generic[RigT]):
         seen = {*table, *failed}
         results = [self._with_reason(result, done, seen) for result in results]
         failed.update((name, result) for name, result in done.items() if result.status == "failed")
-        checks = tuple(_worth(r, table[r.name]) for r in results)
-        return Verdict(self.name, part, checks, seed=bench.draws.seed)
+        return Verdict(self.name, part, tuple(_worth(r, table[r.name]) for r in results))
 
     def _with_reason(
         self, result: CheckResult, done: dict[str, CheckResult], seen: set[str]

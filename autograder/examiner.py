@@ -19,7 +19,7 @@ import os
 import socket
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, TextIO
 
 from autograder import exams, stuck
@@ -56,7 +56,8 @@ def sit(
             session, subject, outside, sitting.memory, request["key"], int(request["seed"])
         )
         exam = exams.load(request["exam"])
-        return exam.sit(request["part"], bench, sitting.failed)
+        verdict = exam.sit(request["part"], bench, sitting.failed)
+        return replace(verdict, seed=bench.draws.seed)
     finally:
         subject.release()
 

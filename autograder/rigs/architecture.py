@@ -16,7 +16,7 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from autograder.bench import Bench, StudentError
 from autograder.exam import Failed
 from autograder.rigs.errands import SETTLE, WAYPOINT, marked
-from autograder.rigs.participants import NO_NODE, node_of, of_others
+from autograder.rigs.participants import NO_NODE, count_listening, known, node_of, of_others
 from autograder.rigs.patience import Patience
 from autograder.rigs.pouring import Poured, Pours
 from autograder.rigs.quiet import QuietNode
@@ -31,6 +31,10 @@ from course.design import dye
 DESIGN = "design"
 THREADS = 8
 """Threads that run the design's nodes: one that waits in a callback holds up itself alone."""
+USUAL_PARTICIPANTS = 2
+"""The examiner's, and the one that all of a design's nodes share."""
+AT_REST_S = 3.0
+"""Seconds of a busy process after which what it has made counts as discovered."""
 
 
 class ArchitectureRig:
@@ -77,11 +81,19 @@ class ArchitectureRig:
                 actual=f"A small node that was made beside yours did not within {4 * SETTLE:.0f} "
                 "s: does something in the notebook keep the process from talking to others?",
             )
+        self._discover_others()
         graph = read_graph(self.node, self._marks)
         if NO_NODE in graph.nodes:  # each participant tells its names in its own time
             self.wait(lambda: NO_NODE not in read_graph(self.node, self._marks).nodes, SETTLE)
             graph = read_graph(self.node, self._marks)
         return graph
+
+    def _discover_others(self) -> None:
+        """Wait for what is in participants of other contexts: the mark tells of its own alone."""
+        domain_id = self._session.domain_id
+        self.wait(lambda: len(known(self.node)) >= count_listening(domain_id))
+        if len(known(self.node)) > USUAL_PARTICIPANTS:
+            Stillness(self.subject.pid).reached(timeout=AT_REST_S)
 
     def new_faults(self) -> list[str]:
         """Return what is wrong with endpoints that have come since the start, a sentence each."""

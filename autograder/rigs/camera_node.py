@@ -13,6 +13,7 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32
 
+from autograder.rigs.moments import published_at
 from autograder.rigs.quiet import QuietNode
 
 IMAGE, ZOOM, SNAPSHOT = "camera/image", "camera/zoom", "camera/snapshot"
@@ -21,7 +22,7 @@ IMAGE, ZOOM, SNAPSHOT = "camera/image", "camera/zoom", "camera/snapshot"
 class Picture(NamedTuple):
     """What a picture's pixels say: its device, its number since the device was opened, its zoom.
 
-    And when it was published, by DDS: in ns of this machine's time of day.
+    And when it was published, in ns of this machine's time of day.
     """
 
     device: str
@@ -46,7 +47,7 @@ class ExaminerNode(QuietNode):
     def __init__(self) -> None:
         """Listen on the image topic, whichever reliability is offered."""
         super().__init__(f"examiner_{secrets.token_hex(4)}")
-        self._pictures: dict[Picture, None] = {}
+        self._pictures: dict[tuple[int, str, int, int], Picture] = {}
         self._strange: set[int] = set()
         for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
             qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=reliability)
@@ -55,16 +56,16 @@ class ExaminerNode(QuietNode):
         self.zoom = self.create_publisher(Int32, ZOOM, latched)
 
     def _note(self, message: Any, info: dict[str, int]) -> None:
-        # By the time of its publishing it is known when the other reader gets it, too.
-        published = info["source_timestamp"]
-        if (picture := _picture(message, published)) is None:
-            self._strange.add(published)
+        # By the writer's stamp it is known when the other reader gets it, too.
+        stamp = info["source_timestamp"]
+        if (picture := _picture(message, published_at(info))) is None:
+            self._strange.add(stamp)
         else:
-            self._pictures.setdefault(picture)
+            self._pictures.setdefault((stamp, *picture[:3]), picture)
 
     def of(self, device: str) -> list[Picture]:
         """Return the pictures of ``device``; later calls return them first, and then newer ones."""
-        return [picture for picture in list(self._pictures) if picture.device == device]
+        return [picture for picture in list(self._pictures.values()) if picture.device == device]
 
     def strange(self) -> int:
         """Return how many images came that are not a camera's."""

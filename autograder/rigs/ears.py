@@ -20,13 +20,17 @@ class Ears(Sequence[T]):
     def __init__(self) -> None:
         """Nothing yet."""
         self._heard: list[tuple[int, T]] = []
+        self._known: set[int] = set()
         self._forgotten = 0
 
-    def hear(self, published: int, item: T) -> None:
-        """Note what was published at ``published`` (ns), unless it has been heard before."""
-        at = bisect_left(self._heard, published, key=itemgetter(0))
-        known = at < len(self._heard) and self._heard[at][0] == published
-        if published > self._forgotten and not known:
+    def hear(self, published: int, item: T, stamp: int) -> None:
+        """Note what was published at ``published`` (ns), unless it has been heard before.
+
+        By its ``stamp`` it is known again: the writer's, which is the same for both subscriptions.
+        """
+        if published > self._forgotten and stamp not in self._known:
+            self._known.add(stamp)
+            at = bisect_left(self._heard, published, key=itemgetter(0))
             self._heard.insert(at, (published, item))
 
     @property

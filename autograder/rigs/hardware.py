@@ -14,6 +14,7 @@ from sensor_msgs.msg import BatteryState, Image
 from std_msgs.msg import Float64
 
 from autograder.rigs.ears import Ears
+from autograder.rigs.moments import published_at
 from autograder.rigs.quiet import QuietNode
 
 T = TypeVar("T")
@@ -57,7 +58,7 @@ class ExaminerNode(QuietNode):
         """Listen with two subscriptions; ``value`` says what is kept of a message and its info."""
 
         def note(message: Any, info: dict[str, Any]) -> None:
-            ears.hear(int(info["source_timestamp"]), value(message, info))
+            ears.hear(published_at(info), value(message, info), int(info["source_timestamp"]))
 
         for reliable in (False, True):
             self.listen(msg_type, topic, note, reliable=reliable)
@@ -82,5 +83,5 @@ class ExaminerNode(QuietNode):
 
 
 def _picture(image: Image, info: dict[str, Any]) -> Picture:
-    published, number = int(info["source_timestamp"]), int(info["publication_sequence_number"] or 0)
+    published, number = published_at(info), int(info["publication_sequence_number"] or 0)
     return Picture(published, number, image.height, image.width, image.step, len(image.data))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Iterable
+from pathlib import Path
 from weakref import WeakKeyDictionary
 
 from rclpy.context import Context
@@ -52,6 +53,24 @@ def note_own(node: Node) -> None:
         node.destroy_publisher(probe)
         if len(ends) == 1:
             _ours[node.context] = participant_of(ends[0])
+
+
+def known(node: Node) -> set[bytes]:
+    """Return the participants of ROS that a node has discovered, its own among them."""
+    ends = node.get_publishers_info_by_topic("ros_discovery_info", no_mangle=True)
+    return {participant_of(end) for end in ends}
+
+
+def count_listening(domain_id: int) -> int:
+    """Return how many participants of a domain there are in this network namespace.
+
+    Each has a port of its own for discovery (DDSI-RTPS 2.3, 9.6.1.4), known before anybody has
+    discovered it.
+    """
+    first = 7400 + 250 * domain_id + 10
+    lines = Path("/proc/net/udp").read_text().splitlines()[1:]
+    ports = {int(line.split()[1].rpartition(":")[2], 16) for line in lines}
+    return len(ports & set(range(first, first + 240, 2)))
 
 
 def is_own(end: TopicEndpointInfo) -> bool:

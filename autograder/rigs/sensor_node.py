@@ -18,6 +18,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 
+from autograder.rigs.moments import published_at
 from autograder.rigs.quiet import QuietNode
 from autograder.rigs.readings import SENSORS, STOP, Heard, Sensor, Tag
 
@@ -89,7 +90,7 @@ class ExaminerNode(QuietNode):
                 self.foreign.add(topic)
             elif tag.nonce == self.nonce:
                 heard[sensor.name].append(tag)
-                when, kind = info["source_timestamp"], (sensor.name, tag.phase)
+                when, kind = published_at(info), (sensor.name, tag.phase)
                 if not sensor.unchanged(message, tag):
                     self.altered.add(topic)
                     if sensor.blank(message):

@@ -167,6 +167,15 @@ course.runtime.residents.destroy_node = queue.SimpleQueue().get  # waits, and is
     assert "still being taken down 5 s after an examination (in residents.py:" in reason
 
 
+def test_only_what_failed_before_the_program_began_is_tried_again() -> None:
+    failed = runner.refuse(program("x = 1"), "the examiner did not start", "grader_error")
+    assert failed.may_be_tried_again
+    failed.begun = True
+    assert failed.spoilt
+    assert not failed.may_be_tried_again
+    assert runner.Outcome.from_json(failed.to_json()) == failed
+
+
 def test_a_constructor_that_never_returns_fails_its_check(monkeypatch: pytest.MonkeyPatch) -> None:
     source = """
 from rclpy.node import Node

@@ -1,11 +1,11 @@
 """Attacks on the grader: contained, explained in the grade, and of no effect on anybody else.
 
-Each ``attacks/<name>.py`` is a cell that a student hands in, under a header of comments:
+Each ``attacks/<name>.py`` is the last cell before the first check, under a header of comments:
 
     # title: what it tries
     # told: a fragment of what the grade says about it (any number of them)
     # prints: a fragment of what the cell itself must print, an error included
-    # exercise: whose solution the cell stands behind; qos if left out
+    # exercise: the exercise; qos if left out
     # base: the corpus case that the rest of the submission is; an empty solution if left out
     # score: the automatic points that it deserves; 0 if left out, "any" if they do not matter
     # seconds: what a cell of it may take, if not as long as always
@@ -48,6 +48,8 @@ from tests.machine import needs_isolation
 HERE = Path(__file__).parent
 EMPTY = "broken-empty"
 FULL = 15.0
+SEED = 36
+"""Not the usual one: what is known by heart from other runs must not be right by chance."""
 
 pytestmark = [
     needs_isolation,
@@ -100,9 +102,9 @@ class Class:
         if attack:
             place = next(
                 number for number, cell in enumerate(notebook.cells)
-                if submission.grade_id(cell) == f"{exercise}-solution"
+                if submission.grade_id(cell) == f"{exercise}-visible"
             )  # fmt: skip
-            notebook.cells.insert(place + 1, new_code_cell(attack))
+            notebook.cells.insert(place, new_code_cell(attack))
         return submission.program(submission.restore(notebook, source, released)[0])
 
 

@@ -75,7 +75,7 @@ def _nonsense(draws: Draws) -> list[tuple[str, list[Parameter]]]:
 def good(rig: RobotRig) -> None:
     """Good requests: the first one, both limits, one at a time, at its bounds, the same again."""
     draw = rig.bench.draws.number
-    first = draw("the first angular limit", 0.8, 0.3, 1.9)
+    first = draw("the first angular limit", 0.8, 1.05, 1.9)
     both = draw("a linear limit", 0.33, 0.26, 0.45), draw("an angular limit", 0.66, 0.3, 1.2)
     again = draw("the next linear limit", 0.21, 0.11, 0.25), draw("the next", 1.3, 1.25, 1.8)
     with rig.robot(Operator.SERVER, Operator) as (robot, operator):
