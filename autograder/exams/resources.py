@@ -203,7 +203,7 @@ def lives_are_flat(rig: CameraRig) -> None:
         raise Failed(
             expected=f"{grown.made} lives leave no thread and no file behind, and less than "
             f"{MEMORY} KiB a life.",
-            actual=f"Each life of the driver left {phrase(leaked)} behind.",
+            actual=f"Each life of the driver left {phrase(leaked)} behind.{rig.others()}",
         )
     with rig.trying():
         require_flat_snapshots(rig)

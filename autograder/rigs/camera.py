@@ -212,6 +212,13 @@ class CameraRig:
         """Return True when all that was sent has been dealt with, False if a thread never rests."""
         return self._still.reached()
 
+    def others(self) -> str:
+        """Return a sentence on the processes that the notebook has started, if there are any."""
+        if not (names := self.process.others()):
+            return ""
+        were = "A process that it had started was" if len(names) == 1 else "Processes were"
+        return f" {were} left: {phrase(names)}."
+
     def device(self, kind: str = "front") -> str:
         """Return a device that nobody else uses; ``kind`` is its name's beginning."""
         return f"{kind}-{secrets.token_hex(4)}"

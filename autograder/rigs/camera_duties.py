@@ -113,7 +113,7 @@ def require_threads_ended(rig: CameraRig, among: set[int], when: str) -> None:
             expected=f"{when} every thread of the driver has ended, within a second.",
             actual=f"{SETTLE_S - deadline.left:.1f} s later {left} of the threads that it had "
             "started were still there. If you start a thread, tell it to end, and wake it if it "
-            "sleeps; if you make a thread pool, shut it down.",
+            f"sleeps; if you make a thread pool, shut it down.{rig.others()}",
         )
 
 

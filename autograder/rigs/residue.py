@@ -36,7 +36,7 @@ def require_flat(rig: CameraRig, before: Usage, times: int, expected: str, round
             raise Failed(
                 expected=f"{expected} no thread and no file.",
                 actual=f"After {times} {rounds} the process had {grown()} more {WORDS[what]} "
-                "than before.",
+                f"than before.{rig.others()}",
             )
 
 
@@ -63,7 +63,8 @@ def require_flat_memory(
     raise Failed(
         expected=f"{expected} and less than 1 MiB of memory each.",
         actual=f"After {times} {rounds} the process had {memory // 1024} MiB more memory than "
-        "before. They came after as many others: what a first time costs does not count.",
+        "before. They came after as many others: what a first time costs does not count."
+        f"{rig.others()}",
     )
 
 

@@ -100,6 +100,10 @@ class BoxedSubject:
         if not self.pid:  # it is the only one that process 1 has, as yet
             children = Path(f"/proc/{self._init}/task/{self._init}/children").read_text().split()
             self.pid = int(children[0]) if children else 0
+        with suppress(OSError):
+            # If the machine runs out of memory all the same, this process goes first, and what it
+            # starts: it cannot change that where its /proc is read-only.
+            Path(f"/proc/{self.pid}/oom_score_adj").write_text("1000")
         pid = number_inside(self.pid)
         ours = [number for number in Sandboxed(self._init).inside() if number != pid]
         self.delay = SeenDelay(Sandboxed(self._init, ours), pid)

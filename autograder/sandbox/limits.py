@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import json
 import resource
-from contextlib import suppress
 from dataclasses import asdict, dataclass
-from pathlib import Path
 
 MIB = 1024 * 1024
 
@@ -25,6 +23,8 @@ class Limits:
     Attributes:
         memory: what all its processes together may hold.
         data: writable memory that one process may reserve; beyond it Python raises MemoryError.
+        addresses: addresses that one process may use: a table of them costs memory, too, even where
+            there is nothing yet (512 times less).
         tasks: processes and threads at a time.
         processes: processes at a time; a bomb is ended before it has slowed others down.
         busy: processes and threads that run, or wait for a processor, at a time.
@@ -32,13 +32,18 @@ class Limits:
         cpu: processor time of all its processes together.
         file: largest file.
         open_files: open file descriptors of one process.
-        all_files: those of all its processes; the kernel holds 200 KB of messages for a socket.
+        all_files: those of all its processes.
+        sockets: in its network, those included that no process has open any more, as they are under
+            way to another; the kernel holds 200 KB of messages for one.
+        locks: of parts of files.
+        inodes: files and folders in each of its scratch folders, which cost memory if empty, too.
         scratch: room in its home folder, in /tmp and in /dev/shm, each.
         wall: time from start to end, exams included.
     """
 
     memory: int = 1536 * MIB
     data: int = 2048 * MIB
+    addresses: int = 32 * 1024 * MIB
     tasks: int = 200
     processes: int = 32
     busy: int = 12
@@ -47,6 +52,9 @@ class Limits:
     file: int = 64 * MIB
     open_files: int = 1024
     all_files: int = 2048
+    sockets: int = 1200
+    locks: int = 5000
+    inodes: int = 20_000
     scratch: int = 64 * MIB
     wall: int = 900
 
@@ -76,11 +84,11 @@ class Limits:
             resource.RLIMIT_FSIZE: self.file,
             resource.RLIMIT_NOFILE: self.open_files,
             resource.RLIMIT_CORE: 0,
+            resource.RLIMIT_AS: self.addresses,
+            resource.RLIMIT_MSGQUEUE: 0,
+            resource.RLIMIT_SIGPENDING: self.tasks,
         }
         for what, bound in bounds.items():
             _, hard = resource.getrlimit(what)
             most = bound if hard == resource.RLIM_INFINITY else min(bound, hard)
             resource.setrlimit(what, (most, most))
-        with suppress(OSError):
-            # If the machine runs out of memory all the same, this process goes first.
-            Path("/proc/self/oom_score_adj").write_text("1000")

@@ -24,11 +24,13 @@ class Process:
         folder: its folder in /proc.
         alive: that of a thread which has not ended: the first thread of a process can end before
             others, and the process's own folder then shows nothing of what these hold.
-        cpu: processor time in s, with that of its children that have ended.
+        own: processor time in s.
+        cpu: with that of its children that have ended, and that somebody has waited for.
     """
 
     folder: Path
     alive: Path
+    own: float
     cpu: float
 
     def busy(self) -> int:
@@ -40,12 +42,12 @@ def process(folder: Path) -> Process | None:
     """Return the process whose folder in /proc this is; None if there is nothing left of it."""
     with suppress(OSError):
         state, *numbers = _stat(folder)
-        cpu = sum(map(int, numbers[10:14])) / _TICK
+        own, cpu = (sum(map(int, numbers[10:last])) / _TICK for last in (12, 14))
         if state not in _ENDED:
-            return Process(folder, folder, cpu)
+            return Process(folder, folder, own, cpu)
         for thread, of_thread in _threads(folder):
             if of_thread not in _ENDED:
-                return Process(folder, thread, cpu)
+                return Process(folder, thread, own, cpu)
     return None
 
 
@@ -68,6 +70,29 @@ def anonymous(process: Process) -> int:
     with suppress(OSError):
         _, resident, shared = (process.alive / "statm").read_bytes().split()[:3]
         return (int(resident) - int(shared)) * _PAGE
+    return 0
+
+
+def page_tables(process: Process) -> int:
+    """Return the bytes of the tables of its addresses, which is not in what it holds otherwise."""
+    with suppress(OSError, IndexError):
+        status = (process.alive / "status").read_bytes()
+        return int(status.partition(b"\nVmPTE:")[2].split(maxsplit=1)[0]) * 1024
+    return 0
+
+
+def lines(file: Path) -> list[bytes]:
+    """Return the rows of a table in /proc, without its heading."""
+    with suppress(OSError):
+        return file.read_bytes().splitlines()[1:]
+    return []
+
+
+def queued(row: bytes) -> int:
+    """Return the bytes that wait in an internet socket, by its row in /proc/net."""
+    with suppress(IndexError, ValueError):
+        out, _, into = row.split()[4].partition(b":")
+        return int(out, 16) + int(into, 16)
     return 0
 
 

@@ -18,6 +18,8 @@ from autograder.sandbox.limits import Limits
 from course.interfaces import cache
 
 HOME = Path("/home/student")
+SCRATCH = (Path("/tmp"), HOME, Path("/dev/shm"))
+"""Folders that can be written to, each a small file system in memory."""
 HANDED_IN = Path("/run/handed-in")
 """Where a submission's other files lie, read-only; the subject copies them to its home."""
 
@@ -38,7 +40,7 @@ def arguments(limits: Limits, handed_in: Path | None, hidden: Iterable[Path]) ->
         hidden: folders that must not be seen even if they lie within something that is.
     """
     yield from _system()
-    for scratch in (Path("/tmp"), HOME, Path("/dev/shm")):
+    for scratch in SCRATCH:
         yield from _way_to(scratch)
         yield from ("--perms", "1777", "--size", str(limits.scratch), "--tmpfs", str(scratch))
     shown = list(python_folders())
@@ -52,7 +54,10 @@ def arguments(limits: Limits, handed_in: Path | None, hidden: Iterable[Path]) ->
     for folder in (*hidden, *_bundled()):
         if folder.is_dir() and _is_within(folder, [Path("/usr"), *shown]):
             yield from ("--tmpfs", str(folder), "--remount-ro", str(folder))
-    yield from ("--remount-ro", "/dev", "--remount-ro", "/", "--chdir", str(HOME))
+    # In /proc a process could have the machine spare it when memory runs out, or write to others.
+    for mount in ("/proc", "/dev", "/"):
+        yield from ("--remount-ro", mount)
+    yield from ("--chdir", str(HOME))
 
 
 def _way_to(folder: Path) -> Iterator[str]:

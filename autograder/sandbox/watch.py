@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import threading
 import time
@@ -9,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from autograder.descriptors import readable
-from autograder.sandbox import usage
+from autograder.sandbox import usage, view
 from autograder.sandbox.limits import MIB, Limits
 from autograder.sandbox.usage import Process
 
@@ -18,7 +19,10 @@ PERIOD = 0.1
 LONGEST = 0.5
 """Seconds that one look may stand for: on a busy machine the next one can come late."""
 COUNTED = 5
-"""Each so manyeth look counts who is busy, however little they get of a busy machine."""
+"""Each so manyeth look counts who is busy, however little they get of a busy machine, and what the
+kernel holds for all of them."""
+INTERNET = ("tcp", "tcp6", "udp", "udp6")
+"""Tables of sockets in /proc/PID/net that tell how much waits in each."""
 BLIND_TIMEOUT = 5.0
 """Seconds that the files of a sandbox may stay unreadable before it is ended for that."""
 
@@ -36,7 +40,9 @@ class Watch:
         self._limits = limits
         self._started = time.monotonic()
         self._over = threading.Event()
-        self._used = self._crowded = 0.0
+        self._used = self._crowded = self._gone = 0.0
+        self._queued = 0  # bytes in sockets
+        self._own: dict[str, float] = {}
         self._looked, self._looks = self._started, 0
         self._blind_since: float | None = None
         self.reason = ""
@@ -89,7 +95,7 @@ class Watch:
         return self._worked(found) or self._held(found)
 
     def _worked(self, processes: list[Process]) -> str:
-        used = sum(process.cpu for process in processes)
+        used = self._spent(processes)
         grew, self._used = used - self._used, used
         now = time.monotonic()
         passed, self._looked = min(now - self._looked, LONGEST), now
@@ -104,12 +110,46 @@ class Watch:
             return f"it kept more than {self._limits.busy} processes and threads busy at a time"
         return ""
 
+    def _spent(self, processes: list[Process]) -> float:
+        """Return the processor time of all that are there and of all that have ended.
+
+        What a child has used is its parent's once that has waited for it. Of one that nobody waits
+        for, what it had used when it was last seen counts.
+        """
+        own = {process.folder.name: process.own for process in processes}
+        for name, seconds in self._own.items():
+            if own.get(name, -1.0) < seconds:  # ended, or another one has its number
+                self._gone += seconds
+        self._own = own
+        by_parents = sum(process.cpu for process in processes)
+        return max(self._used, by_parents, sum(own.values()) + self._gone)
+
     def _held(self, processes: list[Process]) -> str:
         if sum(map(usage.descriptors, processes)) > self._limits.all_files:
             return f"its processes had more than {self._limits.all_files} files open"
+        if self._looks % COUNTED == 0 and (reason := self._kept_by_kernel()):
+            return reason
+        kernel = self._queued + sum(map(usage.page_tables, processes))
         # Cheap first: this counts what forked processes share once for each of them.
-        if sum(map(usage.anonymous, processes)) > self._limits.memory and (
-            sum(map(usage.share, processes)) > self._limits.memory
+        if kernel + sum(map(usage.anonymous, processes)) > self._limits.memory and (
+            kernel + sum(map(usage.share, processes)) > self._limits.memory
         ):
             return f"it held more than {self._limits.memory // MIB} MB of memory"
+        return ""
+
+    def _kept_by_kernel(self) -> str:
+        """Count what is in no process's own account: empty files, locks, and what sockets hold."""
+        root = self._proc.parent
+        for scratch in view.SCRATCH:
+            with suppress(OSError):
+                room = os.statvfs(f"{root}{scratch}")
+                if room.f_files - room.f_ffree > self._limits.inodes:
+                    return f"it had more than {self._limits.inodes} files in {scratch}"
+        if len(usage.lines(self._proc / "locks")) > self._limits.locks:
+            return f"it held more than {self._limits.locks} locks on files"
+        net = self._proc.parent.parent / "net"
+        rows = [row for name in INTERNET for row in usage.lines(net / name)]
+        self._queued = sum(map(usage.queued, rows))
+        if len(rows) + len(usage.lines(net / "unix")) > self._limits.sockets:
+            return f"there were more than {self._limits.sockets} sockets in its network"
         return ""

@@ -19,6 +19,7 @@ from autograder.corpus import Case
 from autograder.descriptors import readable
 from autograder.gradebook import CourseGradebook
 from autograder.sandbox import BoxError, SandboxError, network, probe, seccomp, usage, warmth
+from autograder.sandbox.box import Box
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.usage import Process
 from autograder.sandbox.watch import Watch
@@ -163,6 +164,26 @@ def test_who_is_not_root_gets_the_same_sandbox() -> None:
 def test_the_hidden_part_is_examined_in_full() -> None:
     outcome = runner.run((EXAM,))
     assert {check.status for check in outcome.verdicts["qos-hidden"].checks} == {"not_checked"}
+
+
+@needs_sandbox
+def test_the_time_of_children_that_nobody_waits_for_counts() -> None:
+    program = """
+import os, signal, time
+signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+while True:
+    if os.fork() == 0:
+        while time.process_time() < 0.5:
+            pass
+        os._exit(0)
+    time.sleep(0.6)
+"""
+    limits = Limits(cpu=3, wall=60)
+    with Box(limits) as box:
+        network = box.join(["sh", "-c", "read -r _"], stdin=subprocess.PIPE)
+        with box.start([sys.executable, "-c", program], {}, ()) as subject:
+            assert subject.fate(90) == "it used more than 3 s of processor time"
+        network.communicate(b"\n")
 
 
 def test_limits_survive_the_way_to_the_subject() -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 from autograder.corpus.trials import busy_loops
-from autograder.starving import FairDeadline, of_process, run_times
+from autograder.starving import FairDeadline, SeenDelay, of_process, run_times
 
 
 def kept() -> float:
@@ -20,6 +21,29 @@ def test_a_deadline_is_put_off_while_others_keep_the_process_from_running_not_fo
         assert deadline.left > 0
         while deadline.left:  # it is put off by no more than two seconds
             pass
+
+
+class Several:
+    """Some processes that are one program's."""
+
+    def folders(self) -> list[str]:
+        return [f"/proc/{pid}" for pid in (os.getpid(), *children())]
+
+    def of(self, pid: int) -> str:
+        return f"/proc/{pid}"
+
+
+def children() -> list[str]:
+    return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+
+
+def test_who_is_kept_from_running_by_its_own_processes_gets_no_more_time() -> None:
+    with busy_loops(4 * (os.cpu_count() or 1)):
+        delay = SeenDelay(Several(), os.getpid())
+        before, mark = kept(), delay.mark()
+        while kept() - before < 1.2:
+            pass
+        assert delay.since(mark) < 0.6
 
 
 def test_a_process_that_is_not_there_was_never_kept_waiting() -> None:

@@ -1,10 +1,10 @@
 # title: A name that is no text, so that whoever watches stumbles over it
 # told: it held more than 1536 MB of memory
 
+import ctypes
 import os
 
-with open("/proc/self/comm", "wb") as name:
-    name.write(b"\xff) R (\xff")
+ctypes.CDLL(None).prctl(15, b"\xff) R (\xff", 0, 0, 0)
 for _ in range(4):
     if os.fork() == 0:
         hoard = bytearray(b"x") * (700 * 2**20)

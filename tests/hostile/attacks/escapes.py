@@ -1,4 +1,4 @@
-# title: New namespaces, mounts, tracing, keyrings, the kernel's other doors
+# title: New namespaces, mounts, tracing, keyrings, leases, watches, the kernel's other doors
 # prints: opened: []
 
 import ctypes
@@ -18,15 +18,33 @@ for name, number, *arguments in [
     ("userfaultfd", 323, 0),
     ("setns", 308, 0, 0),
     ("clone3", 435, bytes(88), 88),
+    ("semget", 64, 0, 32000, 0o600),
+    ("shmget", 29, 0, 4096, 0o600),
+    ("msgget", 68, 0, 0o600),
+    ("setxattr", 188, b"/tmp", b"user.a", b"x", 1, 0),
+    ("inotify_init", 253),
+    ("inotify_init1", 294, 0),
+    ("fanotify_init", 300, 0, 0),
+    ("lease", 72, os.open(os.__file__, 0), 1024, 0),
+    ("notify", 72, os.open("/tmp", 0), 1026, 1),
 ]:
     if libc.syscall(number, *arguments) >= 0:
         opened.append(name)
+for path in ("/proc/self/oom_score_adj", "/proc/1/oom_score_adj", "/proc/self/mem"):
+    try:
+        with open(path, "r+b"):
+            opened.append(path)
+    except OSError:
+        pass
 for path in ("/proc/1/mem", "/proc/sys/kernel/core_pattern", "/proc/sysrq-trigger", "/dev/kmsg"):
     try:
         with open(path, "wb"):
             opened.append(path)
     except OSError:
         pass
+with open("/proc/self/oom_score_adj") as score:
+    if score.read() != "1000\n":
+        opened.append("oom score")
 if os.getuid() == 0:
     opened.append("root")
 print("opened:", opened)

@@ -2,7 +2,7 @@
 # exercise: architecture
 # base: wrong-emptied
 # score: 0
-# prints: after: b'tests.hostile.attacks::exits'
+# told: Nobody publishes on /scan
 
 import ctypes
 from rclpy.node import Node as _Node
@@ -26,9 +26,6 @@ class Evil(_Node):
         for number, place in enumerate(PLACES):
             names[0], names[1] = place, b"X"
             self.create_publisher(UInt8, f"evil_{number}", 1)
-        for number, topic in enumerate(["scan", "motors/command", "obstacles"]):
-            self.create_publisher(UInt8, topic, 1)
-        print("after:", names[0])
 
 
 class Design:
