@@ -93,7 +93,7 @@ class ArchitectureRig:
         domain_id = self._session.domain_id
         self.wait(lambda: len(known(self.node)) >= count_listening(domain_id))
         if len(known(self.node)) > USUAL_PARTICIPANTS:
-            Stillness(self.subject.pid).reached(timeout=AT_REST_S)
+            Stillness(self._outside).reached(timeout=AT_REST_S)
 
     def new_faults(self) -> list[str]:
         """Return what is wrong with endpoints that have come since the start, a sentence each."""
