@@ -93,7 +93,8 @@ def _asleep(scene: Scene, given: Given) -> bool:
 
 
 def _threads(scene: Scene, given: Given) -> list[int]:
-    return usage.thread_ids(scene.subject)
+    # Its own alone: which of them a session has given up, say, has nothing to do with children.
+    return usage.thread_ids(scene.subject.of(scene.pid))
 
 
 def _naps(scene: Scene, given: Given) -> list[tuple[int, int]]:

@@ -43,13 +43,11 @@ def usage(processes: Processes) -> Usage:
     return Usage(threads, files, pages * _PAGE // 1024)
 
 
-def thread_ids(processes: Processes) -> list[int]:
-    """Return the kernel's numbers of their threads."""
-    found = []
-    for folder in processes.folders():
-        with suppress(OSError):
-            found += [int(name) for name in os.listdir(f"{folder}/task")]  # noqa: PTH208
-    return found
+def thread_ids(process: str) -> list[int]:
+    """Return the kernel's numbers of the threads of one process, by its folder."""
+    with suppress(OSError):
+        return [int(name) for name in os.listdir(f"{process}/task")]  # noqa: PTH208
+    return []
 
 
 def naps(processes: Processes, threads: Iterable[int]) -> dict[int, int]:

@@ -18,11 +18,11 @@ class Process:
         self._outside = outside
 
     def threads(self) -> int:
-        """Return how many threads it has."""
-        return self.usage().threads
+        """Return how many threads its own process has."""
+        return len(self.thread_ids())
 
     def thread_ids(self) -> set[int]:
-        """Return the kernel's numbers of its threads."""
+        """Return the kernel's numbers of its own process's threads."""
         return set(self._outside.ask("threads"))
 
     def naps(self, threads: Iterable[int]) -> dict[int, int]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Self
 
 from autograder.outside.processes import Sandboxed, number_inside
-from autograder.sandbox import network, warmth
+from autograder.sandbox import cgroups, network, warmth
 from autograder.sandbox.host import fate_of
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.network import BoxError
@@ -82,6 +82,7 @@ class BoxedSubject:
         """Watch over the process namespace whose process 1 is ``init``; a warden learns of it."""
         self._process = process
         self._init = init
+        self._limits = limits
         self._warden = warden
         self._held = held
         self.handle = os.pidfd_open(init)  # unlike its number, never another process's
@@ -104,6 +105,8 @@ class BoxedSubject:
             # If the machine runs out of memory all the same, this process goes first, and what it
             # starts: it cannot change that where its /proc is read-only.
             Path(f"/proc/{self.pid}/oom_score_adj").write_text("1000")
+        if (group := cgroups.enclose(self.pid, self._limits)) is not None:
+            self._held.callback(group.close)
         pid = number_inside(self.pid)
         ours = [number for number in Sandboxed(self._init).inside() if number != pid]
         self.delay = SeenDelay(Sandboxed(self._init, ours), pid)

@@ -35,7 +35,8 @@ REFUSED = {
     "fspick": 433, "mount_setattr": 442, "memfd_secret": 447, "setxattrat": 463,
 }  # fmt: skip
 _MMAP, _CLONE, _CLONE3, _SOCKET, _FCNTL = 9, 56, 435, 41, 72
-_SET_LEASE, _NOTIFY = 1024, 1026  # commands of fcntl
+_COMMANDS = {"F_OFD_SETLK": 37, "F_OFD_SETLKW": 38, "F_SETLEASE": 1024, "F_NOTIFY": 1026}
+"""Those of fcntl that are refused: a lock without an owner is counted for nobody."""
 _SHARED, _ANONYMOUS = 0x01, 0x20  # of a map's flags
 FAMILIES = (socket.AF_UNIX, socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK)
 """Kinds of sockets that remain; DDS looks network interfaces up over netlink."""
@@ -62,8 +63,10 @@ def program() -> bytes:
     steps += [
         _step(_EQUAL, _MMAP, 0, 5), _step(_LOAD, _ARGUMENT_3), _step(_ANY_BIT, _ANONYMOUS, 0, 2),
         _step(_ANY_BIT, _SHARED, 0, 1), _refuse(errno.EPERM), _step(_RETURN, _ALLOW),
-        _step(_EQUAL, _FCNTL, 0, 5), _step(_LOAD, _ARGUMENT_1), _step(_EQUAL, _SET_LEASE, 1, 0),
-        _step(_EQUAL, _NOTIFY, 0, 1), _refuse(errno.EPERM), _step(_RETURN, _ALLOW),
+        _step(_EQUAL, _FCNTL, 0, 3 + len(_COMMANDS)), _step(_LOAD, _ARGUMENT_1),
+        *(_step(_EQUAL, command, len(_COMMANDS) - place, 0)
+          for place, command in enumerate(_COMMANDS.values())),
+        _step(_RETURN, _ALLOW), _refuse(errno.EPERM),
         _step(_EQUAL, _CLONE, 0, 4), _step(_LOAD, _ARGUMENT_0),
         _step(_ANY_BIT, _NEW_USER_NAMESPACE, 0, 1), _refuse(errno.EPERM), _step(_RETURN, _ALLOW),
         _step(_EQUAL, _SOCKET, 0, 2 + len(FAMILIES)), _step(_LOAD, _ARGUMENT_0),

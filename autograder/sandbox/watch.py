@@ -139,17 +139,24 @@ class Watch:
 
     def _kept_by_kernel(self) -> str:
         """Count what is in no process's own account: empty files, locks, and what sockets hold."""
-        root = self._proc.parent
+        root, own = self._proc.parent, set()
         for scratch in view.SCRATCH:
             with suppress(OSError):
-                room = os.statvfs(f"{root}{scratch}")
+                room, device = (
+                    os.statvfs(f"{root}{scratch}"),
+                    Path(f"{root}{scratch}").stat().st_dev,
+                )
+                own.add((os.major(device), os.minor(device)))
                 if room.f_files - room.f_ffree > self._limits.inodes:
                     return f"it had more than {self._limits.inodes} files in {scratch}"
-        if len(usage.lines(self._proc / "locks")) > self._limits.locks:
+        locked = usage.locked_devices(self._proc / "locks")
+        if len(locked) > self._limits.locks:
             return f"it held more than {self._limits.locks} locks on files"
-        net = self._proc.parent.parent / "net"
-        rows = [row for name in INTERNET for row in usage.lines(net / name)]
+        if own and set(locked) - own:
+            return "it held a lock on a file that is not its own, and that others may wait for"
+        net = root.parent / "net"
+        rows = [row for name in INTERNET for row in usage.rows(net / name)]
         self._queued = sum(map(usage.queued, rows))
-        if len(rows) + len(usage.lines(net / "unix")) > self._limits.sockets:
+        if len(rows) + len(usage.rows(net / "unix")) > self._limits.sockets:
             return f"there were more than {self._limits.sockets} sockets in its network"
         return ""

@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from course import cgroups
 from course.doctor.finding import Finding, ok, problem, warning
 
 MIN_DISK, LOW_DISK = 50, 500  # MB: below, a build fails; below, a class's submissions may
@@ -25,6 +26,19 @@ def examine() -> Iterator[Finding]:
     yield stale_segments(SHM, Path("/proc/locks"))
     yield log_folder(os.environ.get("ROS_LOG_DIR"), os.environ.get("ROS_HOME"))
     yield clock(time.time(), Path(__file__).stat().st_mtime)
+    yield counting(cgroups.delegated())
+
+
+def counting(group: Path | None) -> Finding:
+    """Say how it is counted what a submission uses that is graded here."""
+    name = "submissions' limits"
+    if group is not None:
+        return ok(name, f"the kernel counts what a submission uses (cgroups v2, in {group})")
+    return ok(
+        name,
+        "the grader counts what a submission uses, ten times a second; the kernel would where "
+        "systemd delegates a control group (systemd-run --user --scope -p Delegate=yes …)",
+    )
 
 
 def disk(folder: Path, free: int | None = None) -> Finding:

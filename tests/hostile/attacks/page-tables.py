@@ -24,14 +24,17 @@ try:
     print("as much as one likes")
 except MemoryError:
     pass
-for _ in range(28):
+for _ in range(28):  # one after the other, or there would be a crowd
+    done, tell = os.pipe()
     if os.fork() == 0:
         for _ in range(100):
             try:
                 address(1 << 30)
             except MemoryError:
                 break
+        os.write(tell, b"1")
         while True:
             time.sleep(1)
+    os.read(done, 1)
 while True:
     time.sleep(1)
