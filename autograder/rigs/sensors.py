@@ -24,6 +24,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from autograder.bench import Bench
 from autograder.exam import NotExaminable
 from autograder.outside.holding import HoldError
+from autograder.rigs.participants import of_others
 from autograder.rigs.patience import Patience
 from autograder.rigs.phrases import callback_raised
 from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor
@@ -64,14 +65,11 @@ class SensorRig:
 
     def offered(self, topic: str) -> list[TopicEndpointInfo]:
         """Return the publishers on ``topic`` that are not the examiner's."""
-        return self._others(self.node.get_publishers_info_by_topic(topic))
+        return of_others(self.node.get_publishers_info_by_topic(topic))
 
     def requested(self, topic: str) -> list[TopicEndpointInfo]:
         """Return the subscriptions on ``topic`` that are not the examiner's."""
-        return self._others(self.node.get_subscriptions_info_by_topic(topic))
-
-    def _others(self, endpoints: list[TopicEndpointInfo]) -> list[TopicEndpointInfo]:
-        return [e for e in endpoints if not e.node_name.startswith(self.node.get_name())]
+        return of_others(self.node.get_subscriptions_info_by_topic(topic))
 
     def attend(self) -> None:
         """Listen to the consumers' ends, with what they offer: lossless wherever it is possible."""
