@@ -88,11 +88,18 @@ class Watch:
             return f"it ran for more than {self._limits.wall} s"
         if (self._proc / "self").exists():
             return ""  # whoever is here has no number in there; so this is still the machine's own
-        processes = [entry for entry in self._proc.iterdir() if entry.name.isdecimal()]
+        processes = self._folders()
         if len(processes) > self._limits.processes:
-            return f"it started more than {self._limits.processes} processes"
+            return self._too_many
         found = [process for entry in processes if (process := usage.process(entry)) is not None]
         return self._worked(found) or self._held(found)
+
+    def _folders(self) -> list[Path]:
+        return [entry for entry in self._proc.iterdir() if entry.name.isdecimal()]
+
+    @property
+    def _too_many(self) -> str:
+        return f"it started more than {self._limits.processes} processes"
 
     def _worked(self, processes: list[Process]) -> str:
         used = self._spent(processes)
@@ -131,9 +138,15 @@ class Watch:
             return reason
         kernel = self._queued + sum(map(usage.page_tables, processes))
         # Cheap first: this counts what forked processes share once for each of them.
-        if kernel + sum(map(usage.anonymous, processes)) > self._limits.memory and (
-            kernel + sum(map(usage.share, processes)) > self._limits.memory
-        ):
+        if kernel + sum(map(usage.anonymous, processes)) <= self._limits.memory:
+            return ""
+        held = kernel
+        for process in processes:
+            # One that forks all the time keeps whoever looks waiting, while others become many.
+            held += usage.share(process)
+            if len(self._folders()) > self._limits.processes:
+                return self._too_many
+        if held > self._limits.memory:
             return f"it held more than {self._limits.memory // MIB} MB of memory"
         return ""
 
