@@ -6,7 +6,7 @@ import json
 import re
 import socket
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 
 from autograder import outputs, own_interfaces, sandbox, stuck
 from autograder.processes import ExaminerError, ExaminerProcess
+from autograder.program_host import ProgramHost, Start
 from autograder.sandbox import Place, RunningSubject
 from autograder.submission import Cell, Program
 from autograder.verdict import Status, Verdict
@@ -109,7 +110,11 @@ def run(
         channel = Channel(engine)
         examiner = stack.enter_context(ExaminerProcess(control, place.domain_id, spawn=place.spawn))
         subject = stack.enter_context(_start(place, subject_engine, subject_control, files))
-        _follow(program, channel, examiner, subject, outcome, cell_timeout)
+
+        def start(command: Sequence[str], fds: Sequence[int]) -> RunningSubject:
+            return place.start_subject(command, files, fds)
+
+        _follow(program, channel, examiner, subject, outcome, cell_timeout, start)
     outcome.seconds = round(time.monotonic() - started, 2)
     return outcome
 
@@ -130,6 +135,7 @@ def _follow(
     subject: RunningSubject,
     outcome: Outcome,
     cell_timeout: float,
+    start: Start,
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
     status: Status
@@ -146,7 +152,9 @@ def _follow(
                 examiner.request(
                     cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key
                 )
-                outcome.verdicts[cell.grade_id] = examiner.verdict()
+                done = [c.source for c in program[:number] if not c.exam]
+                with ProgramHost(start, subject, done) as host:
+                    outcome.verdicts[cell.grade_id] = examiner.verdict(answer_with=host.answer)
                 moved_on = False
                 if examiner.hangs:
                     # The examiner has waited long enough: it would find the same in every part.

@@ -33,6 +33,7 @@ from autograder.rigs.camera_orders import (
     require_zoom_at_once,
     require_zoom_kept,
 )
+from autograder.rigs.camera_plain import require_given_back_at_the_end
 from autograder.rigs.camera_rate import (
     require_own_clock,
     require_rate,
@@ -176,6 +177,7 @@ def camera_given_back(rig: CameraRig) -> None:
             require_picture(rig, device, "When the driver is started again,")
             rig.program.stop(DRIVER)
             require_closed(rig, device, "After destroy_node()")
+    require_given_back_at_the_end(rig)
 
 
 @EXAM.check(
