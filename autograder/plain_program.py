@@ -11,8 +11,9 @@ next SIGINT, which makes them anew, so that lives can be compared.
 from __future__ import annotations
 
 import signal
-import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from queue import SimpleQueue
 from typing import Any
 
 import rclpy
@@ -34,7 +35,7 @@ def run(
         domain_id: of the examiner who looks on.
         up: called once, when the first nodes are there.
     """
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    interrupts = _Interrupts()
     if not get_default_context().ok():  # else a cell has done so
         rclpy.init(
             args=SIMULATED if wanted["sim_time"] else [],
@@ -43,30 +44,57 @@ def run(
             signal_handler_options=SignalHandlerOptions.NO,
         )
     while True:
-        _live(namespace, wanted, up)
-        try:
-            threading.Event().wait()
-        except KeyboardInterrupt:
-            up = _nothing
+        _live(namespace, wanted, interrupts, up)
+        interrupts.wait()
+        up = _nothing
 
 
 def _live(
-    namespace: Mapping[str, Any], wanted: Mapping[str, Any], up: Callable[[], None]
-) -> list[Any]:
-    """Run the nodes until SIGINT; return them, destroyed."""
+    namespace: Mapping[str, Any],
+    wanted: Mapping[str, Any],
+    interrupts: _Interrupts,
+    up: Callable[[], None],
+) -> None:
+    """Run the nodes until SIGINT, then destroy them."""
     nodes = [namespace[name](*arguments) for name, arguments in wanted["nodes"]]
     threads = int(wanted["threads"])
     executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
     for node in nodes:
         executor.add_node(node)
     up()
-    try:
+    with interrupts.raised():
         executor.spin()
-    except KeyboardInterrupt:
-        for node in nodes:
-            node.destroy_node()
+    for node in nodes:
+        node.destroy_node()
     executor.shutdown(timeout_sec=0.0)
-    return nodes
+
+
+class _Interrupts:
+    """SIGINT raises KeyboardInterrupt while nodes spin; one that comes at another time is kept."""
+
+    def __init__(self) -> None:
+        self._kept: SimpleQueue[int] = SimpleQueue()  # its put is safe in a signal handler
+        self._raises = False
+        signal.signal(signal.SIGINT, self._note)
+
+    def _note(self, number: int, _frame: object) -> None:
+        if not self._raises:
+            self._kept.put(number)
+            return
+        self._raises = False
+        raise KeyboardInterrupt
+
+    @contextmanager
+    def raised(self) -> Iterator[None]:
+        """Run the block until SIGINT, which ends it and goes no further."""
+        with suppress(KeyboardInterrupt):
+            self._raises = True
+            yield
+        self._raises = False
+
+    def wait(self) -> None:
+        """Wait for SIGINT."""
+        self._kept.get()
 
 
 def _nothing() -> None:
