@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from autograder.draws import USUAL_SEED, Draws
 from autograder.outside.asking import Outside
+from autograder.programs import Programs
 from autograder.starving import RunDelay, of_process
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 from course import Session
@@ -372,14 +373,17 @@ class Bench:
         memory: dict[str, Any],
         key: Mapping[str, Any] | None = None,
         seed: int = USUAL_SEED,
+        programs: Programs | None = None,
     ) -> None:
         """Put both within a check's reach.
 
         ``outside`` looks at the subject's processes. ``memory`` outlives this bench: what an
         experiment found in an earlier part of the exam, as long as the notebook has not moved on
         since. ``key`` is the answer key that the part's hidden cell carries, if it has one: the
-        subject never sees it. ``seed`` is what the numbers of the exam are drawn from.
+        subject never sees it. ``seed`` is what the numbers of the exam are drawn from. ``programs``
+        runs the notebook's nodes in programs of their own, for a submission in a sandbox.
         """
+        self.programs = programs
         self.session = session
         self.subject = subject
         self.memory = memory

@@ -25,6 +25,7 @@ from typing import Any, TextIO
 from autograder import exams, stuck
 from autograder.bench import MAX_REPLY, Bench, Subject
 from autograder.outside.asking import Afar, Here, Outside
+from autograder.programs import Programs
 from autograder.verdict import CheckResult, Verdict
 from autograder.wire import Channel
 from course import Session
@@ -47,14 +48,16 @@ def sit(
     subject: Subject,
     outside: Outside,
     sittings: Sittings,
+    programs: Programs | None = None,
 ) -> Verdict:
     """Run one part of an exam, let the subject go on, and return the verdict."""
     sitting = sittings.setdefault(request["exam"], Sitting())
     subject.delay = outside.delay
     try:
         bench = Bench(
-            session, subject, outside, sitting.memory, request["key"], int(request["seed"])
-        )
+            session, subject, outside, sitting.memory, request["key"], int(request["seed"]),
+            programs,
+        )  # fmt: skip
         exam = exams.load(request["exam"])
         verdict = exam.sit(request["part"], bench, sitting.failed)
         return replace(verdict, seed=bench.draws.seed)
@@ -71,12 +74,14 @@ def serve(
 ) -> None:
     """Answer requests until standard input ends; without ``outside``, look at the subject here."""
     sittings: Sittings = {}
-    for line in requests:
+    while line := requests.readline():
         request = json.loads(line)
         if request["moved_on"]:
             sittings.clear()
         outside = outside or Here(int(request["pid"]))
-        verdict = sit(request, session, subject, outside, sittings)
+        # Nobody starts a second process beside a student's own kernel.
+        programs = Programs(requests, answers, outside) if outside.own_network else None
+        verdict = sit(request, session, subject, outside, sittings, programs)
         answer = {"verdict": verdict.as_data(), "hangs": subject.hangs}
         answers.write(json.dumps(answer) + "\n")
         answers.flush()

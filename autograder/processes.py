@@ -37,6 +37,9 @@ MAX_HANGS = 1000
 LAST_WORDS = 65536
 """Bytes that are kept of what an examiner says on standard error."""
 
+Answering = Callable[[dict[str, Any]], dict[str, Any]]
+"""Answers a request of an examiner's, as JSON knows it."""
+
 Spawn = Callable[..., "Process"]
 
 
@@ -113,7 +116,6 @@ class ExaminerProcess:
             key: the answer key of the part's hidden cell.
             seed: what the exam's numbers are drawn from; one that nobody knows if left out.
         """
-        assert self._process.stdin is not None
         asked = {
             "exam": exam,
             "part": part,
@@ -123,15 +125,14 @@ class ExaminerProcess:
             "seed": fresh_seed() if seed is None else seed,
         }
         self._asked = exam, part
-        line = json.dumps(asked).encode() + b"\n"
-        try:
-            self._process.stdin.write(line)
-            self._process.stdin.flush()
-        except BrokenPipeError:
-            raise self._ended("The examiner ended at once") from None
+        self._send(asked)
 
-    def verdict(self, timeout: float = EXAM_TIMEOUT) -> Verdict:
+    def verdict(
+        self, timeout: float = EXAM_TIMEOUT, answer_with: Answering | None = None
+    ) -> Verdict:
         """Return the verdict of the part that was asked for.
+
+        ``answer_with`` answers what the examiner asks for meanwhile (`autograder.program_host`).
 
         Raises:
             ExaminerError: the examiner ended, took longer than ``timeout`` seconds, or wrote what
@@ -139,6 +140,18 @@ class ExaminerProcess:
         """
         assert self._process.stdout is not None
         deadline = FairDeadline(timeout, of_process(self._process.pid))
+        while True:
+            line = self._line(deadline, timeout)
+            try:
+                answer = parse(line)
+                if answer_with is None or "wants" not in answer:
+                    return self._verdict_of(answer)
+            except (ValueError, KeyError, TypeError, VerdictError) as error:
+                raise ExaminerError(f"What the examiner wrote is no verdict: {error}") from None
+            self._send(answer_with(answer))
+
+    def _line(self, deadline: FairDeadline, timeout: float) -> bytes:
+        assert self._process.stdout is not None
         stream = self._process.stdout.fileno()
         while b"\n" not in self._buffer:
             if stream not in self._wait(deadline.left):
@@ -152,14 +165,21 @@ class ExaminerProcess:
                 raise self._ended("The examiner ended without a verdict")
             self._buffer += chunk
         line, self._buffer = self._buffer.split(b"\n", 1)
+        return line
+
+    def _verdict_of(self, answer: dict[str, Any]) -> Verdict:
+        self.hangs = str(answer["hangs"])[:MAX_HANGS]
+        verdict = Verdict.from_data(answer["verdict"])
+        verdict.require_asked(*self._asked, points.of_part(*self._asked))
+        return verdict
+
+    def _send(self, message: dict[str, Any]) -> None:
+        assert self._process.stdin is not None
         try:
-            answer = parse(line)
-            self.hangs = str(answer["hangs"])[:MAX_HANGS]
-            verdict = Verdict.from_data(answer["verdict"])
-            verdict.require_asked(*self._asked, points.of_part(*self._asked))
-            return verdict
-        except (ValueError, KeyError, TypeError, VerdictError) as error:
-            raise ExaminerError(f"What the examiner wrote is no verdict: {error}") from None
+            self._process.stdin.write(json.dumps(message).encode() + b"\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            raise self._ended("The examiner ended at once") from None
 
     def _wait(self, timeout: float) -> list[int]:
         """Return which of its streams can be read, and take what is said on standard error.

@@ -6,7 +6,7 @@ import json
 import re
 import socket
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any
 from autograder import outputs, own_interfaces, sandbox, stuck
 from autograder.draws import fresh_seed
 from autograder.processes import ExaminerError, ExaminerFloodedError, ExaminerProcess
+from autograder.program_host import ProgramHost, Start
 from autograder.sandbox import Place, RunningSubject
 from autograder.submission import Cell, Program
 from autograder.verdict import Status, Verdict
@@ -122,8 +123,12 @@ def run(
         channel = Channel(engine)
         examiner = stack.enter_context(ExaminerProcess(control, place.domain_id, spawn=place.spawn))
         subject = stack.enter_context(_start(place, subject_engine, subject_control, files))
+
+        def start(command: Sequence[str], fds: Sequence[int]) -> RunningSubject:
+            return place.start_subject(command, files, fds)
+
         seed = fresh_seed() if seed is None else seed
-        _follow(program, channel, examiner, subject, outcome, cell_timeout, seed)
+        _follow(program, channel, examiner, subject, outcome, cell_timeout, seed, start)
     outcome.seconds = round(time.monotonic() - started, 2)
     return outcome
 
@@ -145,6 +150,7 @@ def _follow(
     outcome: Outcome,
     cell_timeout: float,
     seed: int,
+    start: Start,
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
     status: Status
@@ -163,7 +169,9 @@ def _follow(
                     cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key,
                     seed=seed,
                 )  # fmt: skip
-                outcome.verdicts[cell.grade_id] = examiner.verdict()
+                done = [c.source for c in program[:number] if not c.exam]
+                with ProgramHost(start, subject, done) as host:
+                    outcome.verdicts[cell.grade_id] = examiner.verdict(answer_with=host.answer)
                 moved_on = False
                 if examiner.hangs:
                     # The examiner has waited long enough: it would find the same in every part.

@@ -18,7 +18,7 @@ from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
-from autograder import stuck
+from autograder import plain_program, stuck
 from autograder.harness import Harness
 from autograder.raised import SUBJECT_ENV
 from autograder.recording import Recording
@@ -67,6 +67,24 @@ def run(engine: Channel, control: Channel, domain_id: int) -> None:
             _tell(engine, {"ran": number}, recording, exams)
 
 
+def run_program(engine: Channel, domain_id: int) -> None:
+    """Run the engine's cells, and then nodes of theirs as a plain program, with nobody to ask."""
+    kernel = make_kernel()
+    kernel.begin(Recording())
+    engine.send({"ready": True})
+    told, process = engine.receive(), os.getpid()
+    for number, source in enumerate(told["cells"]):
+        kernel.run_cell(source, number)
+        if os.getpid() != process:
+            os._exit(0)
+
+    def up() -> None:
+        engine.send({"up": True})
+        engine.close()
+
+    plain_program.run(kernel.cells.user_ns, told["program"], domain_id, up)
+
+
 def _tell(engine: Channel, message: dict[str, int], recording: Recording, exams: set[int]) -> None:
     """Send what cells show that showed something else, or nothing, before; then a message."""
     for number, outputs in recording.changed().items():
@@ -100,6 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--domain", type=int, required=True, help="domain id the exam is sat on")
     parser.add_argument("--limits", help="what it may use of the machine, as JSON")
     parser.add_argument("--files", type=Path, help="folder whose files it works with")
+    parser.add_argument("--program", action="store_true", help="run nodes as a plain program")
     options = parser.parse_args(arguments)
     if options.files:
         for entry in options.files.iterdir():
@@ -113,6 +132,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     engine = Channel(socket.socket(fileno=options.engine))
     control = Channel(socket.socket(fileno=options.control))
     try:
+        if options.program:
+            control.close()
+            run_program(engine, options.domain)
         run(engine, control, options.domain)
     except ChannelClosed:
         return 1

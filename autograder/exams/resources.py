@@ -33,6 +33,11 @@ from autograder.rigs.camera_orders import (
     require_zoom_at_once,
     require_zoom_kept,
 )
+from autograder.rigs.camera_plain import (
+    require_closed_at_the_end,
+    require_no_thread_at_the_end,
+    require_off_graph_at_the_end,
+)
 from autograder.rigs.camera_rate import (
     require_own_clock,
     require_rate,
@@ -154,6 +159,7 @@ def endpoints_gone(rig: CameraRig) -> None:
         require_endpoints(rig, node)
         rig.program.stop(DRIVER, bare=True)
         require_gone(rig, device, "After destroy_node()", node)
+    require_off_graph_at_the_end(rig)
 
 
 @EXAM.check(
@@ -178,6 +184,7 @@ def camera_given_back(rig: CameraRig) -> None:
             require_picture(rig, device, "When the driver is started again,")
             rig.program.stop(DRIVER)
             require_closed(rig, device, "After destroy_node()")
+    require_closed_at_the_end(rig)
 
 
 @EXAM.check(
@@ -207,6 +214,7 @@ def lives_are_flat(rig: CameraRig) -> None:
         )
     with rig.trying():
         require_flat_snapshots(rig)
+    require_no_thread_at_the_end(rig)
 
 
 @EXAM.check(

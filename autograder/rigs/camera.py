@@ -52,6 +52,7 @@ class CameraRig:
         """
         self.subject = bench.subject
         self.session = bench.session
+        self.programs = bench.programs
         self.process = Process(bench.outside)
         self._still = Stillness(bench.outside)
         node = bench.memory.get(ExaminerNode.__name__) or bench.session.run(ExaminerNode)
