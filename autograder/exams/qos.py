@@ -30,7 +30,7 @@ from autograder.rigs.pauses import BURST
 from autograder.rigs.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Sensor
 from autograder.rigs.refusal import Refusal, refusal
 from autograder.rigs.sensors import CONSUMERS, DRIVERS, SensorRig, sensor_rig
-from autograder.rigs.singles import require_each_at_once
+from autograder.rigs.singles import each_at_once
 from autograder.rigs.stops import (
     amiss,
     around,
@@ -114,7 +114,7 @@ def readings_flow(rig: SensorRig) -> None:
             expected="Each of the four sensors' readings comes out at the consumer.",
             actual=_silence(rig, silent),
         )
-    rig.once(require_each_at_once)
+    rig.once(each_at_once)
     for sensor in SENSORS:
         if sensor.topic in rig.node.altered:
             raise altered(sensor)

@@ -11,9 +11,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Iterable
 from pathlib import Path
-from weakref import WeakKeyDictionary
 
-from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import Empty
@@ -28,7 +26,7 @@ NAMELESS = "_NODE_NAME_UNKNOWN_"
 NO_NODE = "/(endpoints of no node)"
 """What stands for that node."""
 
-_ours: WeakKeyDictionary[Context, bytes] = WeakKeyDictionary()
+_ours: set[bytes] = set()
 
 
 def participant_of(end: TopicEndpointInfo) -> bytes:
@@ -44,15 +42,18 @@ def node_of(end: TopicEndpointInfo) -> str:
 
 
 def note_own(node: Node) -> None:
-    """Note that the participant of a node of this process is the examiner's."""
-    while node.context not in _ours:
+    """Note that the participant of a node of this process is the examiner's.
+
+    A context has a new one whenever all of its nodes have gone.
+    """
+    found: list[TopicEndpointInfo] = []
+    while len(found) != 1:
         # Nobody can have heard of this topic when it is looked at: what is there is ours.
         topic = f"_own_{secrets.token_hex(8)}"
         probe = node.create_publisher(Empty, topic, 1)
-        ends = node.get_publishers_info_by_topic(topic)
+        found = node.get_publishers_info_by_topic(topic)
         node.destroy_publisher(probe)
-        if len(ends) == 1:
-            _ours[node.context] = participant_of(ends[0])
+    _ours.add(participant_of(found[0]))
 
 
 def known(node: Node) -> set[bytes]:
@@ -75,7 +76,7 @@ def count_listening(domain_id: int) -> int:
 
 def is_own(end: TopicEndpointInfo) -> bool:
     """Whether an endpoint is the examiner's."""
-    return participant_of(end) in _ours.values()
+    return participant_of(end) in _ours
 
 
 def of_others(ends: Iterable[TopicEndpointInfo]) -> list[TopicEndpointInfo]:

@@ -3,8 +3,8 @@
 rclpy gathers what nodes wait on anew for each wait, of which there are several a message, and there
 is much of it: a node has services of its own, and each publisher and subscription an event handler.
 That takes longer than most callbacks (https://github.com/ros2/rclpy/issues/1223). Here it is kept
-until something is created or destroyed, and where messages come fast, not every wait is for the
-event handlers, too. The order of what is ready is rclpy's.
+until something is created or destroyed, and where messages come fast, not every wait is for news
+of profiles that do not fit, too. The order of what is ready is rclpy's.
 """
 
 # mypy: allow-untyped-calls
@@ -22,7 +22,11 @@ from rclpy.callback_groups import (
     MutuallyExclusiveCallbackGroup,
     ReentrantCallbackGroup,
 )
-from rclpy.event_handler import EventHandler
+from rclpy.event_handler import (
+    EventHandler,
+    QoSPublisherEventType,
+    QoSSubscriptionEventType,
+)
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import (
     ConditionReachedException,
@@ -39,8 +43,16 @@ from rclpy.waitable import NumberOfEntities
 Ready = tuple[Task, Any, Any]
 """A task to run, the entity whose callback it is, and that one's node, where there are these."""
 
-EVENTS_PERIOD_S = 0.05
-"""Seconds between two waits for event handlers: what they tell of is for people to read."""
+NEWS_PERIOD_S = 0.05
+"""Seconds between two waits for profiles or types that do not fit: that is for people to read."""
+
+_NEWS = (
+    QoSPublisherEventType.RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS,
+    QoSPublisherEventType.RCL_PUBLISHER_INCOMPATIBLE_TYPE,
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_REQUESTED_INCOMPATIBLE_QOS,
+    QoSSubscriptionEventType.RCL_SUBSCRIPTION_INCOMPATIBLE_TYPE,
+)
+"""What rclpy has each publisher and subscription listen to."""
 
 _KINDS = ("timer", "subscription", "guard_condition", "client", "service")
 """What a wait set calls its entities, in the order in which they run."""
@@ -82,8 +94,8 @@ class WaitList:
         self.changed = True
         self._nodes: Sequence[Node] = ()
         self._groups: dict[CallbackGroup, Any] = {}  # with one entity of each
-        self._all = self._but_events = _Wait((), ())
-        self._events_due = 0.0
+        self._all = self._but_news = _Wait((), ())
+        self._news_due = 0.0
 
     def ready(
         self, timeout: float | None, nodes: Sequence[Node] | None, condition: Callable[[], bool]
@@ -134,7 +146,7 @@ class WaitList:
     def clear(self) -> None:
         """Let go of everything: nobody waits any more."""
         self.changed, self._nodes, self._groups = True, (), {}
-        self._all = self._but_events = _Wait((), ())
+        self._all = self._but_news = _Wait((), ())
 
     def _begun(self, nodes: Sequence[Node]) -> Iterator[Ready]:
         """Yield the tasks that go on: coroutines, and those that no worker has come to."""
@@ -156,21 +168,21 @@ class WaitList:
         if self.changed or nodes != self._nodes:
             self.changed = False  # first: what is created from now on changes it again
             self._gather(nodes)
-        left = self._events_due - time.monotonic()
+        left = self._news_due - time.monotonic()
         if not self._may_begin_all():
             said: dict[CallbackGroup, bool] = {}
             wait = _Wait(
                 [each for each in self._all.owned if _may_begin(each.entity, said)], self._all.own
             )
         elif left > 0 and timeout != 0:
-            wait = self._but_events
+            wait = self._but_news
             timeout = left if timeout < 0 else min(left, timeout)
         else:
             wait = self._all
         with wait.used():
             ready = [] if wait.misses else wait.ready(self._executor, timeout)
-        if wait is not self._but_events:
-            self._events_due = time.monotonic() + EVENTS_PERIOD_S
+        if wait is not self._but_news:
+            self._news_due = time.monotonic() + NEWS_PERIOD_S
         if wait.misses:  # something was destroyed just now
             self.changed = True
         return ready
@@ -188,9 +200,7 @@ class WaitList:
         own = executor._guard.handle, executor._sigint_gc.handle
         self._groups = {each.entity.callback_group: each.entity for each in owned}
         self._all = _Wait(owned, own)
-        self._but_events = _Wait(
-            [each for each in owned if not isinstance(each.entity, EventHandler)], own
-        )
+        self._but_news = _Wait([each for each in owned if not _is_news(each.entity)], own)
 
     def _may_begin_all(self) -> bool:
         """Return whether every callback may begin, as is mostly so."""
@@ -243,6 +253,10 @@ def _may_begin(entity: Any, said: dict[CallbackGroup, bool]) -> bool:
     if group not in said or type(group) not in _ALIKE:
         said[group] = bool(group.can_execute(entity))
     return said[group]
+
+
+def _is_news(entity: Any) -> bool:
+    return isinstance(entity, EventHandler) and entity.event_type in _NEWS
 
 
 def _entities(node: Node, kind: str) -> Iterable[Any]:
