@@ -256,7 +256,8 @@ def _may_begin(entity: Any, said: dict[CallbackGroup, bool]) -> bool:
 
 
 def _is_news(entity: Any) -> bool:
-    return isinstance(entity, EventHandler) and entity.event_type in _NEWS
+    # By identity: an event of a publisher equals the one of a subscription with the same number.
+    return isinstance(entity, EventHandler) and any(entity.event_type is kind for kind in _NEWS)
 
 
 def _entities(node: Node, kind: str) -> Iterable[Any]:
