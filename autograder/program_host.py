@@ -93,7 +93,7 @@ class ProgramHost:
     def _end(self) -> None:
         if self._program is not None:
             self._program = None
-            self._subject.ready()
+            self._subject.tell_warden()
         self._held.close()
 
     def __enter__(self) -> Self:

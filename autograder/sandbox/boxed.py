@@ -89,6 +89,7 @@ class BoxedSubject:
         held.callback(os.close, self.handle)
         self._watch = Watch(init, self.handle, limits)
         self.pid = 0
+        self._numbers: tuple[int, list[int]] = (0, [])  # of it and of those that hold its sandbox
         self.delay: RunDelay = of_process(0)
 
     @property
@@ -97,7 +98,7 @@ class BoxedSubject:
         return self._watch.failed
 
     def ready(self) -> None:
-        """Find the subject's process, and tell the warden whom to look at."""
+        """Find the subject's process, bound it, and tell the warden of it."""
         if not self.pid:  # it is the only one that process 1 has, as yet
             children = Path(f"/proc/{self._init}/task/{self._init}/children").read_text().split()
             self.pid = int(children[0]) if children else 0
@@ -108,10 +109,16 @@ class BoxedSubject:
         if (group := cgroups.enclose(self.pid, self._limits)) is not None:
             self._held.callback(group.close)
         pid = number_inside(self.pid)
+        # Nothing of the student's runs yet: the others hold the sandbox.
         ours = [number for number in Sandboxed(self._init).inside() if number != pid]
         self.delay = SeenDelay(Sandboxed(self._init, ours), pid)
+        self._numbers = pid, ours
+        self.tell_warden()
+
+    def tell_warden(self) -> None:
+        """Have the warden look at this subject."""
         if self._warden is not None:
-            self._warden.tell(self._init, pid, ours)
+            self._warden.tell(self._init, *self._numbers)
 
     def require_holder(self) -> None:
         """Wait until what holds the sandbox says that it is there.

@@ -72,6 +72,9 @@ class HostSubject:
     def ready(self) -> None:
         """Need nothing: the process is the one that was started."""
 
+    def tell_warden(self) -> None:
+        """Tell nobody: there is no warden."""
+
     def failed(self) -> str:
         """Return why it did not start, in words."""
         return self.fate()

@@ -62,6 +62,9 @@ class RunningSubject(Protocol):
     def ready(self) -> None:
         """Note that the subject has started and has not run any of the student's code yet."""
 
+    def tell_warden(self) -> None:
+        """Have the warden, if there is one, look at this subject from now on."""
+
     def failed(self) -> str:
         """Return why it did not start, in words."""
 
