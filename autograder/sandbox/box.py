@@ -65,11 +65,11 @@ class Box:
         self._make_network()
         asked, asks = socket.socketpair()
         with asked, asks:
-            warden = self._start_warden(asked)
+            warden = self._held.enter_context(Warden(self._start_warden(asked)))
             command = [*command, "--outside", str(asks.fileno())]
             fds = [*options.pop("pass_fds", ()), asks.fileno()]
-            examiner, init = self._start_examiner(command, fds, options)
-        self._warden = self._held.enter_context(Warden(warden, init))
+            examiner, warden.examiner = self._start_examiner(command, fds, options)
+        self._warden = warden
         return examiner
 
     def join(self, command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:

@@ -36,11 +36,14 @@ def end(process: Process) -> None:
 
 
 class Warden:
-    """A running warden (`autograder.outside.warden`), as the engine sees it."""
+    """A running warden (`autograder.outside.warden`), as the engine sees it.
 
-    def __init__(self, process: Process, examiner: int) -> None:
-        """Have one that answers an examiner, by the first process of that one's sandbox."""
-        self._process, self._examiner = process, examiner
+    ``examiner`` is the first process of the sandbox of the examiner whom it answers.
+    """
+
+    def __init__(self, process: Process) -> None:
+        """Take the process, and end it with this."""
+        self._process, self.examiner = process, 0
 
     def tell(self, init: int, pid: int, ours: list[int]) -> None:
         """Tell it whom to look at.
@@ -50,7 +53,7 @@ class Warden:
             pid: the subject, by its number in there.
             ours: what else is in there, by such numbers.
         """
-        told = {"subject": init, "examiner": self._examiner, "pid": pid, "ours": ours}
+        told = {"subject": init, "examiner": self.examiner, "pid": pid, "ours": ours}
         assert self._process.stdin is not None
         with suppress(BrokenPipeError):  # without an answer the examiner reports a grader's error
             self._process.stdin.write(json.dumps(told).encode() + b"\n")
