@@ -31,6 +31,10 @@ MAX_STAGED = 500
 """Files that are copied; for each of them nbgrader lists its folder again, several times."""
 
 
+AS_TEXT = ".txt"
+"""What is put after the name of a file that a browser would run."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """What nbgrader's configuration says of files (``CourseDirectory``).
@@ -70,7 +74,7 @@ class _LeftOut:
             )
         if self.active:
             found.append(
-                f"{named(self.active)} is missing {what}: a browser would run what stands in it."
+                f"{named(self.active)} has {AS_TEXT} after its name {what}: a browser would run it."
             )
         if self.too_many:
             found.append(f"{self.too_many} files are missing {what}: {MAX_STAGED} are copied.")
@@ -124,9 +128,10 @@ def copy_files(
             left_out.too_many += 1
         elif not os.access(path, os.R_OK):
             left_out.unreadable.append(str(name))
-        elif not screen.may_lie_beside(name.name, path.read_bytes):
-            left_out.active.append(str(name))
         else:
+            if not screen.may_lie_beside(name.name, path.read_bytes):
+                left_out.active.append(str(name))
+                name = name.with_name(name.name + AS_TEXT)
             (staged / name.parent).mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, staged / name, follow_symlinks=False)
             room -= status.st_size
@@ -149,7 +154,7 @@ def copy_around(
         if _is_passed_over(name, limits.ignored, pages):
             continue
         if not screen.may_lie_beside(name.name, lambda content=content: content):  # type: ignore[misc]
-            continue
+            name = name.with_name(name.name + AS_TEXT)
         if not any((staged / part).is_file() for part in (name, *name.parents)):
             (staged / name.parent).mkdir(parents=True, exist_ok=True)
             with suppress(IsADirectoryError):
