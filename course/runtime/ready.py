@@ -285,6 +285,9 @@ class _Wait:
             except InvalidHandle:
                 self.misses = True
         self._handles["guard_condition"] += own
+        self._guards = [each.entity for each in owned if each.kind == "guard_condition"]
+        # Of other waitables, each wait may need another number of places.
+        self._is_of_one_size = all(isinstance(w.entity, EventHandler) for w in self._waitables)
         items = [each.entity for each in self._waitables]
         items += [handle for handles in self._handles.values() for handle in handles]
         self._use = [(item.__enter__, item.__exit__) for item in items]
@@ -308,12 +311,12 @@ class _Wait:
 
     def ready(self, executor: Executor, timeout: float) -> list[_Owned]:
         """Return what is ready, after ``timeout`` s at most (for ever if it is negative)."""
-        for each in self.owned:
-            if each.kind == "guard_condition" and each.entity._executor_triggered:
-                each.entity.trigger()  # its callback has not begun since
+        for guard in self._guards:
+            if guard._executor_triggered:
+                guard.trigger()  # its callback has not begun since
         wait_set = self._wait_set or self._make(executor)
-        if all(isinstance(each.entity, EventHandler) for each in self._waitables):
-            self._wait_set = wait_set  # of other waitables, each wait may need another number
+        if self._is_of_one_size:
+            self._wait_set = wait_set
         wait_set.clear_entities()
         for kind, handles in self._handles.items():
             if handles:
