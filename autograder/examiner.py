@@ -79,7 +79,7 @@ def serve(
         if request["moved_on"]:
             sittings.clear()
         outside = outside or Here(int(request["pid"]))
-        # Nobody starts a second process beside a student's own kernel.
+        # In a student's own notebook there is only the kernel's process.
         programs = Programs(requests, answers, outside) if outside.own_network else None
         verdict = sit(request, session, subject, outside, sittings, programs)
         answer = {"verdict": verdict.as_data(), "hangs": subject.hangs}

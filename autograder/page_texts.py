@@ -1,7 +1,7 @@
 """Texts of a submission as HTML, made in a process that ends when one of them takes too long.
 
-Parsers of Markdown and lexers take a minute for some texts of 100 kB, and whoever waits for them is
-the one writer of a whole class. So a text has a bound on its size, the process that formats it one
+Markdown parsers and lexers take a minute for some texts of 100 kB, and the gradebook's only writer
+would wait for them. So a text has a bound on its size, the process that formats it one
 on its memory and on its processor time (which counts what the text costs, however busy the machine
 is), and so have all texts of a page. What is over is for the caller to show as it was typed.
 """
@@ -70,7 +70,7 @@ class Page:
 
 
 class _Formatter:
-    """The process that formats (`autograder.formatting`): started when needed, and anew if lost."""
+    """The process that formats (`autograder.formatting`): started when needed, also anew."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None

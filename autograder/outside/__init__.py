@@ -1,4 +1,4 @@
-"""What an examination needs of this machine beside DDS, and an examiner in a sandbox cannot reach.
+"""What an examiner needs from this machine besides DDS, and cannot reach from its sandbox.
 
 The processes of a submission are looked at (their threads, files, memory, processor time), and its
 network is made to lose packets. For a sandboxed submission a *warden* does so: a small process

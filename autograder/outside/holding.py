@@ -184,7 +184,7 @@ class _Hold:
                 self._stopped.pop(tid, None)
 
     def _let_go(self) -> None:
-        """Let all go on; whoever still has to stop for it does so when others have gone on."""
+        """Let all threads go on; one that has not stopped yet is let go as soon as it stops."""
         deadline = Deadline(HOLD_TIMEOUT_S)
         while self._seized and deadline.left:
             for tid, owed in list(self._stopped.items()):
