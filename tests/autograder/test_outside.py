@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -78,9 +79,11 @@ def test_an_examiner_reaches_nothing_of_ours(
 @needs_warm_starts
 def test_a_forked_examiner_is_where_its_sandbox_is() -> None:
     """It is in no namespace of this process's but the time's, and has no right."""
-    with Box(warm=True) as box:
-        command = [sys.executable, "-P", "-m", "autograder.examiner", "--control", "0"]
-        examiner = box.spawn([*command, "--domain", "1"])
+    subject, control = socket.socketpair()
+    with subject, control, Box(warm=True) as box:
+        command = [sys.executable, "-P", "-m", "autograder.examiner", "--domain", "1"]
+        fd = control.fileno()
+        examiner = box.spawn([*command, "--control", str(fd)], pass_fds=[fd])
         status = Path(f"/proc/{examiner.pid}/status")
         assert poll(lambda: "Seccomp:\t2" in status.read_text(), 30.0, Pulse())
         for kind in ("mnt", "pid", "net", "ipc", "uts"):
@@ -89,6 +92,7 @@ def test_a_forked_examiner_is_where_its_sandbox_is() -> None:
         assert "CapEff:\t0000000000000000" in status.read_text()
         if os.geteuid() == 0:
             assert "Uid:\t0" not in status.read_text()
+        assert examiner.poll() is None
         for stream in (examiner.stdin, examiner.stdout, examiner.stderr):
             assert stream is not None
             stream.close()

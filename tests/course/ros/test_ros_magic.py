@@ -100,7 +100,7 @@ def assert_is_a_rate(text: str, elapsed: float) -> None:
     )
     messages = int(re.search(r"over (\d+) messages", text)[1])  # type: ignore[index]
     assert (messages - 1) / rate <= elapsed
-    rounded = 0.0001  # s
+    rounded = 0.0001 + 0.0005 / rate**2  # s: of a period, and of a rate, as they are printed
     assert shortest - rounded <= 1 / rate <= longest + rounded
 
 
