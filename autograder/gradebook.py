@@ -111,6 +111,9 @@ class CourseGradebook:
                 del config.Autograde.exporter_class  # what is staged can be read
         if "exporter_class" not in config.GenerateFeedback:
             config.GenerateFeedback.exporter_class = FeedbackExporter
+        if "optimistic_validation" not in config.Exporter:
+            # A notebook is compared with the format once all of a converter's steps are done.
+            config.Exporter.optimistic_validation = True
         index_page.configure(config)
         self._engines = Engines()
         self.config: Config = config
