@@ -1,19 +1,21 @@
 """What one process uses, as its folder in /proc tells; nothing, once it has ended.
 
-Read as bytes, since a process gives itself whatever name it likes.
+Read as bytes, since a process gives itself whatever name it likes; and by plain system calls, since
+it is read ten times a second for each submission that runs, and `pathlib` takes far longer.
 """
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
-_PAGE = os.sysconf("SC_PAGE_SIZE")
 _TICK = os.sysconf("SC_CLK_TCK")
 _ENDED = (b"Z", b"X")
+_TCP = re.compile(rb"^TCP: inuse (\d+) .*\btw (\d+)", re.MULTILINE)
+_TCP6 = re.compile(rb"^TCP6: inuse (\d+)", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -28,8 +30,8 @@ class Process:
         cpu: with that of its children that have ended, and that somebody has waited for.
     """
 
-    folder: Path
-    alive: Path
+    folder: str
+    alive: str
     own: float
     cpu: float
 
@@ -38,7 +40,7 @@ class Process:
         return sum(state == b"R" for _, state in _threads(self.folder))
 
 
-def process(folder: Path) -> Process | None:
+def process(folder: str) -> Process | None:
     """Return the process whose folder in /proc this is; None if there is nothing left of it."""
     with suppress(OSError):
         state, *numbers = _stat(folder)
@@ -51,9 +53,10 @@ def process(folder: Path) -> Process | None:
     return None
 
 
-def _threads(folder: Path) -> Iterator[tuple[Path, bytes]]:
+def _threads(folder: str) -> Iterator[tuple[str, bytes]]:
     with suppress(OSError):
-        for thread in (folder / "task").iterdir():
+        for name in os.listdir(f"{folder}/task"):  # noqa: PTH208 - the names alone, of many
+            thread = f"{folder}/task/{name}"
             with suppress(OSError):
                 yield thread, _stat(thread)[0]
 
@@ -61,41 +64,40 @@ def _threads(folder: Path) -> Iterator[tuple[Path, bytes]]:
 def descriptors(process: Process) -> int:
     """Return the number of open file descriptors."""
     with suppress(OSError):
-        return len(os.listdir(process.alive / "fd"))  # noqa: PTH208 - the names alone, of many
+        return len(os.listdir(f"{process.alive}/fd"))  # noqa: PTH208
     return 0
 
 
-def anonymous(process: Process) -> int:
-    """Return the bytes of memory that belong to no file."""
-    with suppress(OSError):
-        _, resident, shared = (process.alive / "statm").read_bytes().split()[:3]
-        return (int(resident) - int(shared)) * _PAGE
-    return 0
+def memory(process: Process) -> tuple[int, int]:
+    """Return the bytes of memory that belong to no file, and those of the tables of its addresses.
 
-
-def page_tables(process: Process) -> int:
-    """Return the bytes of the tables of its addresses, which is not in what it holds otherwise."""
+    The latter are not in what it holds otherwise.
+    """
     with suppress(OSError, IndexError):
-        status = (process.alive / "status").read_bytes()
-        return int(status.partition(b"\nVmPTE:")[2].split(maxsplit=1)[0]) * 1024
-    return 0
+        status = content(f"{process.alive}/status")
+        anonymous, tables = (
+            int(status.partition(name)[2].split(maxsplit=1)[0]) * 1024
+            for name in (b"\nRssAnon:", b"\nVmPTE:")
+        )
+        return anonymous, tables
+    return 0, 0
 
 
-def rows(table: Path) -> list[bytes]:
+def rows(table: str) -> list[bytes]:
     """Return the rows of a table in /proc/PID/net, without its heading."""
     with suppress(OSError):
-        return table.read_bytes().splitlines()[1:]
+        return content(table).splitlines()[1:]
     return []
 
 
-def locked_devices(table: Path) -> list[tuple[int, int]]:
+def locked_devices(table: str) -> list[tuple[int, int]]:
     """Return the device of each file that a process in a namespace has locked, one a lock.
 
     Those without an owner, which a sandbox cannot have, are shown in every namespace.
     """
     found = []
     with suppress(OSError):
-        for row in table.read_bytes().splitlines():
+        for row in content(table).splitlines():
             with suppress(ValueError, IndexError):
                 # 1: POSIX  ADVISORY  WRITE 7 00:4f:5 0 EOF; who waits for one has a -> behind 1:
                 owner, place = row.replace(b" -> ", b" ").split()[4:6]
@@ -103,6 +105,18 @@ def locked_devices(table: Path) -> list[tuple[int, int]]:
                 if int(owner) > 0:
                     found.append((int(major, 16), int(minor, 16)))
     return found
+
+
+def has_connections(net: str) -> bool:
+    """Whether there are TCP sockets, listening or closing ones too, in a network's folder in /proc.
+
+    To write down those of one network, the kernel looks through the machine's, for milliseconds;
+    how many there are it knows. Where it does not say, there may be some.
+    """
+    with suppress(OSError):
+        counts = _TCP.search(content(f"{net}/sockstat")), _TCP6.search(content(f"{net}/sockstat6"))
+        return any(found is None or any(map(int, found.groups())) for found in counts)
+    return True
 
 
 def queued(row: bytes) -> int:
@@ -116,12 +130,27 @@ def queued(row: bytes) -> int:
 def share(process: Process) -> int:
     """Return the fair share of the memory that it uses: what is shared counts in parts."""
     with suppress(OSError):
-        for line in (process.alive / "smaps_rollup").read_bytes().splitlines():
+        for line in content(f"{process.alive}/smaps_rollup").splitlines():
             if line.startswith(b"Pss_Anon:"):
                 return int(line.split()[1]) * 1024
     return 0
 
 
-def _stat(task: Path) -> list[bytes]:
+def content(path: str) -> bytes:
+    """Return what stands in a file of /proc.
+
+    Raises:
+        OSError: it is not there, or not any more.
+    """
+    file, parts = os.open(path, os.O_RDONLY), []
+    try:
+        while part := os.read(file, 1 << 16):
+            parts.append(part)
+    finally:
+        os.close(file)
+    return b"".join(parts)
+
+
+def _stat(task: str) -> list[bytes]:
     """Return what follows the name, which can hold anything, in a task's ``stat``."""
-    return (task / "stat").read_bytes().rpartition(b")")[2].split()
+    return content(f"{task}/stat").rpartition(b")")[2].split()

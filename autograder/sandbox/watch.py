@@ -21,7 +21,7 @@ LONGEST = 0.5
 COUNTED = 5
 """Each so manyeth look counts who is busy, however little they get of a busy machine, and what the
 kernel holds for all of them."""
-INTERNET = ("tcp", "tcp6", "udp", "udp6")
+TCP, UDP = ("tcp", "tcp6"), ("udp", "udp6")
 """Tables of sockets in /proc/PID/net that tell how much waits in each."""
 BLIND_TIMEOUT = 5.0
 """Seconds that the files of a sandbox may stay unreadable before it is ended for that."""
@@ -36,7 +36,8 @@ class Watch:
     def __init__(self, init: int, handle: int, limits: Limits) -> None:
         """Watch the namespace whose process 1 is ``init``, as seen from here, with a pidfd."""
         self._handle = handle
-        self._proc = Path(f"/proc/{init}/root/proc")  # the sandbox's own view: only its processes
+        self._proc = f"/proc/{init}/root/proc"  # the sandbox's own view: only its processes
+        self._root, self._net = f"/proc/{init}/root", f"/proc/{init}/net"
         self._limits = limits
         self._started = time.monotonic()
         self._over = threading.Event()
@@ -86,7 +87,7 @@ class Watch:
         """Return what is used too much of, as a phrase, or an empty string."""
         if time.monotonic() - self._started > self._limits.wall:
             return f"it ran for more than {self._limits.wall} s"
-        if (self._proc / "self").exists():
+        if Path(f"{self._proc}/self").exists():
             return ""  # whoever is here has no number in there; so this is still the machine's own
         processes = self._folders()
         if len(processes) > self._limits.processes:
@@ -94,8 +95,9 @@ class Watch:
         found = [process for entry in processes if (process := usage.process(entry)) is not None]
         return self._worked(found) or self._held(found)
 
-    def _folders(self) -> list[Path]:
-        return [entry for entry in self._proc.iterdir() if entry.name.isdecimal()]
+    def _folders(self) -> list[str]:
+        names = os.listdir(self._proc)  # noqa: PTH208
+        return [f"{self._proc}/{name}" for name in names if name.isdecimal()]
 
     @property
     def _too_many(self) -> str:
@@ -123,9 +125,9 @@ class Watch:
         What a child has used is its parent's once that has waited for it. Of one that nobody waits
         for, what it had used when it was last seen counts.
         """
-        own = {process.folder.name: process.own for process in processes}
-        for name, seconds in self._own.items():
-            if own.get(name, -1.0) < seconds:  # ended, or another one has its number
+        own = {process.folder: process.own for process in processes}
+        for folder, seconds in self._own.items():
+            if own.get(folder, -1.0) < seconds:  # ended, or another one has its number
                 self._gone += seconds
         self._own = own
         by_parents = sum(process.cpu for process in processes)
@@ -136,9 +138,10 @@ class Watch:
             return f"its processes had more than {self._limits.all_files} files open"
         if self._looks % COUNTED == 0 and (reason := self._kept_by_kernel()):
             return reason
-        kernel = self._queued + sum(map(usage.page_tables, processes))
+        memory = [usage.memory(process) for process in processes]
+        kernel = self._queued + sum(tables for _, tables in memory)
         # Cheap first: this counts what forked processes share once for each of them.
-        if kernel + sum(map(usage.anonymous, processes)) <= self._limits.memory:
+        if kernel + sum(anonymous for anonymous, _ in memory) <= self._limits.memory:
             return ""
         held = kernel
         for process in processes:
@@ -152,24 +155,22 @@ class Watch:
 
     def _kept_by_kernel(self) -> str:
         """Count what is in no process's own account: empty files, locks, and what sockets hold."""
-        root, own = self._proc.parent, set()
+        own = set()
         for scratch in view.SCRATCH:
             with suppress(OSError):
-                room, device = (
-                    os.statvfs(f"{root}{scratch}"),
-                    Path(f"{root}{scratch}").stat().st_dev,
-                )
+                place = f"{self._root}{scratch}"
+                room, device = os.statvfs(place), Path(place).stat().st_dev
                 own.add((os.major(device), os.minor(device)))
                 if room.f_files - room.f_ffree > self._limits.inodes:
                     return f"it had more than {self._limits.inodes} files in {scratch}"
-        locked = usage.locked_devices(self._proc / "locks")
+        locked = usage.locked_devices(f"{self._proc}/locks")
         if len(locked) > self._limits.locks:
             return f"it held more than {self._limits.locks} locks on files"
         if own and set(locked) - own:
             return "it held a lock on a file that is not its own, and that others may wait for"
-        net = root.parent / "net"
-        rows = [row for name in INTERNET for row in usage.rows(net / name)]
+        tables = (*TCP, *UDP) if usage.has_connections(self._net) else UDP
+        rows = [row for name in tables for row in usage.rows(f"{self._net}/{name}")]
         self._queued = sum(map(usage.queued, rows))
-        if len(rows) + len(usage.rows(net / "unix")) > self._limits.sockets:
+        if len(rows) + len(usage.rows(f"{self._net}/unix")) > self._limits.sockets:
             return f"there were more than {self._limits.sockets} sockets in its network"
         return ""
