@@ -205,6 +205,47 @@ def test_the_machine_s_own_processes_do_not_count() -> None:
     assert watch.reason == "it ran for more than 1 s"
 
 
+CONNECTIONS = """
+import socket, sys
+listens = {where}
+said = [listens]
+print(flush=True)
+sys.stdin.readline()
+said += [socket.create_connection(listens.getsockname()[:2]), listens.accept()[0]]
+said[1].send(bytes(1000))
+listens.close()
+print(flush=True)
+sys.stdin.readline()
+"""
+"""Two sockets of which one holds what nobody reads, once their network is up."""
+
+
+@needs_sandbox
+@pytest.mark.parametrize(
+    ("where", "table"),
+    [("socket.create_server(('127.0.0.1', 0))", "tcp"),
+     ("socket.create_server(('::1', 0), family=socket.AF_INET6)", "tcp6")],
+)  # fmt: skip
+def test_connections_are_seen_where_there_are_any(where: str, table: str) -> None:
+    script = 'ip link set lo up; echo; read -r _; exec "$@"'
+    command = [sys.executable, "-c", CONNECTIONS.format(where=where)]
+    with subprocess.Popen(
+        ["unshare", "-rn", "bash", "-c", script, "bash", *command],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    ) as process:  # fmt: skip
+        assert process.stdin is not None
+        assert process.stdout is not None
+        net, seen, held = f"/proc/{process.pid}/net", [], []
+        for _ in range(3):
+            process.stdout.readline()
+            seen.append(usage.has_connections(net))
+            held.append(sum(map(usage.queued, usage.rows(f"{net}/{table}"))))
+            process.stdin.write(b"\n")
+            process.stdin.flush()
+    assert seen == [False, True, True]
+    assert held == [0, 0, 1000]
+
+
 def watch_that_kills() -> Watch:
     """Watch a process that does nothing until the watch has killed it; return the watch."""
     with subprocess.Popen(["sleep", "infinity"]) as process:
