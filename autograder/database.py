@@ -24,7 +24,8 @@ from nbgrader.api import (
     SubmittedAssignment,
     SubmittedNotebook,
 )
-from sqlalchemy import create_engine, inspect, text
+from sqlalchemy import inspect, text
+from sqlalchemy.engine import Engine
 from sqlalchemy.orm import Session
 
 from course.errors import CourseError
@@ -107,14 +108,15 @@ def unusable(said: str, root: Path) -> GradebookUnusable | None:
     return None
 
 
-def require_this_schema(db_url: str, root: Path) -> None:
+def require_this_schema(engine: Engine, root: Path) -> None:
     """Look whether a gradebook, if there is one, has the tables that this nbgrader uses.
+
+    The ``engine`` for it is closed in the end, and opens again when needed.
 
     Raises:
         OldGradebookError: it has not.
         SQLAlchemyError: it cannot be read.
     """
-    engine = create_engine(db_url)
     try:
         tables = inspect(engine).get_table_names()
         if not tables:

@@ -242,7 +242,7 @@ class CourseGradebook:
     def opened(self) -> Iterator[Gradebook]:
         """Give nbgrader's own gradebook for the block; raises as `autograde` does."""
         try:
-            database.require_this_schema(self.coursedir.db_url, self.root)
+            database.require_this_schema(self._engines.engine(self.coursedir.db_url), self.root)
             with (
                 _quiet(),
                 self._engines.shared(),

@@ -209,7 +209,7 @@ class Engines:
     def engine(self, url: str, **options: Any) -> Any:
         """Return the engine for ``url``; ``options`` are those of `sqlalchemy.create_engine`."""
         if url not in self._engines:
-            engine = sqlalchemy.create_engine(url, **options)
+            engine = sqlalchemy.create_engine(url, **{"future": True, **options})
             sqlalchemy.event.listen(engine, "handle_error", self._note)
             self._engines[url] = engine
         return self._engines[url]
