@@ -37,8 +37,12 @@ class Tag(NamedTuple):
     number: int
 
     def __str__(self) -> str:
-        """Return the tag as text."""
-        return f"{self.nonce}/{self.phase}/{self.number}"
+        """Return the tag as text of 19 characters, as a rule.
+
+        After a frame of that length DDS needs no bytes to fill a gap before what comes next, of
+        which nobody knows what they hold: so readings that are equal are equal when serialized.
+        """
+        return f"{self.nonce:08}/{self.phase:04}/{self.number:05}"
 
     @classmethod
     def read(cls, text: str) -> Tag | None:
