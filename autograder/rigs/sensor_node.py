@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -47,10 +48,10 @@ def undemanding() -> QoSProfile:
 class ExaminerNode(QuietNode):
     """The examiner's endpoints: hardware outputs, a witness a topic, and the consumers' ends."""
 
-    def __init__(self) -> None:
+    def __init__(self, context: Context | None = None) -> None:
         """Create what does not depend on the student; a nonce of this run tags readings."""
         self.nonce = secrets.randbelow(2**24)  # that a float32 still holds exactly
-        super().__init__(f"examiner_{self.nonce}")
+        super().__init__(f"examiner_{self.nonce}", context)
         self._phases: dict[str, int] = {}
         self.hardware = {
             s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless()) for s in SENSORS

@@ -61,7 +61,7 @@ _ALIKE = (MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup)
 """Groups that say the same of each of their callbacks."""
 
 
-class _Owned(NamedTuple):
+class Owned(NamedTuple):
     """Something to wait on, its node, and its kind."""
 
     entity: Any
@@ -127,7 +127,7 @@ class WaitList:
             for begun in self._begun(looked_at):
                 found = True
                 yield begun
-            ready = self._wait(looked_at, limit)
+            ready = self.wait(looked_at, limit)
             if limit > 0:
                 limit = max(0.0, deadline - time.monotonic())
             over = limit == 0
@@ -163,8 +163,13 @@ class WaitList:
                 entry for entry in executor._tasks if not (entry[0].done() or entry[0].cancelled())
             ]
 
-    def _wait(self, nodes: Sequence[Node], timeout: float) -> list[_Owned]:
-        """Return what is ready, after ``timeout`` s at most (for ever if it is negative)."""
+    def wait(self, nodes: Sequence[Node], timeout: float) -> list[Owned]:
+        """Return what is ready, after ``timeout`` s at most (for ever if it is negative).
+
+        Raises:
+            ShutdownException: the executor was shut down.
+            ExternalShutdownException: its context was.
+        """
         if self.changed or nodes != self._nodes:
             self.changed = False  # first: what is created from now on changes it again
             self._gather(nodes)
@@ -174,7 +179,7 @@ class WaitList:
             wait = _Wait(
                 [each for each in self._all.owned if _may_begin(each.entity, said)], self._all.own
             )
-        elif left > 0 and timeout != 0:
+        elif left > 0 and timeout != 0 and self._but_news is not self._all:
             wait = self._but_news
             timeout = left if timeout < 0 else min(left, timeout)
         else:
@@ -190,7 +195,7 @@ class WaitList:
     def _gather(self, nodes: Sequence[Node]) -> None:
         self._nodes = list(nodes)
         owned = [
-            _Owned(entity, node, kind)
+            Owned(entity, node, kind)
             for kinds in (("waitable",), _KINDS)
             for node in nodes
             for kind in kinds
@@ -200,7 +205,9 @@ class WaitList:
         own = executor._guard.handle, executor._sigint_gc.handle
         self._groups = {each.entity.callback_group: each.entity for each in owned}
         self._all = _Wait(owned, own)
-        self._but_news = _Wait([each for each in owned if not _is_news(each.entity)], own)
+        rest = [each for each in owned if not _is_news(each.entity)]
+        # Who listens to no news need not wake up to look for any.
+        self._but_news = self._all if len(rest) == len(owned) else _Wait(rest, own)
 
     def _may_begin_all(self) -> bool:
         """Return whether every callback may begin, as is mostly so."""
@@ -268,11 +275,11 @@ def _entities(node: Node, kind: str) -> Iterable[Any]:
 class _Wait:
     """A wait on some entities, as often as needed."""
 
-    def __init__(self, owned: Sequence[_Owned], own: Sequence[Any]) -> None:
+    def __init__(self, owned: Sequence[Owned], own: Sequence[Any]) -> None:
         """Take entities, and the handles of the executor's own guards."""
         self.owned, self.own = owned, own
         self.misses = False  # one of them has been destroyed
-        self._waitables: list[_Owned] = []
+        self._waitables: list[Owned] = []
         self._handles: dict[str, list[Any]] = {kind: [] for kind in _KINDS}
         self._place: dict[int, int] = {}  # of an entity among `owned`, by its handle's pointer
         for place, each in enumerate(owned):
@@ -309,7 +316,7 @@ class _Wait:
             for end in used:
                 end(None, None, None)
 
-    def ready(self, executor: Executor, timeout: float) -> list[_Owned]:
+    def ready(self, executor: Executor, timeout: float) -> list[Owned]:
         """Return what is ready, after ``timeout`` s at most (for ever if it is negative)."""
         for guard in self._guards:
             if guard._executor_triggered:
