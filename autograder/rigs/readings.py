@@ -66,9 +66,16 @@ class Sensor:
 
     def message(self, tag: Tag, stamp: Time) -> Any:
         """Return a reading that carries ``tag`` and was taken at ``stamp``."""
+        return self.fill(self.type(), tag, stamp)
+
+    def fill(self, message: Any, tag: Tag, stamp: Time) -> Any:
+        """Make a reading, new or filled before, one that carries ``tag``; return it.
+
+        To make a message takes longer than to fill it.
+        """
         if self.type is String:
-            return String(data=str(tag))
-        message = self.type()
+            message.data = str(tag)
+            return message
         message.header.frame_id = str(tag)
         message.header.stamp = stamp.to_msg()
         numbers = [float(number) for number in tag]

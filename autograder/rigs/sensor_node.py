@@ -72,6 +72,7 @@ class ExaminerNode(QuietNode):
         # As they went out, serialized. One that comes back like that is told by it, and need not be
         # taken apart: most are, and each is heard at least twice.
         self._delivered: dict[str, dict[bytes, Tag]] = defaultdict(dict)
+        self._readings = {s.name: s.type() for s in SENSORS}  # each filled anew, to be serialized
         for sensor in SENSORS:
             self.listen(sensor, sensor.topic, undemanding(), self.witnessed)
 
@@ -161,7 +162,7 @@ class ExaminerNode(QuietNode):
         now = self.get_clock().now()
         self._stamps[sensor.name, now.nanoseconds] = tag
         self.sent[sensor.name, tag.phase][index] = now.nanoseconds
-        serialized = serialize_message(sensor.message(tag, now))
+        serialized = serialize_message(sensor.fill(self._readings[sensor.name], tag, now))
         self._delivered[sensor.name][serialized] = tag
         self._ends[sensor.name].publish(serialized)
 

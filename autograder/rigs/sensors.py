@@ -160,8 +160,15 @@ class SensorRig:
         """
         if timeout is None:
             return self.patience().wait(self.spinner, condition)
+        return self._holds(condition, timeout)
+
+    def wait_in_traffic(self, condition: Callable[[], Any], timeout: float) -> bool:
+        """Do the same while readings come in at their rate: 20 ms more or less do not matter."""
+        return self._holds(condition, timeout, often=False)
+
+    def _holds(self, condition: Callable[[], Any], timeout: float, *, often: bool = True) -> bool:
         with suppress(WaitTimeout):
-            self.spinner.until(condition, timeout=timeout, what="an observation")
+            self.spinner.until(condition, timeout, "an observation", often=often)
             return True
         return False
 

@@ -44,13 +44,18 @@ class Spinner(Executor):
         self._thread = threading.Thread(target=self._spin, name="examiner's nodes", daemon=True)
         self._thread.start()
 
-    def until(self, condition: Callable[[], Any], timeout: float, what: str) -> Any:
+    def until(
+        self, condition: Callable[[], Any], timeout: float, what: str, *, often: bool = True
+    ) -> Any:
         """Return the first true value of ``condition``, as `course.Session.until` does.
+
+        With ``often`` it is looked at after each callback, else every 20 ms. While many callbacks
+        run, to look takes as long as they do.
 
         Raises:
             WaitTimeout: it was not true in time.
         """
-        value = poll(condition, timeout, self._pulse)
+        value = poll(condition, timeout, self._pulse if often else Pulse())
         if value is None:
             raise WaitTimeout(f"Waited {timeout:g} s in vain for {what}.")
         return value
