@@ -73,6 +73,7 @@ class ExaminerNode(QuietNode):
         # taken apart: most are, and each is heard at least twice.
         self._delivered: dict[str, dict[bytes, Tag]] = defaultdict(dict)
         self._readings = {s.name: s.type() for s in SENSORS}  # each filled anew, to be serialized
+        self._filling = threading.Lock()  # a stream may publish while a check does
         for sensor in SENSORS:
             self.listen(sensor, sensor.topic, undemanding(), self.witnessed)
 
@@ -162,7 +163,8 @@ class ExaminerNode(QuietNode):
         now = self.get_clock().now()
         self._stamps[sensor.name, now.nanoseconds] = tag
         self.sent[sensor.name, tag.phase][index] = now.nanoseconds
-        serialized = serialize_message(sensor.fill(self._readings[sensor.name], tag, now))
+        with self._filling:
+            serialized = serialize_message(sensor.fill(self._readings[sensor.name], tag, now))
         self._delivered[sensor.name][serialized] = tag
         self._ends[sensor.name].publish(serialized)
 
