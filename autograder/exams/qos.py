@@ -7,6 +7,8 @@ profile for both sides or two, a transient-local stop.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -69,28 +71,27 @@ def nodes_start(rig: SensorRig) -> None:
                 actual=error.told,
             ) from None
     rig.wait(lambda: not any(line.startswith("There is no") for line in _faults(rig)))
-    if faults := _faults(rig):
+    if faults := list(_faults(rig)):
         raise Failed(expected="Every topic of the task has its endpoint.", actual=" ".join(faults))
 
 
-def _faults(rig: SensorRig) -> list[str]:
-    """Return what is missing, or has another type than the task says, a sentence each."""
-    found = []
+def _faults(rig: SensorRig) -> Iterator[str]:
+    """Yield what is missing, or has another type than the task says, a sentence each."""
     for sensor in SENSORS:
-        ends = {
-            f"subscription to hardware/{sensor.name}": rig.requested(f"hardware/{sensor.name}"),
-            f"publisher on {sensor.topic}": rig.offered(sensor.topic),
-            f"subscription to {sensor.topic}": rig.requested(sensor.topic),
-            f"publisher on consumer/{sensor.name}": rig.offered(f"consumer/{sensor.name}"),
-        }
+        ends = (
+            ("subscription to", f"hardware/{sensor.name}", rig.requested),
+            ("publisher on", sensor.topic, rig.offered),
+            ("subscription to", sensor.topic, rig.requested),
+            ("publisher on", f"consumer/{sensor.name}", rig.offered),
+        )
         wanted = f"{sensor.type.__module__.split('.')[0]}/msg/{sensor.type.__name__}"
-        for what, endpoints in ends.items():
-            types = {endpoint.topic_type for endpoint in endpoints}
+        for what, topic, endpoints in ends:
+            types = {endpoint.topic_type for endpoint in endpoints(topic)}
             if not types:
-                found.append(f"There is no {what}.")
+                yield f"There is no {what} {topic}."
             elif wanted not in types:
-                found.append(f"The {what} has type {', '.join(sorted(types))}, not {wanted}.")
-    return found
+                told = ", ".join(sorted(types))
+                yield f"The {what} {topic} has type {told}, not {wanted}."
 
 
 @EXAM.check(

@@ -11,10 +11,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from typing import Any, Protocol
 
 from autograder.rigs.stillness import Stillness
-from course import Session, WaitTimeout
+from course import WaitTimeout
 
 SETTLE_S = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
@@ -24,6 +24,13 @@ that a loss is repaired; a slower timer is none that anything of the tasks could
 _LOOK_S = 0.05  # between two looks at the threads
 _AT_FIRST_S = 0.25  # before the first look: what comes, comes within that time as a rule
 _CLIP_S = 0.2  # that may count between two looks: an examiner that was late itself saw nothing
+
+
+class Waits(Protocol):
+    """A session, or whatever else tells when a callback of its nodes has ended."""
+
+    def until(self, condition: Callable[[], Any], timeout: float, what: str) -> Any:
+        """Return the first true value of ``condition``; raise `WaitTimeout` if none is in time."""
 
 
 class Patience:
@@ -56,7 +63,7 @@ class Patience:
         self._looked = now if asleep else None
         return self._idle > 0 and now < self._end
 
-    def wait(self, session: Session, condition: Callable[[], Any]) -> bool:
+    def wait(self, session: Waits, condition: Callable[[], Any]) -> bool:
         """Wait until ``condition`` holds; return whether it did before the patience was over."""
         if self.lasts() and _holds(session, condition, min(_AT_FIRST_S, self.left)):
             return True
@@ -66,7 +73,7 @@ class Patience:
         return bool(condition())
 
 
-def _holds(session: Session, condition: Callable[[], Any], seconds: float) -> bool:
+def _holds(session: Waits, condition: Callable[[], Any], seconds: float) -> bool:
     with suppress(WaitTimeout):
         session.until(condition, timeout=seconds, what="an observation")
         return True

@@ -115,8 +115,8 @@ def pursue(
             watched.remove(pursuit)
         return not watched
 
-    rig.wait(lambda: over(Pursuit.settled), WATCHED + PATIENCE)
-    rig.wait(lambda: over(lambda pursuit: pursuit.settled() or pursuit.able), STAMINA)
+    rig.wait_in_traffic(lambda: over(Pursuit.settled), WATCHED + PATIENCE)
+    rig.wait_in_traffic(lambda: over(lambda pursuit: pursuit.settled() or pursuit.able), STAMINA)
     for pursuit in watched:
         pursuit.behind = UNKNOWN
     return {pursuit.sensor.name: pursuit for pursuit in pursuits}

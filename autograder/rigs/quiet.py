@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from rclpy.context import Context
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 
@@ -23,9 +24,9 @@ class QuietNode(Node):
     and have its executor wait for all of them anew before each callback: half of its work.
     """
 
-    def __init__(self, name: str) -> None:
-        """Create it as ``name``, which nobody else should use."""
-        super().__init__(name, start_parameter_services=False, enable_rosout=False)
+    def __init__(self, name: str, context: Context | None = None) -> None:
+        """Create it as ``name``, which nobody else should use; ``context``: not the default."""
+        super().__init__(name, context=context, start_parameter_services=False, enable_rosout=False)
         note_own(self)
 
     def create_publisher(self, *arguments: Any, **options: Any) -> Any:

@@ -37,8 +37,12 @@ class Tag(NamedTuple):
     number: int
 
     def __str__(self) -> str:
-        """Return the tag as text."""
-        return f"{self.nonce}/{self.phase}/{self.number}"
+        """Return the tag as text of 19 characters, as a rule.
+
+        After a frame of that length DDS needs no bytes to fill a gap before what comes next, of
+        which nobody knows what they hold: so readings that are equal are equal when serialized.
+        """
+        return f"{self.nonce:08}/{self.phase:04}/{self.number:05}"
 
     @classmethod
     def read(cls, text: str) -> Tag | None:
@@ -62,9 +66,16 @@ class Sensor:
 
     def message(self, tag: Tag, stamp: Time) -> Any:
         """Return a reading that carries ``tag`` and was taken at ``stamp``."""
+        return self.fill(self.type(), tag, stamp)
+
+    def fill(self, message: Any, tag: Tag, stamp: Time) -> Any:
+        """Make a reading, new or filled before, one that carries ``tag``; return it.
+
+        To make a message takes longer than to fill it.
+        """
         if self.type is String:
-            return String(data=str(tag))
-        message = self.type()
+            message.data = str(tag)
+            return message
         message.header.frame_id = str(tag)
         message.header.stamp = stamp.to_msg()
         numbers = [float(number) for number in tag]

@@ -13,9 +13,11 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from rclpy.context import Context
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.time import Time
 
 from autograder.rigs.moments import published_at
@@ -46,10 +48,10 @@ def undemanding() -> QoSProfile:
 class ExaminerNode(QuietNode):
     """The examiner's endpoints: hardware outputs, a witness a topic, and the consumers' ends."""
 
-    def __init__(self) -> None:
+    def __init__(self, context: Context | None = None) -> None:
         """Create what does not depend on the student; a nonce of this run tags readings."""
         self.nonce = secrets.randbelow(2**24)  # that a float32 still holds exactly
-        super().__init__(f"examiner_{self.nonce}")
+        super().__init__(f"examiner_{self.nonce}", context)
         self._phases: dict[str, int] = {}
         self.hardware = {
             s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless()) for s in SENSORS
@@ -67,6 +69,11 @@ class ExaminerNode(QuietNode):
         self.published: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)
         self.handed: dict[tuple[str, int], list[tuple[int, int]]] = defaultdict(list)
         self._stamps: dict[tuple[str, int], Tag] = {}  # ns since 1970
+        # As they went out, serialized. One that comes back like that is told by it, and need not be
+        # taken apart: most are, and each is heard at least twice.
+        self._delivered: dict[str, dict[bytes, Tag]] = defaultdict(dict)
+        self._readings = {s.name: s.type() for s in SENSORS}  # each filled anew, to be serialized
+        self._filling = threading.Lock()  # a stream may publish while a check does
         for sensor in SENSORS:
             self.listen(sensor, sensor.topic, undemanding(), self.witnessed)
 
@@ -84,14 +91,19 @@ class ExaminerNode(QuietNode):
         ``on`` is the node that gets the subscription, if not this one.
         """
 
-        def keep(message: Any, info: Any) -> None:
-            tag = self._tag(sensor, message)
+        delivered = self._delivered[sensor.name]
+
+        def keep(serialized: bytes, info: Any) -> None:
+            tag, message = delivered.get(serialized), None
+            if tag is None:
+                message = deserialize_message(serialized, sensor.type)
+                tag = self._tag(sensor, message)
             if tag is None:
                 self.foreign.add(topic)
             elif tag.nonce == self.nonce:
                 heard[sensor.name].append(tag)
                 when, kind = published_at(info), (sensor.name, tag.phase)
-                if not sensor.unchanged(message, tag):
+                if message is not None and not sensor.unchanged(message, tag):
                     self.altered.add(topic)
                     if sensor.blank(message):
                         self.blank.add(topic)
@@ -105,7 +117,9 @@ class ExaminerNode(QuietNode):
             incompatible_qos=on_incompatible, use_default_callbacks=False
         )
         node = on or self
-        return node.create_subscription(sensor.type, topic, note, qos, event_callbacks=events)
+        return node.create_subscription(
+            sensor.type, topic, note, qos, event_callbacks=events, raw=True
+        )
 
     @contextmanager
     def guests(self) -> Iterator[None]:
@@ -149,7 +163,10 @@ class ExaminerNode(QuietNode):
         now = self.get_clock().now()
         self._stamps[sensor.name, now.nanoseconds] = tag
         self.sent[sensor.name, tag.phase][index] = now.nanoseconds
-        self._ends[sensor.name].publish(sensor.message(tag, now))
+        with self._filling:
+            serialized = serialize_message(sensor.fill(self._readings[sensor.name], tag, now))
+        self._delivered[sensor.name][serialized] = tag
+        self._ends[sensor.name].publish(serialized)
 
     def _tag(self, sensor: Sensor, message: Any) -> Tag | None:
         """Return the tag of a reading, by its stamp if nothing else is left of it.

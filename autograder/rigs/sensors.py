@@ -29,6 +29,7 @@ from autograder.rigs.patience import Patience
 from autograder.rigs.phrases import callback_raised
 from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor
 from autograder.rigs.sensor_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
+from autograder.rigs.spinning import Spinner
 from autograder.rigs.stillness import HANGS, RESTLESS, Stillness
 from course import WaitTimeout
 
@@ -55,10 +56,9 @@ class SensorRig:
         """Bring up the examiner's endpoints on the subject's domain."""
         self.bench = bench
         self.subject = bench.subject
-        self._session = bench.session
-        node = bench.session.run(ExaminerNode)
-        assert isinstance(node, ExaminerNode)
-        self.node = node
+        self.spinner = Spinner(bench.session.context)
+        self.node = ExaminerNode(bench.session.context)
+        self.spinner.add_node(self.node)
         self._experiments = bench.memory
         self._probes = 0  # how often probed
         self._still = Stillness(bench.outside)
@@ -159,9 +159,16 @@ class SensorRig:
         Without ``timeout`` (s) that is when it would have come: see `Patience`.
         """
         if timeout is None:
-            return self.patience().wait(self._session, condition)
+            return self.patience().wait(self.spinner, condition)
+        return self._holds(condition, timeout)
+
+    def wait_in_traffic(self, condition: Callable[[], Any], timeout: float) -> bool:
+        """Do the same while readings come in at their rate: 20 ms more or less do not matter."""
+        return self._holds(condition, timeout, often=False)
+
+    def _holds(self, condition: Callable[[], Any], timeout: float, *, often: bool = True) -> bool:
         with suppress(WaitTimeout):
-            self._session.until(condition, timeout=timeout, what="an observation")
+            self.spinner.until(condition, timeout, "an observation", often=often)
             return True
         return False
 
@@ -311,4 +318,4 @@ def sensor_rig(bench: Bench) -> Iterator[SensorRig]:
     try:
         yield rig
     finally:
-        bench.session.stop(rig.node)
+        rig.spinner.close()

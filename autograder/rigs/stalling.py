@@ -55,9 +55,9 @@ def _busy_consumer(rig: SensorRig, phase: str) -> dict[str, Backlog] | None:
     with rig.busy(CONSUMERS) as let_go:
         streams = {s.name: Stream(rig.node, s, phase, _limit(s)) for s in SENSORS if s is not IMU}
         before_imu = CAMERA.rate * (PAUSE - IMU_PAUSE)
-        rig.wait(lambda: streams[CAMERA.name].sent >= before_imu, LONGEST)
+        rig.wait_in_traffic(lambda: streams[CAMERA.name].sent >= before_imu, LONGEST)
         streams[IMU.name] = Stream(rig.node, IMU, phase)
-        rig.wait(
+        rig.wait_in_traffic(
             lambda: all(stream.sent >= _least(stream.sensor) for stream in streams.values()),
             LONGEST,
         )

@@ -3,8 +3,9 @@
 rclpy gathers what nodes wait on anew for each wait, of which there are several a message, and there
 is much of it: a node has services of its own, and each publisher and subscription an event handler.
 That takes longer than most callbacks (https://github.com/ros2/rclpy/issues/1223). Here it is kept
-until something is created or destroyed, and where messages come fast, not every wait is for news
-of profiles that do not fit, too. The order of what is ready is rclpy's.
+until something is created or destroyed, and where messages come fast, not every wait is for what
+people ask now and then, too: news of profiles that do not fit, and parameters. The order of what is
+ready is rclpy's.
 """
 
 # mypy: allow-untyped-calls
@@ -43,8 +44,9 @@ from rclpy.waitable import NumberOfEntities
 Ready = tuple[Task, Any, Any]
 """A task to run, the entity whose callback it is, and that one's node, where there are these."""
 
-NEWS_PERIOD_S = 0.05
-"""Seconds between two waits for profiles or types that do not fit: that is for people to read."""
+SELDOM_S = 0.05
+"""Seconds between two waits for profiles or types that do not fit, which is for people to read, and
+for requests that concern parameters."""
 
 _NEWS = (
     QoSPublisherEventType.RCL_PUBLISHER_OFFERED_INCOMPATIBLE_QOS,
@@ -54,6 +56,9 @@ _NEWS = (
 )
 """What rclpy has each publisher and subscription listen to."""
 
+_PARAMETERS = "rcl_interfaces.srv."
+"""What the modules of the services' types begin with that rclpy gives each node: six of them."""
+
 _KINDS = ("timer", "subscription", "guard_condition", "client", "service")
 """What a wait set calls its entities, in the order in which they run."""
 
@@ -61,7 +66,7 @@ _ALIKE = (MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup)
 """Groups that say the same of each of their callbacks."""
 
 
-class _Owned(NamedTuple):
+class Owned(NamedTuple):
     """Something to wait on, its node, and its kind."""
 
     entity: Any
@@ -94,8 +99,8 @@ class WaitList:
         self.changed = True
         self._nodes: Sequence[Node] = ()
         self._groups: dict[CallbackGroup, Any] = {}  # with one entity of each
-        self._all = self._but_news = _Wait((), ())
-        self._news_due = 0.0
+        self._all = self._often = _Wait((), ())
+        self._seldom_due = 0.0
 
     def ready(
         self, timeout: float | None, nodes: Sequence[Node] | None, condition: Callable[[], bool]
@@ -127,7 +132,7 @@ class WaitList:
             for begun in self._begun(looked_at):
                 found = True
                 yield begun
-            ready = self._wait(looked_at, limit)
+            ready = self.wait(looked_at, limit)
             if limit > 0:
                 limit = max(0.0, deadline - time.monotonic())
             over = limit == 0
@@ -146,7 +151,7 @@ class WaitList:
     def clear(self) -> None:
         """Let go of everything: nobody waits any more."""
         self.changed, self._nodes, self._groups = True, (), {}
-        self._all = self._but_news = _Wait((), ())
+        self._all = self._often = _Wait((), ())
 
     def _begun(self, nodes: Sequence[Node]) -> Iterator[Ready]:
         """Yield the tasks that go on: coroutines, and those that no worker has come to."""
@@ -163,26 +168,31 @@ class WaitList:
                 entry for entry in executor._tasks if not (entry[0].done() or entry[0].cancelled())
             ]
 
-    def _wait(self, nodes: Sequence[Node], timeout: float) -> list[_Owned]:
-        """Return what is ready, after ``timeout`` s at most (for ever if it is negative)."""
+    def wait(self, nodes: Sequence[Node], timeout: float) -> list[Owned]:
+        """Return what is ready, after ``timeout`` s at most (for ever if it is negative).
+
+        Raises:
+            ShutdownException: the executor was shut down.
+            ExternalShutdownException: its context was.
+        """
         if self.changed or nodes != self._nodes:
             self.changed = False  # first: what is created from now on changes it again
             self._gather(nodes)
-        left = self._news_due - time.monotonic()
+        left = self._seldom_due - time.monotonic()
         if not self._may_begin_all():
             said: dict[CallbackGroup, bool] = {}
             wait = _Wait(
                 [each for each in self._all.owned if _may_begin(each.entity, said)], self._all.own
             )
-        elif left > 0 and timeout != 0:
-            wait = self._but_news
+        elif left > 0 and timeout != 0 and self._often is not self._all:
+            wait = self._often
             timeout = left if timeout < 0 else min(left, timeout)
         else:
             wait = self._all
         with wait.used():
             ready = [] if wait.misses else wait.ready(self._executor, timeout)
-        if wait is not self._but_news:
-            self._news_due = time.monotonic() + NEWS_PERIOD_S
+        if wait is not self._often:
+            self._seldom_due = time.monotonic() + SELDOM_S
         if wait.misses:  # something was destroyed just now
             self.changed = True
         return ready
@@ -190,7 +200,7 @@ class WaitList:
     def _gather(self, nodes: Sequence[Node]) -> None:
         self._nodes = list(nodes)
         owned = [
-            _Owned(entity, node, kind)
+            Owned(entity, node, kind)
             for kinds in (("waitable",), _KINDS)
             for node in nodes
             for kind in kinds
@@ -200,7 +210,9 @@ class WaitList:
         own = executor._guard.handle, executor._sigint_gc.handle
         self._groups = {each.entity.callback_group: each.entity for each in owned}
         self._all = _Wait(owned, own)
-        self._but_news = _Wait([each for each in owned if not _is_news(each.entity)], own)
+        rest = [each for each in owned if not _is_seldom(each)]
+        # Who has nothing of the kind need not wake up to look for it.
+        self._often = self._all if len(rest) == len(owned) else _Wait(rest, own)
 
     def _may_begin_all(self) -> bool:
         """Return whether every callback may begin, as is mostly so."""
@@ -255,7 +267,11 @@ def _may_begin(entity: Any, said: dict[CallbackGroup, bool]) -> bool:
     return said[group]
 
 
-def _is_news(entity: Any) -> bool:
+def _is_seldom(owned: Owned) -> bool:
+    """Return whether to hear of something a moment later makes no difference to anybody."""
+    entity = owned.entity
+    if owned.kind == "service":
+        return str(getattr(entity.srv_type, "__module__", "")).startswith(_PARAMETERS)
     # By identity: an event of a publisher equals the one of a subscription with the same number.
     return isinstance(entity, EventHandler) and any(entity.event_type is kind for kind in _NEWS)
 
@@ -268,11 +284,11 @@ def _entities(node: Node, kind: str) -> Iterable[Any]:
 class _Wait:
     """A wait on some entities, as often as needed."""
 
-    def __init__(self, owned: Sequence[_Owned], own: Sequence[Any]) -> None:
+    def __init__(self, owned: Sequence[Owned], own: Sequence[Any]) -> None:
         """Take entities, and the handles of the executor's own guards."""
         self.owned, self.own = owned, own
         self.misses = False  # one of them has been destroyed
-        self._waitables: list[_Owned] = []
+        self._waitables: list[Owned] = []
         self._handles: dict[str, list[Any]] = {kind: [] for kind in _KINDS}
         self._place: dict[int, int] = {}  # of an entity among `owned`, by its handle's pointer
         for place, each in enumerate(owned):
@@ -309,7 +325,7 @@ class _Wait:
             for end in used:
                 end(None, None, None)
 
-    def ready(self, executor: Executor, timeout: float) -> list[_Owned]:
+    def ready(self, executor: Executor, timeout: float) -> list[Owned]:
         """Return what is ready, after ``timeout`` s at most (for ever if it is negative)."""
         for guard in self._guards:
             if guard._executor_triggered:
