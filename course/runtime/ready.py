@@ -57,7 +57,8 @@ _NEWS = (
 """What rclpy has each publisher and subscription listen to."""
 
 _PARAMETERS = "rcl_interfaces.srv."
-"""What the modules of the services' types begin with that rclpy gives each node: six of them."""
+"""What the modules of the services' types begin with that rclpy gives each node: six of them, whose
+names begin with the node's own. Others may serve one of these types, too."""
 
 _KINDS = ("timer", "subscription", "guard_condition", "client", "service")
 """What a wait set calls its entities, in the order in which they run."""
@@ -271,7 +272,8 @@ def _is_seldom(owned: Owned) -> bool:
     """Return whether to hear of something a moment later makes no difference to anybody."""
     entity = owned.entity
     if owned.kind == "service":
-        return str(getattr(entity.srv_type, "__module__", "")).startswith(_PARAMETERS)
+        own = entity.service_name.startswith(f"{owned.node.get_fully_qualified_name()}/")
+        return own and str(getattr(entity.srv_type, "__module__", "")).startswith(_PARAMETERS)
     # By identity: an event of a publisher equals the one of a subscription with the same number.
     return isinstance(entity, EventHandler) and any(entity.event_type is kind for kind in _NEWS)
 
