@@ -10,15 +10,16 @@ next SIGINT, which makes them anew, so that lives can be compared.
 
 from __future__ import annotations
 
+import os
 import signal
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
-from queue import SimpleQueue
+from collections.abc import Callable, Mapping
+from threading import Thread
 from typing import Any
 
 import rclpy
 from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
+from rclpy.task import Future
 from rclpy.utilities import get_default_context
 
 SIMULATED = ["--ros-args", "-p", "use_sim_time:=true"]
@@ -62,39 +63,40 @@ def _live(
     for node in nodes:
         executor.add_node(node)
     up()
-    with interrupts.raised():
-        executor.spin()
+    executor.spin_until_future_complete(interrupts.next())
     for node in nodes:
         node.destroy_node()
     executor.shutdown(timeout_sec=0.0)
 
 
 class _Interrupts:
-    """SIGINT raises KeyboardInterrupt while nodes spin; one that comes at another time is kept."""
+    """SIGINT, each counted once. None of them cuts a callback short, which could hold a lock.
+
+    A handler of Python's runs in the main thread, which may wait for messages in C. So a thread
+    reads what Python writes to a pipe at each signal.
+    """
 
     def __init__(self) -> None:
-        self._kept: SimpleQueue[int] = SimpleQueue()  # its put is safe in a signal handler
-        self._raises = False
-        signal.signal(signal.SIGINT, self._note)
+        self._read, write = os.pipe()
+        os.set_blocking(write, False)
+        signal.signal(signal.SIGINT, lambda *_: None)
+        signal.set_wakeup_fd(write)
 
-    def _note(self, number: int, _frame: object) -> None:
-        if not self._raises:
-            self._kept.put(number)
-            return
-        self._raises = False
-        raise KeyboardInterrupt
+    def next(self) -> Future:
+        """Return what is done at the next one."""
+        come = Future()
 
-    @contextmanager
-    def raised(self) -> Iterator[None]:
-        """Run the block until SIGINT, which ends it and goes no further."""
-        with suppress(KeyboardInterrupt):
-            self._raises = True
-            yield
-        self._raises = False
+        def finish() -> None:
+            self.wait()
+            come.set_result(None)
+
+        Thread(target=finish, daemon=True).start()
+        return come
 
     def wait(self) -> None:
-        """Wait for SIGINT."""
-        self._kept.get()
+        """Wait for the next."""
+        while os.read(self._read, 1) != bytes([signal.SIGINT]):
+            pass
 
 
 def _nothing() -> None:

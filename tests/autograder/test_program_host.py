@@ -1,0 +1,95 @@
+"""Plain programs: what an examiner may ask for, and what nodes do in one, seen from outside."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+
+from autograder.program_host import ProgramHost
+from autograder.sandbox import RunningSubject
+
+LIVES = """
+import sys, rclpy
+from rclpy.node import Node
+from autograder import plain_program
+
+class Works(Node):
+    def __init__(self, name):
+        super().__init__(name)
+        print("made", flush=True)
+        self.create_timer(0.01, self.tick)
+        self.told = False
+    def tick(self):
+        if not self.told:
+            self.told = True
+            print("spins", flush=True)
+    def destroy_node(self):
+        super().destroy_node()
+        print("destroyed", flush=True)
+
+class Raises(Works):
+    def tick(self):
+        raise RuntimeError("out of a callback")
+
+wanted = {"nodes": [[sys.argv[1], ["one"]]], "threads": int(sys.argv[2]), "sim_time": False}
+plain_program.run(globals(), wanted, int(sys.argv[3]), lambda: print("up", flush=True))
+"""
+
+
+def start(name: str, threads: int) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", LIVES, name, str(threads), "91"]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+
+
+def reads(program: subprocess.Popen[str], *lines: str) -> None:
+    assert program.stdout is not None
+    assert [program.stdout.readline().strip() for _ in lines] == list(lines)
+
+
+@pytest.mark.parametrize("threads", [1, 4])
+def test_each_interrupt_ends_the_nodes_or_makes_them_anew(threads: int) -> None:
+    with start("Works", threads) as program:
+        try:
+            reads(program, "made", "up", "spins")
+            for _ in range(2):
+                os.kill(program.pid, signal.SIGINT)
+                reads(program, "destroyed")
+                os.kill(program.pid, signal.SIGINT)
+                reads(program, "made", "spins")
+        finally:
+            program.kill()
+
+
+@pytest.mark.parametrize("threads", [1, 4])
+def test_a_callback_that_raises_ends_the_program(threads: int) -> None:
+    with start("Raises", threads) as program:
+        reads(program, "made", "up")
+        assert program.wait(timeout=60) == 1
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        {"wants": "anything"},
+        {"wants": "interrupt"},
+        {"wants": "program"},
+        {"wants": "program", "nodes": [["os.system", []]], "threads": 1, "domain": 1},
+        {"wants": "program", "nodes": [["Node", ["x" * 1000]]], "threads": 1, "domain": 1},
+        {"wants": "program", "nodes": [[["Node"], []]], "threads": 1, "domain": 1},
+        {"wants": "program", "nodes": [["Node", []]], "threads": 1000, "domain": 1},
+        {"wants": "program", "nodes": [["Node", []]], "threads": 1, "domain": 10**6},
+        {"wants": "program", "nodes": {"Node": []}, "threads": 1, "domain": 1},
+    ],
+)
+def test_what_is_no_request_is_refused_and_starts_nothing(request_: dict[str, Any]) -> None:
+    def start_subject(*_: object) -> RunningSubject:
+        raise AssertionError("started")
+
+    subject: Any = None
+    with ProgramHost(start_subject, subject, []) as host:
+        assert "error" in host.answer(request_)
