@@ -31,7 +31,9 @@ to compute for ever. A callback that takes as long has failed the exam by then."
 QUIET = 0.02
 """Seconds for which all others must have slept beside such a thread: one that waits for the
 interpreter's lock, which it holds, also sleeps, but wakes up to ask for it every 5 ms."""
-_ASLEEP = (b"S", b"I", b"t")  # states of proc(5); t: see `autograder.outside.holding`
+_ASLEEP = (b"S", b"I", b"t", b"Z", b"X")
+"""States of proc(5). Those of a thread that is held (`autograder.outside.holding`), and of one that
+has ended and is still there for its parent, are none in which it could go on."""
 _NAP = 0.0005  # s between two looks
 _CLIP = 0.005  # s that one look may count for
 

@@ -44,9 +44,14 @@ def usage(processes: Processes) -> Usage:
 
 
 def thread_ids(process: str) -> list[int]:
-    """Return the kernel's numbers of the threads of one process, by its folder."""
+    """Return the kernel's numbers of the threads of one process, by its folder.
+
+    One that has ended has none, also while it is still there for its parent.
+    """
     with suppress(OSError):
-        return [int(name) for name in os.listdir(f"{process}/task")]  # noqa: PTH208
+        threads = [int(name) for name in os.listdir(f"{process}/task")]  # noqa: PTH208
+        state = Path(process, "stat").read_bytes().rpartition(b") ")[2][:1]
+        return threads if len(threads) > 1 or state not in b"ZX" else []
     return []
 
 
