@@ -16,6 +16,7 @@ from typing import Any
 from autograder.outside import usage
 from autograder.outside.holding import Held, held
 from autograder.outside.processes import Processes, Sandboxed
+from autograder.outside.sleeping import sleepers
 from autograder.outside.stillness import HANGS, Stillness
 from autograder.starving import SeenDelay
 from course import tools
@@ -101,6 +102,10 @@ def _naps(scene: Scene, given: Given) -> list[tuple[int, int]]:
     return [*usage.naps(scene.subject, _numbers(given, "threads", MOST_NUMBERS)).items()]
 
 
+def _sleepers(scene: Scene, given: Given) -> list[tuple[int, float]]:
+    return sleepers(scene.subject.of(scene.pid))
+
+
 def _usage(scene: Scene, given: Given) -> usage.Usage:
     return usage.usage(scene.subject)
 
@@ -159,6 +164,7 @@ REQUESTS: Mapping[str, Callable[[Scene, Given], Any]] = {
     "asleep": _asleep,
     "threads": _threads,
     "naps": _naps,
+    "sleepers": _sleepers,
     "usage": _usage,
     "positions": _positions,
     "others": _others,

@@ -1,0 +1,106 @@
+"""Which threads sleep for a time that they were given, by the wall's clock, and how long still.
+
+A thread that sleeps so (``time.sleep``, ``Event.wait(1.0)``, a time-out of rclpy's) is in a system
+call with a time in it. The kernel tells which call that is (proc(5): ``syscall``), and the time is
+in the thread's memory. Threads of Fast DDS have times of their own, and do not count. Nor does an
+executor that waits for its nodes until the next of their timers is due, and a thread that flushes
+logs: no callback waits there.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from autograder.outside.holding import DDS_THREADS
+
+_POLL, _SELECT, _NANOSLEEP, _FUTEX, _CLOCK_NANOSLEEP, _PSELECT = 7, 23, 35, 202, 230, 270
+_EPOLL_WAIT, _PPOLL, _EPOLL_PWAIT, _EPOLL_PWAIT2 = 232, 271, 281, 441
+"""System calls of Linux on x86-64 that may end after some time."""
+_MILLISECONDS = {_POLL: 2, _EPOLL_WAIT: 3, _EPOLL_PWAIT: 3}
+_POINTERS = {_SELECT: 4, _NANOSLEEP: 0, _PSELECT: 4, _PPOLL: 2, _EPOLL_PWAIT2: 3}
+"""Which argument has, or points to, a time from the call on."""
+_COMMAND, _WAIT, _WAIT_UNTIL, _OF_THE_DAY = 0x7F, 0, 9, 0x100  # futex(2)
+_ABSOLUTE = 1  # clock_nanosleep(2)
+_TIME = struct.Struct("qq")
+_WAIT_IN = ("librmw_", "librcl_logging_", "libspdlog")
+"""What the names of the libraries begin with in which an executor waits, and a writer of logs."""
+_STACK = 1024
+"""Bytes of a thread's stack, the innermost, in which there are places in those libraries then."""
+
+
+def sleepers(process: str) -> list[tuple[int, float]]:
+    """Return the sleeping threads of a process, by its folder, and for how many s they will sleep.
+
+    Where only the whole length is known it is that. None are told if the kernel does not let us
+    look (ptrace(2)).
+    """
+    found = []
+    with suppress(OSError):
+        memory = os.open(f"{process}/mem", os.O_RDONLY)
+        try:
+            for name in os.listdir(f"{process}/task"):  # noqa: PTH208 - the names alone, very often
+                with suppress(OSError, ValueError, IndexError, OverflowError, struct.error):
+                    task = f"{process}/task/{name}"
+                    if not _read(f"{task}/comm").startswith(DDS_THREADS):
+                        call = _read(f"{task}/syscall").split()  # "running" is no number
+                        number, *given = int(call[0]), *(int(word, 16) for word in call[1:])
+                        left = _left(number, given, memory)
+                        if left is not None and not _waits_in_ros(process, given[-2], memory):
+                            found.append((int(name), left))
+        finally:
+            os.close(memory)
+    return found
+
+
+def _read(path: str) -> bytes:
+    file = os.open(path, os.O_RDONLY)
+    try:
+        return os.read(file, 4096)
+    finally:
+        os.close(file)
+
+
+def _left(number: int, given: Sequence[int], memory: int) -> float | None:
+    """Return for how many s a system call will sleep; None if it does not do so for a time."""
+    if number in _MILLISECONDS:
+        milliseconds = given[_MILLISECONDS[number]] & 0xFFFFFFFF
+        return milliseconds / 1e3 if milliseconds < 1 << 31 else None  # for ever if negative
+    if number in _POINTERS and (pointer := given[_POINTERS[number]]):
+        seconds, rest = _time_at(memory, pointer)
+        return seconds + rest / (1e6 if number == _SELECT else 1e9)
+    if number == _CLOCK_NANOSLEEP:
+        return _until(memory, given[2], given[0], absolute=bool(given[1] & _ABSOLUTE))
+    if number == _FUTEX and given[3] and given[1] & _COMMAND in (_WAIT, _WAIT_UNTIL):
+        clock = time.CLOCK_REALTIME if given[1] & _OF_THE_DAY else time.CLOCK_MONOTONIC
+        return _until(memory, given[3], clock, absolute=given[1] & _COMMAND == _WAIT_UNTIL)
+    return None
+
+
+def _waits_in_ros(process: str, stack_pointer: int, memory: int) -> bool:
+    stack = os.pread(memory, _STACK, stack_pointer)
+    places = [place for (place,) in struct.iter_unpack("Q", stack[: len(stack) // 8 * 8])]
+    with Path(process, "maps").open(encoding="utf-8", errors="replace") as mappings:
+        for mapping in mappings:
+            bounds, rights, *_, name = mapping.split(maxsplit=5)
+            if "x" in rights and name.rpartition("/")[2].startswith(_WAIT_IN):
+                start, end = (int(bound, 16) for bound in bounds.split("-"))
+                if any(start <= place < end for place in places):
+                    return True
+    return False
+
+
+def _until(memory: int, pointer: int, clock: int, *, absolute: bool) -> float:
+    seconds, nanoseconds = _time_at(memory, pointer)
+    now = time.clock_gettime(clock) if absolute else 0.0
+    return seconds + nanoseconds / 1e9 - now
+
+
+def _time_at(memory: int, pointer: int) -> tuple[int, int]:
+    """Return the two halves of a struct timespec, or timeval."""
+    seconds, rest = _TIME.unpack(os.pread(memory, _TIME.size, pointer))
+    return seconds, rest
