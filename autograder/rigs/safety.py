@@ -9,6 +9,7 @@ from typing import TypeVar
 from rclpy.node import Node
 
 from autograder.bench import Bench, Endpoints
+from autograder.rigs import survival
 from autograder.rigs.player import Player
 from autograder.rigs.safety_robot import Robot
 from autograder.rigs.stillness import Stillness
@@ -55,11 +56,15 @@ class RobotRig:
         self.renew()
         if not self._fresh:
             self.bench.subject.open(threads=THREADS, sim_time=True)
+            self.bench.subject.mark("beside")  # with a first node come the session's threads
             self._fresh = True
         made = self.bench.session.run(player)
         assert isinstance(made, player)
         self._player = made
-        self._robot = Robot(self.bench, name, made, self._still)
+        self._robot = Robot(self.bench, name, made, self._still, self._ended_by)
+
+    def _ended_by(self, name: str, trial: str) -> bool:
+        return survival.ended_by(name, trial, self.bench, self._still)
 
     def renew(self) -> None:
         """Have the next check begin with a fresh node, in the same session."""

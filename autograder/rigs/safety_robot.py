@@ -6,6 +6,7 @@ after each, so that what it observes does not depend on the machine's load.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -24,6 +25,8 @@ ROUNDS = 10  # of requests that may follow from each other while time stands sti
 
 NAP_S = 0.1
 """Seconds of wall time that a thread may nap between two looks at the node's clock."""
+SAME_S = 0.02
+"""Seconds by which two looks may differ in when a sleep ends."""
 
 
 class WallWait(Failed):
@@ -33,8 +36,13 @@ class WallWait(Failed):
 class Robot:
     """One of the student's nodes at work; ``draws`` are the numbers of the examination."""
 
-    def __init__(self, bench: Bench, name: str, player: Player, still: Stillness) -> None:
+    def __init__(
+        self, bench: Bench, name: str, player: Player, still: Stillness,
+        ended_by: Callable[[str, str], bool],
+    ) -> None:  # fmt: skip
         """Make the node of class ``name`` in the subject's present session.
+
+        ``ended_by`` is whether nodes of a class end a plain program in a trial (`survival`).
 
         Raises:
             Failed: it cannot be made, or lacks an endpoint of the task.
@@ -43,6 +51,8 @@ class Robot:
         self.name, self._bench, self._player, self._still = name, bench, player, still
         self._unserved = False
         self._goes_on = False  # a callback that was there at the end of the last stride
+        self._ended_by = ended_by
+        self._threads = self._of_session()
         # What earlier nodes of the same session raised, of whom this one knows nothing.
         self._known = bench.subject.own_errors()
         self._raised = frozenset(bench.subject.errors())
@@ -121,6 +131,8 @@ class Robot:
         Outside such a block that is looked for only while some callback goes on. How much simulated
         time such a wait takes depends on the machine, and so would every observation. Threads of
         the student's own may wait as they like.
+
+        In a sandbox it is looked for before every stride: see `_require_no_wall_wait`.
         """
         self._unserved = True
         try:
@@ -131,8 +143,8 @@ class Robot:
     def _go_on(self, seconds: float) -> None:
         # Now, and not after the stride: what the node does has just come to rest, so that a wait
         # has only begun, while a stride with a blocked callback takes long in real time.
-        looks = self._unserved or self._goes_on
-        waits = self._bench.subject.wall_waits() if looks else []
+        if self._unserved or self._goes_on or self._bench.outside.own_network:
+            self._require_no_wall_wait()
         self._player.now += seconds  # before: what comes in on the way bears the stride's end
         try:
             self._goes_on = self._bench.subject.advance(seconds)
@@ -140,12 +152,42 @@ class Robot:
             raise Failed(
                 expected=f"No callback of {self.name} blocks while something is slow or broken.",
                 actual="A callback held up the node so that even its clock stood still."
-                + _of_waits(waits)
+                + _of_waits(self._bench.subject.wall_waits())
                 + self.complaint(),
             ) from None
-        if waits:
-            raise WallWait(expected=self._by_the_clock, actual=_of_waits(waits).strip())
         self.rest()
+
+    def _require_no_wall_wait(self) -> None:
+        """Fail if a thread waits by the wall clock for longer than a nap.
+
+        In a student's own notebook the subject says so of its callbacks. Elsewhere it is seen from
+        outside. Only threads of the session run callbacks, which are there before its nodes.
+        """
+        if self._bench.outside.own_network:
+            sleeps = {t: end for t, end in self._sleeps().items() if end > time.monotonic() + NAP_S}
+            if not sleeps:
+                return
+            self.wait(lambda: False, NAP_S)
+            later = self._sleeps()
+            if not any(abs(later.get(t, 0.0) - end) < SAME_S for t, end in sleeps.items()):
+                return  # what wakes up at once has not waited
+        waits = self._bench.subject.wall_waits()
+        if waits or self._bench.outside.own_network:
+            told = _of_waits(waits).strip() or "A callback waits on the wall clock."
+            raise WallWait(expected=self._by_the_clock, actual=told)
+
+    def _of_session(self) -> frozenset[int]:
+        """Return the threads that are there before the node is, but those that sleep already."""
+        if not self._bench.outside.own_network:
+            return frozenset()
+        sleeping = {int(thread) for thread, _ in self._bench.outside.ask("sleepers")}
+        return frozenset(map(int, self._bench.outside.ask("threads"))) - sleeping
+
+    def _sleeps(self) -> dict[int, float]:
+        """Return until when threads of the session will sleep by the wall clock."""
+        now = time.monotonic()
+        found = self._bench.outside.ask("sleepers")
+        return {int(thread): now + left for thread, left in found if thread in self._threads}
 
     @property
     def _by_the_clock(self) -> str:
@@ -156,8 +198,7 @@ class Robot:
 
         A thread or a timer on the wall clock would go on. ``what`` it would be, as a clause.
         """
-        if waits := self._bench.subject.wall_waits():
-            raise WallWait(expected=self._by_the_clock, actual=_of_waits(waits).strip())
+        self._require_no_wall_wait()
         if happened() or not self._still.reached() or self.wait(happened, NAP_S):
             return  # it came by then, or somebody is at work all the time: that proves nothing
         if self.wait(happened, seconds):
@@ -177,14 +218,24 @@ class Robot:
         told = f" A callback raised an error, in {raised[-1].rstrip('.')}." if raised else ""
         return told + (f" A thread of yours ended with {ended[-1].rstrip('.')}." if ended else "")
 
-    def require_no_errors(self) -> None:
-        """Require that nothing of the student's own has left a callback since the node was made."""
+    def require_no_errors(self, trial: str = "") -> None:
+        """Require that nothing of the student's own has left a callback since the node was made.
+
+        A subject is believed where it speaks against itself. What it does not tell of shows in a
+        plain program, which ends when the same is done to a node there: see `survival.ended_by`.
+        """
         for told, count in self._bench.subject.own_errors().items():
             if count > self._known.get(told, 0):
                 raise Failed(
                     expected="Nothing leaves a callback as an exception.",
                     actual=f"What was seen from outside was right, but {told.rstrip('.')}.",
                 )
+        if self._ended_by(self.name, trial):
+            raise Failed(
+                expected="Nothing leaves a callback as an exception.",
+                actual="What was seen from outside was right, but where the node runs in a plain "
+                "program of rclpy, that ended: an exception left one of its callbacks.",
+            )
 
 
 def _of_waits(waits: list[str]) -> str:

@@ -124,7 +124,7 @@ def canceled(rig: RobotRig) -> None:
         robot.spend(EARLY)
         _cancel(robot, dispatcher, drive, "A goal that is canceled before the first mark")
         _one_metre(robot, dispatcher, "after two canceled ones")
-        robot.require_no_errors()
+        robot.require_no_errors("canceled")
 
 
 def _cancel(robot: Robot, dispatcher: Dispatcher, drive: Drives, what: str) -> None:
@@ -158,7 +158,7 @@ def aborted(rig: RobotRig) -> None:
         dispatcher.jam(False)
         robot.rest()
         _one_metre(robot, dispatcher, "after the jam, with free wheels,")
-        robot.require_no_errors()
+        robot.require_no_errors("aborted")
 
 
 def _jammed_from_the_start(robot: Robot, dispatcher: Dispatcher) -> None:

@@ -112,7 +112,7 @@ def ended(rig: RobotRig) -> None:
     with _user(rig) as (robot, user):
         for ends in robot.draws.shuffled("ends of goals", (_succeeds, _is_rejected, _is_aborted)):
             ends(robot, user)
-        robot.require_no_errors()
+        robot.require_no_errors("ended")
 
 
 def _succeeds(robot: Robot, user: NavigatorUser) -> None:
@@ -160,7 +160,7 @@ def stalled(rig: RobotRig) -> None:
         _outcome(robot, user, when, "stalled")
         user.end(ServerGoalHandle.canceled)
         _once(robot, user, when, "stalled")
-        robot.require_no_errors()
+        robot.require_no_errors("stalled")
 
 
 def _slowly_drives(robot: Robot, user: NavigatorUser) -> None:
@@ -278,7 +278,7 @@ def lost(rig: RobotRig) -> None:
         user.end(ServerGoalHandle.succeed)
         _outcome(robot, user, "When the navigator had come back, and the goal succeeded", "arrived")
         _soon_after(robot, user)
-        robot.require_no_errors()
+        robot.require_no_errors("lost")
 
 
 def _soon_after(robot: Robot, user: NavigatorUser) -> None:

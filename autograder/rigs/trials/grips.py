@@ -85,7 +85,7 @@ def refused(rig: RobotRig) -> None:
         if tries_again:
             when = "When the gripper answered not the first try, but the second with success=False"
             _refuses(robot, user, when)
-        robot.require_no_errors()
+        robot.require_no_errors("refused")
     if not tries_again:  # that is another check's, and what is still under way must not be
         rig.begin_anew()
 
@@ -126,7 +126,7 @@ def unanswered(rig: RobotRig) -> None:
         except Failed as failed:
             raise Failed(expected=failed.expected, actual=f"{failed.actual}{SECOND}") from None
         _soon_after(robot, user)
-        robot.require_no_errors()
+        robot.require_no_errors("unanswered")
 
 
 def _soon_after(robot: Robot, user: GripUser) -> None:
@@ -236,7 +236,7 @@ def absent(rig: RobotRig) -> None:
         user.tries[0].reply(True)
         outcome(robot, user, "When the gripper had come back and answered success=True", "done")
         _refused_alive(robot, user)
-        robot.require_no_errors()
+        robot.require_no_errors("absent")
 
 
 def _come_back(robot: Robot, user: GripUser) -> None:

@@ -43,7 +43,7 @@ def stale(rig: RobotRig) -> None:
         when = "When a try was answered with success=True, after a late answer from before"
         outcome(robot, user, when, "done")
         _late_to_the_last(robot, user)
-        robot.require_no_errors()
+        robot.require_no_errors("stale")
 
 
 def _late_to_the_last(robot: Robot, user: GripUser) -> None:

@@ -107,7 +107,7 @@ def bad(rig: RobotRig) -> None:
             if draws.flag(f"something good after {what}", usual=False):
                 be_told_something_good()
         be_told_something_good()
-        robot.require_no_errors()
+        robot.require_no_errors("bad")
 
 
 def atomic(rig: RobotRig) -> None:
@@ -139,7 +139,7 @@ def atomic(rig: RobotRig) -> None:
                 f"{_limits(operator.limits)}.",
             )
         _accepted(robot, operator, "After the jam", (linear, later), angular=later)
-        robot.require_no_errors()
+        robot.require_no_errors("atomic")
 
 
 def _answer(robot: Robot, operator: Operator, request: str, parameters: list[Parameter]) -> Any:

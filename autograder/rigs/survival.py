@@ -1,0 +1,298 @@
+"""The nodes of exercise 5 in a plain program of rclpy: does anything that leaves a callback end it?
+
+What a student's process says of its own errors can be made up. A plain program is not asked: it
+goes on, or it ends. All that the exam provokes is provoked once more, in short, on all four nodes
+at a time; how they deal with it is no matter here.
+"""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+from rclpy.action.server import ServerGoalHandle
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+from rosgraph_msgs.msg import Clock
+
+from autograder.bench import Bench
+from autograder.programs import Program, Programs
+from autograder.rigs.gripper import GripUser, Operator, double, text
+from autograder.rigs.navigation import Dispatcher, NavigatorUser
+from autograder.rigs.player import Player
+from autograder.rigs.quiet import QuietNode
+from autograder.rigs.stillness import Stillness
+
+THREADS = 4
+STRIDE_S = 0.25
+"""Seconds of simulated time between two messages on /clock: nothing here has to be punctual."""
+TAKES = 2
+"""Programs that an act must end before that counts: rclpy's own executor has races, too."""
+MEET_S = 3.0
+"""Seconds in which nodes and counterparts find each other, if they are all there."""
+END_S = 0.3
+"""Seconds in which a program ends if something in it ends it."""
+
+Act = Iterator[float]
+"""What is done to a node; it yields for how many s of simulated time to wait before it goes on."""
+Run = Callable[[Callable[[], Node]], None]
+"""Makes a node of the examiner's, unless it has done so before, and spins it."""
+
+
+class Part(NamedTuple):
+    """A class of the task, who is at its other end, and what they do, by the trial that does it."""
+
+    name: str
+    player: type[Player]
+    acts: Mapping[str, Callable[[Any, Run], Act]]
+
+
+def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
+    """Return whether a node ends a plain program when what is done in a trial is done to it.
+
+    It is found out once a notebook; False where there are no such programs.
+
+    Args:
+        name: the node's class.
+        trial: what is done to it, a name in `PARTS`.
+        bench: gives programs, and remembers.
+        still: tells when all that was sent has been dealt with.
+    """
+    if bench.programs is None:
+        return False
+    key = f"{__name__}.ended"
+    if key not in bench.memory:
+        bench.memory[key] = _ends(bench.programs, still)
+    return (name, trial) in bench.memory[key]
+
+
+def _ends(programs: Programs, still: Stillness) -> frozenset[tuple[str, str]]:
+    """Return which acts end a program, with the classes that they are done to."""
+    if _play(programs, still, PARTS) is None:
+        return frozenset()
+    found = set()
+    for part in PARTS:
+        left, takes = [*part.acts], Counter[str]()
+        while left and (act := _play(programs, still, [_only(part, left)])) is not None:
+            takes[act] += 1
+            left = left[left.index(act) :]
+            if takes[act] == TAKES:
+                found.add((part.name, act))
+                left = left[1:]
+    return frozenset(found)
+
+
+def _only(part: Part, acts: Sequence[str]) -> Part:
+    return part._replace(acts={act: part.acts[act] for act in acts})
+
+
+def _play(programs: Programs, still: Stillness, parts: Sequence[Part]) -> str | None:
+    """Act on the nodes of a program; return in which act of a single part it ended, if it did.
+
+    One of several nodes that cannot be made ends it as well, but not one alone: no act did.
+    """
+    nodes = [(part.name, ()) for part in parts]
+    with programs.program(nodes, threads=THREADS, sim_time=True) as program:
+        if not program.up:
+            return None if len(parts) == 1 else ""
+        return _Stage(program, still, parts).play()
+
+
+class _Stage:
+    """Nodes in a program, their counterparts, and the clock of both."""
+
+    def __init__(self, program: Program, still: Stillness, parts: Sequence[Part]) -> None:
+        self._program, self._still, self._made = program, still, set[str]()
+        node = program.session.run(lambda: QuietNode("clock"))
+        assert isinstance(node, QuietNode)
+        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self._clock, self._now_ns = node.create_publisher(Clock, "/clock", qos), 0
+        self._players: list[Any] = [program.session.run(part.player) for part in parts]
+        program.wait(lambda: not any(player.missing() for player in self._players), MEET_S)
+        for player in self._players:
+            player.attend()
+        self._act, self._alone = "", len(parts) == 1
+        self._due = {
+            self._acts(part, player): 0.0 for part, player in zip(parts, self._players, strict=True)
+        }
+
+    def _acts(self, part: Part, player: Player) -> Act:
+        for self._act, act in part.acts.items():
+            # A wrong node may leave its counterpart where that cannot go on.
+            with suppress(Exception):
+                yield from act(player, self._run)
+            if self._alone and self._program.wait(self._program.ended, END_S):
+                return
+
+    def _run(self, make: Callable[[], Node]) -> None:
+        if make.__name__ not in self._made:
+            self._made.add(make.__name__)
+            self._program.session.run(make)
+            self._rest()
+
+    def play(self) -> str | None:
+        """Move time on until every act is over; return in which the program ended, if it did."""
+        self._rest()
+        while self._due and not self._program.ended():
+            now = self._now_ns / 1e9
+            for act in [act for act, due in self._due.items() if due <= now]:
+                if (seconds := next(act, None)) is None:
+                    del self._due[act]
+                else:
+                    self._due[act] = now + seconds
+            self._rest()
+            self._move()
+        return self._act if self._program.wait(self._program.ended, END_S) else None
+
+    def _rest(self) -> None:
+        self._still.reached()
+        for player in self._players:
+            if player.resume():
+                self._still.reached()
+
+    def _move(self) -> None:
+        # The second message gives executors something to do: what has come by then goes on.
+        for more_ns in (round(STRIDE_S * 1e9), 1):
+            self._now_ns += more_ns
+            self._clock.publish(Clock(clock=Time(nanoseconds=self._now_ns).to_msg()))
+        for player in self._players:
+            player.now = self._now_ns / 1e9
+        self._rest()
+
+
+def _grip_without_gripper(user: GripUser, run: Run) -> Act:
+    user.request(True)
+    yield 5.0
+
+
+def _grips_refused(user: GripUser, run: Run) -> Act:
+    run(user.gripper)
+    for success in (True, False):
+        user.request(success)
+        yield STRIDE_S
+        user.tries[0].reply(success)
+        yield 0.5
+
+
+def _grip_unanswered(user: GripUser, run: Run) -> Act:
+    run(user.gripper)
+    user.request(True)
+    yield 1.75
+    user.tries[1].crash()
+    yield 4.0
+    user.tries[2].reply(True)
+    yield 0.5
+
+
+def _grip_answered_late(user: GripUser, run: Run) -> Act:
+    run(user.gripper)
+    user.request(True)
+    yield 2.0
+    user.tries[0].reply(True)
+    yield STRIDE_S
+    user.tries[1].reply(True)
+    yield 0.5
+
+
+def _limits_that_are_bad(operator: Operator, run: Run) -> Act:
+    good = [double("linear", 0.3), double("angular", 0.6)]
+    for parameters in (
+        good, [double("linear", math.nan)], [double("angular", math.inf)], [double("linear", -0.5)],
+        [double("angular", 7.0)], [text("linear", "fast")], [double("warp", 0.5)], [], good,
+    ):  # fmt: skip
+        operator.ask(parameters)
+        yield STRIDE_S
+
+
+def _limits_for_jammed_wheels(operator: Operator, run: Run) -> Act:
+    operator.ask([double("linear", 0.3), double("angular", math.nan)])
+    yield STRIDE_S
+    operator.jam(True)
+    yield STRIDE_S
+    operator.ask([double("linear", 0.9)])
+    yield 0.5
+    operator.jam(False)
+    yield STRIDE_S
+    operator.ask([double("linear", 0.4)])
+    yield STRIDE_S
+
+
+def _goal_without_navigator(user: NavigatorUser, run: Run) -> Act:
+    user.request(3)
+    yield 1.5
+
+
+def _goals_that_are_lost(user: NavigatorUser, run: Run) -> Act:
+    yield from _goal_without_navigator(user, run)
+    run(user.navigator)
+    user.request(3, obeys=False)
+    yield 3.5
+    user.request(3, hesitates=True)
+    yield 1.5
+    user.decide()
+    yield STRIDE_S
+
+
+def _goals_that_end(user: NavigatorUser, run: Run) -> Act:
+    run(user.navigator)
+    for how in (ServerGoalHandle.succeed, ServerGoalHandle.abort):
+        user.request(3)
+        yield STRIDE_S
+        user.feedback(1)
+        yield STRIDE_S
+        user.end(how)
+        yield STRIDE_S
+    user.request(3, accepts=False)
+    yield 0.5
+
+
+def _goal_that_stalls(user: NavigatorUser, run: Run) -> Act:
+    run(user.navigator)
+    user.request(3)
+    yield 2.75
+    user.end(ServerGoalHandle.canceled)
+    yield 0.5
+
+
+def _drives_that_are_canceled(dispatcher: Dispatcher, run: Run) -> Act:
+    dispatcher.send(0)
+    yield STRIDE_S
+    drive = dispatcher.send(5)
+    yield 0.75
+    dispatcher.cancel(drive)
+    yield 0.75
+
+
+def _drives_with_jammed_wheels(dispatcher: Dispatcher, run: Run) -> Act:
+    dispatcher.send(3)
+    yield 0.5
+    dispatcher.jam(True)
+    yield 1.25
+    dispatcher.jam(False)
+    yield STRIDE_S
+    dispatcher.send(1)
+    yield 1.5
+
+
+PARTS = (
+    Part(GripUser.CLIENT, GripUser, {
+        "absent": _grip_without_gripper, "refused": _grips_refused,
+        "unanswered": _grip_unanswered, "stale": _grip_answered_late,
+    }),
+    Part(Operator.SERVER, Operator, {
+        "bad": _limits_that_are_bad, "atomic": _limits_for_jammed_wheels,
+    }),
+    Part(NavigatorUser.CLIENT, NavigatorUser, {
+        "lost": _goals_that_are_lost, "ended": _goals_that_end, "stalled": _goal_that_stalls,
+    }),
+    Part(Dispatcher.SERVER, Dispatcher, {
+        "canceled": _drives_that_are_canceled, "aborted": _drives_with_jammed_wheels,
+    }),
+)  # fmt: skip
