@@ -128,6 +128,9 @@ class _Stage:
             # A wrong node may leave its counterpart where that cannot go on.
             with suppress(Exception):
                 yield from act(player, self._run)
+            # What a callback raised ends rclpy's executor when it has the next one to run.
+            yield STRIDE_S
+            yield STRIDE_S
             if self._alone and self._program.wait(self._program.ended, END_S):
                 return
 
@@ -167,38 +170,46 @@ class _Stage:
         self._rest()
 
 
+def _till(happened: Callable[[], Any], most: float) -> Act:
+    """Wait until something happened, for so many s at most."""
+    for _ in range(round(most / STRIDE_S)):
+        if happened():
+            return
+        yield STRIDE_S
+
+
 def _grip_without_gripper(user: GripUser, run: Run) -> Act:
     user.request(True)
-    yield 5.0
+    yield from _till(lambda: user.outcomes, 8.0)
 
 
 def _grips_refused(user: GripUser, run: Run) -> Act:
     run(user.gripper)
     for success in (True, False):
         user.request(success)
-        yield STRIDE_S
+        yield from _till(lambda: user.tries, 1.0)
         user.tries[0].reply(success)
-        yield 0.5
+        yield from _till(lambda: user.outcomes, 1.0)
 
 
 def _grip_unanswered(user: GripUser, run: Run) -> Act:
     run(user.gripper)
     user.request(True)
-    yield 1.75
+    yield from _till(lambda: len(user.tries) > 1, 3.0)
     user.tries[1].crash()
-    yield 4.0
+    yield from _till(lambda: user.outcomes, 6.0)
     user.tries[2].reply(True)
-    yield 0.5
+    yield STRIDE_S
 
 
 def _grip_answered_late(user: GripUser, run: Run) -> Act:
     run(user.gripper)
     user.request(True)
-    yield 2.0
+    yield from _till(lambda: len(user.tries) > 1, 3.0)
     user.tries[0].reply(True)
     yield STRIDE_S
     user.tries[1].reply(True)
-    yield 0.5
+    yield from _till(lambda: user.outcomes, 1.0)
 
 
 def _limits_that_are_bad(operator: Operator, run: Run) -> Act:
@@ -207,35 +218,28 @@ def _limits_that_are_bad(operator: Operator, run: Run) -> Act:
         good, [double("linear", math.nan)], [double("angular", math.inf)], [double("linear", -0.5)],
         [double("angular", 7.0)], [text("linear", "fast")], [double("warp", 0.5)], [], good,
     ):  # fmt: skip
-        operator.ask(parameters)
-        yield STRIDE_S
+        yield from _till(operator.ask(parameters).done, 0.5)
 
 
 def _limits_for_jammed_wheels(operator: Operator, run: Run) -> Act:
-    operator.ask([double("linear", 0.3), double("angular", math.nan)])
-    yield STRIDE_S
+    half = [double("linear", 0.3), double("angular", math.nan)]
+    yield from _till(operator.ask(half).done, 0.5)
     operator.jam(True)
     yield STRIDE_S
-    operator.ask([double("linear", 0.9)])
-    yield 0.5
+    yield from _till(operator.ask([double("linear", 0.9)]).done, 0.5)
     operator.jam(False)
     yield STRIDE_S
-    operator.ask([double("linear", 0.4)])
-    yield STRIDE_S
-
-
-def _goal_without_navigator(user: NavigatorUser, run: Run) -> Act:
-    user.request(3)
-    yield 1.5
+    yield from _till(operator.ask([double("linear", 0.4)]).done, 0.5)
 
 
 def _goals_that_are_lost(user: NavigatorUser, run: Run) -> Act:
-    yield from _goal_without_navigator(user, run)
+    user.request(3)
+    yield from _till(lambda: user.outcomes, 3.0)  # there may be no navigator yet
     run(user.navigator)
     user.request(3, obeys=False)
-    yield 3.5
+    yield from _till(lambda: user.outcomes, 5.0)
     user.request(3, hesitates=True)
-    yield 1.5
+    yield from _till(lambda: user.outcomes, 2.5)
     user.decide()
     yield STRIDE_S
 
@@ -244,41 +248,41 @@ def _goals_that_end(user: NavigatorUser, run: Run) -> Act:
     run(user.navigator)
     for how in (ServerGoalHandle.succeed, ServerGoalHandle.abort):
         user.request(3)
-        yield STRIDE_S
+        yield from _till(lambda: user.goals, 1.0)
         user.feedback(1)
         yield STRIDE_S
         user.end(how)
-        yield STRIDE_S
+        yield from _till(lambda: user.outcomes, 1.0)
     user.request(3, accepts=False)
-    yield 0.5
+    yield from _till(lambda: user.outcomes, 1.0)
 
 
 def _goal_that_stalls(user: NavigatorUser, run: Run) -> Act:
     run(user.navigator)
     user.request(3)
-    yield 2.75
+    yield from _till(lambda: user.cancels, 4.0)
     user.end(ServerGoalHandle.canceled)
-    yield 0.5
+    yield from _till(lambda: user.outcomes, 1.0)
 
 
 def _drives_that_are_canceled(dispatcher: Dispatcher, run: Run) -> Act:
-    dispatcher.send(0)
-    yield STRIDE_S
+    rejected = dispatcher.send(0)
+    yield from _till(lambda: rejected.handle, 0.5)
     drive = dispatcher.send(5)
-    yield 0.75
+    yield from _till(lambda: any(dispatcher.speeds), 1.0)
     dispatcher.cancel(drive)
-    yield 0.75
+    yield from _till(lambda: drive.status, 1.0)
 
 
 def _drives_with_jammed_wheels(dispatcher: Dispatcher, run: Run) -> Act:
-    dispatcher.send(3)
-    yield 0.5
+    drive = dispatcher.send(3)
+    yield from _till(lambda: any(dispatcher.speeds), 1.0)
     dispatcher.jam(True)
-    yield 1.25
+    yield from _till(lambda: drive.status, 2.0)
     dispatcher.jam(False)
     yield STRIDE_S
-    dispatcher.send(1)
-    yield 1.5
+    again = dispatcher.send(1)
+    yield from _till(lambda: again.status, 3.0)
 
 
 PARTS = (

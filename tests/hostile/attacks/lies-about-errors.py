@@ -2,7 +2,7 @@
 # exercise: safety
 # base: right-exemplar
 # told: where the node runs in a plain program of rclpy, that ended: an exception left one of its callbacks
-# score: 8
+# score: 11
 
 from autograder.harness import Harness
 
