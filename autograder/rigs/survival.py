@@ -23,12 +23,14 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
 from autograder.bench import Bench
+from autograder.exam import NotExaminable
 from autograder.programs import Program, Programs
 from autograder.rigs.gripper import GripUser, Operator, double, text
 from autograder.rigs.navigation import Dispatcher, NavigatorUser
 from autograder.rigs.player import Player
 from autograder.rigs.quiet import QuietNode
 from autograder.rigs.stillness import Stillness
+from course.runtime.waiting import Deadline
 
 THREADS = 4
 STRIDE_S = 0.25
@@ -39,6 +41,8 @@ MEET_S = 3.0
 """Seconds in which nodes and counterparts find each other, if they are all there."""
 END_S = 0.3
 """Seconds in which a program ends if something in it ends it."""
+MOST_S = 60.0
+"""Seconds that it may take to find out which acts end a program, once it is known that some do."""
 
 Act = Iterator[float]
 """What is done to a node; it yields for how many s of simulated time to wait before it goes on."""
@@ -64,29 +68,48 @@ def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
         trial: what is done to it, a name in `PARTS`.
         bench: gives programs, and remembers.
         still: tells when all that was sent has been dealt with.
+
+    Raises:
+        NotExaminable: there was no time to find it out.
     """
     if bench.programs is None:
         return False
-    key = f"{__name__}.ended"
+    key = f"{__name__}.ends"
     if key not in bench.memory:
         bench.memory[key] = _ends(bench.programs, still)
-    return (name, trial) in bench.memory[key]
+    ends: Mapping[tuple[str, str], bool] = bench.memory[key]
+    if trial and (name, trial) not in ends:
+        raise NotExaminable(
+            "Something ends a plain program of your nodes, and it took too long to find out what. "
+            "After a hand-in a person looks at it."
+        )
+    return bool(trial) and ends[name, trial]
 
 
-def _ends(programs: Programs, still: Stillness) -> frozenset[tuple[str, str]]:
-    """Return which acts end a program, with the classes that they are done to."""
+def _ends(programs: Programs, still: Stillness) -> dict[tuple[str, str], bool]:
+    """Return of each act, with the class it is done to, whether it ends a program.
+
+    What there was no time for is missing.
+    """
+    ends = {(part.name, act): False for part in PARTS for act in part.acts}
     if _play(programs, still, PARTS) is None:
-        return frozenset()
-    found = set()
+        return ends
+    deadline = Deadline(MOST_S)
     for part in PARTS:
         left, takes = [*part.acts], Counter[str]()
-        while left and (act := _play(programs, still, [_only(part, left)])) is not None:
+        while left and deadline.left:
+            act = _play(programs, still, [_only(part, left)])
+            if act is None:
+                left = []
+                break
             takes[act] += 1
             left = left[left.index(act) :]
             if takes[act] == TAKES:
-                found.add((part.name, act))
+                ends[part.name, act] = True
                 left = left[1:]
-    return frozenset(found)
+        for act in left:  # there was no time for them
+            del ends[part.name, act]
+    return ends
 
 
 def _only(part: Part, acts: Sequence[str]) -> Part:
@@ -94,14 +117,15 @@ def _only(part: Part, acts: Sequence[str]) -> Part:
 
 
 def _play(programs: Programs, still: Stillness, parts: Sequence[Part]) -> str | None:
-    """Act on the nodes of a program; return in which act of a single part it ended, if it did.
+    """Act on the nodes of a program; return in which act it ended, if it did.
 
-    One of several nodes that cannot be made ends it as well, but not one alone: no act did.
+    Of several parts, whose acts go on side by side, it may have been any. One of several nodes that
+    cannot be made ends it as well, but not one alone: no act did.
     """
     nodes = [(part.name, ()) for part in parts]
     with programs.program(nodes, threads=THREADS, sim_time=True) as program:
         if not program.up:
-            return None if len(parts) == 1 else ""
+            return None if len(parts) == 1 else next(iter(parts[0].acts))
         return _Stage(program, still, parts).play()
 
 
@@ -118,7 +142,7 @@ class _Stage:
         program.wait(lambda: not any(player.missing() for player in self._players), MEET_S)
         for player in self._players:
             player.attend()
-        self._act, self._alone = "", len(parts) == 1
+        self._act, self._alone = next(iter(parts[0].acts)), len(parts) == 1
         self._due = {
             self._acts(part, player): 0.0 for part, player in zip(parts, self._players, strict=True)
         }
