@@ -110,8 +110,12 @@ class Class:
 
 @pytest.fixture(scope="module")
 def class_(tmp_path_factory: pytest.TempPathFactory) -> Class:
+    return class_in(tmp_path_factory.mktemp("course"))
+
+
+def class_in(folder: Path) -> Class:
     exercises = sorted({attack.exercise for attack in attacks()} | {"qos"})
-    root = notebooks_of(tmp_path_factory.mktemp("course"), exercises)
+    root = notebooks_of(folder, exercises)
     build(root)
     release(root, "ch05")
     notebooks, cases = {}, {}
