@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import IO, Any
@@ -144,6 +146,15 @@ def require_word(stream: IO[Any], process: subprocess.Popen[bytes]) -> None:
 
 
 def _said(process: subprocess.Popen[bytes]) -> str:
-    """Return what a process that ends left on standard error."""
+    """Return what a process that ends left on standard error.
+
+    One of bwrap's that is killed while it makes its namespaces leaves a child, which waits for it
+    for ever and holds its standard error.
+    """
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(TOOL_TIMEOUT)
+    with suppress(ProcessLookupError):  # it may have had no group of its own, or left nobody
+        os.killpg(process.pid, signal.SIGKILL)
+    process.kill()
     _, said = process.communicate()
     return said.decode(errors="replace").strip() if said else ""

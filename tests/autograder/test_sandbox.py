@@ -328,3 +328,15 @@ def test_a_tool_that_hangs_is_not_waited_for_without_end(monkeypatch: pytest.Mon
         with pytest.raises(BoxError, match="not there after"):
             network.require_word(tool.stdout, tool)
         assert tool.wait() == -signal.SIGKILL
+
+
+def test_what_a_killed_tool_leaves_is_not_waited_for_either() -> None:
+    """As bwrap does: its child has its standard error, and waits for it."""
+    info, info_end = os.pipe()
+    with subprocess.Popen(
+        ["sh", "-c", "sleep infinity & echo odd >&2; kill -9 $$"],
+        stderr=subprocess.PIPE, start_new_session=True,
+    ) as tool:  # fmt: skip
+        os.close(info_end)  # so that it has said nothing
+        with pytest.raises(BoxError, match="odd"):
+            network.child(info, tool)
