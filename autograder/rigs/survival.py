@@ -27,6 +27,7 @@ from autograder.exam import NotExaminable
 from autograder.programs import Program, Programs
 from autograder.rigs.gripper import GripUser, Operator, double, text
 from autograder.rigs.navigation import Dispatcher, NavigatorUser
+from autograder.rigs.patience import Patience
 from autograder.rigs.player import Player
 from autograder.rigs.quiet import QuietNode
 from autograder.rigs.stillness import Stillness
@@ -39,8 +40,10 @@ TAKES = 2
 """Programs that an act must end before that counts: rclpy's own executor has races, too."""
 MEET_S = 3.0
 """Seconds in which nodes and counterparts find each other, if they are all there."""
+MEET_IDLE_S = 0.5
+"""Seconds, with nobody at work, after which they know each other on both sides."""
 END_S = 0.3
-"""Seconds in which a program ends if something in it ends it."""
+"""Seconds, with nobody at work, in which a program ends if something in it ends it."""
 MOST_S = 60.0
 """Seconds that it may take to find out which acts end a program, once it is known that some do."""
 
@@ -142,6 +145,8 @@ class _Stage:
         program.wait(lambda: not any(player.missing() for player in self._players), MEET_S)
         for player in self._players:
             player.attend()
+        # They may be known here before they know of anybody: a request would then be lost.
+        Patience(still, idle=MEET_IDLE_S).wait(program.session, lambda: False)
         self._act, self._alone = next(iter(parts[0].acts)), len(parts) == 1
         self._due = {
             self._acts(part, player): 0.0 for part, player in zip(parts, self._players, strict=True)
@@ -155,8 +160,12 @@ class _Stage:
             # What a callback raised ends rclpy's executor when it has the next one to run.
             yield STRIDE_S
             yield STRIDE_S
-            if self._alone and self._program.wait(self._program.ended, END_S):
+            if self._alone and self._ends():
                 return
+
+    def _ends(self) -> bool:
+        """Return whether the program ends now; on a busy machine that takes a while."""
+        return Patience(self._still, idle=END_S).wait(self._program.session, self._program.ended)
 
     def _run(self, make: Callable[[], Node]) -> None:
         if make.__name__ not in self._made:
@@ -176,7 +185,7 @@ class _Stage:
                     self._due[act] = now + seconds
             self._rest()
             self._move()
-        return self._act if self._program.wait(self._program.ended, END_S) else None
+        return self._act if self._ends() else None
 
     def _rest(self) -> None:
         self._still.reached()
