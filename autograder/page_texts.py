@@ -70,7 +70,7 @@ class Page:
 
 
 class _Formatter:
-    """The process that formats (`autograder.formatting`): started when needed, also anew."""
+    """The process that formats (`autograder.formatting`): started on demand, again if lost."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None

@@ -72,7 +72,7 @@ class ExaminerNode(QuietNode):
         # As they went out, serialized. One that comes back like that is told by it, and need not be
         # taken apart: most are, and each is heard at least twice.
         self._delivered: dict[str, dict[bytes, Tag]] = defaultdict(dict)
-        self._readings = {s.name: s.type() for s in SENSORS}  # each filled anew, to be serialized
+        self._readings = {s.name: s.type() for s in SENSORS}  # one message a sensor, reused
         self._filling = threading.Lock()  # a stream may publish while a check does
         for sensor in SENSORS:
             self.listen(sensor, sensor.topic, undemanding(), self.witnessed)

@@ -65,7 +65,7 @@ class Spinner(Executor):
         return value
 
     def wake(self) -> None:
-        """Wait anew: something was created or destroyed."""
+        """Gather what to wait on again: something was created or destroyed."""
         self._waits.changed = True
         super().wake()
 

@@ -79,7 +79,7 @@ def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
         return False
     key = f"{__name__}.ends"
     if key not in bench.memory:
-        bench.memory[key] = _ends(bench.programs, still)
+        bench.memory[key] = _ending_acts(bench.programs, still)
     ends: Mapping[tuple[str, str], bool] = bench.memory[key]
     if trial and (name, trial) not in ends:
         raise NotExaminable(
@@ -89,7 +89,7 @@ def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
     return bool(trial) and ends[name, trial]
 
 
-def _ends(programs: Programs, still: Stillness) -> dict[tuple[str, str], bool]:
+def _ending_acts(programs: Programs, still: Stillness) -> dict[tuple[str, str], bool]:
     """Return of each act, with the class it is done to, whether it ends a program.
 
     What there was no time for is missing.

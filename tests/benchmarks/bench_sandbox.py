@@ -1,4 +1,4 @@
-"""What a sandbox costs a submission, and for how long an attack holds up the one beside it.
+"""What a sandbox costs a submission, and how long an attack delays its neighbour.
 
 Run it as ``python -m tests.benchmarks.bench_sandbox`` for the cost: the same right submission is
 graded in a sandbox and without one, by turns. ``--attacks`` shows for each attack of
