@@ -1,8 +1,9 @@
 """A notebook's nodes as a plain program of rclpy: no session, no harness, nobody who asks.
 
-What an exam learns of it, it sees from outside. A callback that raises ends the program. SIGINT
-ends its nodes, as Ctrl-C does; with what they have not given back the program goes on until the
-next SIGINT, which makes them anew, so that lives can be compared.
+What an exam learns of it, it sees from outside. A callback that raises ends the program; where each
+node has an executor of its own, it ends that node. SIGINT ends its nodes, as Ctrl-C does; with what
+they have not given back the program goes on until the next SIGINT, which makes them anew, so that
+lives can be compared.
 """
 
 # mypy: allow-untyped-calls
@@ -12,7 +13,8 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from threading import Thread
 from typing import Any
 
@@ -32,7 +34,8 @@ def run(
 
     Args:
         namespace: the notebook's globals.
-        wanted: ``"nodes"``, a list of [class, arguments], ``"threads"`` and ``"sim_time"``.
+        wanted: ``"nodes"``, a list of [class, arguments], ``"threads"``, ``"sim_time"``, and
+            ``"apart"``, whether each node has an executor of its own, with so many threads.
         domain_id: of the examiner who looks on.
         up: called once, when the first nodes are there.
     """
@@ -57,13 +60,39 @@ def _live(
     up: Callable[[], None],
 ) -> None:
     """Run the nodes until SIGINT, then destroy them."""
-    nodes = [namespace[name](*arguments) for name, arguments in wanted["nodes"]]
     threads = int(wanted["threads"])
+    if wanted["apart"]:
+        nodes = []
+        for name, arguments in wanted["nodes"]:
+            with suppress(Exception):  # one that cannot be made is nothing to the others
+                nodes.append(namespace[name](*arguments))
+        interrupt = interrupts.next()
+        alone = [Thread(target=_spin_alone, args=(node, threads, interrupt)) for node in nodes]
+        for thread in alone:
+            thread.start()
+        up()
+        for thread in alone:
+            thread.join()
+    else:
+        nodes = [namespace[name](*arguments) for name, arguments in wanted["nodes"]]
+        up()
+        _spin(nodes, threads, interrupts.next())
+
+
+def _spin_alone(node: Any, threads: int, until: Future) -> None:
+    """Spin a node, which is destroyed when something leaves one of its callbacks, too."""
+    try:
+        _spin([node], threads, until)
+    except BaseException:
+        node.destroy_node()
+        raise
+
+
+def _spin(nodes: Sequence[Any], threads: int, until: Future) -> None:
     executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
     for node in nodes:
         executor.add_node(node)
-    up()
-    executor.spin_until_future_complete(interrupts.next())
+    executor.spin_until_future_complete(until)
     for node in nodes:
         node.destroy_node()
     executor.shutdown(timeout_sec=0.0)

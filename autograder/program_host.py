@@ -41,7 +41,7 @@ class ProgramHost:
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return the answer to a request of the examiner's; an ``"error"`` says why there is none.
 
-        ``{"wants": "program", "nodes": [[class, arguments], ...], "threads", "sim_time",
+        ``{"wants": "program", "nodes": [[class, arguments], ...], "threads", "sim_time", "apart",
         "domain"}`` starts one; ``{"wants": "interrupt"}`` sends SIGINT, ``{"wants": "end"}`` ends
         it. From its start to its end whoever looks at the subject's processes sees the program's.
         """
@@ -116,4 +116,5 @@ def _wanted(request: dict[str, Any]) -> tuple[dict[str, Any], int]:
     threads, domain = int(request["threads"]), int(request["domain"])
     if not 1 <= threads <= MOST_THREADS or not 0 <= domain <= MAX_DOMAIN:
         raise ValueError(threads)
-    return {"nodes": nodes, "threads": threads, "sim_time": bool(request["sim_time"])}, domain
+    how = {name: bool(request[name]) for name in ("sim_time", "apart")}
+    return {"nodes": nodes, "threads": threads, **how}, domain

@@ -77,11 +77,13 @@ class Programs:
 
     @contextmanager
     def program(
-        self, nodes: Nodes, *, threads: int = 1, sim_time: bool = False
+        self, nodes: Nodes, *, threads: int = 1, sim_time: bool = False, apart: bool = False
     ) -> Iterator[Program]:
         """Run nodes of the notebook's classes for the length of the block.
 
-        Whatever looks at the subject's processes meanwhile looks at the program's.
+        Where they are ``apart``, each has an executor of its own, with so many threads, and what
+        leaves a callback ends its node alone. Whatever looks at the subject's processes meanwhile
+        looks at the program's.
 
         Raises:
             ProgramError: the engine did not start it; that is never the student's fault.
@@ -91,7 +93,7 @@ class Programs:
         try:
             reply = self._ask(
                 wants="program", nodes=[[name, [*given]] for name, given in nodes],
-                threads=threads, sim_time=sim_time, domain=domain,
+                threads=threads, sim_time=sim_time, apart=apart, domain=domain,
             )  # fmt: skip
             with Session(domain_id=domain) as session:
                 session.explains = False

@@ -2,7 +2,8 @@
 
 A consumer that is busy shows what its queues keep. Whoever asks a process to be busy tells it that
 it is being looked at; a thread that the kernel stops (ptrace(2)) hears nothing of it. Threads of
-Fast DDS are told by their names and left alone, so that what comes in is received meanwhile.
+Fast DDS are let go at once, so that what comes in is received meanwhile. Anybody can give a thread
+their names: which they are is told by the function that they began with.
 
 The kernel lets only that thread act on a held one which has stopped it, and lets all go when that
 thread ends. So each hold has a thread of its own.
@@ -13,8 +14,9 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
+import struct
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -35,9 +37,14 @@ REAP_S = 0.02
 
 DDS_THREADS = b"dds."
 """What the names of Fast DDS's threads begin with."""
+DDS_LIBRARIES = ("libfastrtps", "libfastdds")
+"""What the names of its libraries begin with, before and since its version 3."""
 
 _GET_REGISTERS, _DETACH, _SEIZE, _INTERRUPT = 12, 17, 0x4206, 0x4207
-_REGISTERS, _RESULT, _CALL = 27, 10, 15  # struct user_regs_struct of x86-64: rax, orig_rax
+# struct user_regs_struct of x86-64: rax, orig_rax, and fs_base, where glibc describes the thread
+_REGISTERS, _RESULT, _CALL, _DESCRIPTOR = 27, 10, 15, 21
+_DESCRIPTOR_BYTES = 2048
+"""Of glibc's struct pthread, or a little more: in it is the function that the thread began with."""
 _TAKEN_OUT = {2**64 - number for number in (4, 512, 513, 514, 516)}  # EINTR, ERESTART...
 _FUTEX, _FUTEX_WAIT, _CONTENDED = 202, 0, 2  # the value of a mutex of glibc that others wait for
 _EVENT_STOP = 128
@@ -54,10 +61,10 @@ class HoldError(CourseError):
 
 @dataclass(frozen=True)
 class Held:
-    """What is held: how many threads, and a look at those of DDS, which go on."""
+    """What is held: how many threads, and which are those of DDS, which go on."""
 
     threads: int
-    processes: Processes
+    of_dds: frozenset[int]
 
     def jams(self) -> bool:
         """Return whether DDS cannot receive just now, as one of its threads waits for a lock.
@@ -65,8 +72,7 @@ class Held:
         Who has the lock is held, so that it waits until the end: what the queues keep then tells
         nothing of them. `held` looks for a moment when that is not so, and may not find one.
         """
-        dds = _threads(self.processes(), of_dds=True)
-        return any(map(_waits_for_a_lock, dds))
+        return any(map(_waits_for_a_lock, self.of_dds))
 
 
 @contextmanager
@@ -84,7 +90,7 @@ def held(processes: Processes) -> Iterator[Held]:
     thread = threading.Thread(target=hold.run, name="hold")
     thread.start()
     try:
-        yield Held(hold.wait(), processes)
+        yield hold.wait()
     finally:
         hold.over.set()
         thread.join()
@@ -98,10 +104,11 @@ class _Hold:
     over: threading.Event = field(default_factory=threading.Event)
     _seized: set[int] = field(default_factory=set)
     _stopped: dict[int, int] = field(default_factory=dict)
-    _outcome: SimpleQueue[int | HoldError] = field(default_factory=SimpleQueue)
+    _of_dds: set[int] = field(default_factory=set)
+    _outcome: SimpleQueue[Held | HoldError] = field(default_factory=SimpleQueue)
 
-    def wait(self) -> int:
-        """Return how many threads are held, once all are."""
+    def wait(self) -> Held:
+        """Return what is held, once all is."""
         with suppress(Empty):
             outcome = self._outcome.get(timeout=4 * HOLD_TIMEOUT_S)
             if isinstance(outcome, HoldError):
@@ -117,7 +124,7 @@ class _Hold:
             self._let_go()
             self._outcome.put(error)
             return
-        self._outcome.put(len(self._stopped))
+        self._outcome.put(Held(len(self._stopped), frozenset(self._of_dds)))
         while not self.over.wait(REAP_S):
             self._reap()
         self._let_go()
@@ -133,10 +140,14 @@ class _Hold:
 
     def _hold_all(self) -> None:
         deadline = Deadline(HOLD_TIMEOUT_S)
-        while new := [tid for tid in _threads(self.processes()) if tid not in self._seized]:
+        while new := {*_threads(self.processes())} - self._seized - self._of_dds:
             for tid in new:
                 self._seize(tid)
             self._await_stops(deadline)
+            for tid in new & self._stopped.keys():
+                if _is_of_dds(tid):
+                    self._of_dds.add(tid)
+                    self._detach(tid)
 
     def _seize(self, tid: int) -> None:
         try:
@@ -187,25 +198,61 @@ class _Hold:
         """Let all threads go on; one that has not stopped yet is let go as soon as it stops."""
         deadline = Deadline(HOLD_TIMEOUT_S)
         while self._seized and deadline.left:
-            for tid, owed in list(self._stopped.items()):
-                with suppress(ProcessLookupError):  # it was killed
-                    _ptrace(_DETACH, tid, owed)
-                    self._seized.discard(tid)
-                del self._stopped[tid]
+            for tid in list(self._stopped):
+                self._detach(tid)
             self._reap()
             if self._seized - self._stopped.keys():
                 threading.Event().wait(LOOK_S)
 
+    def _detach(self, tid: int) -> None:
+        owed = self._stopped.pop(tid)
+        with suppress(ProcessLookupError):  # it was killed
+            _ptrace(_DETACH, tid, owed)
+            self._seized.discard(tid)
 
-def _threads(processes: Iterable[int], *, of_dds: bool = False) -> Iterator[int]:
-    """Yield the threads that are to be held, or those of DDS."""
+
+def _threads(processes: Iterable[int]) -> Iterator[int]:
     for pid in processes:
         with suppress(OSError):
             for task in Path(f"/proc/{pid}/task").iterdir():
-                with suppress(OSError):
-                    is_dds = (task / "comm").read_bytes().startswith(DDS_THREADS)
-                    if is_dds is of_dds and not _has_ended(int(task.name)):
-                        yield int(task.name)
+                if not _has_ended(int(task.name)):
+                    yield int(task.name)
+
+
+def _is_of_dds(tid: int) -> bool:
+    """Return whether a held thread is one of Fast DDS: by its name, and by how it began."""
+    with suppress(OSError, ValueError):
+        if Path(f"/proc/{tid}/comm").read_bytes().startswith(DDS_THREADS):
+            registers = _registers(tid)
+            with Path(f"/proc/{tid}/mem").open("rb", buffering=0) as memory:
+                found = os.pread(memory.fileno(), _DESCRIPTOR_BYTES, registers[_DESCRIPTOR])
+            return points_into(found, code_of(f"/proc/{tid}", DDS_LIBRARIES))
+    return False
+
+
+def code_of(process: str, libraries: tuple[str, ...]) -> list[range]:
+    """Return where the code of libraries is in a process.
+
+    Args:
+        process: its folder, or that of one of its threads.
+        libraries: what the names of their files begin with.
+
+    Raises:
+        OSError: it has ended.
+    """
+    found = []
+    with Path(process, "maps").open(encoding="utf-8", errors="replace") as mappings:
+        for mapping in mappings:
+            bounds, rights, *_, name = mapping.split(maxsplit=5)
+            if "x" in rights and name.rpartition("/")[2].startswith(libraries):
+                found.append(range(*(int(bound, 16) for bound in bounds.split("-"))))
+    return found
+
+
+def points_into(words: bytes, code: Sequence[range]) -> bool:
+    """Return whether one of these words from a memory is a place in some code."""
+    places = [place for (place,) in struct.iter_unpack("Q", words[: len(words) // 8 * 8])]
+    return any(place in part for part in code for place in places)
 
 
 def _state(tid: int) -> bytes:
@@ -225,12 +272,17 @@ def _is_at_work(tid: int) -> bool:
     One that waited has been taken out of a system call, which is to be begun again. One that waits
     for a lock may have another, and stands where the owner of it may let go at any moment.
     """
-    registers = (ctypes.c_ulonglong * _REGISTERS)()
     with suppress(ProcessLookupError):
-        _ptrace(_GET_REGISTERS, tid, ctypes.addressof(registers))
+        registers = _registers(tid)
         waited = registers[_RESULT] in _TAKEN_OUT and registers[_CALL] < 2**63
         return not waited or _waits_for_a_lock(tid)
     return False
+
+
+def _registers(tid: int) -> Sequence[int]:
+    registers = (ctypes.c_ulonglong * _REGISTERS)()
+    _ptrace(_GET_REGISTERS, tid, ctypes.addressof(registers))
+    return registers
 
 
 def _waits_for_a_lock(tid: int) -> bool:

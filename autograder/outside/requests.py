@@ -16,7 +16,7 @@ from typing import Any
 from autograder.outside import usage
 from autograder.outside.holding import Held, held
 from autograder.outside.processes import Processes, Sandboxed
-from autograder.outside.sleeping import sleepers
+from autograder.outside.sleeping import Code, sleepers
 from autograder.outside.stillness import HANGS, Stillness
 from autograder.starving import SeenDelay
 from course import tools
@@ -48,6 +48,7 @@ class Scene:
         self.still = Stillness(subject, examiner)
         self.hold = ExitStack()
         self.held: Held | None = None
+        self.code: Code = {}
         self._delay = SeenDelay(subject, pid)
         self._moments, self._marks = [time.monotonic()], [self._delay.mark()]
 
@@ -103,7 +104,7 @@ def _naps(scene: Scene, given: Given) -> list[tuple[int, int]]:
 
 
 def _sleepers(scene: Scene, given: Given) -> list[tuple[int, float]]:
-    return sleepers(scene.subject.of(scene.pid))
+    return sleepers(scene.subject.of(scene.pid), scene.code)
 
 
 def _usage(scene: Scene, given: Given) -> usage.Usage:

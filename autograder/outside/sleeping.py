@@ -2,9 +2,9 @@
 
 A thread that sleeps so (``time.sleep``, ``Event.wait(1.0)``, a time-out of rclpy's) is in a system
 call with a time in it. The kernel tells which call that is (proc(5): ``syscall``), and the time is
-in the thread's memory. Threads of Fast DDS have times of their own, and do not count. Nor does an
-executor that waits for its nodes until the next of their timers is due, and a thread that flushes
-logs: no callback waits there.
+in the thread's memory. A thread of Fast DDS does not count, nor an executor that waits for its
+nodes until the next of their timers is due, nor a thread that flushes logs: no callback waits
+there. They are told by what stands on their stacks.
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ import struct
 import time
 from collections.abc import Sequence
 from contextlib import suppress
-from pathlib import Path
 
-from autograder.outside.holding import DDS_THREADS
+from autograder.outside.holding import DDS_LIBRARIES, code_of, points_into
 
 _POLL, _SELECT, _NANOSLEEP, _FUTEX, _CLOCK_NANOSLEEP, _PSELECT = 7, 23, 35, 202, 230, 270
 _EPOLL_WAIT, _PPOLL, _EPOLL_PWAIT, _EPOLL_PWAIT2 = 232, 271, 281, 441
@@ -27,17 +26,24 @@ _POINTERS = {_SELECT: 4, _NANOSLEEP: 0, _PSELECT: 4, _PPOLL: 2, _EPOLL_PWAIT2: 3
 _COMMAND, _WAIT, _WAIT_UNTIL, _OF_THE_DAY = 0x7F, 0, 9, 0x100  # futex(2)
 _ABSOLUTE = 1  # clock_nanosleep(2)
 _TIME = struct.Struct("qq")
-_WAIT_IN = ("librmw_", "librcl_logging_", "libspdlog")
-"""What the names of the libraries begin with in which an executor waits, and a writer of logs."""
+_WAIT_IN = (*DDS_LIBRARIES, "librmw_", "librcl_logging_", "libspdlog")
+"""What the names of libraries begin with in which DDS waits, an executor, and a writer of logs."""
 _STACK = 1024
 """Bytes of a thread's stack, the innermost, in which there are places in those libraries then."""
 
+Code = dict[str, list[range]]
+"""Where the code of those libraries is in processes, by their folders."""
 
-def sleepers(process: str) -> list[tuple[int, float]]:
-    """Return the sleeping threads of a process, by its folder, and for how many s they will sleep.
+
+def sleepers(process: str, code: Code) -> list[tuple[int, float]]:
+    """Return the sleeping threads of a process, and for how many s they will sleep.
 
     Where only the whole length is known it is that. None are told if the kernel does not let us
     look (ptrace(2)).
+
+    Args:
+        process: its folder.
+        code: what was found out at earlier looks; what is new is added.
     """
     found = []
     with suppress(OSError):
@@ -45,12 +51,12 @@ def sleepers(process: str) -> list[tuple[int, float]]:
         try:
             for name in os.listdir(f"{process}/task"):  # noqa: PTH208 - the names alone, very often
                 with suppress(OSError, ValueError, IndexError, OverflowError, struct.error):
-                    task = f"{process}/task/{name}"
-                    if not _read(f"{task}/comm").startswith(DDS_THREADS):
-                        call = _read(f"{task}/syscall").split()  # "running" is no number
-                        number, *given = int(call[0]), *(int(word, 16) for word in call[1:])
-                        left = _left(number, given, memory)
-                        if left is not None and not _waits_in_ros(process, given[-2], memory):
+                    call = _read(f"{process}/task/{name}/syscall").split()
+                    # "running" is no number
+                    number, *given = int(call[0]), *(int(word, 16) for word in call[1:])
+                    if (left := _left(number, given, memory)) is not None:
+                        stack = os.pread(memory, _STACK, given[-2])
+                        if not _waits_in_ros(process, stack, code):
                             found.append((int(name), left))
         finally:
             os.close(memory)
@@ -81,17 +87,11 @@ def _left(number: int, given: Sequence[int], memory: int) -> float | None:
     return None
 
 
-def _waits_in_ros(process: str, stack_pointer: int, memory: int) -> bool:
-    stack = os.pread(memory, _STACK, stack_pointer)
-    places = [place for (place,) in struct.iter_unpack("Q", stack[: len(stack) // 8 * 8])]
-    with Path(process, "maps").open(encoding="utf-8", errors="replace") as mappings:
-        for mapping in mappings:
-            bounds, rights, *_, name = mapping.split(maxsplit=5)
-            if "x" in rights and name.rpartition("/")[2].startswith(_WAIT_IN):
-                start, end = (int(bound, 16) for bound in bounds.split("-"))
-                if any(start <= place < end for place in places):
-                    return True
-    return False
+def _waits_in_ros(process: str, stack: bytes, code: Code) -> bool:
+    if points_into(stack, code.get(process, ())):
+        return True
+    code[process] = code_of(process, _WAIT_IN)  # libraries may have been loaded since
+    return points_into(stack, code[process])
 
 
 def _until(memory: int, pointer: int, clock: int, *, absolute: bool) -> float:

@@ -36,7 +36,8 @@ class Raises(Works):
     def tick(self):
         raise RuntimeError("out of a callback")
 
-wanted = {"nodes": [[sys.argv[1], ["one"]]], "threads": int(sys.argv[2]), "sim_time": False}
+nodes, threads = [[name, [name]] for name in sys.argv[1].split()], int(sys.argv[2])
+wanted = {"nodes": nodes, "threads": threads, "sim_time": False, "apart": len(nodes) > 1}
 plain_program.run(globals(), wanted, int(sys.argv[3]), lambda: print("up", flush=True))
 """
 
@@ -70,6 +71,19 @@ def test_a_callback_that_raises_ends_the_program(threads: int) -> None:
     with start("Raises", threads) as program:
         reads(program, "made", "up")
         assert program.wait(timeout=60) == 1
+
+
+def test_apart_a_callback_that_raises_ends_its_node_alone_and_one_not_made_is_left_out() -> None:
+    with start("Raises Missing Works", 4) as program:
+        try:
+            reads(program, "made", "made", "up")
+            assert program.stdout is not None
+            said = {program.stdout.readline().strip() for _ in range(2)}
+            assert said == {"destroyed", "spins"}
+            os.kill(program.pid, signal.SIGINT)
+            reads(program, "destroyed")
+        finally:
+            program.kill()
 
 
 @pytest.mark.parametrize(

@@ -131,6 +131,19 @@ def test_own_threads_and_children_stand_still_and_go_on(tmp_path: Path) -> None:
                 assert counts() == before
 
 
+def test_a_thread_with_a_name_of_those_of_dds_is_held_all_the_same(tmp_path: Path) -> None:
+    shared = tmp_path / "counts"
+    shared.write_bytes(b"%08d" % 0 * 3)
+    name = "open('/proc/thread-self/comm', 'w').write('dds.udp.7400')"
+    with process(name + COUNTERS, shared) as running:
+        comm = Path(f"/proc/{running.pid}/comm")
+        assert comm.read_bytes() == b"dds.udp.7400\n"
+        with held(lambda: family(running.pid)):
+            before = shared.read_bytes()
+            threading.Event().wait(0.05)
+            assert shared.read_bytes() == before
+
+
 def test_who_is_killed_while_held_is_gone_at_once() -> None:
     with process("print(flush=True); import time; time.sleep(600)") as running:
         with held(lambda: [running.pid]):
