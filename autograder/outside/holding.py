@@ -282,7 +282,7 @@ def _is_at_work(tid: int) -> bool:
 def _registers(tid: int) -> Sequence[int]:
     registers = (ctypes.c_ulonglong * _REGISTERS)()
     _ptrace(_GET_REGISTERS, tid, ctypes.addressof(registers))
-    return registers
+    return list(registers)
 
 
 def _waits_for_a_lock(tid: int) -> bool:

@@ -116,7 +116,7 @@ def _ending_acts(programs: Programs, still: Stillness) -> dict[tuple[str, str], 
 
 
 def _from(part: Part, act: str, ends: Mapping[tuple[str, str], bool]) -> Part:
-    """Return what is left to do to a class: an act and those after it, or if it is settled these."""
+    """Return what is left to do to a class: an act, unless that is settled, and those after it."""
     names = [*part.acts]
     first = names.index(act) + (1 if ends[part.name, act] else 0)
     return part._replace(acts={name: part.acts[name] for name in names[first:]})
