@@ -4,17 +4,18 @@ And what its database really raised: nbgrader itself passes on a log, in which a
 
 Its converters compile every HTML template for each student, each of its many openings of the
 gradebook makes a database engine of its own, whose SQL is then compiled from nothing, and looks for
-every table, and for each cell the schema of its metadata is itself compared with the schema of
-schemas. Two thirds of the time went into that in which a student's scores and feedback are written.
-Half of what was left of feedback's went into a second reading of each page, which ours do not need.
+every table, for each cell of a notebook it asks the gradebook anew, and compares the schema of its
+metadata with the schema of schemas. Two thirds of the time went into that in which a student's
+scores and feedback are written. Half of what was left of feedback's went into a second reading of
+each page, which ours do not need.
 """
 
 from __future__ import annotations
 
 import html
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import CodeType
 from typing import Any
@@ -29,7 +30,17 @@ from jsonschema.validators import validator_for
 from nbconvert.exporters import HTMLExporter
 from nbformat import NotebookNode, from_dict
 from nbgrader import nbgraderformat
-from nbgrader.api import Gradebook
+from nbgrader.api import (
+    Assignment,
+    BaseCell,
+    Comment,
+    Grade,
+    Gradebook,
+    Notebook,
+    SourceCell,
+    SubmittedAssignment,
+    SubmittedNotebook,
+)  # fmt: skip
 from sqlalchemy.exc import DataError, IntegrityError
 from sqlalchemy.orm import scoped_session, sessionmaker
 from traitlets.config import Config
@@ -192,6 +203,69 @@ class _Schemas:
 _schemas = _Schemas()
 
 
+Rows = Callable[[Any, tuple[str, ...]], Iterable[tuple[str, Any]]]
+"""Returns what a database has of a notebook, or of one handed in, by the names of its cells."""
+
+
+def _finds_at_once(find: Callable[..., Any], rows: Rows) -> Callable[..., Any]:
+    """Return how to find something of one cell where the first look finds it for all of a notebook.
+
+    An open gradebook remembers it: nbgrader opens it for one pass over one notebook.
+    """
+
+    def found(gradebook: Any, cell: str, *where: str) -> Any:
+        known = vars(gradebook).setdefault(rows.__name__, {})
+        if where not in known:
+            known[where] = dict(rows(gradebook.db, where))
+        row = known[where].get(cell)
+        return find(gradebook, cell, *where) if row is None else row
+
+    return found
+
+
+def _grades(db: Any, where: tuple[str, ...]) -> Iterable[tuple[str, Any]]:
+    return _of_a_submission(db, Grade, *where)
+
+
+def _comments(db: Any, where: tuple[str, ...]) -> Iterable[tuple[str, Any]]:
+    return _of_a_submission(db, Comment, *where)
+
+
+def _of_a_submission(
+    db: Any, kind: Any, notebook: str, assignment: str, student: str
+) -> Iterable[tuple[str, Any]]:
+    query = db.query(BaseCell.name, kind).join(kind, kind.cell_id == BaseCell.id)
+    query = query.join(SubmittedNotebook, SubmittedNotebook.id == kind.notebook_id)
+    query = query.join(Notebook, Notebook.id == SubmittedNotebook.notebook_id)
+    query = query.join(
+        SubmittedAssignment, SubmittedAssignment.id == SubmittedNotebook.assignment_id
+    )
+    query = query.join(Assignment, Assignment.id == SubmittedAssignment.assignment_id)
+    found: Iterable[tuple[str, Any]] = query.filter(
+        Notebook.name == notebook,
+        Assignment.name == assignment,
+        SubmittedAssignment.student_id == student,
+    ).all()
+    return found
+
+
+def _source_cells(db: Any, where: tuple[str, ...]) -> Iterable[tuple[str, Any]]:
+    notebook, assignment = where
+    query = db.query(SourceCell.name, SourceCell)
+    query = query.join(Notebook, Notebook.id == SourceCell.notebook_id)
+    query = query.join(Assignment, Assignment.id == Notebook.assignment_id)
+    found: Iterable[tuple[str, Any]] = query.filter(
+        Notebook.name == notebook, Assignment.name == assignment
+    ).all()
+    return found
+
+
+FINDS = {
+    "find_grade": _grades, "find_comment": _comments, "find_source_cell": _source_cells,
+}  # fmt: skip
+"""What nbgrader asks a gradebook for, cell by cell, and what answers for all cells at once."""
+
+
 class Engines:
     """One database engine for each gradebook, in place of one for each time that it is opened."""
 
@@ -231,14 +305,20 @@ class Engines:
                 self._found.add(self._place(db_url, course_id))
                 return
             gradebook.engine = self.engine(db_url)
-            gradebook.db = scoped_session(sessionmaker(bind=gradebook.engine, future=True))
+            # Nobody else writes meanwhile: what has been committed need not be read again.
+            session = sessionmaker(bind=gradebook.engine, future=True, expire_on_commit=False)
+            gradebook.db = scoped_session(session)
             gradebook.course_id, gradebook.authenticator = course_id, authenticator
 
         with (
             _in_place(nbgrader.api, "create_engine", self.engine),
             _in_place(Gradebook, "__init__", open_),
             _in_place(nbgraderformat.common, "jsonschema", _schemas),
+            ExitStack() as finds,
         ):
+            for name, rows in FINDS.items():
+                find = _finds_at_once(getattr(Gradebook, name), rows)
+                finds.enter_context(_in_place(Gradebook, name, find))
             yield
 
     def _place(self, url: str, course: str) -> tuple[object, ...] | None:

@@ -38,6 +38,8 @@ def each_at_once(rig: SensorRig) -> dict[str, tuple[int, int]]:
         open_ones = [r for r in records.values() if index < SINGLES or not r.known()]
         if not _send(rig, [r for r in open_ones if len(r.missed) <= FORGIVEN], index):
             break
+        if any(record.is_slow() for record in records.values()):
+            break
     for sensor in _held_for_the_next(rig, records):
         raised = rig.raised()
         why = f"{raised}." if raised else ": does the driver wait for the next one?"

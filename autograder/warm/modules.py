@@ -7,9 +7,12 @@ from __future__ import annotations
 
 import inspect
 import os
+import pwd
+import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from pathlib import Path
 from tempfile import TemporaryDirectory
 
 COURSE = (
@@ -56,7 +59,8 @@ def scratch_folder(*variables: str) -> Iterator[None]:
     """Name a folder in environment variables where modules can write while they are imported.
 
     A zygote has no home and nothing to write to. matplotlib lists the machine's fonts, which takes
-    half a second, and wants to keep the list; without a folder it cannot be imported at all.
+    most of a second, and wants to keep the list; without a folder it cannot be imported at all.
+    A list that it has kept for the user who grades is used.
 
     Raises:
         OSError: there is none to be had.
@@ -64,7 +68,10 @@ def scratch_folder(*variables: str) -> Iterator[None]:
     before = {name: os.environ[name] for name in variables if name in os.environ}
     with TemporaryDirectory(dir="/dev/shm") as folder:
         os.environ.update(dict.fromkeys(variables, folder))
+        kept = Path(pwd.getpwuid(os.getuid()).pw_dir, ".cache", "matplotlib")
         try:
+            for fonts in kept.glob("fontlist-*.json"):
+                shutil.copy(fonts, folder)
             yield
         finally:
             for name in variables:
