@@ -36,7 +36,7 @@ Root = Annotated[
     Path | None,
     typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
 ]
-IN_FLIGHT = 2 * (os.cpu_count() or 1) + 1
+IN_FLIGHT = 3 * (os.cpu_count() or 1)
 """Notebooks run at a time: most of its time a subject waits, for DDS or a timer.
 
 With more than three a processor, readings come less often at their rate.
