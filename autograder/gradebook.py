@@ -123,7 +123,8 @@ class CourseGradebook:
 
     def generate_assignment(self, assignment: str) -> None:
         """Make the student version of an assignment and enter it into the gradebook."""
-        self._call(self._api.generate_assignment, assignment, force=True, create=True)
+        options = {"force": True, "create": True}
+        self._call(self._api.generate_assignment, assignment, options=options)
 
     def autograde(self, assignment: str, student: str) -> None:
         """Enter one student's scores.
@@ -132,11 +133,14 @@ class CourseGradebook:
             GradebookError: nbgrader cannot enter this student.
             GradebookUnusable: it could not enter anybody: a full disk, or a lock, say.
         """
-        self._call(self._api.autograde, assignment, student, force=True, create=True)
+        options = {"force": True, "create": True}
+        self._call(self._api.autograde, assignment, student, options=options, of_one_pass=True)
 
     def generate_feedback(self, assignment: str, student: str) -> None:
         """Write one student's feedback as HTML; raises as `autograde` does."""
-        self._call(self._api.generate_feedback, assignment, student, force=True)
+        options = {"force": True}
+        method = self._api.generate_feedback
+        self._call(method, assignment, student, options=options, of_one_pass=True)
 
     def assignments(self) -> list[str]:
         """Return the assignments that have been released into the gradebook."""
@@ -211,10 +215,12 @@ class CourseGradebook:
         create = self.config.Autograde.get("create_student", True)
         return roster.of_people(people, create if isinstance(create, bool) else True)
 
-    def _call(self, method: Any, *arguments: Any, **options: Any) -> None:
+    def _call(
+        self, method: Any, *arguments: Any, options: dict[str, bool], of_one_pass: bool = False
+    ) -> None:
         deadline = time.monotonic() + LOCK_PATIENCE
         while True:
-            with _quiet(), self._engines.shared():
+            with _quiet(), self._engines.shared(of_one_pass=of_one_pass):
                 result = method(*arguments, **options)
             if result["success"]:
                 return

@@ -210,7 +210,7 @@ Rows = Callable[[Any, tuple[str, ...]], Iterable[tuple[str, Any]]]
 def _finds_at_once(find: Callable[..., Any], rows: Rows) -> Callable[..., Any]:
     """Return how to find something of one cell where the first look finds it for all of a notebook.
 
-    An open gradebook remembers it: nbgrader opens it for one pass over one notebook.
+    An open gradebook remembers it.
     """
 
     def found(gradebook: Any, cell: str, *where: str) -> Any:
@@ -289,8 +289,14 @@ class Engines:
         return self._engines[url]
 
     @contextmanager
-    def shared(self) -> Iterator[None]:
-        """Have nbgrader use these engines. What it closes, an engine opens again when needed."""
+    def shared(self, *, of_one_pass: bool = False) -> Iterator[None]:
+        """Have nbgrader use these engines. What it closes, an engine opens again when needed.
+
+        Args:
+            of_one_pass: whether a gradebook is opened for one pass over a notebook that was handed
+                in, in which no cell of the assignment comes or goes: what has been found there
+                is not looked for, or read, again.
+        """
         self._raised.clear()
 
         def open_(
@@ -305,8 +311,9 @@ class Engines:
                 self._found.add(self._place(db_url, course_id))
                 return
             gradebook.engine = self.engine(db_url)
-            # Nobody else writes meanwhile: what has been committed need not be read again.
-            session = sessionmaker(bind=gradebook.engine, future=True, expire_on_commit=False)
+            session = sessionmaker(
+                bind=gradebook.engine, future=True, expire_on_commit=not of_one_pass
+            )
             gradebook.db = scoped_session(session)
             gradebook.course_id, gradebook.authenticator = course_id, authenticator
 
@@ -316,7 +323,7 @@ class Engines:
             _in_place(nbgraderformat.common, "jsonschema", _schemas),
             ExitStack() as finds,
         ):
-            for name, rows in FINDS.items():
+            for name, rows in FINDS.items() if of_one_pass else ():
                 find = _finds_at_once(getattr(Gradebook, name), rows)
                 finds.enter_context(_in_place(Gradebook, name, find))
             yield

@@ -68,9 +68,9 @@ def _live(
                 nodes.append(namespace[name](*arguments))
         interrupt = interrupts.next()
         alone = [Thread(target=_spin_alone, args=(node, threads, interrupt)) for node in nodes]
+        up()
         for thread in alone:
             thread.start()
-        up()
         for thread in alone:
             thread.join()
     else:
