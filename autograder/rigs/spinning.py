@@ -13,11 +13,13 @@ from __future__ import annotations
 import threading
 import traceback
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rclpy.context import Context
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import Executor, ExternalShutdownException, ShutdownException
+from rclpy.subscription import Subscription
 
 from course import WaitTimeout
 from course.runtime.ready import WaitList
@@ -28,8 +30,29 @@ MOST_AT_ONCE = 16
 takes longer than to take it."""
 
 
+_PLAIN = ("timer", "subscription")
+"""Kinds of which most callbacks are, called without rclpy's coroutine around each."""
+
+
 def _nobody() -> None:
     """Wake nobody: there is one thread."""
+
+
+def _take_turn(timer: Any) -> Callable[[], Any]:
+    with timer.handle:
+        timer.handle.call_timer()
+    callback: Callable[[], Any] = timer.callback
+    return callback
+
+
+def _take_message(subscription: Any) -> Callable[[], Any] | None:
+    with subscription.handle:
+        taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+    if taken is None:
+        return None
+    if subscription._callback_type is Subscription.CallbackType.MessageOnly:
+        return partial(subscription.callback, taken[0])
+    return partial(subscription.callback, *taken)
 
 
 class Spinner(Executor):
@@ -38,11 +61,11 @@ class Spinner(Executor):
     def __init__(self, context: Context) -> None:
         """Begin to spin, as yet without nodes."""
         super().__init__(context=context)
-        self._waits = WaitList(self, _nobody)
+        self._waits = WaitList(self, _nobody, keeps=True)
         self._pulse = Pulse()
         self._take: dict[str, Callable[[Any], Any]] = {
-            "waitable": self._take_waitable, "timer": self._take_timer,
-            "subscription": self._take_subscription, "client": self._take_client,
+            "waitable": self._take_waitable, "timer": _take_turn,
+            "subscription": _take_message, "client": self._take_client,
             "guard_condition": self._take_guard_condition, "service": self._take_service,
         }  # fmt: skip
         self._thread = threading.Thread(target=self._spin, name="examiner's nodes", daemon=True)
@@ -100,9 +123,14 @@ class Spinner(Executor):
         try:
             if (call := self._take[kind](entity)) is None:
                 return False
-            call().send(None)
+            if kind in _PLAIN:
+                call()
+            else:
+                call().send(None)
         except StopIteration:
             pass
+        except InvalidHandle:  # destroyed just now
+            return False
         except Exception:  # noqa: BLE001 - of a message that is none, say: the next may be one
             traceback.print_exc()
         self._pulse.beat()
