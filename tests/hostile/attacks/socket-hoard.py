@@ -1,6 +1,8 @@
 # title: Messages that nobody reads, which the kernel keeps, in every socket that there may be
-# told: its processes had more than 2048 files open
+# told: The notebook's process ended:
+# told: more than
 
+# Which bound is passed at the next look, that on open files or that on sockets, is chance.
 import os
 import socket
 
