@@ -17,8 +17,12 @@ from tests.machine import needs_isolation, needs_users
 
 GROUPS = 3
 NAMES = [
-    "child-leak", "daemon-orphan", "escapes", "file-locks", "kills-everybody", "locks-our-files",
-    "page-tables", "poisons-cache", "reads-files", "socket-hoard", "type-name-as-path",
+    "blinds-the-watch", "broken-protocol", "child-leak", "daemon", "daemon-orphan",
+    "empty-files", "escapes", "file-locks", "forged-frames", "forged-replies",
+    "forged-verdict", "fork-bomb", "kills-everybody", "locks-our-files", "memory-bomb",
+    "memory-bomb-shared", "monolith-hidden", "network", "page-tables", "patches",
+    "poisons-cache", "reads-files", "socket-hoard", "talks-over-the-examiner",
+    "type-name-as-path",
 ]  # fmt: skip
 TABLE = "tests/hostile/test_hostile.py::test_an_attack_is_contained_and_explained_and_hurts_nobody"
 
