@@ -2,12 +2,11 @@
 
 And what its database really raised: nbgrader itself passes on a log, in which anything may stand.
 
-Its converters compile every HTML template for each student, each of its many openings of the
-gradebook makes a database engine of its own, whose SQL is then compiled from nothing, and looks for
-every table, for each cell of a notebook it asks the gradebook anew, and compares the schema of its
-metadata with the schema of schemas. Two thirds of the time went into that in which a student's
-scores and feedback are written. Half of what was left of feedback's went into a second reading of
-each page, which ours do not need.
+For each student it compiles every HTML template. It opens the gradebook many times, and each time
+it makes a new database engine, compiles its SQL from nothing and looks for every table. For each
+cell it sends queries to the gradebook, and compares the schema of the cell's metadata with the
+schema of schemas. Writing a student's scores and feedback spent two thirds of its time on that.
+Half of what was left of feedback's went into a second reading of each page, which ours do not need.
 """
 
 from __future__ import annotations
@@ -208,19 +207,19 @@ Rows = Callable[[Any, tuple[str, ...]], Iterable[tuple[str, Any]]]
 
 
 def _finds_at_once(find: Callable[..., Any], rows: Rows) -> Callable[..., Any]:
-    """Return how to find something of one cell where the first look finds it for all of a notebook.
+    """Return a replacement for ``find`` whose first call reads the rows of all cells of a notebook.
 
-    An open gradebook remembers it.
+    The open gradebook keeps them for the calls that follow.
     """
 
-    def found(gradebook: Any, cell: str, *where: str) -> Any:
+    def find_kept(gradebook: Any, cell: str, *where: str) -> Any:
         known = vars(gradebook).setdefault(rows.__name__, {})
         if where not in known:
             known[where] = dict(rows(gradebook.db, where))
         row = known[where].get(cell)
         return find(gradebook, cell, *where) if row is None else row
 
-    return found
+    return find_kept
 
 
 def _grades(db: Any, where: tuple[str, ...]) -> Iterable[tuple[str, Any]]:

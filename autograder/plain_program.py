@@ -1,9 +1,9 @@
 """A notebook's nodes as a plain program of rclpy: no session, no harness, nobody who asks.
 
 What an exam learns of it, it sees from outside. A callback that raises ends the program; where each
-node has an executor of its own, it ends that node. SIGINT ends its nodes, as Ctrl-C does; with what
-they have not given back the program goes on until the next SIGINT, which makes them anew, so that
-lives can be compared.
+node has its own executor, it ends that node. SIGINT destroys the nodes, as Ctrl-C does. The program
+then keeps running, with whatever they did not release; the next SIGINT creates new nodes, so that
+one life can be compared with the next.
 """
 
 # mypy: allow-untyped-calls

@@ -56,7 +56,7 @@ class RobotRig:
         self.renew()
         if not self._fresh:
             self.bench.subject.open(threads=THREADS, sim_time=True)
-            self.bench.subject.mark("beside")  # the first node starts the threads
+            self.bench.subject.mark("beside")  # the executor's threads start with its first node
             self._fresh = True
         made = self.bench.session.run(player)
         assert isinstance(made, player)

@@ -3,7 +3,8 @@
 Each ``attacks/<name>.py`` is the last cell before the first check, under a header of comments:
 
     # title: what it tries
-    # told: a fragment of what the grade says about it (any number of them)
+    # told: a fragment of what the grade says about it (any number of them), or " | " between two
+      of which either may be said
     # prints: a fragment of what the cell itself must print, an error included
     # exercise: the exercise; qos if left out
     # base: the corpus case that the rest of the submission is; an empty solution if left out
@@ -236,8 +237,8 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
     said, shown = grade_text(outcome), json.dumps(outcome.outputs, ensure_ascii=False)
     if attack.score != "any":
         assert score(outcome) == float(attack.score), said
-    for fragment in attack.told:
-        assert fragment in said
+    for either in attack.told:
+        assert any(fragment in said for fragment in either.split(" | ")), said
     for fragment in attack.prints:
         assert fragment in shown
     assert "Traceback" not in said

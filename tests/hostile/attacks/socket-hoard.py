@@ -1,6 +1,5 @@
 # title: Messages that nobody reads, which the kernel keeps, in every socket that there may be
-# told: The notebook's process ended:
-# told: more than
+# told: its processes had more than 2048 files open | there were more than 1200 sockets in its network
 
 # Which bound is passed at the next look, that on open files or that on sockets, is chance.
 import os
