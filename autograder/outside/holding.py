@@ -14,11 +14,14 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
+import re
 import struct
 import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import cache, partial
+from importlib.util import find_spec
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
@@ -140,14 +143,23 @@ class _Hold:
 
     def _hold_all(self) -> None:
         deadline = Deadline(HOLD_TIMEOUT_S)
-        while new := {*_threads(self.processes())} - self._seized - self._of_dds:
+        code = cache(partial(code_of, libraries=DDS_LIBRARIES))  # whoever is held loads no other
+        while new := {t: of for t, of in self._threads() if t not in self._seized | self._of_dds}:
             for tid in new:
                 self._seize(tid)
             self._await_stops(deadline)
-            for tid in new & self._stopped.keys():
-                if _is_of_dds(tid):
+            for tid in new.keys() & self._stopped.keys():
+                if _is_of_dds(tid, partial(code, f"/proc/{new[tid]}")):
                     self._of_dds.add(tid)
                     self._detach(tid)
+
+    def _threads(self) -> Iterator[tuple[int, int]]:
+        """Yield the threads that have not ended, each with its process."""
+        for pid in self.processes():
+            with suppress(OSError):
+                for task in Path(f"/proc/{pid}/task").iterdir():
+                    if not _has_ended(int(task.name)):
+                        yield int(task.name), pid
 
     def _seize(self, tid: int) -> None:
         try:
@@ -211,27 +223,24 @@ class _Hold:
             self._seized.discard(tid)
 
 
-def _threads(processes: Iterable[int]) -> Iterator[int]:
-    for pid in processes:
-        with suppress(OSError):
-            for task in Path(f"/proc/{pid}/task").iterdir():
-                if not _has_ended(int(task.name)):
-                    yield int(task.name)
+def _is_of_dds(tid: int, code: Callable[[], Sequence[range]]) -> bool:
+    """Return whether a held thread is one of Fast DDS: by its name, and by how it began.
 
-
-def _is_of_dds(tid: int) -> bool:
-    """Return whether a held thread is one of Fast DDS: by its name, and by how it began."""
+    ``code`` returns where the code of DDS is in its process.
+    """
     with suppress(OSError, ValueError):
         if Path(f"/proc/{tid}/comm").read_bytes().startswith(DDS_THREADS):
             registers = _registers(tid)
             with Path(f"/proc/{tid}/mem").open("rb", buffering=0) as memory:
                 found = os.pread(memory.fileno(), _DESCRIPTOR_BYTES, registers[_DESCRIPTOR])
-            return points_into(found, code_of(f"/proc/{tid}", DDS_LIBRARIES))
+            return points_into(found, code())
     return False
 
 
 def code_of(process: str, libraries: tuple[str, ...]) -> list[range]:
-    """Return where the code of libraries is in a process.
+    """Return where the code of libraries of ROS 2 is in a process, as they were installed with it.
+
+    A submission can have a file of the same name. But it cannot put it there.
 
     Args:
         process: its folder, or that of one of its threads.
@@ -240,13 +249,21 @@ def code_of(process: str, libraries: tuple[str, ...]) -> list[range]:
     Raises:
         OSError: it has ended.
     """
-    found = []
-    with Path(process, "maps").open(encoding="utf-8", errors="replace") as mappings:
-        for mapping in mappings:
-            bounds, rights, *_, name = mapping.split(maxsplit=5)
-            if "x" in rights and name.rpartition("/")[2].startswith(libraries):
-                found.append(range(*(int(bound, 16) for bound in bounds.split("-"))))
-    return found
+    names = "|".join(map(re.escape, libraries))
+    path = rf"{re.escape(str(_installed()))}/(?:[^\n]*/)?(?:{names})[^/\n]*"
+    executable = rf"^([0-9a-f]+)-([0-9a-f]+) ..x\S+ \S+ \S+ \S+ +{path}$"
+    mappings = Path(process, "maps").read_bytes()  # as text, other line ends would count as well
+    found = re.findall(os.fsencode(executable), mappings, re.MULTILINE)
+    return [range(int(start, 16), int(end, 16)) for start, end in found]
+
+
+@cache
+def _installed() -> Path:
+    """Return where ROS 2 is installed: rclpy is in ``lib/python3.x/site-packages`` there."""
+    rclpy = find_spec("rclpy")
+    assert rclpy is not None
+    assert rclpy.origin is not None
+    return Path(rclpy.origin).resolve().parents[4]
 
 
 def points_into(words: bytes, code: Sequence[range]) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import subprocess
 import sys
 import threading
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rclpy
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
@@ -142,6 +144,22 @@ def test_a_thread_with_a_name_of_those_of_dds_is_held_all_the_same(tmp_path: Pat
             before = shared.read_bytes()
             threading.Event().wait(0.05)
             assert shared.read_bytes() == before
+
+
+def test_code_counts_as_that_of_dds_only_where_ros_is_installed(tmp_path: Path) -> None:
+    rclpy.get_rmw_implementation_identifier()  # its libraries are loaded by the first who asks
+    installed = holding.code_of("/proc/self", holding.DDS_LIBRARIES)
+    assert installed
+    # Its path looks like a line of its own where a carriage return ends one, or like a longer path.
+    for folder in ("plain", "a\r00400000-7fff00000000 r-xp 0 0 0 ", f"other {sys.prefix}/lib"):
+        own = tmp_path / folder / "libfastrtps.so"
+        own.parent.mkdir(parents=True)
+        own.write_bytes(bytes(mmap.PAGESIZE))
+        with own.open("rb") as file:
+            mapped = mmap.mmap(file.fileno(), 0, mmap.MAP_PRIVATE, mmap.PROT_READ | mmap.PROT_EXEC)
+        with mapped:
+            assert own.name in Path("/proc/self/maps").read_text()
+            assert holding.code_of("/proc/self", holding.DDS_LIBRARIES) == installed
 
 
 def test_who_is_killed_while_held_is_gone_at_once() -> None:
