@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TextIO
 
-from autograder import exams, stuck
+from autograder import exams, points, stuck
 from autograder.bench import MAX_REPLY, Bench, Subject
 from autograder.outside.asking import Afar, Here, Outside
 from autograder.programs import Programs
@@ -95,6 +95,7 @@ def preload() -> None:
     modules.import_all()
     for name in exams.names():
         exams.load(name)
+    points.table()  # read once, and not in each fork
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -116,6 +117,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with Session(domain_id=options.domain) as session:
         session.explains = False  # it asks whether something comes, and says itself what it means
         serve(sys.stdin, verdicts, session, subject, outside)
+        if outside is not None:
+            os._exit(0)  # in its sandbox nobody is left who would have to hear that it goes
     return 0
 
 

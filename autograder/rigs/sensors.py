@@ -249,7 +249,7 @@ class SensorRig:
 
     def taken(self, sensor: Sensor, phase: str, index: int) -> bool:
         """Whether the driver has published a reading of a phase, or a later one."""
-        return max(self.witnessed(sensor, phase), default=-1) >= index
+        return max(self.publications(sensor, phase), default=-1) >= index
 
     def witnessed(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings as they went over the sensor's topic."""
