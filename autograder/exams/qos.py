@@ -70,8 +70,14 @@ def nodes_start(rig: SensorRig) -> None:
                 expected=f"{name}() makes a node without an error.",
                 actual=error.told,
             ) from None
-    rig.wait(lambda: not any(line.startswith("There is no") for line in _faults(rig)))
-    if faults := list(_faults(rig)):
+    faults: list[str] = []
+
+    def all_there() -> bool:
+        faults[:] = _faults(rig)
+        return not any(line.startswith("There is no") for line in faults)
+
+    rig.wait(all_there)
+    if faults:
         raise Failed(expected="Every topic of the task has its endpoint.", actual=" ".join(faults))
 
 

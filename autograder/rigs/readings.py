@@ -12,7 +12,6 @@ import re
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from rclpy.time import Time
 from sensor_msgs.msg import Image, Imu, LaserScan
 from std_msgs.msg import String
 
@@ -64,11 +63,11 @@ class Sensor:
     rate: float
     most: int
 
-    def message(self, tag: Tag, stamp: Time) -> Any:
-        """Return a reading that carries ``tag`` and was taken at ``stamp``."""
+    def message(self, tag: Tag, stamp: int = 0) -> Any:
+        """Return a reading that carries ``tag`` and was taken at ``stamp`` (ns since 1970)."""
         return self.fill(self.type(), tag, stamp)
 
-    def fill(self, message: Any, tag: Tag, stamp: Time) -> Any:
+    def fill(self, message: Any, tag: Tag, stamp: int) -> Any:
         """Make a reading, new or filled before, one that carries ``tag``; return it.
 
         To make a message takes longer than to fill it.
@@ -76,8 +75,9 @@ class Sensor:
         if self.type is String:
             message.data = str(tag)
             return message
-        message.header.frame_id = str(tag)
-        message.header.stamp = stamp.to_msg()
+        header = message.header
+        header.frame_id = str(tag)
+        header.stamp.sec, header.stamp.nanosec = divmod(stamp, 10**9)
         numbers = [float(number) for number in tag]
         if self.type is Image:
             message.data = str(tag).encode()
@@ -122,7 +122,7 @@ class Sensor:
 
     def unchanged(self, message: Any, tag: Tag) -> bool:
         """Whether a reading is what the hardware delivered; its header is the driver's to fill."""
-        delivered = self.message(tag, Time())
+        delivered = self.message(tag)
         if self.type is not String:
             delivered.header = message.header
         # As text only if need be: a range that is not a number does not equal itself.
