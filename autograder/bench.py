@@ -12,7 +12,7 @@ from autograder.outside.asking import Outside
 from autograder.programs import Programs
 from autograder.starving import RunDelay, of_process
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
-from course import Session
+from course.runtime.core_session import CoreSession
 
 REPLY_TIMEOUT = 10.0
 """Seconds a subject may take over one request (making a node, say) before it counts as hung."""
@@ -367,7 +367,7 @@ class Bench:
 
     def __init__(
         self,
-        session: Session,
+        session: CoreSession,
         subject: Subject,
         outside: Outside,
         memory: dict[str, Any],

@@ -28,7 +28,7 @@ from autograder.outside.asking import Afar, Here, Outside
 from autograder.programs import Programs
 from autograder.verdict import CheckResult, Verdict
 from autograder.wire import Channel
-from course import Session
+from course.runtime.core_session import CoreSession
 
 
 @dataclass
@@ -44,7 +44,7 @@ Sittings = dict[str, Sitting]
 
 def sit(
     request: dict[str, Any],
-    session: Session,
+    session: CoreSession,
     subject: Subject,
     outside: Outside,
     sittings: Sittings,
@@ -68,7 +68,7 @@ def sit(
 def serve(
     requests: TextIO,
     answers: TextIO,
-    session: Session,
+    session: CoreSession,
     subject: Subject,
     outside: Outside | None = None,
 ) -> None:
@@ -114,7 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     outside = None
     if options.outside is not None:
         outside = Afar(socket.socket(fileno=options.outside))
-    with Session(domain_id=options.domain) as session:
+    with CoreSession(domain_id=options.domain) as session:
         session.explains = False  # it asks whether something comes, and says itself what it means
         serve(sys.stdin, verdicts, session, subject, outside)
         if outside is not None:

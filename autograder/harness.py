@@ -29,8 +29,8 @@ from autograder.raised import (
 )
 from autograder.wall_waits import wall_waits
 from autograder.wire import Channel, ChannelClosed
-from course import Session
 from course.runtime.context import default_context_beside
+from course.runtime.core_session import CoreSession
 from course.runtime.teardown import sweep
 
 MAX_VALUE = 64 * 1024
@@ -43,7 +43,7 @@ LAST_CALLBACKS_S = 1.5  # that callbacks of an exam's earlier session are given 
 MOST_CLEANUPS = 100
 """Nodes whose cleanup may raise while a session is closed."""
 
-OpenSession = Callable[[int, bool], Session]
+OpenSession = Callable[[int, bool], CoreSession]
 """Makes a session of so many threads, with simulated time or not."""
 
 
@@ -53,7 +53,7 @@ class Harness:
     def __init__(self, open_session: OpenSession, namespace: Mapping[str, Any]) -> None:
         """Serve what ``namespace`` (a notebook's globals) has, in sessions of ``open_session``."""
         self._open_session = open_session
-        self._session: Session | None = None
+        self._session: CoreSession | None = None
         self._beside = ExitStack()
         self._namespace = namespace
         self._nodes: dict[str, Any] = {}
@@ -97,10 +97,10 @@ class Harness:
             }
 
     @property
-    def _hosting(self) -> Session:
+    def _hosting(self) -> CoreSession:
         return self._session or self._begin(1, False)
 
-    def _begin(self, threads: int, sim_time: bool) -> Session:
+    def _begin(self, threads: int, sim_time: bool) -> CoreSession:
         session = self._open_session(threads, sim_time)
         self._session = session
         self._beside.enter_context(default_context_beside(session.domain_id, sim_time=sim_time))
@@ -302,7 +302,7 @@ def _cell_error(missing: str) -> str:
     return f" The {which} error of a cell was {described(error)[:MAX_TOLD].rstrip('.')}."
 
 
-def _close(session: Session) -> None:
+def _close(session: CoreSession) -> None:
     """Close a session, whatever the student's cleanups raise."""
     for _ in range(MOST_CLEANUPS):
         with suppress(

@@ -18,10 +18,10 @@ from autograder.raised import SUBJECT_ENV
 from autograder.report import Report
 from autograder.verdict import Verdict
 from autograder.wire import Channel
-from course import Session
 from course.domains import lease_domain
 from course.errors import CourseError
 from course.journal.store import JournalError, journal_here
+from course.runtime.core_session import CoreSession
 
 STUCK = 3.0
 """Seconds after a verdict in which the student's node must have been stopped."""
@@ -67,8 +67,8 @@ def examine(
     """
     lease = lease_domain()
 
-    def open_session(threads: int, sim_time: bool) -> Session:
-        return Session(domain_id=lease.domain_id, threads=threads, sim_time=sim_time)
+    def open_session(threads: int, sim_time: bool) -> CoreSession:
+        return CoreSession(domain_id=lease.domain_id, threads=threads, sim_time=sim_time)
 
     try:
         ours, theirs = socket.socketpair()

@@ -15,9 +15,10 @@ from typing import Any, TextIO
 
 from autograder.outside.asking import Outside
 from autograder.outside.requests import RequestError
-from course import Session, WaitTimeout
+from course import WaitTimeout
 from course.domains import MAX_DOMAIN
 from course.errors import CourseError
+from course.runtime.core_session import CoreSession
 
 DOMAINS = 100
 """Domains that programs take turns in: what one that was killed leaves is on the graph for long."""
@@ -34,7 +35,7 @@ class ProgramError(CourseError):
 class Program:
     """A plain program. ``up`` is whether it has made its nodes; ``session`` is in its network."""
 
-    session: Session
+    session: CoreSession
     up: bool
     domain_id: int
     _ask: Callable[..., dict[str, Any]]
@@ -95,7 +96,7 @@ class Programs:
                 wants="program", nodes=[[name, [*given]] for name, given in nodes],
                 threads=threads, sim_time=sim_time, apart=apart, domain=domain,
             )  # fmt: skip
-            with Session(domain_id=domain) as session:
+            with CoreSession(domain_id=domain) as session:
                 session.explains = False
                 yield Program(session, bool(reply["up"]), domain, self._ask, self._outside)
         finally:

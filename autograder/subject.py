@@ -25,8 +25,8 @@ from autograder.recording import Recording
 from autograder.sandbox.limits import Limits
 from autograder.shell import make_kernel
 from autograder.wire import Channel, ChannelClosed
-from course import Session
 from course.domains import reserve_domain
+from course.runtime.core_session import CoreSession
 
 SHELL = (
     "IPython.core.application", "IPython.core.completer", "IPython.core.completerlib",
@@ -48,8 +48,8 @@ def run(engine: Channel, control: Channel, domain_id: int) -> None:
     stuck.tell_when_asked(engine.fileno())
     engine.send({"ready": True})
 
-    def open_session(threads: int, sim_time: bool) -> Session:
-        return Session(domain_id=domain_id, threads=threads, sim_time=sim_time)
+    def open_session(threads: int, sim_time: bool) -> CoreSession:
+        return CoreSession(domain_id=domain_id, threads=threads, sim_time=sim_time)
 
     def serve() -> None:
         Harness(open_session, kernel.cells.user_ns).serve(control)

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from course.errors import WaitTimeout as WaitTimeout
     from course.journal.progress import Progress as Progress
     from course.journal.progress import progress as progress
+    from course.learner_session import Session as Session
     from course.notebook import load_ipython_extension as load_ipython_extension
     from course.notebook import unload_ipython_extension as unload_ipython_extension
     from course.runtime.actions import GoalRun as GoalRun
@@ -49,7 +50,6 @@ if TYPE_CHECKING:
     from course.runtime.logs import LogTable as LogTable
     from course.runtime.recorder import Recorder as Recorder
     from course.runtime.recorder import Stamped as Stamped
-    from course.runtime.session import Session as Session
     from course.runtime.simtime import SimulatedTime as SimulatedTime
 
 _HOMES = {
@@ -84,7 +84,7 @@ _HOMES = {
     "LogTable": "course.runtime.logs",
     "Recorder": "course.runtime.recorder",
     "Stamped": "course.runtime.recorder",
-    "Session": "course.runtime.session",
+    "Session": "course.learner_session",
     "SimulatedTime": "course.runtime.simtime",
 }
 

@@ -13,6 +13,7 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
 from course.errors import SessionError
+from course.learner_session import Session
 from course.runtime.actions import GoalRun
 from course.runtime.closing import CloseReport
 from course.runtime.context import (
@@ -22,7 +23,6 @@ from course.runtime.context import (
 )
 from course.runtime.logs import LogTable
 from course.runtime.recorder import Recorder
-from course.runtime.session import Session
 
 T = TypeVar("T")
 

@@ -13,7 +13,7 @@ from course.journal.notes import CellNotes
 from course.ros import magic as ros_magic
 from course.runtime import closing
 from course.runtime.callback_errors import CallbackError
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 
 _LONG = 3.0  # s that a callback may hold all others up before the learner is told
 _INIT_TWICE = "Context.init() must only be called once"
@@ -25,7 +25,7 @@ def load_ipython_extension(shell: Any) -> None:
     ros_magic.register(shell)
     unload_ipython_extension(shell)
     for session in closing.known():
-        if isinstance(session, Session) and session.closed:
+        if isinstance(session, CoreSession) and session.closed:
             _reported.news(session)  # of cells that ran before: no news of the next one
     shell.events.register("post_run_cell", _report)
 
@@ -66,7 +66,7 @@ class _Reported:
         self._notices: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
         self._blocked: weakref.WeakKeyDictionary[Any, set[Any]] = weakref.WeakKeyDictionary()
 
-    def news(self, session: Session) -> list[News]:
+    def news(self, session: CoreSession) -> list[News]:
         seen = self._errors.setdefault(session, {})
         news = []
         for index, error in enumerate(session.errors):
@@ -126,7 +126,7 @@ def _report(result: Any) -> None:
             )
         )
     for session in closing.known():
-        if isinstance(session, Session):
+        if isinstance(session, CoreSession):
             if not session.closed:
                 session.take_back_stolen_nodes()
             for item in _reported.news(session):

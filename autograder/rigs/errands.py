@@ -8,10 +8,11 @@ from contextlib import suppress
 from typing import Any
 
 from autograder.rigs.phrases import ended
-from course import Session, WaitTimeout
+from course import WaitTimeout
 from course.design import dye
 from course.design.lifelike import AHEAD, lifelike
 from course.runtime.actions import GoalRun, GoalState
+from course.runtime.core_session import CoreSession
 
 SETTLE = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""
@@ -28,7 +29,7 @@ PATIENCE = 2.0
 class Errands:
     """The goals that the examiner sends to one action, one after the other."""
 
-    def __init__(self, session: Session, name: str, action_type: Any) -> None:
+    def __init__(self, session: CoreSession, name: str, action_type: Any) -> None:
         """Send none yet."""
         self._session = session
         self._name = name

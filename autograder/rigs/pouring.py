@@ -23,9 +23,10 @@ from autograder.rigs.errands import NEARER, SETTLE, WAYPOINT, Errands, marked
 from autograder.rigs.robot_graph import Topic
 from autograder.rigs.robot_jobs import EYES
 from autograder.rigs.robot_types import load_type
-from course import Session, WaitTimeout
+from course import WaitTimeout
 from course.design import dye
 from course.design.lifelike import FAR, lifelike
+from course.runtime.core_session import CoreSession
 
 POURS = 8
 """How often dye is poured in before it counts as lost, each time with another tag."""
@@ -76,7 +77,7 @@ class Poured:
 class Pours:
     """Pours dye into one design."""
 
-    def __init__(self, session: Session, node: Node, seen: Mapping[str, set[int]]) -> None:
+    def __init__(self, session: CoreSession, node: Node, seen: Mapping[str, set[int]]) -> None:
         """Pour with endpoints of ``node``; ``seen`` has the tags that were seen on each topic."""
         self._session = session
         self._node = node

@@ -26,7 +26,7 @@ from autograder.outside.requests import CannotLoseError
 from autograder.rigs.quiet import QuietNode
 from autograder.rigs.readings import Heard, Sensor
 from autograder.rigs.sensor_node import ExaminerNode
-from course import Session
+from course.runtime.core_session import CoreSession
 
 NOT_HERE = (
     "What becomes of lost packets could not be examined on this machine, which cannot make a "
@@ -41,7 +41,7 @@ class Radio:
         """Bring it up on ``domain_id``; it listens for readings that ``near`` sends."""
         self._near, self._outside = near, outside
         before = _own_ports()
-        self.session = Session(domain_id=domain_id)
+        self.session = CoreSession(domain_id=domain_id)
         self._node = self.session.run(QuietNode, f"{near.get_name()}_far")
         # What it shares with the near end is the multicast port, which only announces.
         self._ports = sorted(_own_ports() - before)

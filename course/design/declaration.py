@@ -15,13 +15,13 @@ from rclpy.qos import QoSProfile
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
-from course import ambient
+import course
 from course.design import drawing, findings
 from course.design.endpoints import DesignError, Endpoint, Role, endpoint, reason
 from course.design.node import DesignNode
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 
-_running: weakref.WeakKeyDictionary[Session, list[Node]] = weakref.WeakKeyDictionary()
+_running: weakref.WeakKeyDictionary[CoreSession, list[Node]] = weakref.WeakKeyDictionary()
 
 
 class NodeDeclaration:
@@ -187,7 +187,7 @@ class Design:
             for label, node in self.nodes.items()
         }
 
-    def run(self, session: Session | None = None) -> dict[str, Node]:
+    def run(self, session: CoreSession | None = None) -> dict[str, Node]:
         """Bring every node up and spin it in the background; replace those of an earlier run.
 
         Args:
@@ -200,7 +200,7 @@ class Design:
             DesignError: see `node_factories`.
         """
         factories = self.node_factories()
-        host = session or ambient.session()
+        host = session or course.session()
         if earlier := _running.pop(host, []):
             host.stop(*earlier)
         nodes = _running.setdefault(host, [])

@@ -8,7 +8,7 @@ from typing import overload
 
 from course.diagnosis import domains, graph, lifecycle, nodes
 from course.doctor.finding import Finding
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 
 __all__ = ["Diagnosis", "diagnose", "likely", "quick"]
 
@@ -53,7 +53,7 @@ class Diagnosis(Sequence[Finding]):
         return f"<ul>{items}</ul>"
 
 
-def diagnose(session: Session) -> Diagnosis:
+def diagnose(session: CoreSession) -> Diagnosis:
     """Return what is wrong, or may be, with a session's nodes and what they talk to.
 
     Nodes of other processes are asked whether they answer, and other notebooks' sessions whether
@@ -63,12 +63,12 @@ def diagnose(session: Session) -> Diagnosis:
     return Diagnosis([*quick(session), *(found for check in asked for found in check(session))])
 
 
-def quick(session: Session) -> list[Finding]:
+def quick(session: CoreSession) -> list[Finding]:
     """Return what can be found without waiting for anybody."""
     return [*nodes.stuck(session), *nodes.moved(session), *_calm(session)]
 
 
-def likely(session: Session, *, vague: bool, sought: str = "") -> list[Finding]:
+def likely(session: CoreSession, *, vague: bool, sought: str = "") -> list[Finding]:
     """Return what may be why a wait of the session was in vain, the likeliest first.
 
     Stuck callbacks and nodes in other executors are left out: a wait tells of them by itself. Nodes
@@ -91,7 +91,7 @@ def likely(session: Session, *, vague: bool, sought: str = "") -> list[Finding]:
 _LONELY = ("topic", "service", "action")
 
 
-def _calm(session: Session) -> list[Finding]:
+def _calm(session: CoreSession) -> list[Finding]:
     checks = (
         nodes.stolen, nodes.paused, nodes.half_made, nodes.unspun, lifecycle.own,
         domains.on_another_domain, graph.check,

@@ -11,15 +11,15 @@ from course.doctor.finding import Finding, problem, warning
 from course.graph import reader
 from course.runtime import closing
 from course.runtime.actions import SEND_GOAL
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 
 
-def on_another_domain(session: Session) -> Iterator[Finding]:
+def on_another_domain(session: CoreSession) -> Iterator[Finding]:
     """Find sessions of this process that cannot hear each other, and a domain set in vain."""
     others = [
         other
         for other in closing.known()
-        if isinstance(other, Session) and not other.closed and other.nodes
+        if isinstance(other, CoreSession) and not other.closed and other.nodes
     ]
     for other in others:
         if other.domain_id != session.domain_id:
@@ -38,7 +38,7 @@ def on_another_domain(session: Session) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def next_door(session: Session, sought: str = "") -> Iterator[Finding]:
+def next_door(session: CoreSession, sought: str = "") -> Iterator[Finding]:
     """Find what nobody offers here in a session of another notebook on this machine.
 
     Args:

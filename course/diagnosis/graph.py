@@ -9,7 +9,7 @@ from course.doctor.finding import Finding, problem, warning
 from course.graph import reader, words
 from course.graph.model import Graph
 from course.runtime.actions import SEND_GOAL
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 
 NEARLY = " (is it "
 """Stands in a message that names another topic, service or action, which may have been meant."""
@@ -23,7 +23,7 @@ _MENDS = {
 }
 
 
-def check(session: Session) -> Iterator[Finding]:
+def check(session: CoreSession) -> Iterator[Finding]:
     """Find what one look at the graph shows."""
     own = session.nodes
     graph = reader.read(session.observer, own=list(own.values()))

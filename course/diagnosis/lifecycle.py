@@ -17,7 +17,7 @@ from course.diagnosis.nodes import ANSWER, MOST_ASKED
 from course.doctor.finding import Finding, problem, warning
 from course.graph import reader
 from course.runtime import transitions
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 
 _GET_STATE = "/get_state"
 _LEADS_ON = {"unconfigured": (1, "configure"), "inactive": (3, "activate")}
@@ -29,7 +29,7 @@ _MENDS = {
 }  # fmt: skip
 
 
-def own(session: Session) -> Iterator[Finding]:
+def own(session: CoreSession) -> Iterator[Finding]:
     """Find what keeps managed nodes of the session from working."""
     for name, node in session.nodes.items():
         if not isinstance(node, LifecycleNodeMixin):
@@ -43,7 +43,7 @@ def own(session: Session) -> Iterator[Finding]:
             yield from _state(session, name, node)
 
 
-def others(session: Session) -> Iterator[Finding]:
+def others(session: CoreSession) -> Iterator[Finding]:
     """Find managed nodes of other programs that are not active: all are asked at once."""
     services = [
         name
@@ -67,7 +67,7 @@ def others(session: Session) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def _state(session: Session, name: str, node: Node) -> Iterator[Finding]:
+def _state(session: CoreSession, name: str, node: Node) -> Iterator[Finding]:
     assert isinstance(node, LifecycleNodeMixin)
     state = transitions.state_of(node)
     if state == "unconfigured":
@@ -126,7 +126,7 @@ def _topics(node: Node, only: Sequence[object] | None = None) -> str:
     return ", ".join(sorted(names))
 
 
-def _unconfigured(session: Session, name: str) -> str:
+def _unconfigured(session: CoreSession, name: str) -> str:
     graph = reader.read(session.observer, own=list(session.nodes.values()))
     missed = lonely(graph, set(session.nodes))
     may_be = f", {', '.join(missed)} perhaps, which nobody offers" if missed else ""

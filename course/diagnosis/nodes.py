@@ -12,8 +12,8 @@ from rclpy.node import Node
 
 from course.doctor.finding import Finding, problem, warning
 from course.graph import reader
+from course.runtime.core_session import CoreSession
 from course.runtime.names import node_name
-from course.runtime.session import Session
 
 ANSWER = 1.0
 """Seconds within which a node answers to a parameter service, unless it is stuck."""
@@ -21,7 +21,7 @@ ANSWER = 1.0
 MOST_ASKED = 8
 
 
-def stuck(session: Session) -> Iterator[Finding]:
+def stuck(session: CoreSession) -> Iterator[Finding]:
     """Find callbacks that do not return, deadlocks among them."""
     for blocked in session.blocked_callbacks():
         held = " No other callback can run meanwhile." if blocked.holds_up else ""
@@ -30,7 +30,7 @@ def stuck(session: Session) -> Iterator[Finding]:
         yield problem("callback", message, blocked.advice)
 
 
-def stolen(session: Session) -> Iterator[Finding]:
+def stolen(session: CoreSession) -> Iterator[Finding]:
     """Find nodes that another executor took away, and take back those that it has dropped."""
     told = len(session.notices)
     session.take_back_stolen_nodes()
@@ -38,7 +38,7 @@ def stolen(session: Session) -> Iterator[Finding]:
         yield problem("executor", notice, "Leave rclpy.spin_once and its relatives out.")
 
 
-def moved(session: Session) -> Iterator[Finding]:
+def moved(session: CoreSession) -> Iterator[Finding]:
     """Find nodes that an executor of the learner's own holds."""
     for name in session.moved_nodes():
         yield problem(
@@ -47,13 +47,13 @@ def moved(session: Session) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def paused(session: Session) -> Iterator[Finding]:
+def paused(session: CoreSession) -> Iterator[Finding]:
     """Find nodes that were paused and forgotten."""
     for name in session.paused_nodes():
         yield warning("pause", f"{name} is paused: its callbacks do not run.", "course.resume(…).")
 
 
-def unspun(session: Session) -> Iterator[Finding]:
+def unspun(session: CoreSession) -> Iterator[Finding]:
     """Find nodes of this process that were made and never given to an executor."""
     known = [*session.nodes.values(), *(remains.node for remains in session.half_made())]
     own = {id(node) for node in known}
@@ -70,7 +70,7 @@ def unspun(session: Session) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def half_made(session: Session) -> Iterator[Finding]:
+def half_made(session: CoreSession) -> Iterator[Finding]:
     """Find what constructors that raised have left behind."""
     for remains in session.half_made():
         yield problem(
@@ -80,7 +80,7 @@ def half_made(session: Session) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def silent(session: Session) -> Iterator[Finding]:
+def silent(session: CoreSession) -> Iterator[Finding]:
     """Find nodes of other processes that are on the graph and do not answer: all asked at once."""
     services = dict(session.observer.get_service_names_and_types())
     known = {*session.nodes, *(remains.name for remains in session.half_made())}

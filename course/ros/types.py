@@ -12,9 +12,9 @@ from rosidl_parser.definition import NamespacedType
 
 from course import ambient, values
 from course.errors import SessionError
+from course.runtime.core_session import CoreSession
 from course.runtime.names import type_name
 from course.runtime.offers import full_topic, load_type
-from course.runtime.session import Session
 
 
 def agreed(kind: str, name: str, asked: str, on_graph: Sequence[str]) -> Any:
@@ -38,7 +38,7 @@ def agreed(kind: str, name: str, asked: str, on_graph: Sequence[str]) -> Any:
     return found
 
 
-def message(msg_type: Any, text: str, session: Session) -> Any:
+def message(msg_type: Any, text: str, session: CoreSession) -> Any:
     """Return a message of what was typed, where ``auto`` is a header and ``now`` a time of now.
 
     Raises:

@@ -8,7 +8,7 @@ from typing import Any
 
 from course.errors import CourseError
 from course.plain import counted, one_line
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch import forms
@@ -25,7 +25,7 @@ class ActionView(LiveView):
     script = "action"
     shared = ("forms",)
 
-    def __init__(self, session: Session, action_type: Any, name: str) -> None:
+    def __init__(self, session: CoreSession, action_type: Any, name: str) -> None:
         """Watch the action ``name``."""
         super().__init__(session, name)
         self._board = GoalBoard(session, action_type, name)

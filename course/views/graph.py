@@ -9,7 +9,7 @@ from course.graph import layout, reader, words
 from course.graph.mermaid import mermaid
 from course.graph.model import Graph
 from course.plain import counted
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.views.live import Frame, LiveView
 
 MAX_BOXES = 150
@@ -27,7 +27,7 @@ class GraphView(LiveView):
     script = "graph"
     period = 0.5  # s: a graph changes when somebody runs a cell, not ten times a second
 
-    def __init__(self, session: Session, *, everything: bool = False) -> None:
+    def __init__(self, session: CoreSession, *, everything: bool = False) -> None:
         """Show the graph of ``session``, with all that the ROS tools hide if ``everything``."""
         super().__init__(session, everything)
         self._everything = everything

@@ -15,7 +15,7 @@ import anywidget
 import traitlets
 from rclpy.exceptions import InvalidHandle
 
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.views import brief
 from course.views.saved import saved
 from course.views.shelf import shelf_of
@@ -85,7 +85,7 @@ class LiveView(ABC):
     period: ClassVar[float] = FASTEST
     """Seconds between two looks at the model."""
 
-    def __init__(self, session: Session, *about: Any) -> None:
+    def __init__(self, session: CoreSession, *about: Any) -> None:
         """Show what happens in ``session``; ``about`` tells views of one kind from each other."""
         self.session = session
         self.resources = contextlib.ExitStack()

@@ -6,9 +6,9 @@ import json
 import time
 from typing import Any
 
+from course.runtime.core_session import CoreSession
 from course.runtime.log_store import SEVERITIES, LogRow
 from course.runtime.logs import LogTable
-from course.runtime.session import Session
 from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch.rosout import Rosout
@@ -36,7 +36,7 @@ class LogPanel(LiveView):
     shared = ("forms",)
     period = 0.25  # s: nobody reads faster
 
-    def __init__(self, session: Session, level: str = "DEBUG") -> None:
+    def __init__(self, session: CoreSession, level: str = "DEBUG") -> None:
         """Show lines of at least ``level``."""
         session.logs(level=level, last=1)  # an unknown level is an error at once
         super().__init__(session, level)

@@ -9,7 +9,7 @@ from typing import Any
 from course.errors import CourseError
 from course.plain import for_json, one_line
 from course.runtime import arguments
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch.parameter_values import ParameterError
@@ -29,7 +29,7 @@ class ParameterPanel(LiveView):
     shared = ("forms",)
     period = 0.5  # s: each look is three service calls
 
-    def __init__(self, session: Session, node: str) -> None:
+    def __init__(self, session: CoreSession, node: str) -> None:
         """Show the parameters of ``node``.
 
         Raises:

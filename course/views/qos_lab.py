@@ -14,7 +14,7 @@ from course.qoslab import lab, link, rules
 from course.qoslab.experiment import COUNT, SCENARIOS, Experiment, Outcome
 from course.qoslab.lab import LabError
 from course.qoslab.profile import CHOICES, NUMBERS, Profile
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.views.live import Frame, LiveView
 
 KEPT = 8
@@ -52,7 +52,7 @@ class QoSLab(LiveView):
     period = 0.2
 
     def __init__(
-        self, session: Session, offered: QoSProfile | None, requested: QoSProfile | None
+        self, session: CoreSession, offered: QoSProfile | None, requested: QoSProfile | None
     ) -> None:
         """Begin with two profiles; None is the default one."""
         super().__init__(session, offered, requested)

@@ -7,7 +7,7 @@ from typing import Any
 
 from course.errors import CourseError
 from course.plain import counted, for_json, one_line
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch import forms
@@ -24,7 +24,9 @@ class ServiceConsole(LiveView):
     script = "service"
     shared = ("forms",)
 
-    def __init__(self, session: Session, srv_type: Any, name: str, timeout: float = 5.0) -> None:
+    def __init__(
+        self, session: CoreSession, srv_type: Any, name: str, timeout: float = 5.0
+    ) -> None:
         """Call ``name``, and wait ``timeout`` s for each answer."""
         super().__init__(session, name)
         self._model = Calls(session, srv_type, name)

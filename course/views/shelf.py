@@ -8,7 +8,7 @@ from collections.abc import Hashable
 from pathlib import Path
 from typing import Any, Protocol
 
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.views.per_session import PerSession
 
 MOST = 30
@@ -36,7 +36,7 @@ _left: dict[Shown, tuple[Hashable, Hashable]] = {}
 class Shelf:
     """The living views of one session, each with the place in the code that it came from."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: CoreSession) -> None:
         """Keep views until ``session`` closes."""
         self._views: dict[Shown, tuple[Hashable, Hashable]] = {}
         session.on_close(lambda: self.clear("The session has been closed."))

@@ -8,7 +8,7 @@ import time
 import weakref
 from typing import Protocol
 
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.views.per_session import PerSession
 
 LONGEST_REST = 1.0
@@ -31,7 +31,7 @@ class Ticker:
     Its thread ends when it has no view left, and starts again with the next.
     """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: CoreSession) -> None:
         """Serve views of ``session`` until it closes."""
         self._views: weakref.WeakSet[Ticking] = weakref.WeakSet()
         self._changed = threading.Condition()

@@ -12,7 +12,7 @@ from course.errors import SessionError
 from course.mcap_file import RecordingError
 from course.plain import counted
 from course.runtime import arguments
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.views.live import Frame, LiveView
 from course.watch import timeline
 from course.watch.callbacks import CallbackTap, Run
@@ -40,7 +40,7 @@ class Timeline(LiveView):
     period = 0.25  # s
 
     def __init__(
-        self, session: Session, topics: list[tuple[str, Any | None]], window: float = 10.0
+        self, session: CoreSession, topics: list[tuple[str, Any | None]], window: float = 10.0
     ) -> None:
         """Show ``topics`` (names and message classes) over the last ``window`` s.
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from course import values
 from course.errors import CourseError
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.watch import forms
 
 KEPT = 10
@@ -36,7 +36,7 @@ class Call:
 class Calls:
     """Calls of one service; each waits in a thread of its own, so that nothing else has to."""
 
-    def __init__(self, session: Session, srv_type: Any, name: str) -> None:
+    def __init__(self, session: CoreSession, srv_type: Any, name: str) -> None:
         """Call the service ``name`` of ``session``."""
         self.name = name
         self.srv_type = srv_type

@@ -20,7 +20,7 @@ from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 from course import values
 from course.errors import CourseError
 from course.runtime.actions import GoalState
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.watch import forms, progress
 
 KEPT = 40
@@ -72,7 +72,7 @@ class Goal:
 class GoalBoard:
     """Watches the status and feedback of one action, sends goals of its own, and cancels any."""
 
-    def __init__(self, session: Session, action_type: Any, name: str) -> None:
+    def __init__(self, session: CoreSession, action_type: Any, name: str) -> None:
         """Watch the action ``name`` of ``session``'s graph."""
         self.name = name
         self.action_type = action_type

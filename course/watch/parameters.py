@@ -18,7 +18,7 @@ from rcl_interfaces.srv import (
 )
 
 from course import plain
-from course.runtime.session import Session
+from course.runtime.core_session import CoreSession
 from course.watch.parameter_values import ParameterError, RefusedError, to_plain, to_value
 
 _HIDDEN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
@@ -45,7 +45,7 @@ class Entry:
 class ParameterSheet:
     """The parameters of one node, over its parameter services."""
 
-    def __init__(self, session: Session, node: str) -> None:
+    def __init__(self, session: CoreSession, node: str) -> None:
         """Look at ``node`` (fully qualified) of ``session``'s graph."""
         self.node = node
         self._session = session

@@ -10,8 +10,8 @@ from collections import deque
 from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
+from course.runtime.core_session import CoreSession
 from course.runtime.log_store import LogRow, level_name, node_of, store
-from course.runtime.session import Session
 
 KEPT = 1000
 """Lines of other programs that are kept."""
@@ -28,7 +28,7 @@ class Rosout:
     Its own nodes' come on the topic, too; the log store has had them already, in full.
     """
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: CoreSession) -> None:
         """Listen on the domain of ``session``, beginning with the last seconds (rcl keeps 10)."""
         self._session = session
         self._rows: deque[LogRow] = deque(maxlen=KEPT)

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple, Protocol
 from rclpy.qos import DurabilityPolicy
 
 from course.graph import reader
+from course.runtime.core_session import CoreSession
 from course.runtime.offers import fitting_qos, full_topic, type_on
-from course.runtime.session import Session
 
 KEPT = 20_000
 """Messages of one topic that a trace remembers: 20 s at 1 kHz. More take long to draw."""
@@ -83,7 +83,7 @@ class Plots(NamedTuple):
 class Trace:
     """The passages of one topic, as a hidden subscription of the session's sees them."""
 
-    def __init__(self, session: Session, topic: str, msg_type: Any | None = None) -> None:
+    def __init__(self, session: CoreSession, topic: str, msg_type: Any | None = None) -> None:
         """Trace ``topic`` from now on.
 
         Raises:

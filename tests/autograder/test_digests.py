@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,13 +27,6 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-def changed(copy: Path, file: str) -> set[str]:
-    """Return the exams whose digest changes with a file."""
-    before = dict(of_all(copy))
-    with longer(copy / file):
-        return {name for name, digest in of_all(copy) if before[name] != digest}
-
-
 @contextmanager
 def longer(path: Path) -> Iterator[None]:
     content = path.read_bytes()
@@ -41,40 +35,73 @@ def longer(path: Path) -> Iterator[None]:
     path.write_bytes(content)
 
 
-def of_all(root: Path) -> Iterator[tuple[str, str]]:
+def of_all(root: Path) -> dict[str, str]:
     digests.of_exams.cache_clear()
-    for name in exams.names():
-        yield name, digests.of_exams((name,), root)
+    return {name: digests.of_exams((name,), root) for name in exams.names()}
+
+
+def test_a_change_of_one_exam_runs_nothing_else_again(copy: Path) -> None:
+    before = of_all(copy)
+    with longer(copy / "autograder/exams/qos.py"):
+        assert {name for name, digest in of_all(copy).items() if before[name] != digest} == {"qos"}
+    with longer(copy / "autograder/sandbox/fastdds.xml"):
+        assert not before.items() & of_all(copy).items()
+    with longer(copy / "quizzes/banks/ch05.yaml"):
+        assert of_all(copy) == before
+
+
+@pytest.fixture(scope="module")
+def covered() -> dict[str, set[str]]:
+    """Return the modules that decide the verdicts of each exam."""
+    return {name: digests.modules_of_exams([name]) for name in exams.names()}
 
 
 @pytest.mark.parametrize("name", exams.names())
-def test_an_exam_is_its_own_business(copy: Path, name: str) -> None:
-    assert changed(copy, f"autograder/exams/{name}.py") == {name}
+def test_an_exam_is_its_own_business(covered: dict[str, set[str]], name: str) -> None:
+    module = f"autograder.exams.{name}"
+    assert [exam for exam, modules in covered.items() if module in modules] == [name]
 
 
 @pytest.mark.parametrize(
-    ("file", "concerned"),
+    ("module", "concerned"),
     [
-        ("autograder/rigs/sensors.py", {"qos"}),
-        ("autograder/rigs/gap.py", {"qos"}),
-        ("autograder/rigs/trials/goals.py", {"safety"}),
-        ("autograder/harness.py", set(exams.names())),
-        ("autograder/sandbox/limits.py", set(exams.names())),
-        ("autograder/sandbox/fastdds.xml", set(exams.names())),
-        ("course/runtime/session.py", set(exams.names())),
-        ("autograder/cli.py", set()),
-        ("autograder/gradebook.py", set()),
-        ("quizzes/banks/ch05.yaml", set()),
+        ("autograder.rigs.sensors", {"qos"}),
+        ("autograder.rigs.gap", {"qos"}),
+        ("autograder.rigs.trials.goals", {"safety"}),
+        ("autograder.harness", set(exams.names())),
+        ("autograder.sandbox.limits", set(exams.names())),
+        ("course.runtime.core_session", set(exams.names())),
+        ("course.design.node", {"architecture", "patterns"}),
+        ("autograder.cli", set()),
+        ("autograder.gradebook", set()),
     ],
 )
-def test_what_an_exam_imports_belongs_to_it(copy: Path, file: str, concerned: set[str]) -> None:
-    assert changed(copy, file) == concerned
+def test_what_an_exam_imports_belongs_to_it(
+    covered: dict[str, set[str]], module: str, concerned: set[str]
+) -> None:
+    assert module in digests._Code(None)._files
+    assert {exam for exam, modules in covered.items() if module in modules} == concerned
+
+
+@pytest.mark.parametrize(
+    "shown_or_kept",
+    [
+        "course.views", "course.watch", "course.diagnosis", "course.doctor", "course.journal",
+        "course.learner_session", "course.notebook", "quizzes", "autograder.report",
+        "autograder.feedback_page", "autograder.page_texts", "autograder.sheets",
+    ],
+)  # fmt: skip
+def test_what_is_shown_or_kept_changes_no_verdict(
+    covered: dict[str, set[str]], shown_or_kept: str
+) -> None:
+    known = {m for m in digests._Code(None)._files if f"{m}.".startswith(f"{shown_or_kept}.")}
+    assert known
+    assert not known & set().union(*covered.values())
 
 
 def test_what_makes_points_of_verdicts_enters_again_but_runs_nothing(copy: Path) -> None:
     before = digests.of_grading(("qos",), copy)
     for file in ("quizzes/banks/ch05.yaml", "autograder/nbgrader_bridge.py"):
-        assert changed(copy, file) == set()
         with longer(copy / file):
             digests.of_grading.cache_clear()
             assert digests.of_grading(("qos",), copy) != before
@@ -90,9 +117,29 @@ def test_no_import_is_overlooked(package: str) -> None:
     for file in (HOME / package).rglob("*.py"):
         source = file.read_bytes()
         found = digests._imports("a.module", source)
-        for node in ast.walk(ast.parse(source)):
+        for node in of_a_run(ast.parse(source)):
             if isinstance(node, ast.Import):
                 assert {alias.name for alias in node.names} <= found, file
             elif isinstance(node, ast.ImportFrom) and node.module:
                 names = {f"{node.module}.{alias.name}" for alias in node.names}
                 assert {node.module, *names} <= found, file
+
+
+def of_a_run(tree: ast.Module) -> Iterator[ast.AST]:
+    """Walk through a module, without what is there for types, or imported when a name is asked."""
+    for statement in tree.body:
+        for_types = isinstance(statement, ast.If) and ast.unparse(statement.test) == "TYPE_CHECKING"
+        if for_types or (
+            isinstance(statement, ast.FunctionDef) and statement.name == "__getattr__"
+        ):
+            continue
+        yield from ast.walk(statement)
+
+
+@pytest.mark.parametrize("package", ["autograder", "course"])
+def test_what_a_package_imports_on_demand_is_followed_to_its_module(package: str) -> None:
+    source = (HOME / package / "__init__.py").read_bytes()
+    for name, (module, _) in digests._on_demand(package, source).items():
+        own = getattr(importlib.import_module(package), name.rpartition(".")[2])
+        assert own is getattr(importlib.import_module(module), name.rpartition(".")[2])
+    assert digests._on_demand(package, source)

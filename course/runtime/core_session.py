@@ -1,4 +1,7 @@
-"""Session: run ROS 2 nodes in the background, safely, from a notebook, a script or a test."""
+"""The core of a session: it runs ROS 2 nodes in the background, safely, and nothing else.
+
+Examiners and submissions have no use for live views and diagnosis, which `course.Session` adds.
+"""
 
 # mypy: allow-untyped-calls
 
@@ -7,22 +10,27 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Sequence
-from typing import Self
+from typing import Any, Self
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
 
 from course import neighbours
 from course.domains import check_domain_id, lease_domain
 from course.errors import SessionError
 from course.runtime import arguments, closing, signals
+from course.runtime.asking import Asking
 from course.runtime.closing import CloseReport
 from course.runtime.context import Discovery, open_context
+from course.runtime.half_made import Remains
 from course.runtime.jobs import current_job
 from course.runtime.log_store import store
-from course.runtime.showing import Showing
 from course.runtime.simtime import SimulatedTime
 from course.runtime.waiting import Pulse
 
 
-class Session(Showing):
+class CoreSession(Asking):
     """One private rclpy Context on one domain, and the nodes it runs in the background.
 
     Attributes:
@@ -95,6 +103,46 @@ class Session(Showing):
                 "This session runs in real time: open one with course.Session(sim_time=True)."
             )
         return self._sim
+
+    @property
+    def observer(self) -> Node:
+        """The hidden node through which the session looks at the graph."""
+        return self._probe.node
+
+    def watch(
+        self,
+        msg_type: Any,
+        topic: str,
+        callback: Callable[..., None],
+        qos: QoSProfile | int,
+        *,
+        raw: bool = False,
+    ) -> Subscription:
+        """Call ``callback`` with each message on a topic, in a background thread.
+
+        With a second argument, it gets what DDS says about the message, too: its time stamps and
+        number (see rclpy's ``create_subscription``). With ``raw`` a message comes as CDR.
+
+        For live views: a node that blocks does not hold it up. `unwatch` ends it.
+        """
+        return self._probe.subscribe(msg_type, topic, callback, qos, raw=raw)
+
+    def unwatch(self, subscription: Subscription) -> None:
+        """End a `watch`. Idempotent."""
+        if not self.closed:
+            self._probe.drop(subscription)
+
+    def moved_nodes(self) -> list[str]:
+        """Return the names of nodes that are in an executor of the learner's own."""
+        return self._residents.moved()
+
+    def half_made(self) -> list[Remains]:
+        """Return what is left of nodes whose constructor raised."""
+        return self._residents.half_made.all()
+
+    def paused_nodes(self) -> list[str]:
+        """Return the names of paused nodes."""
+        return [resident.name for resident in self._residents.all() if resident.paused]
 
     # Closing.
 

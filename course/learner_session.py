@@ -1,27 +1,23 @@
-"""What a session shows of itself: the live views, each made on demand."""
+"""The session as learners know it: it runs nodes, and shows and explains what they do."""
 
 # mypy: allow-untyped-calls
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from rclpy.action.graph import get_action_names_and_types
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.subscription import Subscription
 
 from course.errors import SessionError
 from course.runtime import arguments
-from course.runtime.asking import Asking
-from course.runtime.half_made import Remains
+from course.runtime.core_session import CoreSession
 from course.runtime.offers import full_action, full_node, full_service, load_type
 
 if TYPE_CHECKING:
     from course.diagnosis import Diagnosis
-    from course.runtime.session import Session
     from course.views.action import ActionView
     from course.views.graph import GraphView
     from course.views.log import LogPanel
@@ -31,36 +27,11 @@ if TYPE_CHECKING:
     from course.views.timeline import Timeline
 
 
-class Showing(Asking):
-    """The part of a Session that shows things. Widgets are imported when one is asked for."""
+class Session(CoreSession):
+    """One private rclpy Context on one domain, the nodes that it runs, and views of them.
 
-    @property
-    def observer(self) -> Node:
-        """The hidden node through which the session looks at the graph."""
-        return self._probe.node
-
-    def watch(
-        self,
-        msg_type: Any,
-        topic: str,
-        callback: Callable[..., None],
-        qos: QoSProfile | int,
-        *,
-        raw: bool = False,
-    ) -> Subscription:
-        """Call ``callback`` with each message on a topic, in a background thread.
-
-        With a second argument, it gets what DDS says about the message, too: its time stamps and
-        number (see rclpy's ``create_subscription``). With ``raw`` a message comes as CDR.
-
-        For live views: a node that blocks does not hold it up. `unwatch` ends it.
-        """
-        return self._probe.subscribe(msg_type, topic, callback, qos, raw=raw)
-
-    def unwatch(self, subscription: Subscription) -> None:
-        """End a `watch`. Idempotent."""
-        if not self.closed:
-            self._probe.drop(subscription)
+    The views are imported when one is asked for. Attributes are those of `CoreSession`.
+    """
 
     def graph(self, *, everything: bool = False) -> GraphView:
         """Return a live view of the ROS graph as this session sees it.
@@ -74,7 +45,7 @@ class Showing(Asking):
         from course.views.graph import GraphView
 
         self._require_open()
-        return GraphView(self._me, everything=everything)
+        return GraphView(self, everything=everything)
 
     def log_panel(self, *, level: str = "DEBUG") -> LogPanel:
         """Return a live view of what all nodes log and print, of at least this level.
@@ -85,7 +56,7 @@ class Showing(Asking):
         from course.views.log import LogPanel
 
         self._require_open()
-        return LogPanel(self._me, level)
+        return LogPanel(self, level)
 
     def service(
         self, name: str, srv_type: Any | None = None, *, timeout: float = 5.0
@@ -108,7 +79,7 @@ class Showing(Asking):
         full = full_service(self.observer, name)
         known = self.observer.get_service_names_and_types()
         found = srv_type or self._type_of("service", full, known)
-        return ServiceConsole(self._me, found, full, timeout)
+        return ServiceConsole(self, found, full, timeout)
 
     def action(self, name: str, action_type: Any | None = None) -> ActionView:
         """Return a live view of an action's goals, with a form that sends one.
@@ -127,7 +98,7 @@ class Showing(Asking):
         full = full_action(self.observer, name)
         known = get_action_names_and_types(self.observer)
         found = action_type or self._type_of("action", full, known)
-        return ActionView(self._me, found, full)
+        return ActionView(self, found, full)
 
     def parameters(self, node: Node | str) -> ParameterPanel:
         """Return a live panel of a node's parameters.
@@ -139,7 +110,7 @@ class Showing(Asking):
         from course.views.parameters import ParameterPanel
 
         self._require_open()
-        return ParameterPanel(self._me, full_node(node))
+        return ParameterPanel(self, full_node(node))
 
     def timeline(self, *topics: str | tuple[str, Any], window: float = 10.0) -> Timeline:
         """Return a live view of when messages were published, received and worked on.
@@ -157,7 +128,7 @@ class Showing(Asking):
 
         self._require_open()
         named = [_named(topic) for topic in topics]
-        return Timeline(self._me, named, arguments.seconds(window, "window"))
+        return Timeline(self, named, arguments.seconds(window, "window"))
 
     def qos_lab(
         self, offered: QoSProfile | int | None = None, requested: QoSProfile | int | None = None
@@ -176,7 +147,7 @@ class Showing(Asking):
         from course.views.qos_lab import QoSLab
 
         self._require_open()
-        return QoSLab(self._me, arguments.qos(offered), arguments.qos(requested))
+        return QoSLab(self, arguments.qos(offered), arguments.qos(requested))
 
     def diagnose(self) -> Diagnosis:
         """Return what is wrong, or may be, with the nodes here: in plain words, with the mend.
@@ -192,32 +163,16 @@ class Showing(Asking):
         from course.diagnosis import diagnose
 
         self._require_open()
-        return diagnose(self._me)
-
-    def moved_nodes(self) -> list[str]:
-        """Return the names of nodes that are in an executor of the learner's own."""
-        return self._residents.moved()
-
-    def half_made(self) -> list[Remains]:
-        """Return what is left of nodes whose constructor raised."""
-        return self._residents.half_made.all()
-
-    def paused_nodes(self) -> list[str]:
-        """Return the names of paused nodes."""
-        return [resident.name for resident in self._residents.all() if resident.paused]
+        return diagnose(self)
 
     def _further_hints(self, *, vague: bool, sought: str) -> list[str]:
         from course.diagnosis import likely
 
         try:
-            found = likely(self._me, vague=vague, sought=sought)
+            found = likely(self, vague=vague, sought=sought)
         except Exception:  # noqa: BLE001 - the session may end meanwhile; the wait has its own error
             return []
         return [f"{finding.message} {finding.mend}" for finding in found]
-
-    @property
-    def _me(self) -> Session:
-        return self  # type: ignore[return-value]  # Session is the one class made of this part
 
     def _type_of(self, what: str, name: str, known: list[tuple[str, list[str]]]) -> Any:
         types = dict(known)
