@@ -10,11 +10,12 @@ import os
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from autograder import ledger, points
 from autograder.desk import Desk, Piece, Work
 from autograder.gradebook import GradebookError
+from autograder.graded import Graded
 from autograder.interruption import Interruption
 from autograder.ledger import Entry, Ledger, Standing
 from autograder.progress import Progress
@@ -31,29 +32,6 @@ MOST_STARTS = 3
 
 MOST_TRIES = 2
 """Times that a notebook is run if the grader fails before it has begun; then a person is told."""
-
-
-@dataclass(frozen=True)
-class Graded:
-    """One student's submission, and what a person should know about it.
-
-    Attributes:
-        student: whose it is.
-        outcomes: by notebook; only what `Progress.done` is told has them, because a class's would
-            fill the memory.
-        points: automatic points, of ``max_points``.
-        seconds: wall time that its notebooks ran.
-        problem: what is wrong with it, in sentences.
-        entered: False if the gradebook did not take the scores.
-    """
-
-    student: str
-    outcomes: dict[str, Outcome]
-    points: float = 0.0
-    max_points: float = 0.0
-    seconds: float = 0.0
-    problem: str = ""
-    entered: bool = True
 
 
 class ClassRun:

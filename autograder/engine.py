@@ -17,9 +17,10 @@ from filelock import FileLock, Timeout
 from autograder import files, page_texts, roster, sandbox
 from autograder import nbgrader_bridge as bridge
 from autograder.anew import Anew
-from autograder.class_run import ClassRun, Graded
+from autograder.class_run import ClassRun
 from autograder.desk import Desk
 from autograder.gradebook import CourseGradebook
+from autograder.graded import Graded
 from autograder.interruption import Interruption
 from autograder.jobs import Job, Result
 from autograder.progress import Progress

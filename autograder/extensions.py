@@ -7,20 +7,16 @@ the engine's folder until the submission is entered, by whichever door.
 from __future__ import annotations
 
 import difflib
-import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 
-from filelock import FileLock
 from nbgrader.api import Gradebook, MissingEntry
 
-from autograder.files import write_whole
+from autograder.extension_store import WaitingExtensions
+from autograder.gradebook import CourseGradebook
 from course.errors import CourseError
 
-FOLDER = "extensions"
 MAX_HOURS = 10 * 366 * 24.0
 """Longest extension: with one of some thousand years no date could be reckoned."""
 
@@ -52,12 +48,10 @@ def extend(root: Path, assignment: str, students: list[str], hours: float) -> li
         GradebookError: there is no course at ``root``.
         GradebookUnusable: its gradebook cannot be used.
     """
-    from autograder.gradebook import CourseGradebook
-
     if not 0 <= hours <= MAX_HOURS:
         raise ExtensionError(f"An extension has 0 to {MAX_HOURS:g} hours, not {hours:g}.")
     course = CourseGradebook(root)
-    waiting = Waiting(course.work_folder, assignment)
+    waiting = WaitingExtensions(course.work_folder, assignment)
     with course.opened() as book:
         due = _due(book, assignment)
         _require_known(book, course.root, students)
@@ -73,41 +67,6 @@ def extend(root: Path, assignment: str, students: list[str], hours: float) -> li
                 waits = False
             dues.append(Due(student, due + timedelta(hours=hours), waits))
     return dues
-
-
-class Waiting:
-    """The extensions of one assignment whose students have not handed in yet."""
-
-    def __init__(self, work: Path, assignment: str) -> None:
-        """Keep them in the engine's folder ``work``."""
-        self._path = work / FOLDER / f"{assignment}.json"
-
-    def put(self, student: str, hours: float) -> None:
-        """Keep one for a student, or with 0 hours none."""
-        with self._changing() as waiting:
-            waiting.pop(student, None)
-            if hours:
-                waiting[student] = hours
-
-    def of(self, student: str) -> float:
-        """Return the hours that wait for a student; 0 if none do."""
-        if not self._path.exists():
-            return 0.0
-        with self._changing() as waiting:
-            return waiting.get(student, 0.0)
-
-    @contextmanager
-    def _changing(self) -> Iterator[dict[str, float]]:
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        with FileLock(self._path.with_suffix(".lock")):
-            try:
-                waiting = json.loads(self._path.read_text(encoding="utf-8"))
-            except FileNotFoundError:
-                waiting = {}
-            before = dict(waiting)
-            yield waiting
-            if waiting != before:
-                write_whole(self._path, json.dumps(waiting))
 
 
 def _due(book: Gradebook, assignment: str) -> datetime:

@@ -33,7 +33,7 @@ from autograder import (
     submission,
 )
 from autograder.beside import files_beside
-from autograder.extensions import Waiting
+from autograder.extension_store import WaitingExtensions
 from autograder.insight import records
 from autograder.intake import Intake, UnclearError
 from autograder.page_texts import Page
@@ -192,7 +192,7 @@ class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]
         The penalty for lateness is next: an extension that waits for this submission is granted.
         """
         assignment, student, notebook = _names(resources)
-        waiting = Waiting(Path(_coursedir(self).root) / WORK_FOLDER, assignment)
+        waiting = WaitingExtensions(Path(_coursedir(self).root) / WORK_FOLDER, assignment)
         if hours := waiting.of(student):
             with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
                 gradebook.grant_extension(assignment, student, hours=hours)

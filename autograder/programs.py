@@ -15,9 +15,8 @@ from typing import Any, TextIO
 
 from autograder.outside.asking import Outside
 from autograder.outside.requests import RequestError
-from course import WaitTimeout
 from course.domains import MAX_DOMAIN
-from course.errors import CourseError
+from course.errors import CourseError, WaitTimeout
 from course.runtime.core_session import CoreSession
 
 DOMAINS = 100

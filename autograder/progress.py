@@ -5,16 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
+from autograder.graded import Graded
 from autograder.terminal import visible
-
-if TYPE_CHECKING:
-    from autograder.class_run import Graded
 
 
 class Progress:

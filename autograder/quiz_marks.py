@@ -24,7 +24,7 @@ from course.errors import CourseError
 from quizzes import loader, record, regrade, rendering, text
 from quizzes.bank import Bank
 from quizzes.errors import QuizError
-from quizzes.marking import Mark
+from quizzes.marks import Mark
 
 PREFIX = "quiz-"
 PART = "answers"

@@ -11,10 +11,11 @@ from rclpy.action.graph import get_action_names_and_types
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
+from course import arguments
 from course.errors import SessionError
-from course.runtime import arguments
 from course.runtime.core_session import CoreSession
-from course.runtime.offers import full_action, full_node, full_service, load_type
+from course.runtime.offers import full_action, full_node, full_service
+from course.types import load_type
 
 if TYPE_CHECKING:
     from course.diagnosis import Diagnosis

@@ -13,11 +13,10 @@ from typing import IO, Any
 from mcap.writer import Writer
 from rclpy.serialization import serialize_message
 
-from course import values
+from course import arguments, values
 from course.errors import CourseError
 from course.files import replacing
-from course.runtime import arguments
-from course.runtime.names import type_name
+from course.types import type_name
 
 _RULE = "=" * 80
 

@@ -24,7 +24,7 @@ from rosidl_parser.definition import (
 
 from course import plain
 from course.errors import CourseError
-from course.runtime.names import type_name
+from course.types import type_name
 
 LONGEST = 64
 """Elements of a sequence, or bytes, that `to_data` keeps by default; the rest is only counted."""
@@ -152,7 +152,7 @@ def in_words(slot: AbstractType) -> str:
 
 @cache
 def _class(name: str) -> Any:
-    from course.runtime.offers import load_type
+    from course.types import load_type
 
     return load_type(name)
 

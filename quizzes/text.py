@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from quizzes import answers
 from quizzes.answers import Answer
 from quizzes.bank import Matching, Multiple, Numeric, Ordering
-from quizzes.model import LETTERS, Item
-
-if TYPE_CHECKING:
-    from quizzes.marking import Mark, Result
+from quizzes.marks import Mark
+from quizzes.model import LETTERS, Item, Paper
 
 INSTRUCTIONS = {
     "single": "Choose one.",
@@ -21,6 +19,22 @@ INSTRUCTIONS = {
     "ordering": "Put these in order.",
     "matching": "Choose for each what belongs to it.",
 }
+
+
+class Marked(Protocol):
+    """What is read of a marked quiz: see `quizzes.marking.Result`."""
+
+    @property
+    def paper(self) -> Paper:
+        """Its questions."""
+
+    @property
+    def marks(self) -> tuple[Mark, ...]:
+        """A mark a question."""
+
+    @property
+    def headline(self) -> str:
+        """The outcome in one sentence."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,7 +83,7 @@ def of_answer(item: Item, answer: Answer) -> str:
     return "; ".join(f"{c}) {item.text(c)}" for c in letters)
 
 
-def of_result(result: Result) -> str:
+def of_result(result: Marked) -> str:
     """Return a marked quiz as Markdown; of one that is marked elsewhere, that it is handed in."""
     if result.paper.bank.keyless:
         return f"**{result.headline}**"

@@ -26,8 +26,8 @@ from autograder.rigs.robot_reasons import (
 )
 from autograder.rigs.robot_traces import raised, require_plans, see_scan_arrive, stranded
 from autograder.rigs.robot_types import UnknownTypeError, load_type
-from course import WaitTimeout
 from course.design import dye
+from course.errors import WaitTimeout
 
 EXAM: Exam[ArchitectureRig] = Exam("architecture", architecture_rig)
 

@@ -23,7 +23,7 @@ from autograder.rigs.listening import LateJoiner, acquaint, arrives
 from autograder.rigs.phrases import with_reason
 from autograder.rigs.robot import LEVEL_MARGIN, NODE, RobotRig, robot_rig
 from autograder.rigs.scenarios import NAMES, SCENARIOS, Scenario
-from course import GoalState
+from course.runtime.actions import GoalState
 
 EXAM: Exam[RobotRig] = Exam("patterns", robot_rig)
 

@@ -9,7 +9,7 @@ from typing import Any
 from rich.table import Table
 
 from autograder.insight import exports, report
-from autograder.insight.report import ClassReport
+from autograder.insight.class_report import ClassReport
 
 MOST_NAMES = 20
 """Students that are named on one line; the page names them all."""

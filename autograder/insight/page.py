@@ -12,9 +12,9 @@ from itertools import groupby
 
 from autograder import questions
 from autograder.insight import plots
+from autograder.insight.class_report import ClassReport
 from autograder.insight.figures import FEW, CheckFigures
 from autograder.insight.means import Mean
-from autograder.insight.report import ClassReport
 from autograder.insight.similarity import MOST_PAIRS, Pair, side_by_side
 from course.plain import counted
 

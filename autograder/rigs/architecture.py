@@ -25,8 +25,8 @@ from autograder.rigs.robot_jobs import ACTION, MOTORS, SENSORS, WHEELS, Jobs
 from autograder.rigs.robot_reasons import every, link_faults, nodes
 from autograder.rigs.robot_types import UnknownTypeError, load_type
 from autograder.rigs.stillness import Stillness
-from course import WaitTimeout
 from course.design import dye
+from course.errors import WaitTimeout
 
 DESIGN = "design"
 THREADS = 8

@@ -28,7 +28,7 @@ from autograder.rigs.patience import IDLE_S, SETTLE_S, Patience
 from autograder.rigs.phrases import phrase
 from autograder.rigs.process import Process
 from autograder.rigs.stillness import Stillness
-from course import WaitTimeout
+from course.errors import WaitTimeout
 from course.runtime.waiting import Deadline
 
 GHOSTS = 1.0

@@ -16,7 +16,8 @@ from autograder.rigs.phrases import ended
 from autograder.rigs.robot import GRAIN, SETTLE, STEP, RobotRig
 from autograder.rigs.robot_types import load_type
 from autograder.rigs.scenarios import NAMES
-from course import GoalRun, WaitTimeout
+from course.errors import WaitTimeout
+from course.runtime.actions import GoalRun
 
 NAME = NAMES["navigation"]
 ACTIONS = "example_interfaces/action/Fibonacci or test_msgs/action/Fibonacci"

@@ -11,7 +11,8 @@ from autograder.rigs.listening import acquaint
 from autograder.rigs.phrases import ended
 from autograder.rigs.robot import SETTLE, STEP
 from autograder.rigs.stations import require_report
-from course import GoalState, WaitTimeout
+from course.errors import WaitTimeout
+from course.runtime.actions import GoalState
 
 LOOKING, STOPPING, UNDER_WAY = 0.6, 4.0, 2.0
 """Seconds of wall time for those who look by the wall's clock whether they are called off, for a

@@ -8,9 +8,9 @@ from contextlib import suppress
 from typing import Any
 
 from autograder.rigs.phrases import ended
-from course import WaitTimeout
 from course.design import dye
 from course.design.lifelike import AHEAD, lifelike
+from course.errors import WaitTimeout
 from course.runtime.actions import GoalRun, GoalState
 from course.runtime.core_session import CoreSession
 

@@ -14,7 +14,7 @@ from contextlib import suppress
 from typing import Any, Protocol
 
 from autograder.rigs.stillness import Stillness
-from course import WaitTimeout
+from course.errors import WaitTimeout
 
 SETTLE_S = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""

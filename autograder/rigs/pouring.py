@@ -23,9 +23,9 @@ from autograder.rigs.errands import NEARER, SETTLE, WAYPOINT, Errands, marked
 from autograder.rigs.robot_graph import Topic
 from autograder.rigs.robot_jobs import EYES
 from autograder.rigs.robot_types import load_type
-from course import WaitTimeout
 from course.design import dye
 from course.design.lifelike import FAR, lifelike
+from course.errors import WaitTimeout
 from course.runtime.core_session import CoreSession
 
 POURS = 8

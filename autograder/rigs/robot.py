@@ -27,7 +27,7 @@ from autograder.rigs.hardware import ExaminerNode
 from autograder.rigs.patience import Patience
 from autograder.rigs.phrases import callback_raised
 from autograder.rigs.stillness import Stillness
-from course import WaitTimeout
+from course.errors import WaitTimeout
 
 T = TypeVar("T")
 

@@ -16,7 +16,7 @@ from autograder.exam import Failed
 from autograder.rigs.patience import Patience
 from autograder.rigs.player import Player
 from autograder.rigs.stillness import Stillness
-from course import WaitTimeout
+from course.errors import WaitTimeout
 
 STRIDE = 0.1  # s of simulated time between two looks
 COARSE = 0.5  # s between two looks where it does not matter when exactly something happens

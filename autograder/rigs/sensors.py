@@ -31,7 +31,7 @@ from autograder.rigs.readings import IMU, SENSORS, STOP, Heard, Sensor
 from autograder.rigs.sensor_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
 from autograder.rigs.spinning import Spinner
 from autograder.rigs.stillness import HANGS, RESTLESS, Stillness
-from course import WaitTimeout
+from course.errors import WaitTimeout
 
 DRIVERS, CONSUMERS = "SensorDrivers", "SensorConsumers"
 

@@ -21,7 +21,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import Executor, ExternalShutdownException, ShutdownException
 from rclpy.subscription import Subscription
 
-from course import WaitTimeout
+from course.errors import WaitTimeout
 from course.runtime.ready import WaitList
 from course.runtime.waiting import Pulse, poll
 

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import importlib
 import weakref
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
@@ -15,7 +16,6 @@ from rclpy.qos import QoSProfile
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
-import course
 from course.design import drawing, findings
 from course.design.endpoints import DesignError, Endpoint, Role, endpoint, reason
 from course.design.node import DesignNode
@@ -200,7 +200,8 @@ class Design:
             DesignError: see `node_factories`.
         """
         factories = self.node_factories()
-        host = session or course.session()
+        # By name: who says which session is meant needs none of what `course.ambient` brings.
+        host = session or importlib.import_module("course.ambient").session()
         if earlier := _running.pop(host, []):
             host.stop(*earlier)
         nodes = _running.setdefault(host, [])

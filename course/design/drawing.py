@@ -2,22 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Container, Iterator, Mapping
+from typing import Protocol
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from course.design.endpoints import Endpoint
-from course.design.findings import Link, links
-
-if TYPE_CHECKING:
-    from course.design.declaration import Design, NodeDeclaration
+from course.design.findings import Declared, Link, links
 
 _SHAPES = {"msg": ('(["', '"])'), "srv": ('{{"', '"}}'), "action": ('[["', '"]]')}
 _WORDS = {"msg": "topic", "srv": "service", "action": "action"}
 
 
-def mermaid(design: Design) -> str:
+class Drawn(Protocol):
+    """What is read of a design."""
+
+    @property
+    def nodes(self) -> Mapping[str, Declared]:
+        """Its nodes, by label."""
+
+    @property
+    def outside(self) -> Container[str]:
+        """The names that somebody else provides or uses."""
+
+    def findings(self) -> list[str]:
+        """Return what is worth another look, a sentence each."""
+
+
+def mermaid(design: Drawn) -> str:
     """Return the graph: nodes are boxes, topics round, services hexagons, actions framed."""
     nodes = {label: f"n{number}" for number, label in enumerate(design.nodes)}
     lines = ["flowchart LR"]
@@ -41,7 +53,7 @@ def _drawn(link: Link, key: str, nodes: dict[str, str], outside: bool) -> Iterat
             yield f"  {key} {arrow} o{key}((outside))"
 
 
-def text(design: Design) -> str:
+def text(design: Drawn) -> str:
     """Return the same as text: nodes, links, and what is worth another look."""
     if not design.nodes:
         return "A design without nodes: begin with design.node('name')."
@@ -56,7 +68,7 @@ def text(design: Design) -> str:
     return "\n".join(lines)
 
 
-def node_lines(node: NodeDeclaration) -> list[str]:
+def node_lines(node: Declared) -> list[str]:
     """Return a node and its endpoints, a line each."""
     own = " (a node of your own)" if node.factory is not None else ""
     return [f"{node.label}{own}", *(f"    {_end_in_words(end)}" for end in node.endpoints)]

@@ -15,7 +15,7 @@ from rclpy.validate_full_topic_name import validate_full_topic_name
 
 from course import types
 from course.errors import CourseError
-from course.runtime.names import type_name
+from course.types import type_name
 
 
 class DesignError(CourseError):

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
@@ -17,6 +17,7 @@ class Declared(Protocol):
     """What is read of a declared node."""
 
     endpoints: list[Endpoint]
+    factory: Any
 
     @property
     def label(self) -> str:

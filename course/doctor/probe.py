@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from course.errors import CourseError
 
 if TYPE_CHECKING:
-    from course import Session
+    from course.runtime.core_session import CoreSession
 
 TIMEOUT = 20.0  # s
 
@@ -29,7 +29,7 @@ def imports() -> dict[str, object]:
     return {"seconds": time.monotonic() - start, "rmw": rmw}
 
 
-def echo(session: Session) -> None:
+def echo(session: CoreSession) -> None:
     """Run a node that sends back what it is sent."""
     from rclpy.node import Node
     from std_msgs.msg import String
@@ -43,7 +43,7 @@ def echo(session: Session) -> None:
     session.run(Echo)
 
 
-def ping(session: Session) -> dict[str, object]:
+def ping(session: CoreSession) -> dict[str, object]:
     """Send until something comes back; return after how many seconds that was."""
     from rclpy.node import Node
     from std_msgs.msg import String
@@ -67,9 +67,9 @@ def play(role: str, domain_id: int | None) -> dict[str, object]:
     """Play one role: "imports", "both" nodes at once, "echo" until stdin ends, or "ping"."""
     if role == "imports":
         return imports()
-    from course import Session
+    from course.runtime.core_session import CoreSession
 
-    with Session(domain_id=domain_id) as session:
+    with CoreSession(domain_id=domain_id) as session:
         if role in ("both", "echo"):
             echo(session)
         if role in ("both", "ping"):

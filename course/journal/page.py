@@ -7,12 +7,10 @@ import os
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-if TYPE_CHECKING:
-    from course.journal.notebooks import Notebook
-    from course.journal.progress import Chapter, Exercise, Progress, QuizTaken
+from course.journal.notebooks import Notebook
+from course.journal.work import Chapter, Exercise, QuizTaken, WorkDone
 
 NAMED = 4
 """Sections or checks that are named; of more, the number is given."""
@@ -22,7 +20,7 @@ _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~$!&])")
 Row = tuple[str, ...]
 
 
-def markdown(progress: Progress, start: Path) -> str:
+def markdown(progress: WorkDone, start: Path) -> str:
     """Return the page as Markdown, with links to the notebooks relative to the folder ``start``."""
     parts = [f"**{_escaped(_headline(progress))}**"]
     if todo := _next(progress):
@@ -38,7 +36,7 @@ def markdown(progress: Progress, start: Path) -> str:
     return "\n\n".join(parts)
 
 
-def text(progress: Progress) -> str:
+def text(progress: WorkDone) -> str:
     """Return the page as plain text."""
     lines = [_headline(progress)]
     if todo := _next(progress):
@@ -52,7 +50,7 @@ def text(progress: Progress) -> str:
     return "\n".join(lines)
 
 
-def _headline(progress: Progress) -> str:
+def _headline(progress: WorkDone) -> str:
     parts = []
     if progress.chapters:
         done, total = (sum(getattr(c, n) for c in progress.chapters) for n in ("done", "total"))
@@ -68,7 +66,7 @@ def _headline(progress: Progress) -> str:
     return (", ".join(parts) or "There are no notebooks of the course here") + "."
 
 
-def _next(progress: Progress) -> tuple[Notebook, str] | None:
+def _next(progress: WorkDone) -> tuple[Notebook, str] | None:
     """Return the notebook to go on with and what to do there; None if all is done."""
     for chapter in progress.chapters:
         if chapter.left:
@@ -86,7 +84,7 @@ def _next(progress: Progress) -> tuple[Notebook, str] | None:
     return None
 
 
-def _tables(progress: Progress) -> Iterator[tuple[Row, list[tuple[Notebook, Row]]]]:
+def _tables(progress: WorkDone) -> Iterator[tuple[Row, list[tuple[Notebook, Row]]]]:
     if progress.chapters:
         head: Row = ("Chapter", "Cells run", "Still to run")
         yield head, [(chapter.notebook, _chapter(chapter)) for chapter in progress.chapters]
@@ -133,7 +131,7 @@ def _when(stamp: str, now: datetime.datetime) -> str:
     return f"{moment.day} {moment:%b %Y, %H:%M}"
 
 
-def _foot(progress: Progress) -> str:
+def _foot(progress: WorkDone) -> str:
     return (
         f"As of {progress.moment.day} {progress.moment:%b %Y, %H:%M}, from your saved notebooks "
         "and the files beside them. Nothing of it leaves this machine. The visible checks are not "
@@ -142,7 +140,7 @@ def _foot(progress: Progress) -> str:
     )
 
 
-def _link(progress: Progress, notebook: Notebook, start: Path) -> str:
+def _link(progress: WorkDone, notebook: Notebook, start: Path) -> str:
     address = quote(os.path.relpath(progress.folder / notebook.path, start))
     return f"[{_escaped(notebook.title)}]({address})"
 

@@ -1,101 +1,29 @@
-"""What is done and what is left in a working copy, as plain data."""
+"""What is done and what is left in a working copy."""
 
 from __future__ import annotations
 
 import datetime
 import json
-from dataclasses import dataclass, field
 from pathlib import Path
 
 from course.journal import page
-from course.journal.notebooks import Notebook, Section, read
+from course.journal.notebooks import Notebook, read
 from course.journal.store import (
     MANIFEST,
-    Checked,
     Entries,
     Journal,
     JournalError,
     journal_here,
 )
-from quizzes.record import MAX_FILE, Attempt, filename, parse
+from course.journal.work import Chapter, Exercise, QuizTaken, WorkDone
+from quizzes.record import MAX_FILE, filename, parse
 
 WELCOME = Path("start-here.ipynb")
 """The notebook that `course lab` opens first; it is not a chapter."""
 
 
-@dataclass(frozen=True)
-class Chapter:
-    """A chapter; ``ran`` has for each of its sections how many of the cells have run."""
-
-    notebook: Notebook
-    ran: tuple[int, ...]
-
-    @property
-    def done(self) -> int:
-        """Cells that have run."""
-        return sum(self.ran)
-
-    @property
-    def total(self) -> int:
-        """Cells that there are."""
-        return sum(len(section.cells) for section in self.notebook.sections)
-
-    @property
-    def left(self) -> tuple[Section, ...]:
-        """The sections with cells that have not run."""
-        pairs = zip(self.notebook.sections, self.ran, strict=True)
-        return tuple(section for section, ran in pairs if ran < len(section.cells))
-
-
-@dataclass(frozen=True)
-class Exercise:
-    """An exercise: what its visible checks found when they ran last (None: never)."""
-
-    notebook: Notebook
-    checked: Checked | None
-
-    @property
-    def done(self) -> bool:
-        """Whether nothing is left that a student can do."""
-        passed = self.checked is not None and not self.checked.open
-        return passed and self.notebook.written == self.notebook.to_write
-
-
-@dataclass(frozen=True)
-class QuizTaken:
-    """A quiz, and the attempts at it in the file beside its notebook."""
-
-    notebook: Notebook
-    attempts: tuple[Attempt, ...]
-    damaged: int = 0
-
-    @property
-    def best(self) -> Attempt | None:
-        """The attempt with the best score, the earliest of equal ones."""
-        return max(self.attempts, key=lambda a: (a.score, -a.attempt), default=None)
-
-    @property
-    def passed(self) -> bool:
-        """Whether an attempt was passed when it was submitted."""
-        return any(attempt.passed for attempt in self.attempts)
-
-
-@dataclass(frozen=True)
-class Progress:
-    """What a student has done; a notebook shows it as a page, `print` as text.
-
-    Attributes:
-        folder: the working copy.
-        moment: when this was read.
-        notices: sentences about files that could not be read.
-    """
-
-    folder: Path
-    moment: datetime.datetime
-    chapters: tuple[Chapter, ...] = ()
-    exercises: tuple[Exercise, ...] = ()
-    quizzes: tuple[QuizTaken, ...] = ()
-    notices: tuple[str, ...] = field(default=())
+class Progress(WorkDone):
+    """What a student has done; a notebook shows it as a page, `print` as text."""
 
     def __repr__(self) -> str:
         """Return it as text."""

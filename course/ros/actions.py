@@ -6,8 +6,8 @@ from course import ambient, plain, values
 from course.errors import SessionError
 from course.graph import reader
 from course.graph.model import Exchange
-from course.ros.arguments import Add, operands, type_and_values
-from course.ros.arguments import timeout as add_timeout
+from course.ros.options import Add, operands, type_and_values
+from course.ros.options import timeout as add_timeout
 from course.ros.types import agreed, message
 from course.runtime.offers import full_action
 

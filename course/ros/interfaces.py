@@ -8,9 +8,8 @@ from typing import Any
 from course import plain, values
 from course.errors import SessionError
 from course.interfaces import installed
-from course.ros.arguments import Add
-from course.runtime.names import type_name
-from course.runtime.offers import load_type
+from course.ros.options import Add
+from course.types import load_type, type_name
 
 NOUN = "interface"
 

@@ -9,13 +9,13 @@ import statistics
 from typing import Any
 
 from course import ambient, plain, values
+from course.arguments import seconds, whole
 from course.errors import SessionError, WaitTimeout
-from course.ros.arguments import Add
-from course.ros.arguments import timeout as add_timeout
+from course.ros.options import Add
+from course.ros.options import timeout as add_timeout
 from course.ros.qos import declare as declare_qos
 from course.ros.qos import profile
 from course.ros.types import message_type
-from course.runtime.arguments import seconds, whole
 from course.runtime.offers import full_topic
 from course.runtime.waiting import Deadline
 

@@ -8,7 +8,7 @@ from course import ambient
 from course.errors import SessionError
 from course.graph import reader
 from course.graph.model import Endpoint, Exchange, Graph
-from course.ros.arguments import Add
+from course.ros.options import Add
 
 NOUN = "node"
 

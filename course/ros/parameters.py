@@ -7,7 +7,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from course import ambient, plain
 from course.errors import CourseError, SessionError
 from course.graph import reader
-from course.ros.arguments import Add
+from course.ros.options import Add
 from course.runtime.offers import full_node
 from course.watch.parameter_values import TYPES, RefusedError
 from course.watch.parameters import ParameterSheet

@@ -15,8 +15,8 @@ from rclpy.qos import (
     QoSReliabilityPolicy,
 )
 
-from course.ros.arguments import Add
-from course.runtime.arguments import whole
+from course.arguments import whole
+from course.ros.options import Add
 
 _POLICIES = {
     "reliability": QoSReliabilityPolicy,

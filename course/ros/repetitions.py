@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from course.arguments import whole
 from course.errors import SessionError
-from course.ros.arguments import TIMEOUT, Add
-from course.runtime.arguments import whole
+from course.ros.options import TIMEOUT, Add
 
 MOST_A_SECOND = 1000.0
 

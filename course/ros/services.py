@@ -8,12 +8,12 @@ from course import ambient, plain, values
 from course.errors import SessionError
 from course.graph import reader
 from course.graph.model import Exchange
-from course.ros.arguments import Add, operands, type_and_values
-from course.ros.arguments import timeout as add_timeout
+from course.ros.options import Add, operands, type_and_values
+from course.ros.options import timeout as add_timeout
 from course.ros.repetitions import declare_rate, repetitions
 from course.ros.types import agreed, message
-from course.runtime.names import type_name
-from course.runtime.offers import full_service, load_type
+from course.runtime.offers import full_service
+from course.types import load_type, type_name
 
 NOUN = "service"
 

@@ -10,20 +10,19 @@ from typing import Any
 from rclpy.qos import QoSProfile
 
 from course import ambient, plain
+from course.arguments import whole
 from course.errors import SessionError
 from course.graph import reader, words
 from course.graph.model import Graph, Topic
 from course.ros import listening
-from course.ros.arguments import Add, operands, type_and_values
-from course.ros.arguments import timeout as add_timeout
+from course.ros.options import Add, operands, type_and_values
+from course.ros.options import timeout as add_timeout
 from course.ros.qos import declare as declare_qos
 from course.ros.qos import profile
 from course.ros.repetitions import declare as add_repetitions
 from course.ros.repetitions import repetitions
 from course.ros.types import message, message_type
-from course.runtime.arguments import whole
-from course.runtime.names import type_name
-from course.runtime.offers import load_type
+from course.types import load_type, type_name
 from course.values import to_data
 
 NOUN = "topic"

@@ -13,8 +13,8 @@ from rosidl_parser.definition import NamespacedType
 from course import ambient, values
 from course.errors import SessionError
 from course.runtime.core_session import CoreSession
-from course.runtime.names import type_name
-from course.runtime.offers import full_topic, load_type
+from course.runtime.offers import full_topic
+from course.types import load_type, type_name
 
 
 def agreed(kind: str, name: str, asked: str, on_graph: Sequence[str]) -> Any:

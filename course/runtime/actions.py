@@ -14,8 +14,8 @@ from rclpy.action.client import ActionClient, ClientGoalHandle
 from rclpy.qos import QoSProfile
 from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
+from course import arguments
 from course.errors import WaitTimeout
-from course.runtime import arguments
 from course.runtime.offers import full_action, full_topic, why_no_service
 from course.runtime.probe import Probe
 from course.runtime.settle import settle

@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
+from course import arguments
 from course.errors import WaitTimeout
-from course.runtime import arguments
 from course.runtime.actions import GoalRun, Goals
 from course.runtime.blocked import BlockedCallback
 from course.runtime.hosting import Hosting

@@ -13,7 +13,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from course.runtime.names import type_name
+from course.types import type_name
 
 _KINDS = {
     "create_publisher": ("topic", "msg_type", "topic"),

@@ -16,10 +16,10 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from course import neighbours
+from course import arguments, neighbours
 from course.domains import check_domain_id, lease_domain
 from course.errors import SessionError
-from course.runtime import arguments, closing, signals
+from course.runtime import closing, signals
 from course.runtime.asking import Asking
 from course.runtime.closing import CloseReport
 from course.runtime.context import Discovery, open_context

@@ -10,8 +10,9 @@ from typing import Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
+from course import arguments
 from course.errors import SessionError
-from course.runtime import arguments, logs, transitions
+from course.runtime import logs, transitions
 from course.runtime.blocked import BlockedCallback, blocked_callbacks
 from course.runtime.callback_errors import CallbackError, ErrorLog
 from course.runtime.clocks import sleeps_in_own_context

@@ -4,8 +4,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
@@ -25,12 +23,6 @@ def node_name(node: Node | None) -> str:
 def full_name(name: str, namespace: str) -> str:
     """Return a node's fully qualified name, of the two parts in which the graph gives it."""
     return f"{namespace.rstrip('/')}/{name}"
-
-
-def type_name(ros_type: Any) -> str:
-    """Return a message, service or action type's name as on the graph: ``std_msgs/msg/String``."""
-    package, kind = ros_type.__module__.split(".")[:2]
-    return f"{package}/{kind}/{ros_type.__name__}"
 
 
 def is_name(full_name: str, name: str) -> bool:

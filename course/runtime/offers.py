@@ -5,10 +5,8 @@
 from __future__ import annotations
 
 import difflib
-import re
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from typing import Any
 
 from rclpy.exceptions import NameValidationException
@@ -23,10 +21,10 @@ from rclpy.qos import (
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
-from course import plain, types
+from course import arguments, plain
 from course.errors import SessionError, WaitTimeout
-from course.runtime import arguments
-from course.runtime.names import full_name, node_name, type_name
+from course.runtime.names import full_name, node_name
+from course.types import load_type, type_name
 
 
 def full_topic(node: Node, topic: str) -> str:
@@ -191,49 +189,3 @@ def _alike(name: str, names: list[str]) -> str:
 def _reasons(reason: str) -> list[str]:
     parts = (part.strip() for part in reason.split(";"))
     return [p.removeprefix("ERROR:") for p in parts if p.startswith("ERROR:")] or [reason]
-
-
-def is_type_name(text: str) -> bool:
-    """Return whether a text has the form of an interface's name, as ``std_msgs/msg/String`` has."""
-    return _TYPE_NAME.fullmatch(text) is not None
-
-
-def load_type(name: str, who: str = "", kind: str = "") -> Any:
-    """Return the class of an interface such as ``std_msgs/msg/String``.
-
-    Args:
-        name: package, kind and name; the kind may be left out where `kind` says it, or else for
-            a message.
-        who: the topic or service that needs it, for the error.
-        kind: "msg", "srv" or "action", if nothing else will do.
-
-    Raises:
-        SessionError: that is no name of an interface, of another kind, or not installed here.
-    """
-    found = _TYPE_NAME.fullmatch(name)
-    if found is None:
-        raise SessionError(
-            f"{plain.shown(name)} is not the name of an interface: write package/kind/Name, as in "
-            f"{_EXAMPLES[kind or 'msg']}."
-        )
-    package, actual, cls = found["package"], found["kind"] or kind or "msg", found["name"]
-    if kind and actual != kind:
-        raise SessionError(f"{name} is no {kind} type: name one such as {_EXAMPLES[kind]}.")
-    with suppress(types.UnknownTypeError):
-        return types.load(package, actual, cls)
-    why = (
-        f"{who} carries {name}, which is not installed here" if who else f"There is no {name} here"
-    )
-    raise SessionError(
-        f"{why}: install its package, or define it with `%%interface {package}/{actual}/{cls}`."
-    )
-
-
-_TYPE_NAME = re.compile(
-    r"(?P<package>[A-Za-z][A-Za-z0-9_]*)/(?:(?P<kind>msg|srv|action)/)?(?P<name>[A-Za-z][A-Za-z0-9_]*)"
-)
-_EXAMPLES = {
-    "msg": "std_msgs/msg/String",
-    "srv": "std_srvs/srv/SetBool",
-    "action": "example_interfaces/action/Fibonacci",
-}

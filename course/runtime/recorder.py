@@ -12,12 +12,12 @@ from typing import Any, NamedTuple, Self
 
 from rclpy.qos import QoSProfile
 
+from course import arguments
 from course.errors import WaitTimeout
-from course.runtime import arguments
-from course.runtime.names import type_name
 from course.runtime.offers import fitting_qos, full_topic, nobody_publishes, type_on, why_no_message
 from course.runtime.probe import Probe
 from course.runtime.waiting import poll
+from course.types import type_name
 
 
 class Stamped(NamedTuple):

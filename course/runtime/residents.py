@@ -16,8 +16,9 @@ from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.node import Node
 
+from course import arguments
 from course.errors import SessionError
-from course.runtime import arguments, clashes
+from course.runtime import clashes
 from course.runtime.blocked import describe
 from course.runtime.context import as_default_context
 from course.runtime.crew import Crew

@@ -20,8 +20,8 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
+from course import arguments
 from course.errors import SessionError, WaitTimeout
-from course.runtime import arguments
 from course.runtime.clocks import sleeps_until
 from course.runtime.crew import Crew
 from course.runtime.jobs import current_job

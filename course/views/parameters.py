@@ -6,9 +6,9 @@ import threading
 from dataclasses import asdict
 from typing import Any
 
+from course import arguments
 from course.errors import CourseError
 from course.plain import for_json, one_line
-from course.runtime import arguments
 from course.runtime.core_session import CoreSession
 from course.views import brief
 from course.views.live import Frame, LiveView

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from course import mcap_file
+from course import arguments, mcap_file
 from course.errors import SessionError
 from course.mcap_file import RecordingError
 from course.plain import counted
-from course.runtime import arguments
 from course.runtime.core_session import CoreSession
 from course.views.live import Frame, LiveView
 from course.watch import timeline

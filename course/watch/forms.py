@@ -9,7 +9,7 @@ from typing import Any
 from rosidl_parser.definition import AbstractString, AbstractWString, BasicType, NamespacedType
 
 from course import plain, values
-from course.runtime.names import type_name
+from course.types import type_name
 
 MAX_FIELDS = 60
 """Inputs that a form has at most; what a larger type nests deeper is typed as YAML."""

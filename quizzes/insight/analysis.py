@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 from quizzes import lint
 from quizzes.bank import Bank
-from quizzes.marking import Mark, Result
+from quizzes.marking import Result
+from quizzes.marks import Mark
 
 FEW = 10
 """Learners below which figures say little; they are shown all the same, and marked."""

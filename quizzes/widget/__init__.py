@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import threading
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import anywidget
 import traitlets
 
 from quizzes.errors import QuizError
+from quizzes.quiz_core import QuizCore
 from quizzes.widget import view
-
-if TYPE_CHECKING:
-    from quizzes.quiz import Quiz
 
 _HERE = Path(__file__).parent
 
@@ -43,7 +41,7 @@ class QuizWidget(anywidget.AnyWidget):
     result: Any = traitlets.Dict(allow_none=True, default_value=None).tag(sync=True)
     notice = traitlets.Unicode().tag(sync=True)
 
-    def __init__(self, quiz: Quiz) -> None:
+    def __init__(self, quiz: QuizCore) -> None:
         """Show ``quiz`` as it stands."""
         self._quiz = quiz
         self._shown: tuple[int, int] | None = None

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from quizzes import marking, model, rendering, text
+from quizzes import model, rendering, text
 from quizzes.bank import Matching, Multiple, Numeric
+from quizzes.marks import Mark
 from quizzes.model import Item
-
-if TYPE_CHECKING:
-    from quizzes.quiz import Quiz
+from quizzes.quiz_core import QuizCore
 
 
-def paper(quiz: Quiz) -> dict[str, Any]:
+def paper(quiz: QuizCore) -> dict[str, Any]:
     """Return the questions of the attempt at hand: texts and letters, and nothing of the key."""
     return {
         "title": quiz.bank.title,
@@ -26,7 +25,7 @@ def paper(quiz: Quiz) -> dict[str, Any]:
     }
 
 
-def _standing(quiz: Quiz) -> str:
+def _standing(quiz: QuizCore) -> str:
     """Return the first and the best score in words; empty before the first attempt."""
     first, best = quiz.first, quiz.best
     if first is None or best is None:
@@ -69,7 +68,7 @@ def _question(item: Item, folder: Path) -> dict[str, Any]:
     }
 
 
-def result(quiz: Quiz) -> dict[str, Any] | None:
+def result(quiz: QuizCore) -> dict[str, Any] | None:
     """Return what came of the attempt at hand; None before it is submitted.
 
     Of a quiz that is marked elsewhere ``passed`` is None, and there are no marks.
@@ -85,7 +84,7 @@ def result(quiz: Quiz) -> dict[str, Any] | None:
     }
 
 
-def _mark(mark: marking.Mark, folder: Path) -> dict[str, Any]:
+def _mark(mark: Mark, folder: Path) -> dict[str, Any]:
     variant = mark.item.variant
     several = isinstance(variant, Multiple)
     key = "" if mark.right or several else text.of_answer(mark.item, model.key(mark.item))

@@ -7,7 +7,7 @@ import pytest
 from quizzes import marking, model
 from quizzes.answers import Answer
 from quizzes.bank import Bank, Multiple
-from quizzes.marking import Mark
+from quizzes.marks import Mark
 from quizzes.model import Item
 
 from . import sample

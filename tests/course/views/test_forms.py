@@ -13,7 +13,7 @@ from test_msgs.msg import Arrays, BasicTypes, Strings
 
 from course import values
 from course.interfaces import installed
-from course.runtime.offers import load_type
+from course.types import load_type
 from course.values import MisfitError
 from course.watch import forms
 
