@@ -51,7 +51,7 @@ def build(
         root: the nbgrader course root, with the text sources in ``authoring``.
         check: write nothing, only compare.
         with_solutions: keep the chapters' cells tagged "solutions".
-        points: points by grade id, in place of the package's ``points.toml`` and quizzes.
+        points: points by grade id, in place of the exercises' ``points.toml`` and of quizzes.
 
     Raises:
         BuildError: a source is not sound, there is none, a file cannot be written, or

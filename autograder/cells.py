@@ -93,8 +93,8 @@ def _validate_cell(cell: NotebookNode, where: str) -> None:
     data = metadata(cell)
     if data.get("grade") and not data.get("points"):
         raise BuildError(
-            f"{where}: a grade cell without points; add it to autograder/points.toml or write "
-            '"points" into its metadata.'
+            f"{where}: a grade cell without points; add it to the points.toml of its exercise or "
+            'write "points" into its metadata.'
         )
     if any(data.get(key) for key in ("grade", "solution", "locked")) and not _GRADE_ID.fullmatch(
         grade_id(cell)

@@ -1,6 +1,6 @@
 """What a verdict depends on beside the submission: digests of the code that comes to it.
 
-An exam's verdict depends on its module, on the rigs that it imports, and on whatever runs a
+An exam's verdict depends on its module, on the instruments that it imports, and on whatever runs a
 subject and an examiner. So a digest covers the modules that these import, directly or not, and a
 change of one exam lets the outcomes of the others stand. What is imported for annotations alone
 changes nothing, and of the names that a package imports on demand only those count that are used.
@@ -58,7 +58,7 @@ def modules_of_exams(names: Iterable[str]) -> set[str]:
 
 
 def _of_run(names: Iterable[str]) -> list[str]:
-    return [*HARNESS, *(f"autograder.exams.{name}" for name in names)]
+    return [*HARNESS, *(f"autograder.exercises.{name}.exam" for name in names)]
 
 
 class _Code:

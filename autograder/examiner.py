@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TextIO
 
-from autograder import exams, points, stuck
+from autograder import exercises, points, stuck
 from autograder.bench import MAX_REPLY, Bench, Subject
 from autograder.outside.asking import Afar, Here, Outside
 from autograder.programs import Programs
@@ -58,7 +58,7 @@ def sit(
             session, subject, outside, sitting.memory, request["key"], int(request["seed"]),
             programs,
         )  # fmt: skip
-        exam = exams.load(request["exam"])
+        exam = exercises.load(request["exam"])
         verdict = exam.sit(request["part"], bench, sitting.failed)
         return replace(verdict, seed=bench.draws.seed)
     finally:
@@ -93,8 +93,8 @@ def preload() -> None:
     from autograder.warm import modules
 
     modules.import_all()
-    for name in exams.names():
-        exams.load(name)
+    for name in exercises.names():
+        exercises.load(name)
     points.table()  # read once, and not in each fork
 
 

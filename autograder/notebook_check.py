@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from autograder import exams
+from autograder import exercises
 from autograder.harness import Harness
 from autograder.processes import ExaminerProcess
 from autograder.raised import SUBJECT_ENV
@@ -47,7 +47,7 @@ def check(
         ExamError: no such exam or part; the message names the ones there are.
     """
     namespace = _caller_globals()
-    exams.load(exam).part(part)
+    exercises.load(exam).part(part)
     if SUBJECT_ENV in os.environ:
         return 0.0  # the real examiner is at work outside this process
     verdict = examine(exam, part, namespace, key)

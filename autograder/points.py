@@ -1,7 +1,17 @@
-"""The table of points (``points.toml``): which check is worth what, in which grade cell."""
+"""The points of all exercises: which check is worth what, in which grade cell.
+
+Each exercise has a ``points.toml`` in its folder. It says which notebook of which assignment it is,
+and lists its checks part by part: each part is one grade cell of the notebook, called
+``<exercise>-<part>`` and worth the sum of its checks. Written answers are graded by hand, and stand
+under ``manual`` by the grade id of their cell.
+
+Points are for a student's own work. What the notebook passes as it is handed out is worth 0: a
+check that others need, and what these earn is lost with it. The corpus runs the stubs to see it.
+"""
 
 from __future__ import annotations
 
+import re
 import tomllib
 from dataclasses import dataclass
 from functools import cache
@@ -12,7 +22,7 @@ Parts = dict[str, dict[str, float]]
 
 @dataclass(frozen=True)
 class Entry:
-    """One exam of the table: what it is called, where it is sat, and its points.
+    """One exercise: what it is called, where its exam is sat, and its points.
 
     ``parts`` maps each part to {check: points}; ``manual`` maps grade ids to points.
     """
@@ -26,9 +36,19 @@ class Entry:
 
 @cache
 def table() -> dict[str, Entry]:
-    """Return {exam: entry} as ``points.toml`` has it."""
-    raw = tomllib.loads(resources.files("autograder").joinpath("points.toml").read_text("utf-8"))
-    return {exam: _entry(data) for exam, data in raw.items()}
+    """Return {exercise: entry}, in the order of their titles: Exercise 2 comes before 10."""
+    folders = resources.files("autograder").joinpath("exercises").iterdir()
+    files = {folder.name: folder.joinpath("points.toml") for folder in folders}
+    entries = {
+        name: _entry(tomllib.loads(file.read_text("utf-8")))
+        for name, file in files.items()
+        if file.is_file()
+    }
+    return dict(sorted(entries.items(), key=lambda named: _place(named[1])))
+
+
+def _place(entry: Entry) -> tuple[str, list[int], str]:
+    return entry.assignment, [int(n) for n in re.findall(r"\d+", entry.title)], entry.title
 
 
 def _entry(data: dict[str, object]) -> Entry:

@@ -282,7 +282,7 @@ def _give_up(
     reached: int = 0,
 ) -> None:
     # They bring rclpy, for which no other notebook need wait that is run from this process.
-    from autograder import exams
+    from autograder import exercises
     from autograder.exam import unexamined
 
     outcome.notes.append(reason)
@@ -290,7 +290,7 @@ def _give_up(
         if number >= reached and cell.grade_id and not cell.exam:
             outcome.outputs[number] = [dict(NOT_RUN)]
         if cell.exam and cell.grade_id not in outcome.verdicts:
-            exam = exams.load(cell.exam)
+            exam = exercises.load(cell.exam)
             outcome.verdicts[cell.grade_id] = unexamined(exam, cell.part, reason, status)
 
 

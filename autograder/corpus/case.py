@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import nbformat
 from nbformat import NotebookNode
 
-from autograder import exams, submission
+from autograder import exercises, submission
 from autograder.cells import without_markers
 from autograder.draws import USUAL_SEED
 from autograder.runner import CELL_TIMEOUT, Outcome
@@ -69,7 +69,7 @@ class Case:
         if self.fails == {EVERYTHING}:
             return frozenset()
         if self.fails == {ROOTS}:
-            checks = exams.load(self.exam).checks.values()
+            checks = exercises.load(self.exam).checks.values()
             return frozenset(check.name for check in checks if not check.needs)
         return self.fails
 

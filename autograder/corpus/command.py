@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Sequence
 
-from autograder import exams, sandbox
+from autograder import exercises, sandbox
 from autograder.corpus import files, trials
 from autograder.corpus.case import Case, CorpusError
 from autograder.corpus.trials import Trial
@@ -20,7 +20,7 @@ def cases(exam: str = "") -> dict[str, list[Case]]:
         ExamError: there is no such exam; names the ones there are.
         CorpusError: a corpus is missing or not well formed.
     """
-    chosen = [exams.load(exam).name] if exam else exams.names()
+    chosen = [exercises.load(exam).name] if exam else exercises.names()
     return {name: files.load(corpus_root(), name) for name in chosen}
 
 

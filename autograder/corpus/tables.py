@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
-from autograder import exams, points
+from autograder import exercises, points
 from autograder.corpus.case import Case
 from autograder.corpus.trials import Trial
 
@@ -54,7 +54,7 @@ def all_flips(trials: list[Trial]) -> list[str]:
 def without_mutant(exam: str, cases: list[Case]) -> list[str]:
     """Return the checks of an exam that no case must fail: checks that nobody needs."""
     killed = {name for case in cases for name in case.must_fail}
-    return [name for name in exams.load(exam).checks if name not in killed]
+    return [name for name in exercises.load(exam).checks if name not in killed]
 
 
 def matrix(cases: dict[str, list[Case]]) -> str:
@@ -80,7 +80,7 @@ def matrix(cases: dict[str, list[Case]]) -> str:
         lines += [f"- `{case.name}`: {case.title}" for case in right]
         lines += ["", "| Check | Points | Must be caught |", "|---|---|---|"]
         worth = {name: p for part in entry.parts.values() for name, p in part.items()}
-        for name in exams.load(exam).checks:
+        for name in exercises.load(exam).checks:
             killers = [f"`{case.name}`" for case in own if name in case.must_fail]
             lines.append(f"| `{name}` | {worth.get(name, 0):g} | {', '.join(killers)} |")
         unexamined = [f"`{case.name}`" for case in own if case.fails and not case.must_fail]

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
-from autograder import exams, points, runner, submission
+from autograder import exercises, points, runner, submission
 from autograder.build import build
 from autograder.corpus.case import Case
 from autograder.draws import USUAL_SEED
@@ -43,7 +43,7 @@ class Trial:
 
 def notebooks(exam: str) -> Notebooks:
     """Build and release the notebook of one exam by itself; return both versions."""
-    entry = points.table()[exams.load(exam).name]
+    entry = points.table()[exercises.load(exam).name]
     with tempfile.TemporaryDirectory(prefix="ros2-course-corpus-") as folder:
         root = one_notebook(Path(folder), exam)
         build(root)

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from autograder import exams, points, questions
+from autograder import exercises, points, questions
 from autograder.database import GradebookUnusable
 from autograder.gradebook import Grade
 from autograder.insight import (
@@ -548,7 +548,7 @@ def test_the_report_of_a_graded_class(graded: Path) -> None:
     page, canvas, moodle = reports.write(report)
 
     by_name = {check.name: check for check in report.checks}
-    assert set(by_name) == set(exams.load("qos").checks)
+    assert set(by_name) == set(exercises.load("qos").checks)
     assert (by_name["imu_burst"].passed, by_name["imu_burst"].failed) == (2, 2)
     assert by_name["readings_flow"].failure_rate == 0
     assert set(report.times.seconds) == {"ann", "bob", "cy", "-dan"}
@@ -615,7 +615,7 @@ def test_the_command_speaks_to_people_and_to_machines(graded: Path) -> None:
     assert "Empty for 1 student who handed in nothing" in shown
     assert "match them by hand: -dan" in shown
     spoken = json.loads(autograder("report", ASSIGNMENT, *root, "--json", cwd=graded).stdout)
-    assert len(spoken["checks"]) == len(exams.load("qos").checks)
+    assert len(spoken["checks"]) == len(exercises.load("qos").checks)
     assert spoken["absent"] == ["zoe"]
     assert len(spoken["means"]["questions"]) == 7
     assert {"-dan", "bob"} <= {pair["left"] for pair in spoken["alike"]}

@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from autograder import corpus, exams, runner, submission
+from autograder import corpus, exercises, runner, submission
 from autograder.cells import without_markers
 from autograder.corpus import Case, CorpusError, Trial, command, tables, trials
 from autograder.corpus.trials import Notebooks
@@ -21,8 +21,8 @@ from autograder.sandbox.probe import Abilities
 
 from .conftest import SUBMISSIONS
 
-CASES = {exam: corpus.load(SUBMISSIONS, exam) for exam in exams.names()}
-EXAMS = pytest.mark.parametrize("exam", exams.names())
+CASES = {exam: corpus.load(SUBMISSIONS, exam) for exam in exercises.names()}
+EXAMS = pytest.mark.parametrize("exam", exercises.names())
 
 
 @cache
@@ -113,7 +113,7 @@ def test_every_mutant_is_killed_and_designs_differ(exam: str) -> None:
     own = CASES[exam]
     for case in own:
         assert (not case.fails) == case.name.startswith("right-"), case.name
-        assert case.must_fail <= set(exams.load(exam).checks), case.name
+        assert case.must_fail <= set(exercises.load(exam).checks), case.name
     assert sum(not case.fails for case in own) >= 6
     assert sum(bool(case.fails) for case in own) >= 15
 

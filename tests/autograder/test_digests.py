@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import autograder
-from autograder import digests, exams
+from autograder import digests, exercises
 
 HOME = Path(autograder.__file__).parents[1]
 
@@ -37,12 +37,12 @@ def longer(path: Path) -> Iterator[None]:
 
 def of_all(root: Path) -> dict[str, str]:
     digests.of_exams.cache_clear()
-    return {name: digests.of_exams((name,), root) for name in exams.names()}
+    return {name: digests.of_exams((name,), root) for name in exercises.names()}
 
 
 def test_a_change_of_one_exam_runs_nothing_else_again(copy: Path) -> None:
     before = of_all(copy)
-    with longer(copy / "autograder/exams/qos.py"):
+    with longer(copy / "autograder/exercises/qos/exam.py"):
         assert {name for name, digest in of_all(copy).items() if before[name] != digest} == {"qos"}
     with longer(copy / "autograder/sandbox/fastdds.xml"):
         assert not before.items() & of_all(copy).items()
@@ -53,24 +53,24 @@ def test_a_change_of_one_exam_runs_nothing_else_again(copy: Path) -> None:
 @pytest.fixture(scope="module")
 def covered() -> dict[str, set[str]]:
     """Return the modules that decide the verdicts of each exam."""
-    return {name: digests.modules_of_exams([name]) for name in exams.names()}
+    return {name: digests.modules_of_exams([name]) for name in exercises.names()}
 
 
-@pytest.mark.parametrize("name", exams.names())
+@pytest.mark.parametrize("name", exercises.names())
 def test_an_exam_is_its_own_business(covered: dict[str, set[str]], name: str) -> None:
-    module = f"autograder.exams.{name}"
+    module = f"autograder.exercises.{name}.exam"
     assert [exam for exam, modules in covered.items() if module in modules] == [name]
 
 
 @pytest.mark.parametrize(
     ("module", "concerned"),
     [
-        ("autograder.rigs.sensors", {"qos"}),
-        ("autograder.rigs.gap", {"qos"}),
-        ("autograder.rigs.trials.goals", {"safety"}),
-        ("autograder.harness", set(exams.names())),
-        ("autograder.sandbox.limits", set(exams.names())),
-        ("course.runtime.core_session", set(exams.names())),
+        ("autograder.exercises.qos.rig", {"qos"}),
+        ("autograder.exercises.qos.packet_loss", {"qos"}),
+        ("autograder.exercises.safety.navigator_client", {"safety"}),
+        ("autograder.harness", set(exercises.names())),
+        ("autograder.sandbox.limits", set(exercises.names())),
+        ("course.runtime.core_session", set(exercises.names())),
         ("course.design.node", {"architecture", "patterns"}),
         ("autograder.cli", set()),
         ("autograder.gradebook", set()),

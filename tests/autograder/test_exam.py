@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from autograder import exams, points
+from autograder import exercises, points
 from autograder.bench import Bench, StudentError, SubjectGone
 from autograder.exam import Exam, ExamError, Failed, NotExaminable, unexamined
 from autograder.verdict import CheckResult
@@ -177,12 +177,12 @@ def test_an_unknown_need_is_refused(exam: Exam[list[str]]) -> None:
 
 def test_an_unknown_exam_names_those_there_are() -> None:
     with pytest.raises(ExamError, match=r"no exam 'qso': there are .*qos.* Did you mean 'qos'"):
-        exams.load("qso")
+        exercises.load("qso")
 
 
-@pytest.mark.parametrize("name", exams.names())
+@pytest.mark.parametrize("name", exercises.names())
 def test_every_exam_and_the_table_of_points_agree(name: str) -> None:
-    exam = exams.load(name)
+    exam = exercises.load(name)
     worth = [check for part in points.table()[name].parts for check in exam.part(part)]
     assert sorted(worth) == sorted(exam.checks), "each check has points in exactly one part"
     for check in exam.checks.values():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from autograder import corpus, exams, points
+from autograder import corpus, exercises, points
 from autograder.corpus import trials
 from autograder.own_interfaces import DEFINITIONS, NAVIGATE_TO
 from autograder.report import Report
@@ -51,7 +51,7 @@ def test_the_examiner_has_the_action_that_the_notebook_gives(notebooks: trials.N
 
 
 def test_nothing_of_the_grader_is_in_what_a_student_reads() -> None:
-    for check in exams.load(EXAM).checks.values():
+    for check in exercises.load(EXAM).checks.values():
         for text in (check.title, check.rationale, *check.hints, check.read):
             assert "autograder" not in text
             assert "rig" not in text.split()

@@ -96,7 +96,7 @@ def test_the_check_works_in_a_plain_script(course: Course, cases: dict[str, Case
 
 @pytest.mark.parametrize("hint", [1, 2, 3])
 def test_hints_of_the_exam_are_graded(hint: int) -> None:
-    from autograder.exams.qos import EXAM
+    from autograder.exercises.qos.exam import EXAM
 
     for check in EXAM.checks.values():
         assert len(check.hints[hint - 1]) > 20

@@ -9,13 +9,13 @@ from typing import Any
 import nbformat
 import pytest
 
-from autograder import corpus, engine, exams, keys, runner, submission
+from autograder import corpus, engine, exercises, keys, runner, submission
 from autograder.build import build
 from autograder.corpus.trials import one_notebook
 from autograder.exam import Failed
+from autograder.exercises.patterns import scenarios
+from autograder.exercises.patterns.choices import compare
 from autograder.release import release
-from autograder.rigs import scenarios
-from autograder.rigs.choosing import compare
 from course.student_version import student_versions
 from tests.machine import needs_isolation
 
@@ -80,7 +80,7 @@ def test_the_subject_is_told_neither_the_key_nor_the_part(root: Path) -> None:
 
 
 def test_no_text_of_a_choice_check_names_a_pattern() -> None:
-    checks = exams.load("patterns").checks
+    checks = exercises.load("patterns").checks
     for scenario in scenarios.SCENARIOS:
         check = checks[f"{scenario}_choice"]
         said = " ".join((check.title, check.rationale, *check.hints, check.read)).lower()
@@ -90,8 +90,8 @@ def test_no_text_of_a_choice_check_names_a_pattern() -> None:
 
 def test_no_visible_check_of_the_node_says_which_pattern_to_take() -> None:
     """Neither as a hint nor as what is to be read; what works, the node shows by working."""
-    checks = exams.load("patterns").checks
-    for name in exams.load("patterns").part("visible"):
+    checks = exercises.load("patterns").checks
+    for name in exercises.load("patterns").part("visible"):
         check = checks[name]
         said = " ".join((check.title, check.rationale, *check.hints, check.read)).lower()
         for word in () if name == "choices_made" else (*scenarios.PATTERNS, "publish", "trigger"):
@@ -100,7 +100,7 @@ def test_no_visible_check_of_the_node_says_which_pattern_to_take() -> None:
 
 def test_the_report_of_a_wrong_choice_names_no_other_pattern(root: Path) -> None:
     """Every wrong answer to every question, as the student would read it."""
-    checks = exams.load("patterns").checks
+    checks = exercises.load("patterns").checks
     for scenario, right in key(root).items():
         for pattern in set(scenarios.PATTERNS) - set(right):
             rig: Any = type("Rig", (), {})()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from autograder import exams, points
+from autograder import exercises, points
 
 EXERCISES = {exam: entry for exam, entry in points.table().items() if entry.assignment == "ch05"}
 
@@ -37,7 +37,7 @@ def test_an_exercise_has_10_visible_points_5_hidden_ones_and_5_for_explanations(
 
 @pytest.mark.parametrize("exam", EXERCISES)
 def test_who_breaks_a_check_without_points_loses_those_of_another_beside_it(exam: str) -> None:
-    checks = exams.load(exam).checks
+    checks = exercises.load(exam).checks
 
     def needs(name: str) -> set[str]:
         direct = checks[name].needs

@@ -7,7 +7,7 @@ import re
 import nbformat
 import pytest
 
-from autograder import exams
+from autograder import exercises
 from course.content import content_root
 
 CHAPTER = "ch05-building-blocks.ipynb"
@@ -33,9 +33,9 @@ def is_there(reference: str) -> bool:
     return any(heading in name and lead in leads for name, leads in places().items())
 
 
-@pytest.mark.parametrize("exam", exams.names())
+@pytest.mark.parametrize("exam", exercises.names())
 def test_what_a_check_tells_to_read_is_in_the_students_chapter(exam: str) -> None:
-    for check in exams.load(exam).checks.values():
+    for check in exercises.load(exam).checks.values():
         assert check.read, check.name
         if check.read.startswith("Chapter 5, "):
             references = re.findall(r"“(.+?)”", check.read)

@@ -1,0 +1,142 @@
+"""How a drive ends: the robot has arrived, or was called off, and stands."""
+
+from __future__ import annotations
+
+from concurrent.futures import Future
+
+from autograder.exam import Failed
+from autograder.exercises.patterns.blocked_aisle import hold, hold_before_goal
+from autograder.exercises.patterns.discovery import acquaint
+from autograder.exercises.patterns.driving import Drive
+from autograder.exercises.patterns.rig import SETTLE, STEP
+from autograder.exercises.patterns.stations import require_report
+from autograder.observe.phrases import ended
+from course.errors import WaitTimeout
+from course.runtime.actions import GoalState
+
+LOOKING, STOPPING, UNDER_WAY = 0.6, 4.0, 2.0
+"""Seconds of wall time for those who look by the wall's clock whether they are called off, for a
+stop to become visible, and for one that was under way when the result came."""
+WATCHED = 2.0
+"""Seconds of the node's clock for which a robot that was called off must stay where it is."""
+
+
+def to_the_end(drive: Drive, *, blocked: bool = False) -> None:
+    """Let the robot drive to its goal, with a report at each station on the way.
+
+    Args:
+        drive: the drive.
+        blocked: whether the aisle is blocked for a while after the first station, and for a
+            moment just before the goal.
+
+    Raises:
+        Failed: it does not drive, does not report, or does not end as it should.
+    """
+    while drive.station < drive.goal:
+        drive.require_driving()
+        if blocked and drive.station == drive.goal - 1:
+            hold_before_goal(drive)
+        drive.roll_on()
+        if drive.station < drive.goal:
+            require_report(drive)
+        if blocked and drive.station == drive.start + 1:
+            hold(drive)
+    arrived = "At the station named the robot has arrived."
+    require_end(drive, GoalState.SUCCEEDED, arrived, stopped=True)
+
+
+def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool = False) -> None:
+    """Wait for the end of the goal, and for the robot to stand still, and stay so.
+
+    Args:
+        drive: the drive.
+        state: how the goal must end.
+        expected: what is needed, as a sentence.
+        stopped: whether the robot must stand when the result comes, not a while later.
+
+    Raises:
+        Failed: it does not end, ends otherwise, or the robot goes on.
+    """
+    rig = drive.rig
+    rig.wait_stepping(lambda: drive.run.done)
+    if not drive.run.done or drive.run.status != state:
+        how = ended(drive.run.status.name) if drive.run.done else "went on and on"
+        stood = drive.stood
+        if stood and not drive.run.done and state == GoalState.CANCELED:
+            stood = (
+                " It stood there all the time: does your node look whether a drive is called off "
+                "only at the next station, or once the robot has moved?"
+            )
+        raise Failed(
+            expected=f"{expected} The goal ends as {state.name}.",
+            actual=f"The goal {how}, with the robot {drive.place}{rig.because()}.{stood}",
+        )
+    # Which of two messages comes first is the transport's affair: a stop may be under way.
+    late = stopped and not rig.wait(lambda: rig.speed == 0, UNDER_WAY)
+    told = rig.speed
+    rig.wait_stepping(lambda: rig.speed == 0)
+    if state == GoalState.CANCELED:
+        rig.step(WATCHED, STEP)
+    rig.step(0.5)
+    acquaint(rig)  # whatever was on its way has come in by now
+    if not rig.node.speeds or rig.speed != 0:
+        raise Failed(
+            expected=f"{expected} The robot is told to stop: hardware/speed is 0.0.",
+            actual=f"The goal ended as {state.name}, but the last speed that the motors were "
+            f"told was {rig.speed:g} m/s: the robot drives on.",
+        )
+    if late:
+        raise Failed(
+            expected=f"{expected} The robot is told to stop first, and then the goal ends.",
+            actual=f"The result came while the motors were still told {told:g} m/s; only later "
+            "were they told to stop.",
+        )
+
+
+def cancel_within(drive: Drive, seconds: float) -> bool:
+    """Ask for the goal to be cancelled; return whether the robot is told to stop in time.
+
+    The time counts from the request on: the answer, too, may wait for the node's clock.
+
+    Args:
+        drive: the drive.
+        seconds: of the node's clock until the stop.
+
+    Raises:
+        Failed: the request was refused, or got no answer.
+    """
+    answer = drive.rig.ask("to cancel", lambda: drive.run.cancel(SETTLE))
+    if answer.done():
+        _require_agreed(drive, answer)
+    in_time = _stops_within(drive, seconds)
+    drive.rig.wait_stepping(answer.done)
+    _require_agreed(drive, answer)
+    return in_time
+
+
+def _require_agreed(drive: Drive, answer: Future[bool]) -> None:
+    try:
+        agreed = answer.result()
+    except WaitTimeout:
+        raise Failed(
+            expected="A request to cancel a drive is answered.",
+            actual=f"It got no answer, {drive.where}{drive.rig.because()}.",
+        ) from None
+    if not agreed:
+        raise Failed(
+            expected="A request to cancel a drive is accepted.",
+            actual=f"It was refused, {drive.where}{drive.rig.because()}.",
+        )
+
+
+def _stops_within(drive: Drive, seconds: float) -> bool:
+    """Return whether the robot is told to stop in so many seconds of the node's clock.
+
+    Who looks by the clock on the wall gets the time to do so before that one moves on.
+    """
+
+    def stopped() -> bool:
+        return drive.rig.speed == 0
+
+    drive.rig.wait(stopped, LOOKING)
+    return drive.rig.wait_stepping(stopped, seconds, STOPPING)

@@ -1,0 +1,69 @@
+"""Where the robot is: asking for it, overhearing it, and whether what comes is right."""
+
+# mypy: allow-untyped-calls
+
+from __future__ import annotations
+
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from autograder.exercises.patterns.discovery import LateJoiner, acquaint, numbers
+from autograder.exercises.patterns.rig import Asker, RobotRig
+from autograder.exercises.patterns.scenarios import NAMES
+
+AGE = 0.5
+"""Seconds of the node's time that a position may be old."""
+CLOSE = 0.011  # m
+MOST_NUMBERS = 12
+"""In an answer that says where the robot is: a date and a time, say, and a pose."""
+LONGEST = 200  # characters of an answer that are shown
+
+
+def fault(rig: RobotRig, asker: Asker, position: float) -> str:
+    """Return what whoever wants to know the position learns if it is wrong, or an empty string.
+
+    It is the end of a sentence, with its full stop. The hardware has reported the ``position``, and
+    says no more: a callback may take its time over each report.
+    """
+    answer = ""
+
+    def right() -> bool:
+        nonlocal answer
+        answer, found = asker(rig)
+        return any(abs(number - position) < CLOSE for number in found)
+
+    if rig.wait_stepping(right, AGE):
+        return ""
+    return answer if answer.endswith("?") else f"{answer}{rig.because()}."
+
+
+def asker_by(rig: RobotRig, pattern: str) -> Asker:
+    """Return a new way of finding out the position, by a service or a topic."""
+    return ask if pattern == "service" else Overhearing(rig)
+
+
+def ask(rig: RobotRig) -> tuple[str, list[float]]:
+    """Ask by the service."""
+    answer = rig.call(Trigger, NAMES["position"], Trigger.Request())
+    if answer is None:
+        return "nobody answered", []
+    found = numbers(answer.message) if answer.success else []
+    if len(found) > MOST_NUMBERS:
+        return f"the answer holds {len(found)} numbers: which one is the position?", []
+    text = answer.message[:LONGEST]
+    return f"the answer was success={answer.success}, message={text!r}", found
+
+
+class Overhearing:
+    """Listens to the topic, from now on."""
+
+    def __init__(self, rig: RobotRig) -> None:
+        """Subscribe, and be known to the publisher."""
+        self._late = LateJoiner(rig, Float64, NAMES["position"])
+        acquaint(rig)
+
+    def __call__(self, _: RobotRig) -> tuple[str, list[float]]:
+        """Tell the newest message."""
+        heard = [message.data for message in self._late.heard[-1:]]
+        said = f"the newest message was {heard[0]:g}" if heard else "no message came"
+        return f"{said} within {AGE:g} s", heard

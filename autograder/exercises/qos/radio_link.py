@@ -1,0 +1,98 @@
+"""A consumer at the far end of a radio link that breaks down for a moment: real packet loss.
+
+The far end is a DDS participant of its own. To break the link, every UDP packet is dropped that is
+sent to this participant's ports, in the network namespace that examiner and subject have to
+themselves (`autograder.outside`). Everything is lost for as long as the gap lasts, and nothing
+outside of it: so a design that recovers always does, one that does not never does, and chance has
+no part in it.
+"""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from rclpy.qos import QoSProfile
+
+from autograder.bench import Bench
+from autograder.exam import NotExaminable
+from autograder.exercises.qos.examiner_node import ExaminerNode
+from autograder.exercises.qos.readings import Heard, Sensor
+from autograder.observe.quiet_node import QuietNode
+from autograder.outside.asking import Outside
+from autograder.outside.requests import CannotLoseError
+from course.runtime.core_session import CoreSession
+
+NOT_HERE = (
+    "What becomes of lost packets could not be examined on this machine, which cannot make a "
+    "network that loses them{why}. After a hand-in a person looks at it."
+)
+
+
+class Radio:
+    """The far end of a radio link."""
+
+    def __init__(self, near: ExaminerNode, domain_id: int, outside: Outside) -> None:
+        """Bring it up on ``domain_id``; it listens for readings that ``near`` sends."""
+        self._near, self._outside = near, outside
+        before = _own_ports()
+        self.session = CoreSession(domain_id=domain_id)
+        self._node = self.session.run(QuietNode, f"{near.get_name()}_far")
+        # What it shares with the near end is the multicast port, which only announces.
+        self._ports = sorted(_own_ports() - before)
+        if not self._ports:
+            raise RuntimeError("the far end of the radio link has no UDP port of its own")
+        self.heard: Heard = defaultdict(list)
+
+    def listen(self, sensor: Sensor, qos: QoSProfile) -> None:
+        """Subscribe to a sensor's topic."""
+        self._near.listen(sensor, sensor.topic, qos, self.heard, on=self._node)
+
+    @contextmanager
+    def gap(self) -> Iterator[None]:
+        """Lose every packet to the far end for as long as the block lasts.
+
+        Raises:
+            NotExaminable: this machine cannot.
+        """
+        try:
+            self._outside.ask("lose", ports=self._ports)
+        except CannotLoseError as error:
+            why = f" ({error})" if str(error) else ""
+            raise NotExaminable(NOT_HERE.format(why=why)) from None
+        try:
+            yield
+        finally:
+            self._outside.ask("deliver")
+
+
+@contextmanager
+def radio(bench: Bench, near: ExaminerNode) -> Iterator[Radio]:
+    """Give a radio link from the subject to a consumer far away.
+
+    Raises:
+        NotExaminable: the network is not the subject's own: others' packets must not get lost.
+    """
+    if not bench.outside.own_network:
+        raise NotExaminable(NOT_HERE.format(why=""))
+    link = Radio(near, bench.session.domain_id, bench.outside)
+    try:
+        yield link
+    finally:
+        link.session.close()
+
+
+def _own_ports() -> set[int]:
+    """Return the UDP ports that this process has bound, by IPv4."""
+    inodes = set()
+    for descriptor in Path("/proc/self/fd").iterdir():
+        with suppress(OSError):  # the descriptor of this very listing
+            inodes.add(str(descriptor.readlink()))
+    lines = Path("/proc/self/net/udp").read_text().splitlines()[1:]
+    rows = (line.split() for line in lines)
+    return {int(row[1].rpartition(":")[2], 16) for row in rows if f"socket:[{row[9]}]" in inodes}

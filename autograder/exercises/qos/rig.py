@@ -1,0 +1,321 @@
+"""The rig of the QoS exam: plays the robot's hardware and listens to what becomes of each reading.
+
+For each sensor a reading goes in on ``hardware/<sensor>``, through the student's driver node onto
+the sensor's topic, through the student's consumer node, and out on ``consumer/<sensor>``. Both
+ends belong to the examiner, and so does a witness that listens on the topic between them.
+"""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from functools import partial
+from itertools import count
+from typing import Any
+
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from autograder.bench import Bench
+from autograder.exam import NotExaminable
+from autograder.exercises.qos.examiner_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
+from autograder.exercises.qos.readings import IMU, SENSORS, STOP, Heard, Sensor
+from autograder.observe.participants import of_others
+from autograder.observe.patience import Patience
+from autograder.observe.phrases import callback_raised
+from autograder.observe.spinner import Spinner
+from autograder.observe.stillness import HANGS, RESTLESS, Stillness
+from autograder.outside.holding import HoldError
+from course.errors import WaitTimeout
+
+DRIVERS, CONSUMERS = "SensorDrivers", "SensorConsumers"
+
+ENDLESS = 3600 * 10**9
+"""Nanoseconds: a lifespan of an hour or more is as good as none."""
+PROBE_PERIOD = 0.1
+"""Seconds between two rounds of probes while endpoints find each other."""
+NOW = 0.05
+"""Seconds in which a busy machine comes to a look at all threads, and another."""
+ROUND = 5
+"""IMU readings in a round, at their own rate: a consumer may take a lone one for an outlier."""
+
+
+PRESSES = "presses"
+"""The phase of the stop events that bear the words of earlier ones."""
+
+
+class SensorRig:
+    """The examiner's view of one subject during the QoS exam."""
+
+    def __init__(self, bench: Bench) -> None:
+        """Bring up the examiner's endpoints on the subject's domain."""
+        self.bench = bench
+        self.subject = bench.subject
+        self.spinner = Spinner(bench.session.context)
+        self.node = ExaminerNode(bench.session.context)
+        self.spinner.add_node(self.node)
+        self._experiments = bench.memory
+        self._probes = 0  # how often probed
+        self._still = Stillness(bench.outside)
+
+    def offered(self, topic: str) -> list[TopicEndpointInfo]:
+        """Return the publishers on ``topic`` that are not the examiner's."""
+        return of_others(self.node.get_publishers_info_by_topic(topic))
+
+    def requested(self, topic: str) -> list[TopicEndpointInfo]:
+        """Return the subscriptions on ``topic`` that are not the examiner's."""
+        return of_others(self.node.get_subscriptions_info_by_topic(topic))
+
+    def attend(self) -> None:
+        """Listen to the consumers' ends, with what they offer: lossless wherever it is possible."""
+        for sensor in SENSORS:
+            topic = f"consumer/{sensor.name}"
+            reliable = all(
+                e.qos_profile.reliability == ReliabilityPolicy.RELIABLE for e in self.offered(topic)
+            )
+            qos = lossless() if reliable else undemanding()
+            self.node.listen(sensor, topic, qos, self.node.consumed)
+
+    @contextmanager
+    def busy(self, name: str) -> Iterator[Callable[[], bool]]:
+        """Keep the node of a class busy for the length of the block; its endpoints go on.
+
+        What is yielded lets it go on before the end of the block. It returns whether its endpoints
+        did not receive, by an accident that `Held.jams` tells of.
+        Where all its threads are held, the drivers are busy as well: see `stand_ins`.
+        """
+        if self.can_hold:
+            with self._held() as let_go, self.node.standing_in():
+                yield let_go
+            return
+        with ExitStack() as paused:
+            self.subject.pause(name)
+            paused.callback(self.subject.resume, name)
+
+            def let_go() -> bool:
+                paused.close()
+                return False
+
+            yield let_go
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether the subject is in a sandbox, where all its threads can be held from outside."""
+        return self.bench.outside.own_network
+
+    @contextmanager
+    def _held(self) -> Iterator[Callable[[], bool]]:
+        """Hold the subject's threads for the length of the block; it is not asked."""
+        outside = self.bench.outside
+        try:
+            outside.ask("hold")
+        except HoldError as error:
+            raise NotExaminable(f"{error} After a hand-in a person looks at it.") from None
+        with ExitStack() as held:
+            held.callback(outside.ask, "release")
+
+            def let_go() -> bool:
+                held.pop_all()
+                return bool(outside.ask("release"))
+
+            yield let_go
+
+    @contextmanager
+    def stand_ins(self, sensors: Sequence[Sensor]) -> Iterator[None]:
+        """Be ready to publish in the drivers' stead while these are held with the consumers.
+
+        They stay for the length of the block: with a publisher goes what waits for a reader.
+        """
+        if not self.can_hold:
+            yield
+            return
+        with self.node.stand_ins({sensor.name: self._offer(sensor) for sensor in sensors}):
+            with self.node.standing_in():
+                self.probe(sensors, self.node.consumed)
+            yield
+
+    def _offer(self, sensor: Sensor) -> QoSProfile:
+        """Return what the driver of a sensor offers: of several, the one that most can hear.
+
+        How many readings a publisher keeps cannot be seen; a consumer's queue does not rest on it.
+        """
+        offers = [end.qos_profile for end in self.offered(sensor.topic)]
+        best = max(offers, key=lambda qos: (-qos.reliability.value, -qos.durability.value))
+        return QoSProfile(
+            history=HistoryPolicy.KEEP_ALL, reliability=best.reliability,
+            durability=best.durability, lifespan=best.lifespan, deadline=best.deadline,
+            liveliness=best.liveliness,
+            liveliness_lease_duration=best.liveliness_lease_duration,
+        )  # fmt: skip
+
+    def wait(self, condition: Callable[[], Any], timeout: float | None = None) -> bool:
+        """Wait until ``condition`` holds; return whether it did before the deadline.
+
+        Without ``timeout`` (s) that is when it would have come: see `Patience`.
+        """
+        if timeout is None:
+            return self.patience().wait(self.spinner, condition)
+        return self._holds(condition, timeout)
+
+    def wait_in_traffic(self, condition: Callable[[], Any], timeout: float) -> bool:
+        """Do the same while readings come in at their rate: 20 ms more or less do not matter."""
+        return self._holds(condition, timeout, often=False)
+
+    def _holds(self, condition: Callable[[], Any], timeout: float, *, often: bool = True) -> bool:
+        with suppress(WaitTimeout):
+            self.spinner.until(condition, timeout, "an observation", often=often)
+            return True
+        return False
+
+    def patience(self) -> Patience:
+        """Return for how long something is waited for that may never come."""
+        return Patience(self._still)
+
+    def rest(self, patience: float = RESTLESS) -> None:
+        """Return when all that was sent has been dealt with, or after ``patience`` s of work."""
+        self._still.reached(patience, max(patience, HANGS))
+
+    def rests(self) -> bool:
+        """Return whether all is at rest just now."""
+        return self._still.reached(timeout=NOW)
+
+    def probe(
+        self,
+        sensors: Iterable[Sensor],
+        heard: Heard,
+        give_up: Callable[[Sensor], Any] | None = None,
+    ) -> list[Sensor]:
+        """Send readings until each sensor was heard from; return those that never were.
+
+        Endpoints find each other in their own time, and what is sent before is lost: so the first
+        readings are probes. ``give_up`` says that waiting for a sensor is pointless.
+        """
+        self._probes += 1
+        phase = f"probe{self._probes}"
+        silent = list(sensors)
+        patience = self.patience()
+        for attempt in count():
+            self._round(silent, heard, phase, attempt)
+            silent = self._silent(silent, heard, phase)
+            hopeless = all(give_up is not None and give_up(sensor) for sensor in silent)
+            if hopeless or not patience.lasts():
+                break
+        return silent
+
+    def _round(self, sensors: list[Sensor], heard: Heard, phase: str, attempt: int) -> None:
+        """Send a reading of each sensor, of the IMU a few at its rate, until all were heard from.
+
+        No two alike: what becomes of repeated words is another check's question.
+        """
+        end = time.monotonic() + PROBE_PERIOD
+        everyone = partial(self._all_heard, sensors, heard, phase)
+        for number in range(attempt * ROUND, (attempt + 1) * ROUND):
+            silent = self._silent(sensors, heard, phase)
+            for sensor in silent:
+                if sensor is IMU or number % ROUND == 0:
+                    self.node.publish(sensor, phase, number)
+            if IMU in silent:
+                self.wait(everyone, 1 / IMU.rate)
+        self.wait(everyone, max(0.0, end - time.monotonic()))
+
+    def probed(self, sensor: Sensor) -> str:
+        """Return what the driver did with the newest probes of a sensor, as a phrase."""
+        phase = f"probe{self._probes}"
+        passed, sent = len(set(self.witnessed(sensor, phase))), len(self.sent(sensor, phase))
+        return f"while the driver published {passed} of the {sent} that came in"
+
+    def _all_heard(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> bool:
+        return not self._silent(sensors, heard, phase)
+
+    def _silent(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> list[Sensor]:
+        return [sensor for sensor in sensors if not self.indices(heard, sensor, phase)]
+
+    def burst(self, sensor: Sensor, phase: str, count: int) -> bool:
+        """Send ``count`` readings; return whether the last was seen on the sensor's topic.
+
+        No faster than the driver takes them: its queue for the hardware need not be longer.
+        """
+        takes = True
+        for index in range(count):
+            self.node.publish(sensor, phase, index)
+            if takes:
+                takes = self.wait(partial(self.taken, sensor, phase, index + 1 - AHEAD), LAG)
+        return self.wait(partial(self.taken, sensor, phase, count - 1))
+
+    def taken(self, sensor: Sensor, phase: str, index: int) -> bool:
+        """Whether the driver has published a reading of a phase, or a later one."""
+        return max(self.publications(sensor, phase), default=-1) >= index
+
+    def witnessed(self, sensor: Sensor, phase: str) -> list[int]:
+        """Return the indices of a phase's readings as they went over the sensor's topic."""
+        return self.indices(self.node.witnessed, sensor, phase)
+
+    def publications(self, sensor: Sensor, phase: str) -> dict[int, int]:
+        """Return when the driver published the readings of a phase: {index: ns since 1970}."""
+        return self.node.published.get(self._filed(sensor, phase), {}).copy()
+
+    def sent(self, sensor: Sensor, phase: str) -> dict[int, int]:
+        """Return when the hardware delivered the readings of a phase: {index: ns since 1970}."""
+        return self.node.sent.get(self._filed(sensor, phase), {}).copy()
+
+    def published(self, sensor: Sensor, phase: str, index: int) -> int:
+        """Return when the driver published a reading, in ns since 1970; 0 if it was not seen."""
+        return self.node.published.get(self._filed(sensor, phase), {}).get(index, 0)
+
+    def handed(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
+        """Return which readings of a phase the consumer passed on, and when (ns since 1970)."""
+        return self.node.handed.get(self._filed(sensor, phase), []).copy()
+
+    def _filed(self, sensor: Sensor, phase: str) -> tuple[str, int]:
+        # What is read with `get` is not made: the executor's thread may be making it just now.
+        return sensor.name, self.node.phase(phase)
+
+    def consumed(self, sensor: Sensor, phase: str) -> list[int]:
+        """Return the indices of a phase's readings in the order the consumer passed them on."""
+        return self.indices(self.node.consumed, sensor, phase)
+
+    def indices(self, heard: Heard, sensor: Sensor, phase: str) -> list[int]:
+        """Return the indices of a phase's readings in order of arrival."""
+        number = self.node.phase(phase)
+        return [tag.number for tag in list(heard[sensor.name]) if tag.phase == number]
+
+    def expires(self, sensor: Sensor) -> bool:
+        """Whether readings of a sensor are dropped when they get old: by a lifespan, at any end."""
+        ends = [*self.offered(sensor.topic), *self.requested(sensor.topic)]
+        return any(0 < end.qos_profile.lifespan.nanoseconds < ENDLESS for end in ends)
+
+    def raised(self) -> str:
+        """Return which error a callback raised last, as a phrase in brackets, or nothing."""
+        raised = self.subject.errors()
+        return f" ({callback_raised(raised[-1])})" if raised else ""
+
+    def comes_again(self) -> int:
+        """Return how many stop events the consumer has handed on more than once so far.
+
+        Those that were sent with the words of earlier ones (`PRESSES`) do not count.
+        """
+        presses = self.node.phase(PRESSES)
+        numbers = Counter(t for t in list(self.node.consumed[STOP.name]) if t.phase != presses)
+        return sum(number > 1 for number in numbers.values())
+
+    def once(self, experiment: Callable[[SensorRig], Any]) -> Any:
+        """Run an experiment that several checks, or parts, read, once a sitting."""
+        name = experiment.__name__
+        if name not in self._experiments:
+            self._experiments[name] = experiment(self)
+        return self._experiments[name]
+
+
+@contextmanager
+def sensor_rig(bench: Bench) -> Iterator[SensorRig]:
+    """Give a rig, and take the examiner's endpoints down afterwards."""
+    rig = SensorRig(bench)
+    try:
+        yield rig
+    finally:
+        rig.spinner.close()

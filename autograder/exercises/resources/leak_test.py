@@ -1,0 +1,106 @@
+"""The experiment of many lives: does the process grow with every driver that is started and ended?
+
+One life proves little: a thread may still be ending, a library fills its caches, a notebook has
+threads of its own. What grows with each of 50 lives, in both halves of them, is a leak.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import NamedTuple
+
+from autograder.exercises.resources.camera_duties import DRIVER, ENDED
+from autograder.exercises.resources.process_usage import Usage
+from autograder.exercises.resources.rig import PERIOD, CameraRig
+
+WARM_UP, FEWEST, LIVES = 3, 6, 50
+"""Lives: at first, and then at least (a camera may need a second to get warm), and at most."""
+TIME = 3.0
+"""Seconds of wall time for all lives after the warm-up, if more than the fewest are to be made."""
+MEMORY = 100  # KiB a life
+NOISE = 640  # KiB that few lives may differ by: an allocator takes memory by the piece
+PICTURES = 5  # a life, of 64 KiB
+
+
+def live(rig: CameraRig, lives: int) -> None:
+    """Start and end the driver ``lives`` times, then collect what is garbage."""
+    device = rig.device()
+    for _ in range(lives):
+        rig.program.start(DRIVER, device)
+        _film(rig, device)
+        rig.program.stop(DRIVER)
+        # A thread of the driver may close the camera a moment later.
+        rig.wait(lambda: not rig.cameras(device), idle=ENDED)
+    rig.subject.collect()
+
+
+def _film(rig: CameraRig, device: str) -> None:
+    """Let the driver take some pictures: who keeps them is known by their number.
+
+    A timer takes all of them as time moves on. A thread that keeps one order at a time may take
+    just one meanwhile; then time moves on step by step, and each step waits for a picture.
+    """
+
+    def asked() -> int:
+        return sum(rig.cameras(device))
+
+    rig.advance(PICTURES * PERIOD)
+    for _ in range(PICTURES):
+        before = asked()
+        if before >= PICTURES:
+            return
+        rig.advance(PERIOD)
+        rig.wait(lambda before=before: asked() > before, PERIOD)  # type: ignore[misc]
+
+
+class Growth(NamedTuple):
+    """What a process has grown by in so many lives: the lesser of two times, item by item."""
+
+    usage: Usage
+    lives: int
+
+    @property
+    def made(self) -> int:
+        """How many lives there were, the warm-up aside."""
+        return 2 * self.lives
+
+    def leaks(self) -> list[str]:
+        """Return what these lives leaked, a phrase each."""
+        return _leaks(self.usage, self.lives)
+
+
+def growth(rig: CameraRig) -> Growth:
+    """Return what the process has grown by in 25 lives, or in as many as there is time for."""
+    began = time.monotonic()
+    live(rig, WARM_UP)
+    pace = (time.monotonic() - began) / WARM_UP
+    lives = max(FEWEST, min(LIVES, int(TIME / pace))) // 2
+    first, second = (_grown(rig, lives) for _ in range(2))
+    usage = Usage(
+        min(first.threads, second.threads),
+        min(first.files, second.files),
+        min(first.memory, second.memory),
+    )
+    return Growth(usage, lives)
+
+
+def _grown(rig: CameraRig, lives: int) -> Usage:
+    before = rig.process.usage()
+    live(rig, lives)
+    rig.wait(lambda: not _leaks(rig.process.usage().grown(before), lives), idle=ENDED)
+    return rig.process.usage().grown(before)
+
+
+def _leaks(grown: Usage, lives: int) -> list[str]:
+    found = []
+    if grown.threads >= lives / 2:
+        found.append(f"{_each(grown.threads / lives)} of its threads")
+    if grown.files >= lives / 2:
+        found.append(f"{_each(grown.files / lives)} of its open files")
+    if grown.memory >= max(NOISE, lives * MEMORY):
+        found.append(f"{grown.memory // lives} KiB of memory")
+    return found
+
+
+def _each(a_life: float) -> str:
+    return {1: "one", 2: "two"}.get(round(a_life), "some")

@@ -1,0 +1,151 @@
+"""Drives a lifecycle node through its states, over the services that every lifecycle node has.
+
+Sources: the ROS 2 design article "Managed nodes", and the interfaces of ``lifecycle_msgs``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import GetParameters, SetParameters
+
+from autograder.exam import Failed
+from autograder.exercises.resources.rig import RESEND, CameraRig
+from autograder.observe.phrases import phrase
+
+TRANSITIONS = {
+    "configure": (Transition.TRANSITION_CONFIGURE, "inactive"),
+    "activate": (Transition.TRANSITION_ACTIVATE, "active"),
+    "deactivate": (Transition.TRANSITION_DEACTIVATE, "inactive"),
+    "cleanup": (Transition.TRANSITION_CLEANUP, "unconfigured"),
+}
+STATES = ("unconfigured", "inactive", "active", "finalized")
+SHUTDOWNS = {
+    "unconfigured": Transition.TRANSITION_UNCONFIGURED_SHUTDOWN,
+    "inactive": Transition.TRANSITION_INACTIVE_SHUTDOWN,
+    "active": Transition.TRANSITION_ACTIVE_SHUTDOWN,
+}
+
+
+class Managed:
+    """One lifecycle node of the subject, by its fully qualified name."""
+
+    def __init__(self, rig: CameraRig, node: str) -> None:
+        """Drive ``node``; its services are looked for when they are needed."""
+        self._rig = rig
+        self._node = node
+        self._rate = ""
+
+    def set(self, **values: str | float) -> bool:
+        """Set parameters; return whether the node took them all."""
+        return not self._refused(values)
+
+    def _refused(self, values: dict[str, str | float]) -> list[str]:
+        """Set parameters; return what the node refused, and why."""
+        self._rate = f" with a rate of {values['rate']:g} Hz" if "rate" in values else ""
+        parameters = [Parameter(name=name, value=_value(value)) for name, value in values.items()]
+        request = SetParameters.Request(parameters=parameters)
+        reply = self._ask(SetParameters, "set_parameters", request)
+        return [
+            f"{name}={value!r}" + (f" ({result.reason.rstrip('.')})" if result.reason else "")
+            for (name, value), result in zip(values.items(), reply.results, strict=True)
+            if not result.successful
+        ]
+
+    def require(self, **values: str | float) -> None:
+        """Set parameters that the node must take."""
+        if refused := self._refused(values):
+            shown = ", ".join(f"{name}={value!r}" for name, value in values.items())
+            raise Failed(
+                expected=f"The parameters {shown} can be set.",
+                actual=f"The node refused {phrase(refused)}.",
+            )
+
+    def require_defaults(self) -> None:
+        """Fail unless the parameters have their defaults; nobody has set any yet."""
+        request = GetParameters.Request(names=["device", "rate"])
+        values = list(self._ask(GetParameters, "get_parameters", request).values)
+        device, rate = (*values, ParameterValue(), ParameterValue())[:2]
+        text, double = ParameterType.PARAMETER_STRING, ParameterType.PARAMETER_DOUBLE
+        if (device.type, device.string_value, rate.type, rate.double_value) != (
+            text, "front", double, 10.0,
+        ):  # fmt: skip
+            raise Failed(
+                expected="Your node has the parameters device (a string, by default 'front') and "
+                "rate (a double, by default 10.0).",
+                actual=f"When it had just been made, device was {_shown(device)} and rate was "
+                f"{_shown(rate)}.",
+            )
+
+    def state(self) -> str:
+        """Return the label of the node's state."""
+        return str(self._ask(GetState, "get_state", GetState.Request()).current_state.label)
+
+    def attempt(self, transition: str) -> str:
+        """Ask for a transition; return the state that came of it."""
+        if transition in TRANSITIONS:
+            number = TRANSITIONS[transition][0]
+        else:
+            number = SHUTDOWNS[self.state()]
+        client = self._rig.client(ChangeState, f"{self._node}/change_state")
+        self._rig.wait(client.service_is_ready)
+        reply = client.call_async(ChangeState.Request(transition=Transition(id=number)))
+        # The state says what came of it, even if the response is lost.
+        self._rig.wait(reply.done, RESEND)
+        states: list[str] = []
+        if not self._rig.wait(lambda: states.append(self.state()) or states[-1] in STATES):  # type: ignore[func-returns-value]
+            raise Failed(
+                expected=f"A “{transition}” comes to its end.",
+                actual=f"Your node is stuck in “{states[-1]}”{self._rig.raised()}. Each on_…() "
+                "method must return, and return a TransitionCallbackReturn.",
+            )
+        return states[-1]
+
+    def go(self, *transitions: str) -> None:
+        """Make transitions that must all succeed."""
+        for transition in transitions:
+            goal = TRANSITIONS[transition][1] if transition in TRANSITIONS else "finalized"
+            if (state := self.attempt(transition)) != goal:
+                how = self._rate if transition == "configure" else ""
+                raise Failed(
+                    expected=f"After “{transition}”{how} your node is {goal}.",
+                    actual=f"It is {state}{self._rig.raised()}. {self._hint(transition)}",
+                )
+
+    @staticmethod
+    def _hint(transition: str) -> str:
+        """Return why rclpy says nothing, and how to see it: it catches what on_…() raises."""
+        return (
+            f"Your on_{transition}() did not return SUCCESS, or it raised. rclpy keeps such an "
+            "exception to itself. To see it, call your methods one after the other in a cell of "
+            "your own: `node = course.run(ManagedCamera)`, then `node.on_configure(None)` …"
+        )
+
+    def _ask(self, service: Any, name: str, request: Any) -> Any:
+        reply = self._rig.ask(service, f"{self._node}/{name}", request)
+        if reply is None:
+            raise Failed(
+                expected=f"Your node answers its service {self._node}/{name}.",
+                actual=f"No answer came{self._rig.raised()}.",
+            )
+        return reply
+
+
+def _value(value: str | float) -> ParameterValue:
+    if isinstance(value, str):
+        return ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
+    return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
+
+
+def _shown(value: ParameterValue) -> str:
+    """Return a parameter's value for a reader."""
+    kinds = {
+        ParameterType.PARAMETER_NOT_SET: "not there",
+        ParameterType.PARAMETER_STRING: repr(value.string_value),
+        ParameterType.PARAMETER_DOUBLE: repr(value.double_value),
+        ParameterType.PARAMETER_INTEGER: f"the whole number {value.integer_value}",
+    }
+    return kinds.get(value.type, "of another type")

@@ -1,0 +1,282 @@
+"""The rig of the resources exam: looks at a camera driver on the graph, on the wire, in /proc.
+
+The library ``Camera`` that the notebook gives opens a memory file ``camera:<device>`` for a device
+and ``camera-stream:<device>`` for its stream, and moves the position in the first by one whenever
+somebody asks for a picture. So what a node does with its camera is seen from outside.
+"""
+
+# mypy: allow-untyped-calls
+# rclpy leaves most of its functions untyped.
+
+from __future__ import annotations
+
+import re
+import secrets
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+from rclpy.duration import Duration
+from std_msgs.msg import Int32
+
+from autograder.bench import PATIENCE, Bench, StudentError
+from autograder.exam import Failed
+from autograder.exercises.resources.camera_graph import CameraGraph
+from autograder.exercises.resources.camera_program import Program
+from autograder.exercises.resources.examiner_node import ExaminerNode, Picture
+from autograder.exercises.resources.process_usage import Process
+from autograder.observe.patience import IDLE_S, SETTLE_S, Patience
+from autograder.observe.phrases import phrase
+from autograder.observe.stillness import Stillness
+from course.errors import WaitTimeout
+from course.runtime.waiting import Deadline
+
+GHOSTS = 1.0
+"""Seconds that endpoints of an earlier life are given to go off the graph."""
+RESEND = 1.0
+"""Seconds after which a request that has no response is made again."""
+NUDGE = 0.05
+"""Seconds after which a callback that does not answer may be one that awaits something."""
+PERIOD = 0.1
+"""Seconds of simulated time between two pictures, and of wall time between two probes."""
+
+
+class CameraRig:
+    """The examiner's view of one subject during the resources exam."""
+
+    def __init__(self, bench: Bench) -> None:
+        """Bring up the examiner's endpoints on the subject's domain, or go on with them.
+
+        They stay from one part of the exam to the next. New ones would have to find out anew what
+        is on the graph, and take what an earlier check left there for the next one's.
+        """
+        self.subject = bench.subject
+        self.session = bench.session
+        self.programs = bench.programs
+        self.process = Process(bench.outside)
+        self._still = Stillness(bench.outside)
+        node = bench.memory.get(ExaminerNode.__name__) or bench.session.run(ExaminerNode)
+        assert isinstance(node, ExaminerNode)
+        bench.memory[ExaminerNode.__name__] = node
+        self.node = node
+        self.graph = CameraGraph(node)
+        self.program = Program(bench.subject, self.graph)
+        self.memory = bench.memory
+        self.draws = bench.draws
+        self._clean = False
+        self._provoked = False
+        self._clients: dict[str, Any] = {}
+        self.requests = 0  # that were made of services so far
+        self.waited = 0.0  # s of wall time that the last wait took which had no time-out
+
+    # The subject.
+
+    def fresh(self) -> None:
+        """Begin a new session on simulated time; nothing of an earlier one goes on."""
+        self.subject.open(sim_time=True)
+        self._clean, self._provoked = True, False
+
+    @contextmanager
+    def life(self, name: str, *args: Any) -> Iterator[str]:
+        """Give the full name of a node of the class ``name`` for one life.
+
+        It is stopped at the end, unless it is destroyed by then. What its cleanup raises then is
+        for another check to find.
+        """
+        with self.trying():
+            node = self.program.start(name, *args)
+            yield node
+        try:
+            self.subject.stop(name)
+            self._clean = self._vanishes(node)
+        except StudentError:
+            self._clean = False
+
+    def _vanishes(self, node: str) -> bool:
+        """Whether a node that was stopped goes off the graph.
+
+        rclpy 7.1 leaves the services of a destroyed lifecycle node there until it is collected; the
+        next node of that name must not be taken for it.
+        """
+        service = f"{node}/get_state"
+        if self.node.count_services(service):
+            self.subject.collect()
+        return self.wait(lambda: not self.node.count_services(service))
+
+    @contextmanager
+    def trying(self) -> Iterator[None]:
+        """Begin with a clean session, and leave none to the next check if this one fails.
+
+        What a wrong design has left on the graph by now is not held against it again, and what the
+        examiner made a callback raise in an earlier check explains nothing in this one.
+        """
+        if not self._clean or self._provoked:
+            self.fresh()
+        self.wait(lambda: not self.graph.endpoints(), GHOSTS)
+        self.graph.disregard()
+        self._clean = False
+        yield
+        self._clean = True
+
+    def advance(self, seconds: float) -> None:
+        """Move simulated time on."""
+        try:
+            self.subject.advance(seconds)
+        except StudentError as error:
+            raise Failed(
+                expected="Your callbacks return, and the driver follows the robot's time.",
+                actual=f"{_held_up(str(error))}{self.raised()}.",
+            ) from None
+
+    def nudge(self) -> None:
+        """Give the subject's executors something to do, and no timer a reason to fire.
+
+        rclpy 7.1 resumes a callback that awaits something when its executor has something else to
+        do: on a robot, at the next tick. Here it learns that a nanosecond has passed.
+        """
+        self.subject.nudge()
+
+    def raised(self) -> str:
+        """Return what the student's callbacks raised, as the end of a sentence."""
+        raised, ended = self.subject.errors(), self.subject.thread_errors()
+        told = [f"a callback raised: {raised[-1].rstrip('.')}"] if raised else []
+        told += [f"a thread of yours ended with {ended[-1].rstrip('.')}"] if ended else []
+        return f" ({phrase(told)})" if told else ""
+
+    def refused_zoom(self, factor: int) -> None:
+        """Send a zoom that the camera does not have; it is with the driver when this returns."""
+        self._provoked = True
+        self.node.zoom.publish(Int32(data=factor))
+        self.node.zoom.wait_for_all_acked(Duration(seconds=SETTLE_S))
+
+    def ask(self, service: Any, name: str, request: Any, *, nudging: bool = False) -> Any:
+        """Call a service; return its response, or None if none came in time.
+
+        A response that goes out before its way back is known is lost: it is asked for again, so
+        this is for requests that may be made twice. ``nudging``: a callback may await something.
+        """
+        client = self.client(service, name)
+        self.wait(client.service_is_ready)
+        patience = self.patience()
+        replies: list[Any] = []
+        while patience.lasts():
+            replies.append(client.call_async(request))
+            self.requests += 1
+            again = Deadline(RESEND)
+            while again.left and patience.lasts():
+                self.wait(lambda: any(reply.done() for reply in replies), NUDGE)
+                for reply in replies:
+                    if reply.done():
+                        return reply.result()
+                if nudging:
+                    self.nudge()
+        return None
+
+    def client(self, service: Any, name: str) -> Any:
+        """Return the client of a service, one for all lives of its server."""
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(service, name)
+        return self._clients[name]
+
+    # What is seen.
+
+    def wait(
+        self, condition: Callable[[], Any], timeout: float | None = None, idle: float = IDLE_S
+    ) -> bool:
+        """Wait until ``condition`` holds, for ``timeout`` s; return whether it did by then.
+
+        Without ``timeout`` as long as it may come: until all have slept for ``idle`` s, see
+        `Patience`. `end_of_wait` says afterwards when that was.
+        """
+        if timeout is None:
+            patience = self.patience(idle)
+            holds = patience.wait(self.session, condition)
+            self.waited = patience.spent
+            return holds
+        with suppress(WaitTimeout):
+            self.session.until(condition, timeout=timeout, what="an observation")
+            return True
+        return False
+
+    @property
+    def end_of_wait(self) -> str:
+        """When the last wait without a time-out was over, as a phrase."""
+        if self.waited < SETTLE_S:
+            return "when nothing was at work any more"
+        return f"{SETTLE_S:.0f} s later"
+
+    def patience(self, idle: float = IDLE_S, seconds: float = SETTLE_S) -> Patience:
+        """Begin to wait for as long as something may take: see `Patience`."""
+        return Patience(self._still, seconds, idle)
+
+    def rest(self) -> bool:
+        """Return True when all that was sent has been dealt with, False if a thread never rests."""
+        return self._still.reached()
+
+    def others(self) -> str:
+        """Return a sentence on the processes that the notebook has started, if there are any."""
+        if not (names := self.process.others()):
+            return ""
+        were = "A process that it had started was" if len(names) == 1 else "Processes were"
+        return f" {were} left: {phrase(names)}."
+
+    def device(self, kind: str = "front") -> str:
+        """Return a device that nobody else uses; ``kind`` is its name's beginning."""
+        return f"{kind}-{secrets.token_hex(4)}"
+
+    def cameras(self, device: str) -> list[int]:
+        """Return how often each open camera of ``device`` was asked for a picture."""
+        return self.process.positions(f"camera:{device}")
+
+    def streams(self, device: str) -> bool:
+        """Whether the stream of ``device`` runs."""
+        return bool(self.process.positions(f"camera-stream:{device}"))
+
+    def pictures(self, device: str) -> list[Picture]:
+        """Return the pictures of ``device`` that went over the topic, in order of arrival."""
+        return self.node.of(device)
+
+    def see(self, device: str, condition: Callable[[], Any] | None = None) -> bool:
+        """Let time pass until ``condition`` (by default: that there is a picture) holds.
+
+        Endpoints find each other in their own time, and what is sent before is lost.
+        """
+        condition = condition or (lambda: self.pictures(device))
+        patience = self.patience()
+        for _ in range(int(SETTLE_S / PERIOD)):
+            self.advance(PERIOD)
+            if self.wait(condition, PERIOD if patience.lasts() else 0.0):
+                return True
+        return False
+
+    def catch_up(self) -> None:
+        """Wait until every endpoint that the subject has by now is known here.
+
+        A participant's endpoints are told in order: those of a mark that is made now come last.
+        """
+        mark = f"mark_{secrets.token_hex(4)}"
+        self.graph.note_mark(mark)
+        self.subject.mark(mark)
+        self.wait(lambda: self.node.count_publishers(mark) and self.node.count_subscribers(mark))
+
+
+@contextmanager
+def camera_rig(bench: Bench) -> Iterator[CameraRig]:
+    """Give a rig; the examiner's session takes its endpoints down at its end."""
+    yield CameraRig(bench)
+
+
+def _held_up(error: str) -> str:
+    """Return why simulated time could not be moved on, from the session's error."""
+    found = re.fullmatch(r"\w+: (.+) did not follow simulated time to ([\d.]+) s: .*", error, re.S)
+    if found is None:
+        return error.rstrip(".")
+    if found[1] == "the session":  # all nodes know the time: something goes on without end
+        return (
+            f"At {found[2]} s of the robot's time your program did not come to rest: for "
+            f"{PATIENCE:.0f} s there always was a callback running, or the next one ready"
+        )
+    return (
+        f"At {found[2]} s of the robot's time a callback of {found[1]} had been running for "
+        f"{PATIENCE:.0f} s"
+    )

@@ -1,0 +1,1 @@
+"""What several exams look with: nodes, waits and the words of their findings."""

@@ -1,1 +1,0 @@
-"""What the error-handling exam puts each of the student's nodes through."""

@@ -1,0 +1,74 @@
+"""Patience is for a busy machine: where all sleep, little of it is enough."""
+
+from __future__ import annotations
+
+import time
+
+import pytest
+
+from autograder.corpus.trials import busy_loops
+from autograder.exercises.qos.backlogs import Backlog
+from autograder.exercises.qos.readings import IMU, LIDAR, STOP, Sensor
+from autograder.observe.patience import Patience
+from autograder.observe.stillness import Stillness
+from autograder.outside.asking import Here
+from course import Session
+from tests.autograder.test_stillness import ASLEEP, BUSY, process
+
+LONG_S = 600.0
+
+
+def test_what_nobody_is_at_work_on_is_not_waited_for_to_the_end() -> None:
+    with process(ASLEEP) as other, Session() as session:
+        assert not Patience(Stillness(Here(other.pid)), LONG_S, 0.3).wait(session, lambda: False)
+
+
+def test_what_comes_is_waited_for() -> None:
+    with process(ASLEEP) as other, Session() as session:
+        due = time.monotonic() + 0.5
+        assert Patience(Stillness(Here(other.pid)), LONG_S, LONG_S).wait(
+            session, lambda: time.monotonic() > due
+        )
+
+
+def test_a_process_that_is_at_work_is_waited_for_to_the_end() -> None:
+    with process(BUSY) as other, Session() as session:
+        patience = Patience(Stillness(Here(other.pid)), 1.0, 0.2)
+        began = time.monotonic()
+        assert not patience.wait(session, lambda: False)
+        assert time.monotonic() - began >= 1.0
+
+
+def test_a_machine_that_is_busy_with_others_takes_nothing_from_a_wait_that_ends() -> None:
+    with busy_loops(4), process(ASLEEP) as other, Session() as session:
+        assert not Patience(Stillness(Here(other.pid)), LONG_S, 0.3).wait(session, lambda: False)
+
+
+def left(sensor: Sensor = LIDAR, count: int = 15, **seen: object) -> Backlog:
+    """Return what a right consumer leaves, but for what was ``seen``."""
+    right = {"published": count, "kept": [count - 1], "replayed": 1, "oldest": 0.1, "early": False}
+    return Backlog(sensor, count, **{**right, "altered": False, "again": 0, **seen})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("found", "decided"),
+    [
+        (left(), False),
+        (left(early=True), True),
+        (left(altered=True), True),
+        (left(published=8), True),
+        (left(published=12), False),
+        (left(STOP, 100, published=99), True),
+        (left(replayed=10, oldest=1.0), True),
+        (left(replayed=10, oldest=0.4), False),
+        (left(IMU, 150, replayed=49, oldest=1.0), False),
+        (left(kept=[14, 13]), True),
+        # The newest may still come out, on a busy machine.
+        (left(kept=[3, 2], replayed=10, oldest=1.0), False),
+        (left(kept=[]), False),
+    ],
+)
+def test_what_a_pause_has_decided_is_told_from_what_comes_after_it(
+    found: Backlog, decided: bool
+) -> None:
+    assert found.decided is decided
