@@ -143,8 +143,9 @@ class _Hold:
 
     def _hold_all(self) -> None:
         deadline = Deadline(HOLD_TIMEOUT_S)
-        code = cache(partial(code_of, libraries=DDS_LIBRARIES))  # whoever is held loads no other
-        while new := {t: of for t, of in self._threads() if t not in self._seized | self._of_dds}:
+        # A process that is held loads no library, so that its memory map is read once.
+        code = cache(partial(code_of, libraries=DDS_LIBRARIES))
+        while new := self._new_threads():
             for tid in new:
                 self._seize(tid)
             self._await_stops(deadline)
@@ -153,13 +154,16 @@ class _Hold:
                     self._of_dds.add(tid)
                     self._detach(tid)
 
-    def _threads(self) -> Iterator[tuple[int, int]]:
-        """Yield the threads that have not ended, each with its process."""
+    def _new_threads(self) -> dict[int, int]:
+        """Return {thread: process} of the threads that are not held or known yet, and not ended."""
+        found, known = {}, self._seized | self._of_dds
         for pid in self.processes():
             with suppress(OSError):
                 for task in Path(f"/proc/{pid}/task").iterdir():
-                    if not _has_ended(int(task.name)):
-                        yield int(task.name), pid
+                    tid = int(task.name)
+                    if tid not in known and not _has_ended(tid):
+                        found[tid] = pid
+        return found
 
     def _seize(self, tid: int) -> None:
         try:

@@ -51,7 +51,7 @@ class Exercise:
 
 @dataclass(frozen=True)
 class QuizTaken:
-    """A quiz, and the attempts at it in the file beside its notebook."""
+    """A quiz and its attempts, as read from the file in the notebook's folder."""
 
     notebook: Notebook
     attempts: tuple[Attempt, ...]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from autograder.exercises.patterns import camera_stream as filming
-from autograder.exercises.patterns import unaffected_during_drive as meanwhile
+from autograder.exercises.patterns import camera_stream, unaffected_during_drive
 from autograder.exercises.patterns.driving import Drive
 from autograder.exercises.patterns.stations import require_no_further
 
@@ -29,9 +28,9 @@ def hold(drive: Drive) -> None:
         Failed: the feedback goes on, so it does not look where the robot is, or not closely.
     """
     drive.leave()
-    stretch = filming.Stretch(drive.rig)
+    stretch = camera_stream.Stretch(drive.rig)
     if drive.rig.films:
-        stretch.run(BLOCKED, sum(meanwhile.FILMED) / 2)
+        stretch.run(BLOCKED, sum(unaffected_during_drive.FILMED) / 2)
     else:
         drive.go_by(BLOCKED)
     require_no_further(drive)
@@ -62,14 +61,14 @@ def _wait_on_the_wall(drive: Drive) -> None:
     drive.rig.wait(lambda: drive.latest > drive.station or drive.run.done, BLOCKED_WALL)
 
 
-def _require_the_rest(drive: Drive, stretch: filming.Stretch) -> None:
+def _require_the_rest(drive: Drive, stretch: camera_stream.Stretch) -> None:
     """Fail if the drive, of which ``stretch`` is a part, holds up what worked without one."""
     where = drive.where.replace("while", "While", 1)
-    meanwhile.require_pictures(drive.rig, stretch, where)
+    unaffected_during_drive.require_pictures(drive.rig, stretch, where)
     # Twice: a position that is looked up now and then may be right by chance, but then it has
     # just been looked up.
     for part in FURTHER:
         drive.move(drive.station + part)
-        meanwhile.require_position(drive.rig, drive.position, where)
-    meanwhile.require_battery(drive.rig, where)
-    meanwhile.require_parameters(drive.rig, where)
+        unaffected_during_drive.require_position(drive.rig, drive.position, where)
+    unaffected_during_drive.require_battery(drive.rig, where)
+    unaffected_during_drive.require_parameters(drive.rig, where)

@@ -17,12 +17,15 @@ from sensor_msgs.msg import BatteryState
 
 from autograder.bench import StudentError
 from autograder.exam import Exam, Failed
-from autograder.exercises.patterns import camera_stream as filming
-from autograder.exercises.patterns import choices as choosing
-from autograder.exercises.patterns import drive_ends as endings
-from autograder.exercises.patterns import interface_patterns as offers
-from autograder.exercises.patterns import odometry, stations
-from autograder.exercises.patterns import unaffected_during_drive as meanwhile
+from autograder.exercises.patterns import (
+    camera_stream,
+    choices,
+    drive_ends,
+    interface_patterns,
+    odometry,
+    stations,
+    unaffected_during_drive,
+)
 from autograder.exercises.patterns.discovery import LateJoiner, acquaint, arrives
 from autograder.exercises.patterns.driving import ACTIONS, SPEED_MARGIN, Drive
 from autograder.exercises.patterns.rig import LEVEL_MARGIN, NODE, RobotRig, robot_rig
@@ -47,7 +50,7 @@ QUIET, COARSE = 8.0, 0.5
 """Seconds of the node's clock after which a change is long past, and between two moments of it."""
 
 # The visible checks name no pattern, neither in their hints nor in what is to be read.
-READ_PATTERNS = f"{choosing.READ}, and the section on the pattern of your choice"
+READ_PATTERNS = f"{choices.READ}, and the section on the pattern of your choice"
 READ_ACTIONS = "Chapter 5, “Actions: long-running operations with feedback”"
 
 # What can be used over the ROS graph as the task describes it; which pattern is asked for in the
@@ -56,7 +59,7 @@ WORKING: dict[Scenario, dict[str, str]] = {
     "position": {"service": "std_srvs/srv/Trigger", "topic": "std_msgs/msg/Float64"},
     "camera": {"topic": "sensor_msgs/msg/Image"},
     "navigation": {"action": ACTIONS},
-    "parameters": {"service": offers.SET_PARAMETERS},
+    "parameters": {"service": interface_patterns.SET_PARAMETERS},
     "battery": {"topic": "sensor_msgs/msg/BatteryState"},
 }
 
@@ -81,7 +84,9 @@ def node_starts(rig: RobotRig) -> str:
             expected=f"{NODE}() makes a node without an error.",
             actual=error.told,
         ) from None
-    found = offers.settle(rig, {scenario: tuple(WORKING[scenario]) for scenario in SCENARIOS})
+    found = interface_patterns.settle(
+        rig, {scenario: tuple(WORKING[scenario]) for scenario in SCENARIOS}
+    )
     rig.memory["offers"] = found
     rig.stands_still()
     kinds = [f"{scenario}: {' and '.join(found[scenario]) or 'nothing'}" for scenario in SCENARIOS]
@@ -94,14 +99,14 @@ def node_starts(rig: RobotRig) -> str:
         'Each value is one of three texts: "topic", "service" or "action".',
         "Keep the five keys as they are, replace each None by your word, and run the cell again.",
     ),
-    read=choosing.READ,
+    read=choices.READ,
 )
 def choices_made(rig: RobotRig) -> None:
     """A pattern is chosen for each of the five scenarios.
 
     A designer who leaves it open has others decide, usually for a topic.
     """
-    rig.memory["choices"] = choosing.read(rig)
+    rig.memory["choices"] = choices.read(rig)
 
 
 @EXAM.check(
@@ -121,7 +126,7 @@ def camera_streams(rig: RobotRig) -> None:
     Wi-Fi is full.
     """
     needed = "Pictures come by themselves, 10 a second, for any number of viewers."
-    offers.require(rig, "camera", WORKING["camera"], needed)
+    interface_patterns.require(rig, "camera", WORKING["camera"], needed)
     pictures = rig.node.pictures
     since = rig.still
     left = FROZEN - (time.time_ns() - since) / 1e9
@@ -131,14 +136,14 @@ def camera_streams(rig: RobotRig) -> None:
             expected=f"{needed} The node's clock sets the pace, as a timer of the node does.",
             actual="Pictures were published while the node's clock stood still.",
         )
-    if not filming.another(rig, since):
+    if not camera_stream.another(rig, since):
         raise Failed(
             expected=needed,
-            actual=f"Not one picture came in {filming.patience(rig):g} s of the node's time"
+            actual=f"Not one picture came in {camera_stream.patience(rig):g} s of the node's time"
             f"{rig.because()}.",
         )
-    filming.require_rate(rig, RATE_WINDOW, RATE)
-    if fault := filming.picture_fault(pictures[-1]):
+    camera_stream.require_rate(rig, RATE_WINDOW, RATE)
+    if fault := camera_stream.picture_fault(pictures[-1]):
         raise Failed(expected="A message on robot/camera holds a picture.", actual=fault)
     rig.films = rig.memory["films"] = True
 
@@ -160,7 +165,7 @@ def position_answered(rig: RobotRig) -> str:
     """
     needed = "Whoever wants to know the position gets it in metres, "
     needed += f"at most {odometry.AGE:g} s old, also while the robot stands still."
-    pattern = offers.require(rig, "position", WORKING["position"], needed)
+    pattern = interface_patterns.require(rig, "position", WORKING["position"], needed)
     if not rig.listens_to("position"):
         raise Failed(expected=needed, actual="Your node does not listen to hardware/position.")
     asker = odometry.asker_by(rig, pattern)
@@ -208,28 +213,28 @@ def parameter_changes(rig: RobotRig) -> str:
     Somebody mistypes 5 for 0.5 m/s: the robot has to say no, and say why.
     """
     needed = "Whoever changes max_speed hears whether the new value holds, or why it does not."
-    offers.require(rig, "parameters", WORKING["parameters"], needed)
-    prefix = offers.parameter_node(rig)
+    interface_patterns.require(rig, "parameters", WORKING["parameters"], needed)
+    prefix = interface_patterns.parameter_node(rig)
     # Where only a service knows it, the first drive tells: see speed_takes_effect.
     if prefix is not None and rig.untouched:
-        first = offers.speed_limit(rig, prefix)
+        first = interface_patterns.speed_limit(rig, prefix)
         if first is not None and first != SPEED_AT_START:
             raise Failed(
                 expected=f"max_speed is {SPEED_AT_START:g} m/s at the start.",
                 actual=f"Before anybody has changed it, it is {first:g} m/s.",
             )
-    with meanwhile.standing(rig):
+    with unaffected_during_drive.standing(rig):
         for good in _good_speeds(rig):
-            taken, reason = offers.set_speed_limit(rig, good)
+            taken, reason = interface_patterns.set_speed_limit(rig, good)
             if not taken:
                 raise Failed(
                     expected=f"{needed} {good:g} m/s is a good value: from 0.1 to 1.0 all are.",
                     actual=f"It was refused, {with_reason(reason)}.",
                 )
     for bad in _bad_speeds(rig):
-        taken, reason = offers.set_speed_limit(rig, bad)
+        taken, reason = interface_patterns.set_speed_limit(rig, bad)
         if taken:
-            offers.set_speed_limit(rig, good)  # with this one no robot can drive on
+            interface_patterns.set_speed_limit(rig, good)  # with this one no robot can drive on
             raise Failed(
                 expected="Values of max_speed that are not between 0.1 and 1.0 are refused.",
                 actual=f"{bad:g} m/s was accepted.",
@@ -239,7 +244,7 @@ def parameter_changes(rig: RobotRig) -> str:
                 expected="A value that is refused is refused with a reason.",
                 actual=f"{bad:g} m/s was refused, and the reason was left empty.",
             )
-    if prefix is not None and (now := offers.speed_limit(rig, prefix)) != good:
+    if prefix is not None and (now := interface_patterns.speed_limit(rig, prefix)) != good:
         raise Failed(
             expected=f"The value that was set, {good:g} m/s, can be read back.",
             actual=f"Read back, max_speed is {now}.",
@@ -303,7 +308,7 @@ def battery_broadcast(rig: RobotRig) -> None:
     The planner, the display and the log all need it; whoever is forgotten strands the robot.
     """
     needed = f"Whoever listens to robot/battery knows a new level within {LEVEL_AGE:g} s."
-    offers.require(rig, "battery", WORKING["battery"], needed)
+    interface_patterns.require(rig, "battery", WORKING["battery"], needed)
     if not rig.listens_to("charge"):
         raise Failed(expected=needed, actual="Your node does not listen to hardware/charge.")
     acquaint(rig)
@@ -313,7 +318,7 @@ def battery_broadcast(rig: RobotRig) -> None:
             raise Failed(
                 expected=f"{needed} Its percentage is 0.0 to 1.0.",
                 actual=f"{LEVEL_AGE:g} s after the level had become {level:g}, "
-                f"{meanwhile.last_level(rig)}{rig.because()}.",
+                f"{unaffected_during_drive.last_level(rig)}{rig.because()}.",
             )
     rig.broadcasts = rig.memory["broadcasts"] = True
 
@@ -389,13 +394,13 @@ def navigation_drives(rig: RobotRig) -> None:
     A drive takes minutes: whoever sent the robot wants to know how far it is, and that it is there.
     """
     needed = "Somebody names a station, hears of each one that is passed, and learns how it ended."
-    offers.require(rig, "navigation", WORKING["navigation"], needed)
+    interface_patterns.require(rig, "navigation", WORKING["navigation"], needed)
     start = _next_start(rig)
     with Drive(rig, start, start + WAY) as drive:
         if rig.untouched:
             rig.first_top = drive.top_speed(SPEED_AT_START)
         # An earlier part of the exam may have found already what is found in a blocked aisle.
-        endings.to_the_end(drive, blocked=not rig.memory.get("waits"))
+        drive_ends.to_the_end(drive, blocked=not rig.memory.get("waits"))
         stations.require_result(drive)
     rig.memory["waits"] = True
     _drive_again(rig, drive.position, "a drive")
@@ -412,7 +417,7 @@ def _drive_again(rig: RobotRig, position: float, before: str) -> None:
     with _told_of_next(before), Drive(rig, position, round(position) + 1) as drive:
         if rig.obeyed is not None:
             drive.require_speed(rig.obeyed, f"With max_speed at {rig.obeyed:g} m/s")
-        endings.to_the_end(drive)
+        drive_ends.to_the_end(drive)
         stations.require_result(drive)
 
 
@@ -453,8 +458,8 @@ def speed_takes_effect(rig: RobotRig) -> None:
         )
     position = float(_next_start(rig))
     for limit, refused in _limits(rig):
-        offers.set_speed_limit(rig, limit)
-        offers.set_speed_limit(rig, refused)  # the good one stays
+        interface_patterns.set_speed_limit(rig, limit)
+        interface_patterns.set_speed_limit(rig, refused)  # the good one stays
         expected = f"With max_speed at {limit:g} m/s, and {refused:g} m/s refused after that,"
         with Drive(rig, position, int(position) + 2) as drive:
             drive.require_speed(limit, expected)
@@ -462,7 +467,7 @@ def speed_takes_effect(rig: RobotRig) -> None:
             stations.require_report(drive)
             drive.go_by(PASSING)  # at the station some halt for a moment
             drive.require_speed(limit, expected)
-            endings.to_the_end(drive)
+            drive_ends.to_the_end(drive)
             position = drive.position
     rig.obeyed = limit
 
@@ -492,7 +497,7 @@ def navigation_cancel(rig: RobotRig) -> None:
         drive.leave()
         _call_off(drive)
     before = "a drive that was called off"
-    meanwhile.require_the_same_after(rig, drive.position, before)
+    unaffected_during_drive.require_the_same_after(rig, drive.position, before)
     with _told_of_next(before), Drive(rig, drive.position, drive.goal) as drive:
         drive.require_driving()  # and not yet at any station
         _call_off(drive)
@@ -500,8 +505,8 @@ def navigation_cancel(rig: RobotRig) -> None:
 
 
 def _call_off(drive: Drive) -> None:
-    in_time = endings.cancel_within(drive, STOPS)
-    endings.require_end(
+    in_time = drive_ends.cancel_within(drive, STOPS)
+    drive_ends.require_end(
         drive, GoalState.CANCELED, "A drive that is called off ends there and then."
     )
     if not in_time:
@@ -512,4 +517,4 @@ def _call_off(drive: Drive) -> None:
         )
 
 
-choosing.add_checks(EXAM, needs=("choices_made",))
+choices.add_checks(EXAM, needs=("choices_made",))

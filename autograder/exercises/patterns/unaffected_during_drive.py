@@ -10,9 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from autograder.exam import Failed
-from autograder.exercises.patterns import camera_stream as filming
-from autograder.exercises.patterns import interface_patterns as offers
-from autograder.exercises.patterns import odometry
+from autograder.exercises.patterns import camera_stream, interface_patterns, odometry
 from autograder.exercises.patterns.discovery import hear_out
 from autograder.exercises.patterns.rig import RobotRig
 from autograder.observe.phrases import with_reason
@@ -25,7 +23,7 @@ LEVEL_AGE = 1.0  # s
 HOLDS_UP = "the drive holds nobody up."
 
 
-def require_pictures(rig: RobotRig, stretch: filming.Stretch, where: str) -> None:
+def require_pictures(rig: RobotRig, stretch: camera_stream.Stretch, where: str) -> None:
     """Fail if the pictures came at another rate in a ``stretch`` of a drive.
 
     ``where`` says when that was, as the beginning of a sentence.
@@ -33,7 +31,7 @@ def require_pictures(rig: RobotRig, stretch: filming.Stretch, where: str) -> Non
     if not rig.films:
         return
     rates = stretch.rates()
-    wrong = "" if rates is None else filming.rate_fault(rates, FILMED)
+    wrong = "" if rates is None else camera_stream.rate_fault(rates, FILMED)
     if wrong or rates is None:
         came = f"they came at {wrong} a second" if wrong else "no picture came"
         raise Failed(
@@ -77,7 +75,7 @@ def require_parameters(rig: RobotRig, where: str) -> None:
     expected = "While the robot drives, too, max_speed takes any value from 0.1 to 1.0; it may "
     expected += "count from the next goal on."
     try:
-        taken, reason = offers.set_speed_limit(rig, rig.limit)
+        taken, reason = interface_patterns.set_speed_limit(rig, rig.limit)
     except Failed as failed:
         raise Failed(expected=expected, actual=f"{where}. {failed.actual}") from None
     if not taken:
@@ -111,9 +109,9 @@ def require_the_same_after(rig: RobotRig, position: float, before: str) -> None:
     limit = rig.limit if rig.obeyed is None else rig.obeyed  # the one that holds
     if limit is not None:
         with standing(rig):
-            offers.set_speed_limit(rig, limit)
+            interface_patterns.set_speed_limit(rig, limit)
     expected = f"After {before} pictures, position and battery level come as they did before."
-    if rig.memory.get("films") and not filming.another(rig, time.time_ns()):
+    if rig.memory.get("films") and not camera_stream.another(rig, time.time_ns()):
         raise Failed(expected=expected, actual=f"No picture came any more{rig.because()}.")
     if pattern := rig.memory.get("position"):
         asker = rig.asker or odometry.asker_by(rig, pattern)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import groupby, pairwise
 
 from autograder.exam import Failed
-from autograder.exercises.safety import drive_goal as sending
+from autograder.exercises.safety import drive_goal
 from autograder.exercises.safety.navigation import Dispatcher, Drives, moves
 from autograder.exercises.safety.node_under_test import STRIDE, Robot
 from autograder.exercises.safety.rig import RobotRig
@@ -28,8 +28,8 @@ def arrives(rig: RobotRig) -> None:
         bad = (0, draw("a goal behind", *BACKWARDS), draw("a goal too far away", *TOO_FAR))
         for order in robot.draws.shuffled("bad goals", bad):
             _rejected(robot, dispatcher, order)
-        drive = sending.driving(robot, dispatcher, metres)
-        sending.ends(robot, drive, f"A goal of {metres} m", "succeeded", metres + SLACK)
+        drive = drive_goal.driving(robot, dispatcher, metres)
+        drive_goal.ends(robot, drive, f"A goal of {metres} m", "succeeded", metres + SLACK)
         if dispatcher.now - drive.began < metres - SLACK:
             raise Failed(
                 expected=f"A goal of {metres} m takes {metres} s, at 1 m/s.",
@@ -43,15 +43,15 @@ def arrives(rig: RobotRig) -> None:
             )
         _require_feedback(dispatcher, drive, marks)
         _require_speed(dispatcher)
-        sending.stands(robot, dispatcher, "succeeded")
+        drive_goal.stands(robot, dispatcher, "succeeded")
         _one_metre(robot, dispatcher, "after a longer one")
 
 
 def _one_metre(robot: Robot, dispatcher: Dispatcher, occasion: str) -> None:
     """Require that a goal of 1 m is served as usual: nothing is left of the drive before it."""
-    drive = sending.driving(robot, dispatcher, 1, occasion)
+    drive = drive_goal.driving(robot, dispatcher, 1, occasion)
     what = f"A goal of 1 m {occasion}"
-    sending.ends(robot, drive, what, "succeeded", 1.0 + SLACK)
+    drive_goal.ends(robot, drive, what, "succeeded", 1.0 + SLACK)
     told = next((passed for passed in drive.feedback if passed not in ([], [1])), None)
     if told is not None or drive.result != [1]:
         raise Failed(
@@ -60,12 +60,12 @@ def _one_metre(robot: Robot, dispatcher: Dispatcher, occasion: str) -> None:
             if told is None
             else f"The feedback was {told}.",
         )
-    sending.stands(robot, dispatcher, "succeeded")
+    drive_goal.stands(robot, dispatcher, "succeeded")
 
 
 def _rejected(robot: Robot, dispatcher: Dispatcher, order: int) -> None:
     drive = dispatcher.send(order)
-    robot.run(lambda: drive.handle is not None, sending.PROMPT)
+    robot.run(lambda: drive.handle is not None, drive_goal.PROMPT)
     if drive.handle is None or drive.handle.accepted:
         raise Failed(
             expected=f"A goal of {order} m is rejected.",
@@ -115,12 +115,12 @@ def _require_speed(dispatcher: Dispatcher) -> None:
 def canceled(rig: RobotRig) -> None:
     """Drives that are canceled when a metre has just begun, and before the first mark."""
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
-        drive = sending.driving(robot, dispatcher, sending.LONGEST)
+        drive = drive_goal.driving(robot, dispatcher, drive_goal.LONGEST)
         # Who looks for a cancel at each mark only has then most of a metre before the next look.
         robot.run(lambda: any(drive.feedback), 1.0 + SLACK)
         robot.spend(STRIDE)
         _cancel(robot, dispatcher, drive, "A canceled goal")
-        drive = sending.driving(robot, dispatcher, 1, "after a canceled one")
+        drive = drive_goal.driving(robot, dispatcher, 1, "after a canceled one")
         robot.spend(EARLY)
         _cancel(robot, dispatcher, drive, "A goal that is canceled before the first mark")
         _one_metre(robot, dispatcher, "after two canceled ones")
@@ -138,20 +138,22 @@ def _cancel(robot: Robot, dispatcher: Dispatcher, drive: Drives, what: str) -> N
             if drive.canceling is False
             else f"It was not answered.{robot.complaint()}",
         )
-    sending.ends(robot, drive, what, "canceled", CANCEL)
-    sending.stands(robot, dispatcher, "been canceled")
+    drive_goal.ends(robot, drive, what, "canceled", CANCEL)
+    drive_goal.stands(robot, dispatcher, "been canceled")
 
 
 def aborted(rig: RobotRig) -> None:
     """The wheels jam on the way, are jammed for the next goal too, and come loose."""
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
-        drive = sending.driving(robot, dispatcher, sending.LONG)
+        drive = drive_goal.driving(robot, dispatcher, drive_goal.LONG)
         robot.spend(THIRD)  # so long that a node is seen to go on as it began
         jammed = dispatcher.now
         dispatcher.jam(True)
         # They raise at the next command.
-        sending.ends(robot, drive, "A goal whose wheels jam", "aborted", COMMAND + sending.ABORT)
-        sending.stands(robot, dispatcher, "been aborted")
+        drive_goal.ends(
+            robot, drive, "A goal whose wheels jam", "aborted", COMMAND + drive_goal.ABORT
+        )
+        drive_goal.stands(robot, dispatcher, "been aborted")
         _require_reason(robot, dispatcher, "The goal")
         _require_commands(dispatcher, jammed)
         _jammed_from_the_start(robot, dispatcher)
@@ -164,10 +166,10 @@ def aborted(rig: RobotRig) -> None:
 def _jammed_from_the_start(robot: Robot, dispatcher: Dispatcher) -> None:
     """Send a goal while the wheels are jammed: the first command raises, not one on the way."""
     what = "A goal whose wheels are jammed from the start"
-    drive = sending.accepted(robot, dispatcher, 1, "while the wheels are jammed")
-    sending.ends(robot, drive, what, "aborted", sending.ABORT)
+    drive = drive_goal.accepted(robot, dispatcher, 1, "while the wheels are jammed")
+    drive_goal.ends(robot, drive, what, "aborted", drive_goal.ABORT)
     _require_reason(robot, dispatcher, what)
-    sending.stands(robot, dispatcher, "been aborted, jammed from the start")
+    drive_goal.stands(robot, dispatcher, "been aborted, jammed from the start")
 
 
 def _require_reason(robot: Robot, dispatcher: Dispatcher, what: str) -> None:
@@ -186,7 +188,7 @@ def _require_commands(dispatcher: Dispatcher, jammed: float) -> None:
     """Require commands so often that a jam is noticed: until the wheels jammed, that is."""
     times = [at for at in dispatcher.told if at <= jammed]
     silence = max(after - before for before, after in pairwise([*times, jammed]))
-    if silence > COMMAND + sending.TOLERANCE:
+    if silence > COMMAND + drive_goal.TOLERANCE:
         raise Failed(
             expected=f"On the way the wheels get a command at least every {COMMAND:g} s: they "
             "notice a jam only then.",

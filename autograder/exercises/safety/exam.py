@@ -8,11 +8,14 @@ own stride added to it.
 from __future__ import annotations
 
 from autograder.exam import Exam
-from autograder.exercises.safety import drive_server as drives
-from autograder.exercises.safety import gripper_client as grips
-from autograder.exercises.safety import late_answers, shutdowns
-from autograder.exercises.safety import navigator_client as goals
-from autograder.exercises.safety import speed_service as speeds
+from autograder.exercises.safety import (
+    drive_server,
+    gripper_client,
+    late_answers,
+    navigator_client,
+    shutdowns,
+    speed_service,
+)
 from autograder.exercises.safety.rig import RobotRig, robot_rig
 
 EXAM: Exam[RobotRig] = Exam("safety", robot_rig)
@@ -39,7 +42,7 @@ def gripper_answers(rig: RobotRig) -> None:
 
     The rest of the robot waits for this word: the arm lifts only what is held.
     """
-    rig.once(grips.carried_out)
+    rig.once(gripper_client.carried_out)
 
 
 @EXAM.check(
@@ -56,7 +59,7 @@ def gripper_refuses(rig: RobotRig) -> None:
 
     The gripper has its reason, such as fingers in between: asking again is no way to overrule it.
     """
-    grips.refused(rig)
+    gripper_client.refused(rig)
 
 
 @EXAM.check(
@@ -74,7 +77,7 @@ def gripper_retries(rig: RobotRig) -> None:
     A hiccup is worth a second try. A client that tries for ever never tells anybody that the
     gripper is dead, and one that tries without pauses keeps it from recovering.
     """
-    grips.unanswered(rig)
+    gripper_client.unanswered(rig)
 
 
 @EXAM.check(
@@ -90,7 +93,7 @@ def speed_serves(rig: RobotRig) -> None:
 
     In a crowded ward operators slow the robot down, and have to know that it listened.
     """
-    rig.once(speeds.good)
+    rig.once(speed_service.good)
 
 
 @EXAM.check(
@@ -108,7 +111,7 @@ def speed_refuses(rig: RobotRig) -> None:
     NaN compares false with every limit: a check that forgets it lets the robot drive at any speed.
     And an exception in the callback answers nobody.
     """
-    speeds.bad(rig)
+    speed_service.bad(rig)
 
 
 @EXAM.check(
@@ -125,7 +128,7 @@ def goals_end(rig: RobotRig) -> None:
     A result arrives for an aborted goal too. Whoever takes every result for success unloads the
     parcel in the corridor.
     """
-    rig.once(goals.ended)
+    rig.once(navigator_client.ended)
 
 
 @EXAM.check(
@@ -142,7 +145,7 @@ def goals_stall(rig: RobotRig) -> None:
 
     A limit on the whole drive is too short for a long corridor and too long for a hung navigator.
     """
-    goals.stalled(rig)
+    navigator_client.stalled(rig)
 
 
 @EXAM.check(
@@ -159,7 +162,7 @@ def drive_arrives(rig: RobotRig) -> None:
 
     The wheels keep doing what they were told last: a drive that ends without a stop does not end.
     """
-    rig.once(drives.arrives)
+    rig.once(drive_server.arrives)
 
 
 @EXAM.check(
@@ -176,7 +179,7 @@ def drive_cancels(rig: RobotRig) -> None:
 
     Somebody steps in front of the robot: whoever cancels means now.
     """
-    drives.canceled(rig)
+    drive_server.canceled(rig)
 
 
 @EXAM.check(
@@ -193,7 +196,7 @@ def drive_aborts(rig: RobotRig) -> None:
 
     When the jam comes loose, wheels that were not stopped start to turn again.
     """
-    drives.aborted(rig)
+    drive_server.aborted(rig)
 
 
 @EXAM.check(
@@ -228,7 +231,7 @@ def gripper_absent(rig: RobotRig) -> None:
 
     A node that blocks looks dead to the safety monitor, which then stops the whole robot.
     """
-    grips.absent(rig)
+    gripper_client.absent(rig)
 
 
 @EXAM.check(
@@ -245,7 +248,7 @@ def speed_atomic(rig: RobotRig) -> None:
 
     Half of a request is a state that nobody asked for, and that the next good request makes real.
     """
-    speeds.atomic(rig)
+    speed_service.atomic(rig)
 
 
 @EXAM.check(
@@ -262,7 +265,7 @@ def goals_lost(rig: RobotRig) -> None:
 
     Just when the navigator does not obey or does not answer, nobody else stops the robot.
     """
-    goals.lost(rig)
+    navigator_client.lost(rig)
 
 
 @EXAM.check(

@@ -6,7 +6,7 @@ import time
 from contextlib import suppress
 
 from autograder.exam import Failed
-from autograder.exercises.safety import heartbeat as heart
+from autograder.exercises.safety import heartbeat
 from autograder.exercises.safety.grip_request import (
     ALLOWED,
     DEADLINE,
@@ -221,7 +221,7 @@ def absent(rig: RobotRig) -> None:
         began_on_the_wall = time.monotonic()
         robot.spend(IDLE)
         watched = time.monotonic() - began_on_the_wall
-        heart.beats(user.beats, began, user.now, "Before the first request", watched)
+        heartbeat.beats(user.beats, began, user.now, "Before the first request", watched)
         tried(robot, user, True)
     with client(rig, gripper=False) as (robot, user):
         began = user.now
@@ -257,8 +257,8 @@ def _refused_alive(robot: Robot, user: GripUser) -> None:
     tried(robot, user, True)
     user.tries[0].reply(False)
     began = user.now
-    robot.spend(2 * heart.BEAT)
-    heart.beats(user.beats, began, user.now, "After a refusal")
+    robot.spend(2 * heartbeat.BEAT)
+    heartbeat.beats(user.beats, began, user.now, "After a refusal")
 
 
 def _gone(robot: Robot, user: GripUser, when: str, began: float) -> None:
@@ -269,4 +269,4 @@ def _gone(robot: Robot, user: GripUser, when: str, began: float) -> None:
             expected=f"{when}, three tries take 3 s, and the pauses 1.5 s: it may come back.",
             actual=f"“failed” came after {lasted:.1f} s.",
         )
-    heart.beats(user.beats, began, user.now, when)
+    heartbeat.beats(user.beats, began, user.now, when)

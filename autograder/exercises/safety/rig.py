@@ -9,7 +9,7 @@ from typing import TypeVar
 from rclpy.node import Node
 
 from autograder.bench import Bench, Endpoints
-from autograder.exercises.safety import plain_program_survival as survival
+from autograder.exercises.safety import plain_program_survival
 from autograder.exercises.safety.counterpart import Player
 from autograder.exercises.safety.node_under_test import Robot
 from autograder.observe.stillness import Stillness
@@ -56,7 +56,7 @@ class RobotRig:
         self.renew()
         if not self._fresh:
             self.bench.subject.open(threads=THREADS, sim_time=True)
-            self.bench.subject.mark("beside")  # the executor's threads start with its first node
+            self.bench.subject.mark("beside")  # the executor starts its threads with the first node
             self._fresh = True
         made = self.bench.session.run(player)
         assert isinstance(made, player)
@@ -64,7 +64,7 @@ class RobotRig:
         self._robot = Robot(self.bench, name, made, self._still, self._ended_by)
 
     def _ended_by(self, name: str, trial: str) -> bool:
-        return survival.ended_by(name, trial, self.bench, self._still)
+        return plain_program_survival.ended_by(name, trial, self.bench, self._still)
 
     def renew(self) -> None:
         """Have the next check begin with a fresh node, in the same session."""

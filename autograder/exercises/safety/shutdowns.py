@@ -6,7 +6,7 @@ import time
 
 from autograder.bench import REPLY_TIMEOUT, StudentError, SubjectGone
 from autograder.exam import Failed
-from autograder.exercises.safety import drive_goal as sending
+from autograder.exercises.safety import drive_goal
 from autograder.exercises.safety.navigation import Dispatcher
 from autograder.exercises.safety.node_under_test import Robot
 from autograder.exercises.safety.rig import RobotRig
@@ -32,7 +32,7 @@ def shutdown(rig: RobotRig) -> None:
     rig.renew()
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
         _shut_down(rig, "while no goal is under way")
-        robot.run(lambda: dispatcher.speeds, sending.STOP)
+        robot.run(lambda: dispatcher.speeds, drive_goal.STOP)
         if dispatcher.speeds[-1:] != [False]:
             raise Failed(
                 expected="shutdown() stops the wheels, also while no goal is under way: a zero "
@@ -66,7 +66,7 @@ def _goal_afterwards(robot: Robot, dispatcher: Dispatcher, last: str) -> None:
 def _shutdown_on_the_way(rig: RobotRig) -> float:
     """Shut the node down in the middle of a drive; return how long the call took, in s."""
     with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
-        drive = sending.driving(robot, dispatcher, sending.LONG)
+        drive = drive_goal.driving(robot, dispatcher, drive_goal.LONG)
         robot.spend(0.5)
         took = _shut_down(rig, "in the middle of a drive")
         robot.rest()
@@ -76,8 +76,8 @@ def _shutdown_on_the_way(rig: RobotRig) -> float:
                 actual="After the call the last Twist on cmd_vel told the robot to drive.",
             )
         before = len(dispatcher.speeds)
-        sending.ends(robot, drive, "A goal under way at shutdown()", "aborted", sending.ABORT)
-        sending.stands(robot, dispatcher, "been aborted")
+        drive_goal.ends(robot, drive, "A goal under way at shutdown()", "aborted", drive_goal.ABORT)
+        drive_goal.stands(robot, dispatcher, "been aborted")
         if any(dispatcher.speeds[before:]):
             raise Failed(
                 expected="After shutdown() the wheels are told nothing any more but to stop.",
