@@ -374,6 +374,7 @@ class Bench:
         key: Mapping[str, Any] | None = None,
         seed: int = USUAL_SEED,
         programs: Programs | None = None,
+        ends: bool = False,
     ) -> None:
         """Put both within a check's reach.
 
@@ -381,8 +382,10 @@ class Bench:
         experiment found in an earlier part of the exam, as long as the notebook has not moved on
         since. ``key`` is the answer key that the part's hidden cell carries, if it has one: the
         subject never sees it. ``seed`` is what the numbers of the exam are drawn from. ``programs``
-        runs the notebook's nodes in programs of their own, for a submission in a sandbox.
+        runs the notebook's nodes in programs of their own, for a submission in a sandbox. ``ends``
+        says that all processes end with this part: what is left up is not taken down.
         """
+        self.ends = ends
         self.programs = programs
         self.session = session
         self.subject = subject

@@ -69,6 +69,8 @@ class Exam(Generic[RigT]):
     name: str
     rig: Callable[[Bench], AbstractContextManager[RigT]]
     checks: dict[str, Check[RigT]] = field(default_factory=dict)
+    _left_up: ExitStack | None = field(default=None, init=False, repr=False)
+    """What a bench that ends leaves up: it would be taken down if nobody referred to it."""
 
     def check(
         self, *, needs: Sequence[str] = (), hints: Sequence[str] = (), read: str = ""
@@ -132,6 +134,8 @@ class Exam(Generic[RigT]):
                 done.update((name, _blamed(self.checks[name], error)) for name in self._roots())
                 rig = None
             results = [self._result(name, rig, done, gone) for name in table]
+            if bench.ends:
+                self._left_up = stack.pop_all()
         seen = {*table, *failed}
         results = [self._with_reason(result, done, seen) for result in results]
         failed.update((name, result) for name, result in done.items() if result.status == "failed")

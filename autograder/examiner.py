@@ -1,11 +1,12 @@
 """The examiner process: sits exams on a subject that it can only see over DDS.
 
 Started as ``python -P -m autograder.examiner --control FD --domain N``. It reads requests
-``{"exam": ..., "part": ..., "moved_on": ..., "key": ..., "pid": ..., "seed": ...}`` from standard
-input, one JSON object a line, and answers each with ``{"verdict": ..., "hangs": ...}`` on standard
-output; ``hangs`` says why the subject cannot be expected to go on, if so. ``moved_on`` says that
-the notebook ran cells since, ``key`` is the answer key of the part's hidden cell, ``pid`` the
-subject's process, ``seed`` what the exam's numbers are drawn from.
+``{"exam": ..., "part": ..., "moved_on": ..., "key": ..., "pid": ..., "seed": ..., "last": ...}``
+from standard input, one JSON object a line, and answers each with
+``{"verdict": ..., "hangs": ...}`` on standard output; ``hangs`` says why the subject cannot be
+expected to go on, if so. ``moved_on`` says that the notebook ran cells since, ``key`` is the answer
+key of the part's hidden cell, ``pid`` the subject's process, ``seed`` what the exam's numbers are
+drawn from, ``last`` that nothing of the notebook runs after it.
 File descriptor ``FD`` is the control channel to the subject's harness. In a sandbox it also has
 ``--outside FD``, its channel to a warden (`autograder.outside`), and is alone with the subject on
 their network.
@@ -50,19 +51,25 @@ def sit(
     sittings: Sittings,
     programs: Programs | None = None,
 ) -> Verdict:
-    """Run one part of an exam, let the subject go on, and return the verdict."""
+    """Run one part of an exam, let the subject go on, and return the verdict.
+
+    After the last part, in a sandbox, nothing goes on: nodes on either side are not taken down one
+    by one, which takes as long as some checks, but end with the sandbox.
+    """
+    ends = bool(request["last"]) and outside.own_network
     sitting = sittings.setdefault(request["exam"], Sitting())
     subject.delay = outside.delay
     try:
         bench = Bench(
             session, subject, outside, sitting.memory, request["key"], int(request["seed"]),
-            programs,
+            programs, ends,
         )  # fmt: skip
         exam = exercises.load(request["exam"])
         verdict = exam.sit(request["part"], bench, sitting.failed)
         return replace(verdict, seed=bench.draws.seed)
     finally:
-        subject.release()
+        if not ends:
+            subject.release()
 
 
 def serve(

@@ -104,6 +104,7 @@ class ExaminerProcess:
         moved_on: bool = True,
         key: Mapping[str, Any] | None = None,
         seed: int | None = None,
+        last: bool = False,
     ) -> None:
         """Ask for a part of an exam; its verdict comes with `verdict`.
 
@@ -115,6 +116,7 @@ class ExaminerProcess:
                 there need not be tried again.
             key: the answer key of the part's hidden cell.
             seed: what the exam's numbers are drawn from; one that nobody knows if left out.
+            last: nothing of the notebook runs after it, so in a sandbox nothing is taken down.
         """
         asked = {
             "exam": exam,
@@ -123,6 +125,7 @@ class ExaminerProcess:
             "key": dict(key or {}),
             "pid": pid,
             "seed": fresh_seed() if seed is None else seed,
+            "last": last,
         }
         self._asked = exam, part
         self._send(asked)

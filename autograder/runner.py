@@ -167,7 +167,7 @@ def _follow(
             if cell.exam:
                 examiner.request(
                     cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key,
-                    seed=seed,
+                    seed=seed, last=number == len(program) - 1,
                 )  # fmt: skip
                 done = [c.source for c in program[:number] if not c.exam]
                 with ProgramHost(start, subject, done) as host:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -55,7 +57,24 @@ def exam(monkeypatch: pytest.MonkeyPatch) -> Exam[list[str]]:
     return exam
 
 
-BENCH: Any = None
+BENCH: Any = SimpleNamespace(ends=False)
+
+
+def test_what_is_up_at_the_end_of_all_processes_is_left_up(exam: Exam[list[str]]) -> None:
+    taken_down: list[str] = []
+
+    @contextmanager
+    def rig(_bench: Any) -> Iterator[list[str]]:
+        try:
+            yield []
+        finally:
+            taken_down.append("rig")
+
+    exam.rig = rig
+    for ends, down in ((True, []), (False, ["rig"])):
+        exam.sit("visible", cast(Bench, SimpleNamespace(ends=ends)))
+        gc.collect()
+        assert taken_down == down
 
 
 def test_what_a_check_quotes_is_cut(exam: Exam[list[str]]) -> None:
