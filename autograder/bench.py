@@ -370,26 +370,26 @@ class Bench:
         session: CoreSession,
         subject: Subject,
         outside: Outside,
-        memory: dict[str, Any],
-        key: Mapping[str, Any] | None = None,
         seed: int = USUAL_SEED,
         programs: Programs | None = None,
         ends: bool = False,
     ) -> None:
         """Put both within a check's reach.
 
-        ``outside`` looks at the subject's processes. ``memory`` outlives this bench: what an
-        experiment found in an earlier part of the exam, as long as the notebook has not moved on
-        since. ``key`` is the answer key that the part's hidden cell carries, if it has one: the
-        subject never sees it. ``seed`` is what the numbers of the exam are drawn from. ``programs``
-        runs the notebook's nodes in programs of their own, for a submission in a sandbox. ``ends``
-        says that all processes end with this part: what is left up is not taken down.
+        ``outside`` looks at the subject's processes. ``seed`` is what the numbers of the exam are
+        drawn from. ``programs`` runs the notebook's nodes in programs of their own, for a
+        submission in a sandbox. ``ends`` says that all processes end with this exam: what is left
+        up is not taken down.
+
+        Attributes:
+            memory: what checks found that others need.
+            key: the answer key of the part that is examined; the subject never sees it.
         """
         self.ends = ends
         self.programs = programs
         self.session = session
         self.subject = subject
-        self.memory = memory
-        self.key: Mapping[str, Any] = key or {}
+        self.memory: dict[str, Any] = {}
+        self.key: Mapping[str, Any] = {}
         self.outside = outside
         self.draws = Draws(seed)

@@ -8,10 +8,11 @@ docstring is the title that a student reads; the rest says why it matters on a r
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field, replace
-from typing import Generic, TypeVar
+from types import MappingProxyType
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from autograder import points as points_table
 from autograder.bench import Bench, StudentError, SubjectGone
@@ -44,6 +45,13 @@ class Failed(Exception):  # noqa: N818 - it is a finding, not a fault
 
 class NotExaminable(Exception):  # noqa: N818 - a limit of this machine, not a fault
     """The check cannot be made on this machine; the message says why, for the student's grade."""
+
+
+class Part(NamedTuple):
+    """A part of an exam: its name, and the answer key that its cell carries, if any."""
+
+    name: str
+    key: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -114,18 +122,16 @@ class Exam(Generic[RigT]):
                 raise ExamError(f"points.toml names a check '{name}' that '{self.name}' lacks.")
         return table
 
-    def sit(self, part: str, bench: Bench, failed: dict[str, CheckResult] | None = None) -> Verdict:
-        """Run the checks of ``part``, and what they need, each once.
+    def sit(self, parts: Iterable[Part], bench: Bench) -> Iterator[Verdict]:
+        """Run the checks of each part, and what they need, each once; yield a verdict a part.
 
-        A check of another part that is needed here earns nothing here: its points are in its own
-        part. One that the untouched notebook passes has no points at all: see ``points.toml``.
-        ``failed`` has what failed in an earlier part and is not tried again; what fails now is
-        added to it.
+        All parts are one examination of the same running nodes. A check that is needed in another
+        part earns nothing there: its points are in its own. One that the untouched notebook passes
+        has no points at all: see ``points.toml``.
         """
-        table = self.part(part)
-        failed = {} if failed is None else failed
-        done = dict(failed)
+        done: dict[str, CheckResult] = {}
         gone: list[CheckResult] = []
+        told: set[str] = set()
         with ExitStack() as stack:
             rig: RigT | None
             try:
@@ -133,26 +139,26 @@ class Exam(Generic[RigT]):
             except (StudentError, SubjectGone) as error:
                 done.update((name, _blamed(self.checks[name], error)) for name in self._roots())
                 rig = None
-            results = [self._result(name, rig, done, gone) for name in table]
+            for part in parts:
+                table = self.part(part.name)
+                bench.key = part.key
+                results = [self._result(name, rig, done, gone) for name in table]
+                told.update(table)
+                results = [self._with_reason(result, done, told) for result in results]
+                checks = tuple(_worth(result, table[result.name]) for result in results)
+                yield Verdict(self.name, part.name, checks)
             if bench.ends:
                 self._left_up = stack.pop_all()
-        seen = {*table, *failed}
-        results = [self._with_reason(result, done, seen) for result in results]
-        failed.update((name, result) for name, result in done.items() if result.status == "failed")
-        return Verdict(self.name, part, tuple(_worth(r, table[r.name]) for r in results))
 
     def _with_reason(
-        self, result: CheckResult, done: dict[str, CheckResult], seen: set[str]
+        self, result: CheckResult, done: dict[str, CheckResult], told: set[str]
     ) -> CheckResult:
-        """Say why what a check needs failed, where no report of this notebook says so.
-
-        It may have passed in an earlier part, and not now.
-        """
+        """Say why what a check needs failed, where no report so far says so."""
         needs = [done[need] for need in self.checks[result.name].needs if need in done]
-        hidden = [need for need in needs if need.status == "failed" and need.name not in seen]
+        hidden = [need for need in needs if need.status == "failed" and need.name not in told]
         if result.status != "not_checked" or not hidden:
             return result
-        return replace(result, actual=f"{result.actual} This time it failed: {hidden[0].actual}")
+        return replace(result, actual=f"{result.actual} It failed: {hidden[0].actual}")
 
     def _roots(self) -> list[str]:
         return [name for name, check in self.checks.items() if not check.needs]

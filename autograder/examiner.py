@@ -1,12 +1,11 @@
 """The examiner process: sits exams on a subject that it can only see over DDS.
 
 Started as ``python -P -m autograder.examiner --control FD --domain N``. It reads requests
-``{"exam": ..., "part": ..., "moved_on": ..., "key": ..., "pid": ..., "seed": ..., "last": ...}``
-from standard input, one JSON object a line, and answers each with
-``{"verdict": ..., "hangs": ...}`` on standard output; ``hangs`` says why the subject cannot be
-expected to go on, if so. ``moved_on`` says that the notebook ran cells since, ``key`` is the answer
-key of the part's hidden cell, ``pid`` the subject's process, ``seed`` what the exam's numbers are
-drawn from, ``last`` that nothing of the notebook runs after it.
+``{"exam": ..., "parts": [[NAME, KEY], ...], "pid": ..., "seed": ..., "last": ...}`` from standard
+input, one JSON object a line, and writes for each part ``{"verdict": ..., "hangs": ...}`` to
+standard output; ``hangs`` says why the subject cannot be expected to go on, if so. ``KEY`` is the
+answer key of the part's hidden cell, ``pid`` the subject's process, ``seed`` what the exam's
+numbers are drawn from, ``last`` that nothing of the notebook runs after it.
 File descriptor ``FD`` is the control channel to the subject's harness. In a sandbox it also has
 ``--outside FD``, its channel to a warden (`autograder.outside`), and is alone with the subject on
 their network.
@@ -19,28 +18,18 @@ import json
 import os
 import socket
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, TextIO
 
 from autograder import exercises, points, stuck
 from autograder.bench import MAX_REPLY, Bench, Subject
+from autograder.exam import Part
 from autograder.outside.asking import Afar, Here, Outside
 from autograder.programs import Programs
-from autograder.verdict import CheckResult, Verdict
+from autograder.verdict import Verdict
 from autograder.wire import Channel
 from course.runtime.core_session import CoreSession
-
-
-@dataclass
-class Sitting:
-    """What earlier parts of an exam found, good as long as the notebook has not moved on."""
-
-    failed: dict[str, CheckResult] = field(default_factory=dict)
-    memory: dict[str, Any] = field(default_factory=dict)
-
-
-Sittings = dict[str, Sitting]
 
 
 def sit(
@@ -48,25 +37,20 @@ def sit(
     session: CoreSession,
     subject: Subject,
     outside: Outside,
-    sittings: Sittings,
     programs: Programs | None = None,
-) -> Verdict:
-    """Run one part of an exam, let the subject go on, and return the verdict.
+) -> Iterator[Verdict]:
+    """Run parts of an exam, yield a verdict a part, and let the subject go on.
 
-    After the last part, in a sandbox, nothing goes on: nodes on either side are not taken down one
-    by one, which takes as long as some checks, but end with the sandbox.
+    In a sandbox in which nothing goes on, nodes on either side are not taken down one by one, which
+    takes as long as some checks: they end with the sandbox.
     """
     ends = bool(request["last"]) and outside.own_network
-    sitting = sittings.setdefault(request["exam"], Sitting())
     subject.delay = outside.delay
     try:
-        bench = Bench(
-            session, subject, outside, sitting.memory, request["key"], int(request["seed"]),
-            programs, ends,
-        )  # fmt: skip
+        bench = Bench(session, subject, outside, int(request["seed"]), programs, ends)
         exam = exercises.load(request["exam"])
-        verdict = exam.sit(request["part"], bench, sitting.failed)
-        return replace(verdict, seed=bench.draws.seed)
+        for verdict in exam.sit([Part(name, key) for name, key in request["parts"]], bench):
+            yield replace(verdict, seed=bench.draws.seed)
     finally:
         if not ends:
             subject.release()
@@ -80,18 +64,15 @@ def serve(
     outside: Outside | None = None,
 ) -> None:
     """Answer requests until standard input ends; without ``outside``, look at the subject here."""
-    sittings: Sittings = {}
     while line := requests.readline():
         request = json.loads(line)
-        if request["moved_on"]:
-            sittings.clear()
         outside = outside or Here(int(request["pid"]))
         # In a student's own notebook there is only the kernel's process.
         programs = Programs(requests, answers, outside) if outside.own_network else None
-        verdict = sit(request, session, subject, outside, sittings, programs)
-        answer = {"verdict": verdict.as_data(), "hangs": subject.hangs}
-        answers.write(json.dumps(answer) + "\n")
-        answers.flush()
+        for verdict in sit(request, session, subject, outside, programs):
+            answer = {"verdict": verdict.as_data(), "hangs": subject.hangs}
+            answers.write(json.dumps(answer) + "\n")
+            answers.flush()
 
 
 def preload() -> None:

@@ -74,7 +74,7 @@ def examine(
         ours, theirs = socket.socketpair()
         with ours, ExaminerProcess(theirs, lease.domain_id) as examiner:
             channel = Channel(ours)
-            examiner.request(exam, part, pid=os.getpid(), key=key)
+            examiner.request(exam, [(part, key or {})], pid=os.getpid())
             sitting = _Sitting(examiner)
             try:
                 sitting.serve(Harness(open_session, namespace), channel)

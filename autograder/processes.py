@@ -7,7 +7,8 @@ import os
 import signal
 import socket
 import subprocess
-from collections.abc import Callable, Mapping
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
@@ -91,49 +92,43 @@ class ExaminerProcess:
         finally:
             control.close()
         self._buffer = b""
-        self._asked = ("", "")
+        self._asked: deque[tuple[str, str]] = deque()
         self._said, self._mute = b"", False
         self.hangs = ""
 
     def request(
         self,
         exam: str,
-        part: str,
+        parts: Sequence[tuple[str, Mapping[str, Any]]],
         *,
         pid: int,
-        moved_on: bool = True,
-        key: Mapping[str, Any] | None = None,
         seed: int | None = None,
         last: bool = False,
     ) -> None:
-        """Ask for a part of an exam; its verdict comes with `verdict`.
+        """Ask for parts of an exam; their verdicts come one by one with `verdict`.
 
         Args:
             exam: the exam's name.
-            part: the part's name.
+            parts: the name of each, and the answer key of its cell, if it has one.
             pid: the subject's process, for an examiner that looks at it itself.
-            moved_on: False if the notebook ran nothing since the last part: then what failed
-                there need not be tried again.
-            key: the answer key of the part's hidden cell.
             seed: what the exam's numbers are drawn from; one that nobody knows if left out.
             last: nothing of the notebook runs after it, so in a sandbox nothing is taken down.
         """
-        asked = {
-            "exam": exam,
-            "part": part,
-            "moved_on": moved_on,
-            "key": dict(key or {}),
-            "pid": pid,
-            "seed": fresh_seed() if seed is None else seed,
-            "last": last,
-        }
-        self._asked = exam, part
-        self._send(asked)
+        self._asked = deque((exam, part) for part, _ in parts)
+        self._send(
+            {
+                "exam": exam,
+                "parts": [[part, dict(key)] for part, key in parts],
+                "pid": pid,
+                "seed": fresh_seed() if seed is None else seed,
+                "last": last,
+            }
+        )
 
     def verdict(
         self, timeout: float = EXAM_TIMEOUT, answer_with: Answering | None = None
     ) -> Verdict:
-        """Return the verdict of the part that was asked for.
+        """Return the verdict of the next part that was asked for.
 
         ``answer_with`` answers what the examiner asks for meanwhile (`autograder.program_host`).
 
@@ -173,7 +168,8 @@ class ExaminerProcess:
     def _verdict_of(self, answer: dict[str, Any]) -> Verdict:
         self.hangs = str(answer["hangs"])[:MAX_HANGS]
         verdict = Verdict.from_data(answer["verdict"])
-        verdict.require_asked(*self._asked, points.of_part(*self._asked))
+        asked = self._asked.popleft()
+        verdict.require_asked(*asked, points.of_part(*asked))
         return verdict
 
     def _send(self, message: dict[str, Any]) -> None:

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from autograder.draws import fresh_seed
 from autograder.processes import ExaminerError, ExaminerFloodedError, ExaminerProcess
 from autograder.program_host import ProgramHost, Start
 from autograder.sandbox import Place, RunningSubject
-from autograder.submission import Cell, Program
+from autograder.submission import Program
 from autograder.verdict import Status, Verdict
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 
@@ -154,32 +155,35 @@ def _follow(
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
     status: Status
-    moved_on, number, shown = True, 0, outputs.Notebook(outcome.outputs)
+    number, shown = 0, outputs.Notebook(outcome.outputs)
     try:
         _await(channel, subject)
         outcome.begun = True
-        channel.send({"cells": [_shown(cell) for cell in program]})
+        channel.send({"cells": [_shown(program, number) for number in range(len(program))]})
         for number, cell in enumerate(program):
             was_cut = shown.cut
             _await_cell(channel, subject, program, number, shown, cell_timeout)
             if shown.cut and not was_cut:
                 outcome.notes.append(TOO_MUCH)
-            if cell.exam:
+            if not cell.exam:
+                _note_error(outcome, number)
+            elif parts := _sitting(program, number):
+                last = number + len(parts) == len(program)
                 examiner.request(
-                    cell.exam, cell.part, pid=subject.pid, moved_on=moved_on, key=cell.key,
-                    seed=seed, last=number == len(program) - 1,
+                    cell.exam, [(part.part, part.key) for part in parts],
+                    pid=subject.pid, seed=seed, last=last,
                 )  # fmt: skip
                 done = [c.source for c in program[:number] if not c.exam]
                 with ProgramHost(start, subject, done) as host:
-                    outcome.verdicts[cell.grade_id] = examiner.verdict(answer_with=host.answer)
-                moved_on = False
-                if examiner.hangs:
-                    # The examiner has waited long enough: it would find the same in every part.
-                    _give_up(program, outcome, examiner.hangs, reached=number)
+                    for part in parts:
+                        outcome.verdicts[part.grade_id] = examiner.verdict(answer_with=host.answer)
+                        if examiner.hangs:
+                            # It has waited long enough: it would find the same in every part.
+                            _give_up(program, outcome, examiner.hangs, reached=number)
+                            return
+                if last:
                     return
-            else:
-                moved_on = True
-                _note_error(outcome, number)
+                _await_cell(channel, subject, program, number, shown, cell_timeout, over=True)
     except ChannelTimeout:
         frames = stuck.ask(subject.pid, channel)
         reason = _stuck(program, number, cell_timeout, frames)
@@ -232,9 +236,22 @@ def _await(channel: Channel, subject: RunningSubject) -> None:
     subject.ready()
 
 
-def _shown(cell: Cell) -> dict[str, str]:
-    """Return what a subject is told of a cell: never an answer key, nor which part comes."""
-    return {"source": "" if cell.exam else cell.source, "exam": cell.exam}
+def _sitting(program: Program, number: int) -> Program:
+    """Return the parts of an exam that are examined together at a cell: those from there on.
+
+    Empty if it has been one of them before, or is no part of an exam.
+    """
+    exam = program[number].exam
+    if number and program[number - 1].exam == exam:
+        return ()
+    return tuple(takewhile(lambda cell: cell.exam == exam, program[number:] if exam else ()))
+
+
+def _shown(program: Program, number: int) -> dict[str, str]:
+    """Return what a subject is told of a cell: never an answer key, nor which parts come."""
+    if parts := _sitting(program, number):
+        return {"source": "", "exam": parts[0].exam}
+    return {"source": "" if program[number].exam else program[number].source, "exam": ""}
 
 
 def _await_cell(
@@ -244,13 +261,17 @@ def _await_cell(
     number: int,
     shown: outputs.Notebook,
     timeout: float,
+    *,
+    over: bool = False,
 ) -> None:
     """Wait until the subject has come to an exam, or has run a cell; keep what is shown by then.
+
+    With ``over``, wait until it has taken down what was examined.
 
     What a cell shows can change later: a display is updated, a task goes on. But what nbgrader
     takes for a score is what a test showed when it ran.
     """
-    reached = {"exam" if program[number].exam else "ran": number}
+    reached = {"exam" if _sitting(program, number) and not over else "ran": number}
     seen: set[int] = set()
     while (message := channel.receive_fairly(timeout, subject.delay)) != reached:
         match message:

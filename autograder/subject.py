@@ -60,6 +60,7 @@ def run(engine: Channel, control: Channel, domain_id: int) -> None:
             exams.add(number)
             _tell(engine, {"exam": number}, recording, exams)
             kernel.run_beside(number, serve)
+            _tell(engine, {"ran": number}, recording, exams)
         else:
             kernel.run_cell(cell["source"], number)
             if os.getpid() != process:

@@ -13,8 +13,8 @@ import pytest
 
 from autograder import exercises, points
 from autograder.bench import Bench, StudentError, SubjectGone
-from autograder.exam import Exam, ExamError, Failed, NotExaminable, unexamined
-from autograder.verdict import CheckResult
+from autograder.exam import Exam, ExamError, Failed, NotExaminable, Part, unexamined
+from autograder.verdict import CheckResult, Verdict
 
 
 @contextmanager
@@ -57,7 +57,17 @@ def exam(monkeypatch: pytest.MonkeyPatch) -> Exam[list[str]]:
     return exam
 
 
-BENCH: Any = SimpleNamespace(ends=False)
+def bench(*, ends: bool = False) -> Bench:
+    return cast(Bench, SimpleNamespace(ends=ends, key={}))
+
+
+def sit(exam: Exam[list[str]], *parts: str) -> list[Verdict]:
+    return list(exam.sit(map(Part, parts), bench()))
+
+
+def checks(exam: Exam[list[str]], part: str) -> tuple[CheckResult, ...]:
+    (verdict,) = sit(exam, part)
+    return verdict.checks
 
 
 def test_what_is_up_at_the_end_of_all_processes_is_left_up(exam: Exam[list[str]]) -> None:
@@ -72,14 +82,14 @@ def test_what_is_up_at_the_end_of_all_processes_is_left_up(exam: Exam[list[str]]
 
     exam.rig = rig
     for ends, down in ((True, []), (False, ["rig"])):
-        exam.sit("visible", cast(Bench, SimpleNamespace(ends=ends)))
+        list(exam.sit([Part("visible")], bench(ends=ends)))
         gc.collect()
         assert taken_down == down
 
 
 def test_what_a_check_quotes_is_cut(exam: Exam[list[str]]) -> None:
     exam.checks["second"] = replace(exam.checks["second"], run=quotes)
-    actual = exam.sit("visible", BENCH).checks[1].actual
+    actual = checks(exam, "visible")[1].actual
     assert len(actual) < 8000
     assert actual.endswith("x [993000 more]")
 
@@ -89,7 +99,7 @@ def quotes(rig: list[str]) -> None:
 
 
 def test_a_check_whose_need_failed_is_not_checked(exam: Exam[list[str]]) -> None:
-    verdict = exam.sit("visible", BENCH)
+    (verdict,) = sit(exam, "visible")
     assert [check.status for check in verdict.checks] == ["passed", "failed", "not_checked"]
     assert (verdict.score, verdict.max_score) == (1.0, 7.0)
     first, second, third = verdict.checks
@@ -103,28 +113,24 @@ def test_what_needs_a_check_that_could_not_be_made_is_not_at_fault(exam: Exam[li
         raise NotExaminable("Not on this machine.")
 
     exam.checks["second"] = replace(exam.checks["second"], run=not_here)
-    third = exam.sit("visible", BENCH).checks[2]
+    third = checks(exam, "visible")[2]
     assert third.status == "not_checked"
     assert third.actual == (
         "This needs “It runs”, which could not be examined here. It is not your fault."
     )
 
 
-def test_what_failed_only_when_an_earlier_part_was_over_is_told_with_the_reason(
-    exam: Exam[list[str]],
-) -> None:
-    failed: dict[str, CheckResult] = {}
-    assert exam.sit("visible", BENCH, failed).checks[0].passed
+def test_what_no_report_tells_of_is_told_with_what_needs_it(exam: Exam[list[str]]) -> None:
     exam.checks["first"] = replace(exam.checks["first"], run=exam.checks["second"].run)
-    (last,) = exam.sit("hidden", BENCH, failed).checks
+    (last,) = checks(exam, "hidden")
     assert last.status == "not_checked"
-    assert last.actual == "This needs “It starts” first. This time it failed: right"
-    (again,) = exam.sit("hidden", BENCH, failed).checks  # what a report says is not said again
-    assert again.actual == "This needs “It starts” first."
+    assert last.actual == "This needs “It starts” first. It failed: right"
+    _, hidden = sit(exam, "visible", "hidden")  # what a report says is not said again
+    assert hidden.checks[0].actual == "This needs “It starts” first."
 
 
 def test_the_graders_own_fault_is_never_the_students(exam: Exam[list[str]]) -> None:
-    verdict = exam.sit("hidden", BENCH)
+    (verdict,) = sit(exam, "hidden")
     assert [check.status for check in verdict.checks] == ["grader_error"]
     assert verdict.needs_human
     assert "ZeroDivisionError" in verdict.checks[0].actual
@@ -137,7 +143,7 @@ def test_a_subject_that_ends_fails_the_check(exam: Exam[list[str]]) -> None:
         raise SubjectGone("It left.")
 
     points.table()["toy"].parts["late"] = {"gone": 1.0}
-    (check,) = exam.sit("late", BENCH).checks
+    (check,) = checks(exam, "late")
     assert (check.status, check.actual) == ("failed", "It left.")
 
 
@@ -161,7 +167,7 @@ def test_what_comes_after_a_subject_is_gone_is_not_at_fault(
         raise SubjectGone("It left.")
 
     points.table()["toy"].parts["late"] = {"loses": 1.0, "later": 1.0}
-    first, second = exam.sit("late", BENCH).checks
+    first, second = checks(exam, "late")
     assert (first.status, second.status) == ("failed", "not_checked")
     assert "“It comes back”" in second.actual
 
@@ -174,8 +180,9 @@ def test_each_check_runs_once_a_sitting(exam: Exam[list[str]]) -> None:
         yield seen
 
     exam.rig = rig
-    exam.sit("visible", BENCH)
-    assert seen == ["first", "second"]
+    exam.checks["last"] = replace(exam.checks["last"], run=lambda rig: rig.append("last"))
+    sit(exam, "visible", "hidden")
+    assert seen == ["first", "second", "last"]
 
 
 def test_unexamined_parts_keep_their_points_out_of_reach(exam: Exam[list[str]]) -> None:
@@ -222,7 +229,7 @@ def test_what_the_students_code_raises_in_the_rig_fails_every_check_without_need
         yield []
 
     exam.rig = rig
-    results = {check.name: check for check in exam.sit("visible", BENCH).checks}
+    results = {check.name: check for check in checks(exam, "visible")}
     assert {name: check.status for name, check in results.items()} == {
         "first": "failed", "second": "not_checked", "third": "not_checked"
     }  # fmt: skip
@@ -237,6 +244,6 @@ def test_an_error_of_the_students_code_in_a_check_is_not_the_graders(
         """It ends."""
         raise StudentError("KeyError: 'x'", "  line 3, in tick\n")
 
-    check = exam.sit("hidden", BENCH).checks[0]
+    check = checks(exam, "hidden")[0]
     assert check.status == "failed"
     assert check.actual == "It raised KeyError: 'x'. It happened here:\n  line 3, in tick\n"

@@ -144,7 +144,7 @@ class SensorDrivers(Node):
         threading.Event().wait()
 """
     hidden = Cell("", "qos-hidden", "qos", "hidden")
-    outcome = runner.run((*program(source), hidden), cell_timeout=5)
+    outcome = runner.run((*program(source), Cell("x = 1"), hidden), cell_timeout=5)
     (reason,) = {check.actual for check in outcome.verdicts["qos-hidden"].checks}
     assert "Your nodes were still being taken down 5 s after an examination (line 8 of " in reason
     assert outcome.notes == [reason]
@@ -161,7 +161,7 @@ class SensorDrivers(Node):
 course.runtime.residents.destroy_node = queue.SimpleQueue().get  # waits, and is no line of theirs
 """
     hidden = Cell("", "qos-hidden", "qos", "hidden")
-    outcome = runner.run((*program(source), hidden), cell_timeout=5)
+    outcome = runner.run((*program(source), Cell("x = 1"), hidden), cell_timeout=5)
     assert not outcome.spoilt
     (reason,) = {check.actual for check in outcome.verdicts["qos-hidden"].checks}
     assert "still being taken down 5 s after an examination (in residents.py:" in reason
@@ -355,7 +355,7 @@ def test_an_examiner_without_a_verdict_says_where_it_is_stuck() -> None:
     lease = lease_domain()
     try:
         with ours, ExaminerProcess(theirs, lease.domain_id) as examiner:
-            examiner.request("qos", "visible", pid=os.getpid())
+            examiner.request("qos", [("visible", {})], pid=os.getpid())
             Channel(ours).receive(60.0)  # and is not answered
             with pytest.raises(ExaminerError) as raised:
                 examiner.verdict(timeout=0.1)

@@ -58,9 +58,9 @@ def compare(rig: RobotRig, scenario: Scenario) -> str:
         Failed: it is not; says what it would mean in use, and nothing of what is right.
         LookupError: no key came with this part.
     """
-    if scenario not in rig.key:
+    if scenario not in rig.bench.key:
         raise LookupError("no answer key came along: it stands in the hidden cell of the source")
-    right = rig.key[scenario]
+    right = rig.bench.key[scenario]
     chosen = rig.memory["choices"][scenario]
     meaning = would_mean(scenario, chosen)
     if chosen not in right:

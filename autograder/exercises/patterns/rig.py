@@ -64,9 +64,9 @@ class RobotRig:
 
     def __init__(self, bench: Bench) -> None:
         """Bring up the examiner's endpoints on the subject's domain."""
+        self.bench = bench
         self.subject = bench.subject
         self.session = bench.session
-        self.key = bench.key
         self.memory = bench.memory
         self.draws = bench.draws
         node = bench.session.run(ExaminerNode)
