@@ -6,8 +6,10 @@ A program that is interrupted is not asked.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 from rclpy.node import Node
 
@@ -15,7 +17,8 @@ from autograder.exam import Failed
 from autograder.exercises.resources.camera_duties import DRIVER, ENDED
 from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT
 from autograder.exercises.resources.rig import CameraRig
-from autograder.observe.patience import SETTLE_S
+from autograder.observe.patience import Patience
+from autograder.observe.stillness import Stillness
 from autograder.programs import Program
 
 LIVES = 4
@@ -55,9 +58,7 @@ def require_closed_at_the_end(rig: CameraRig) -> None:
             "its destroy_node() returns.", "The program was gone: an exception left it, or an exit."
         )
     if lives.left_open:
-        raise _failed(
-            "its destroy_node() closes the camera.", f"{SETTLE_S:.0f} s later it was still open."
-        )
+        raise _failed("its destroy_node() closes the camera.", "It was still open.")
 
 
 def require_no_thread_at_the_end(rig: CameraRig) -> None:
@@ -89,15 +90,20 @@ def _watch(rig: CameraRig, program: Program, device: str) -> Lives:
     def on_graph() -> bool:
         return bool(watcher.count_publishers(IMAGE) or watcher.count_services(SNAPSHOT))
 
+    still = Stillness(rig.outside)
+
+    def comes(condition: Callable[[], Any]) -> bool:
+        return Patience(still).wait(program.session, condition)
+
     threads: list[int] = []
     for _ in range(LIVES):
         # A picture is asked for by a timer or a thread, once the nodes spin.
-        if not program.up or not program.wait(lambda: any(rig.cameras(device)), SETTLE_S):
+        if not program.up or not comes(lambda: any(rig.cameras(device))):
             return Lives(worked=False)
-        program.wait(on_graph, SETTLE_S)
+        comes(on_graph)
         program.interrupt()
-        closed = program.wait(lambda: not rig.cameras(device), SETTLE_S)
-        off_graph = program.wait(lambda: not on_graph(), SETTLE_S)
+        closed = comes(lambda: not rig.cameras(device))
+        off_graph = comes(lambda: not on_graph())
         if program.ended():
             return Lives(raised=True)
         if not closed or not off_graph:

@@ -45,19 +45,15 @@ class CameraRig:
     """The examiner's view of one subject during the resources exam."""
 
     def __init__(self, bench: Bench) -> None:
-        """Bring up the examiner's endpoints on the subject's domain, or go on with them.
-
-        They stay from one part of the exam to the next. New ones would have to find out anew what
-        is on the graph, and take what an earlier check left there for the next one's.
-        """
+        """Bring up the examiner's endpoints on the subject's domain."""
         self.subject = bench.subject
         self.session = bench.session
         self.programs = bench.programs
+        self.outside = bench.outside
         self.process = Process(bench.outside)
         self._still = Stillness(bench.outside)
-        node = bench.memory.get(ExaminerNode.__name__) or bench.session.run(ExaminerNode)
+        node = bench.session.run(ExaminerNode)
         assert isinstance(node, ExaminerNode)
-        bench.memory[ExaminerNode.__name__] = node
         self.node = node
         self.graph = CameraGraph(node)
         self.program = Program(bench.subject, self.graph)
