@@ -71,11 +71,14 @@ class Check(Generic[RigT]):
 class Exam(Generic[RigT]):
     """The checks of one exercise, and the rig they run on.
 
-    ``rig`` is a context manager around the bench: what it gives is what every check takes.
+    ``rig`` is a context manager around the bench: what it gives is what every check takes. With
+    ``fresh_parts`` each part has one of its own, for checks that leave their mark on what the nodes
+    do later: what failed in an earlier part is not tried again there, what passed is.
     """
 
     name: str
     rig: Callable[[Bench], AbstractContextManager[RigT]]
+    fresh_parts: bool = False
     checks: dict[str, Check[RigT]] = field(default_factory=dict)
     _left_up: ExitStack | None = field(default=None, init=False, repr=False)
     """What a bench that ends leaves up: it would be taken down if nobody referred to it."""
@@ -125,21 +128,25 @@ class Exam(Generic[RigT]):
     def sit(self, parts: Iterable[Part], bench: Bench) -> Iterator[Verdict]:
         """Run the checks of each part, and what they need, each once; yield a verdict a part.
 
-        All parts are one examination of the same running nodes. A check that is needed in another
-        part earns nothing there: its points are in its own. One that the untouched notebook passes
-        has no points at all: see ``points.toml``.
+        All parts are one examination of the same running nodes, but for ``fresh_parts``. A check
+        that is needed in another part earns nothing there: its points are in its own. One that the
+        untouched notebook passes has no points at all: see ``points.toml``.
         """
         done: dict[str, CheckResult] = {}
         gone: list[CheckResult] = []
         told: set[str] = set()
         with ExitStack() as stack:
-            rig: RigT | None
-            try:
-                rig = stack.enter_context(self.rig(bench))
-            except (StudentError, SubjectGone) as error:
-                done.update((name, _blamed(self.checks[name], error)) for name in self._roots())
-                rig = None
-            for part in parts:
+            rig: RigT | None = None
+            for number, part in enumerate(parts):
+                if number == 0 or self.fresh_parts:
+                    stack.close()
+                    done = {n: result for n, result in done.items() if result.status == "failed"}
+                    try:
+                        rig = stack.enter_context(self.rig(bench))
+                    except (StudentError, SubjectGone) as error:
+                        roots = [name for name in self.checks if not self.checks[name].needs]
+                        done.update((name, _blamed(self.checks[name], error)) for name in roots)
+                        rig = None
                 table = self.part(part.name)
                 bench.key = part.key
                 results = [self._result(name, rig, done, gone) for name in table]
@@ -159,9 +166,6 @@ class Exam(Generic[RigT]):
         if result.status != "not_checked" or not hidden:
             return result
         return replace(result, actual=f"{result.actual} It failed: {hidden[0].actual}")
-
-    def _roots(self) -> list[str]:
-        return [name for name, check in self.checks.items() if not check.needs]
 
     def _result(
         self,

@@ -185,6 +185,21 @@ def test_each_check_runs_once_a_sitting(exam: Exam[list[str]]) -> None:
     assert seen == ["first", "second", "last"]
 
 
+def test_an_exam_may_have_a_fresh_rig_for_each_part(exam: Exam[list[str]]) -> None:
+    """What passed is run again in it if something needs it, what failed is not."""
+    rigs: list[list[str]] = []
+
+    @contextmanager
+    def rig(_bench: Bench) -> Iterator[list[str]]:
+        rigs.append([])
+        yield rigs[-1]
+
+    exam.rig, exam.fresh_parts = rig, True
+    exam.checks["last"] = replace(exam.checks["last"], run=lambda rig: rig.append("last"))
+    sit(exam, "visible", "hidden")
+    assert rigs == [["first", "second"], ["first", "last"]]
+
+
 def test_unexamined_parts_keep_their_points_out_of_reach(exam: Exam[list[str]]) -> None:
     verdict = unexamined(exam, "visible", "the process ended")
     assert (verdict.score, verdict.max_score) == (0.0, 7.0)

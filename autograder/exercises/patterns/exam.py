@@ -33,7 +33,7 @@ from autograder.exercises.patterns.scenarios import NAMES, SCENARIOS, Scenario
 from autograder.observe.phrases import with_reason
 from course.runtime.actions import GoalState
 
-EXAM: Exam[RobotRig] = Exam("patterns", robot_rig)
+EXAM: Exam[RobotRig] = Exam("patterns", robot_rig, fresh_parts=True)
 
 RATE, RATE_WINDOW = (9.0, 11.0), 2.0  # Hz, s
 FROZEN = 0.6  # s on the wall
