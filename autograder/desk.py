@@ -25,9 +25,9 @@ from autograder import (
 )
 from autograder import nbgrader_bridge as bridge
 from autograder.feedback_page import INDEX
-from autograder.files import walk
 from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.intake import Found, Intake, NotHandedInError, UnclearError
+from autograder.intake_files import handed_out
 from autograder.intake_names import quoted
 from autograder.jobs import Job
 from autograder.ledger import Standing
@@ -212,7 +212,7 @@ class Desk:
             {name: released for name, (_, released) in self._originals.items()},
             intake_claims.of_student(self.root, self.assignment, student),
             whose=f"{quoted(self.assignment)} {quoted(student)}",
-            given=frozenset(path.relative_to(release).as_posix() for path in walk(release)),
+            given=handed_out(release),
         )
 
     def _piece(self, work: Work, name: str, intake: Intake) -> tuple[NotebookNode, Piece]:

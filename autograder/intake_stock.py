@@ -15,6 +15,7 @@ from nbgrader.coursedir import CourseDirectory
 
 from autograder import intake_asked, intake_claims
 from autograder.intake import Intake, UnclearError
+from autograder.intake_files import handed_out
 from autograder.intake_names import entry, quoted
 from autograder.submission import SubmissionError
 
@@ -36,6 +37,7 @@ def look_into(
         released,
         intake_claims.of_student(Path(coursedir.root), assignment, student),
         whose=f"{quoted(assignment)} {quoted(student)}",
+        given=handed_out(Path(coursedir.format_path(coursedir.release_directory, ".", assignment))),
     )
 
 

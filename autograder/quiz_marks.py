@@ -151,6 +151,8 @@ def verdict(bank: Bank, folder: Path, student: str, root: Path | None = None) ->
             "person has to look at them."
         )
         return _unmarked(bank, reason[:500], status="grader_error")
+    if marked.best is None and found.question:
+        return _unmarked(bank, found.question, tuple(_remarks(marked)), "not_examined")
     if marked.best is None:
         return _none_counts(bank, name, marked)
     checks = tuple(_check(mark) for mark in marked.best.marks)
@@ -159,9 +161,9 @@ def verdict(bank: Bank, folder: Path, student: str, root: Path | None = None) ->
         doubt = CheckResult("attempts", title, "not_examined", 0.0, 0.0, actual=marked.doubt)
         checks = (*checks, doubt)
     if found.question:
-        title = "The attempts are the student's own"
-        whose = CheckResult("login", title, "not_examined", 0.0, 0.0, actual=found.question)
-        checks = (*checks, whose)
+        title = "It is clear which attempts count, and whose they are"
+        unclear = CheckResult("file", title, "not_examined", 0.0, 0.0, actual=found.question)
+        checks = (*checks, unclear)
     notes = (*([found.note] if found.note else []), *_notes(marked, student))
     return Verdict(f"{PREFIX}{bank.quiz}", PART, checks, notes)
 
