@@ -99,6 +99,7 @@ class Desk:
         self.root = gradebook.root
         self.work_folder = self.root / bridge.WORK_FOLDER
         self._trust = trust
+        self._class = gradebook.roster().known
         self._marks = Marks(self.work_folder, assignment)
         self._originals = {
             name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
@@ -140,10 +141,9 @@ class Desk:
         intake = self._intake(work.student)
         for name in self.notebooks:
             notebook, piece = self._piece(work, name, intake)
-            quizzes = quiz_marks.with_quizzes(
-                Outcome(), notebook, submitted, work.student, self.root
-            )
-            asked = quiz_marks.questions(notebook, submitted, work.student, self.root)
+            whose = notebook, submitted, work.student, self.root, self._class
+            quizzes = quiz_marks.with_quizzes(Outcome(), *whose)
+            asked = quiz_marks.questions(*whose)
             for cell, (why, command) in asked.items():
                 said = f"{why} Say it with `{command}`, or with --nothing in place of the file."
                 work.problems.append(said)

@@ -8,7 +8,7 @@ somebody else in the class.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import islice
@@ -63,14 +63,17 @@ def with_attempts(items: Iterable[Item]) -> Iterator[tuple[Item, list[record.Att
             yield item, attempts
 
 
-def find(folder: Path, quiz: str, student: str, root: Path) -> Attempts:
+def find(
+    folder: Path, quiz: str, student: str, root: Path, roster: Collection[str] = ()
+) -> Attempts:
     """Return a student's attempts at a quiz that lie in a submission.
 
     Args:
         folder: the submission.
         quiz: its name.
         student: whose submission it is.
-        root: the course root, with the claims and the class.
+        root: the course root, with the claims and the submissions of the class.
+        roster: the students whom the gradebook knows; they may have handed in nothing.
 
     Raises:
         OSError: the file is there and cannot be read.
@@ -86,7 +89,8 @@ def find(folder: Path, quiz: str, student: str, root: Path) -> Attempts:
             if item is None:
                 return Attempts(nothing=True)
             return Attempts(_read(item), f"'{shown(item.place)}' counts, as a person has said.")
-    return _of_the_student(_unclaimed(folder, quiz, command, root), student, root)
+    class_ = _with_folders(root) | {normal(name) for name in roster}
+    return _of_the_student(_unclaimed(folder, quiz, command, root), student, class_)
 
 
 def _unclaimed(folder: Path, quiz: str, command: str, root: Path) -> Attempts:
@@ -162,13 +166,13 @@ def _places(found: list[_Holding]) -> str:
     return listed(file.item.place for file in found)
 
 
-def _of_the_student(found: Attempts, student: str, root: Path) -> Attempts:
+def _of_the_student(found: Attempts, student: str, class_: Collection[str]) -> Attempts:
     """Ask a person if attempts carry the login of somebody else in the class."""
     if found.content is None:
         return found
     logins = dict.fromkeys(normal(a.student) for a in record.parse(found.content)[0])
     others = [login for login in logins if login != normal(student)]
-    known = [login for login in others if login in _class(root)]
+    known = [login for login in others if login in class_]
     if not known:
         return found
     who = listed(known)
@@ -179,7 +183,7 @@ def _of_the_student(found: Attempts, student: str, root: Path) -> Attempts:
     return replace(found, question=" ".join(filter(None, (found.question, said))))
 
 
-def _class(root: Path) -> frozenset[str]:
+def _with_folders(root: Path) -> frozenset[str]:
     submitted = root / "submitted"
     try:
         return _names(submitted, submitted.stat().st_mtime_ns)

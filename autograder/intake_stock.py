@@ -25,6 +25,12 @@ def submitted(coursedir: CourseDirectory, assignment: str, student: str) -> Path
     return Path(coursedir.format_path(coursedir.submitted_directory, student, assignment))
 
 
+def students(coursedir: CourseDirectory) -> frozenset[str]:
+    """Return the students whom the gradebook knows."""
+    with Gradebook(coursedir.db_url, coursedir.course_id) as gradebook:
+        return frozenset(student.id for student in gradebook.students)
+
+
 def look_into(
     coursedir: CourseDirectory,
     assignment: str,

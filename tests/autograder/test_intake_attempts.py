@@ -159,6 +159,13 @@ def test_a_login_of_somebody_else_in_the_class_is_asked_about(folder: Path, name
     assert "under the login of 'bob', who is in the class" in asked(found)
 
 
+def test_the_class_is_whom_the_gradebook_knows_too(folder: Path) -> None:
+    take(folder, "bob", 5)
+    (folder.parents[1] / "carl").mkdir()
+    found = quiz_marks.verdict(load_bank("ch05"), folder, "ada", roster=("ada", "bob"))
+    assert "under the login of 'bob', who is in the class" in asked(found)
+
+
 @pytest.mark.parametrize("login", ["jovyan", "ada@laptop"])
 def test_a_login_of_nobody_in_the_class_is_only_said(folder: Path, login: str) -> None:
     take(folder, login, 5)
