@@ -84,6 +84,14 @@ def exported(course: Course, assignment: str = ASSIGNMENT) -> tuple[set[str], se
     return canvas, moodle
 
 
+def by_nbgrader(course: Course) -> dict[str, str]:
+    """Return {student: score} of the file that ``nbgrader export`` writes."""
+    done = nbgrader(course, "export", "--to", "by-nbgrader.csv")
+    assert done.returncode == 0, done.stderr
+    rows = csv.DictReader(io.StringIO((course.root / "by-nbgrader.csv").read_text()))
+    return {row["student_id"]: row["score"] for row in rows}
+
+
 def claim(course: Course, *arguments: str, assignment: str = ASSIGNMENT) -> str:
     done = CliRunner().invoke(
         cli.app, ["claim", assignment, *arguments, "--root", str(course.root)]
@@ -199,6 +207,12 @@ def test_a_quiz_waits_until_a_person_has_said_which_attempts_count(quiz_course: 
         assert f"`autograder claim {assignment} {student} {quiz.CELL} " in problems[student]
     assert {student for student, score in scores(course, assignment).items() if not score} == asked
     assert exported(course, assignment) == (set(found) - asked,) * 2
+    hand_in_attempts(course, "up", {quiz.FILE: 5})
+    folder = course.root / "submitted" / "up"
+    (folder / assignment).rename(folder / "Ch05-Quiz")
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        book.add_student("up")
+    assert by_nbgrader(course) == {"renamed": "5.0", "nothing": "0.0", "bob": "0.0"}
 
     claims = {"two": "b.txt", "poorer": other, "borrowed": quiz.FILE, "picture": "--nothing"}
     for student, file in claims.items():
@@ -209,6 +223,7 @@ def test_a_quiz_waits_until_a_person_has_said_which_attempts_count(quiz_course: 
     }  # fmt: skip
     assert not any(one.needs_manual_grade or one.asked for one in found.values())
     assert exported(course, assignment) == (set(found),) * 2
+    assert by_nbgrader(course) == {**{s: str(one.score) for s, one in found.items()}, "bob": "0.0"}
 
 
 @pytest.mark.parametrize(
