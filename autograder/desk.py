@@ -25,9 +25,9 @@ from autograder import (
 )
 from autograder import nbgrader_bridge as bridge
 from autograder.feedback_page import INDEX
-from autograder.files import walk
 from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.intake import Found, Intake, NotHandedInError, UnclearError
+from autograder.intake_files import handed_out
 from autograder.intake_names import quoted
 from autograder.jobs import Job
 from autograder.ledger import Standing
@@ -99,6 +99,7 @@ class Desk:
         self.root = gradebook.root
         self.work_folder = self.root / bridge.WORK_FOLDER
         self._trust = trust
+        self._class = gradebook.roster().known
         self._marks = Marks(self.work_folder, assignment)
         self._originals = {
             name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
@@ -140,10 +141,9 @@ class Desk:
         intake = self._intake(work.student)
         for name in self.notebooks:
             notebook, piece = self._piece(work, name, intake)
-            quizzes = quiz_marks.with_quizzes(
-                Outcome(), notebook, submitted, work.student, self.root
-            )
-            asked = quiz_marks.questions(notebook, submitted, work.student, self.root)
+            whose = notebook, submitted, work.student, self.root, self._class
+            quizzes = quiz_marks.with_quizzes(Outcome(), *whose)
+            asked = quiz_marks.questions(*whose)
             for cell, (why, command) in asked.items():
                 said = f"{why} Say it with `{command}`, or with --nothing in place of the file."
                 work.problems.append(said)
@@ -212,7 +212,7 @@ class Desk:
             {name: released for name, (_, released) in self._originals.items()},
             intake_claims.of_student(self.root, self.assignment, student),
             whose=f"{quoted(self.assignment)} {quoted(student)}",
-            given=frozenset(path.relative_to(release).as_posix() for path in walk(release)),
+            given=handed_out(release),
         )
 
     def _piece(self, work: Work, name: str, intake: Intake) -> tuple[NotebookNode, Piece]:

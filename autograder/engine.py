@@ -179,7 +179,9 @@ def _students(
 
     ``only`` are the students that are meant; all if there are none.
     """
-    students, wrong = roster.submissions(gradebook.root, assignment, gradebook.roster())
+    students, wrong = roster.submissions(
+        gradebook.root, assignment, gradebook.roster(), gradebook.assignments()
+    )
     for student in only:
         if student not in students and student not in wrong:
             close = difflib.get_close_matches(student, [*students, *wrong], n=1)

@@ -3,23 +3,22 @@
 A notebook lies under its own name in the submission's folder. Where it does not, while something
 lies there that nobody has claimed, there is a question: the one file that holds the notebook's
 cells is taken, and that is said; anything else is left to a person, never graded as nothing.
+Claimed are the assignment's notebooks, a quiz's attempts, and what was handed out.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path, PurePosixPath
 
 from nbformat import NotebookNode
-from rapidfuzz import fuzz
 
 from autograder import intake_attempts, intake_cells, intake_claims, submission
 from autograder.beside import MAX_BYTES, Beside, files_beside
 from autograder.intake_claims import Claim
-from autograder.intake_files import HandedIn, Item, look_through
+from autograder.intake_files import NOTEBOOK, HandedIn, Item, look_through
 from autograder.intake_names import entry, listed, normal, quoted, shown
 from autograder.intake_zip import ArchiveError
 from autograder.submission import MAX_NOTEBOOK, SubmissionError
@@ -29,9 +28,6 @@ ALIKE = 0.5
 
 MAX_READ = 20
 """Files of other names that are read as notebooks; further ones are left to a person."""
-
-_RESEMBLES = 85.0
-"""Per cent of a notebook's name that must be in that of a file which may stand for it."""
 
 
 class UnclearError(SubmissionError):
@@ -101,7 +97,7 @@ class Intake:
             released: {name: notebook as it was handed out}.
             claims: what a person has said of it.
             whose: the assignment and the student, as the command line wants them.
-            given: names of other files that were handed out.
+            given: places of other files that were handed out.
         """
         self._folder = folder
         self._released = released
@@ -219,7 +215,7 @@ class Intake:
         missing = f"There is no {name}.ipynb in the submission"
         if found:
             raise self._unclear(name, f"{missing}, but there are {_places(found)}:", found)
-        if strange := self._strange(name):
+        if strange := self._strange():
             names = listed(item.place for item in strange)
             verb = "is" if len(strange) == 1 else "are"
             raise self._unclear(name, f"{missing}, but there {verb} {names}{self._why(strange)}:")
@@ -263,7 +259,7 @@ class Intake:
                 notebook = _parsed(item) if number < MAX_READ else None
             except SubmissionError:
                 notebook = None
-            if notebook is not None or ".ipynb" in item.name.lower():
+            if notebook is not None or NOTEBOOK in item.name.lower():
                 found.append(_Candidate(item, notebook, self._match(notebook)))
         return found
 
@@ -278,25 +274,17 @@ class Intake:
         best = max(alike, key=lambda name: alike[name])
         return best if alike[best] >= ALIKE else ""
 
-    def _strange(self, name: str) -> list[Item]:
-        """Return what may stand for a missing notebook, though nothing in it says so."""
-        strange = [c.item for c in self._candidates if not c.of]
-        there = [n for n in self._released if self.proper(n).is_file()]
-        taken = [c for c in self._candidates if c.of]
-        notebooks = {f"{n}.ipynb" for n in self._released}
-        for item in self.handed_in.items:
-            if item in strange or item.archive is not None or item.place in self._given:
-                continue
-            if intake_attempts.is_likely(item.name):
-                continue  # a quiz's, and asked about as such
-            if normal(item.place) in notebooks or any(c.item == item for c in taken):
-                continue
-            if any(c.item.path == item.path and c.item.archive for c in taken):
-                continue  # a zip file that holds others of the notebooks
-            nothing_else = not there and not taken
-            if nothing_else or item.place in self.handed_in.closed or _resembles(item.name, name):
-                strange.append(item)
-        return strange
+    def _strange(self) -> list[Item]:
+        """Return what may stand for a missing notebook: all that is known to be nothing else."""
+        own = {f"{name}.ipynb" for name in self._released}
+        taken = {candidate.item.place for candidate in self._candidates if candidate.of}
+        taken |= {claim.file for claim in self._claims.values()}
+        unclaimed = [
+            item for item in self.handed_in.unclaimed(self._given)
+            if normal(item.place) not in own and item.place not in taken
+        ]  # fmt: skip
+        of_quizzes = {item.place for item, _ in intake_attempts.with_attempts(unclaimed)}
+        return [item for item in unclaimed if item.place not in of_quizzes]
 
     def _why(self, strange: list[Item]) -> str:
         reasons = [self.handed_in.closed.get(item.place, "") for item in strange]
@@ -320,7 +308,7 @@ def _parsed(item: Item) -> NotebookNode:
 
 def _may_be_notebook(name: str) -> bool:
     # "x.ipynb.txt", "x.ipynb (1)" and "x.ipynb.bak" are what browsers and editors make of one.
-    return ".ipynb" in name.lower() or name.lower().endswith(".json")
+    return NOTEBOOK in name.lower() or name.lower().endswith(".json")
 
 
 def _is_plain_path(place: str) -> bool:
@@ -328,16 +316,6 @@ def _is_plain_path(place: str) -> bool:
     path = PurePosixPath(place)
     plain = place == str(path) and not path.is_absolute() and "\0" not in place
     return plain and ".." not in path.parts and not path.name.startswith(".")
-
-
-def _resembles(file: str, name: str) -> bool:
-    """Whether a file's name is much like that of a notebook, whatever comes before or after."""
-    stem, words = (_letters(text) for text in (name, file))
-    return len(stem) > 2 and fuzz.partial_ratio(stem, words) >= _RESEMBLES
-
-
-def _letters(text: str) -> str:
-    return re.sub(r"[\W_]+", "", normal(text).casefold())
 
 
 def _places(found: list[_Candidate]) -> str:

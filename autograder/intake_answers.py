@@ -84,22 +84,17 @@ class Answers(Cells):
             self.moved.append(name)
 
     def _doubt_the_rest(self) -> None:
-        """Ask about answers that are missing while there is text that nobody has claimed."""
+        """Ask about answers that nothing stands for while there is text that nobody has claimed."""
         open_ = [name for name in self.answers if self._is_open(name)]
-        missing = [name for name in open_ if self._cell(name) is None]
         texts = [cell for cell in self.unknown() if is_text(cell) and not self.is_given(cell)]
-        if missing and texts:
-            self.doubt(missing, _unclear(len(texts)))
+        texts += [c for c in self.cells if c.cell_type != "code" and self.added(c).strip()]
+        if texts:
+            self.doubt(open_, _unclear(len(texts)))
         last = self.answers[-1] if self.answers else ""
         if last in self.moved:  # all of them may have been written below the last question
             self.doubt(open_, _unclear(1))
         elif last in self.taken:
-            self.doubt(missing, _unclear(1))
-        order = list(self.reference)
-        for name in open_:
-            question = order[order.index(name) - 1] if order.index(name) else ""
-            if any(self.added(c).strip() for c in self.cells if grade_id(c) == question):
-                self.doubt([name], _unclear(1))
+            self.doubt([name for name in open_ if self._cell(name) is None], _unclear(1))
 
 
 def _unclear(count: int) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
@@ -19,8 +19,10 @@ NBGRADERS = ("timestamp.txt", "submission_secret.txt")
 MAX_ARCHIVES = 10
 """Zip files of one submission that are looked into."""
 
-_JUNK = ("__MACOSX", ".", "__pycache__")
+_JUNK = ("__MACOSX", ".", "__pycache__", "~$", "Thumbs.db", "desktop.ini")
 """How names of what computers add by themselves begin."""
+
+NOTEBOOK = ".ipynb"
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,18 @@ class HandedIn:
         alike = (item for item in self.items if shown(item.place) == normal(place))
         return next(exact, None) or next(alike, None)
 
+    def unclaimed(self, given: Collection[str]) -> list[Item]:
+        """Return the files that may hold work: all but those ``given``, wherever they lie now.
+
+        What lies in a zip file stands for it, if it could be opened.
+        """
+        opened = {item.path for item in self.items if item.archive is not None}
+        return [
+            item for item in self.items
+            if not (item.archive is None and item.path in opened)
+            and not any(f"/{normal(item.place)}".endswith(f"/{place}") for place in given)
+        ]  # fmt: skip
+
     def beside(self, item: Item) -> Iterator[tuple[str, Item]]:
         """Yield (path as seen from there, file) of what lies in the folder of ``item``."""
         for other in self.items:
@@ -97,7 +111,7 @@ def look_through(folder: Path) -> HandedIn:
     opened = 0
     for path in walk(folder):
         place = path.relative_to(folder).as_posix()
-        if _is_junk(place) or place in NBGRADERS:
+        if is_junk(place):
             continue
         items.append(Item(place, path))
         if path.suffix.lower() != ".zip":
@@ -110,10 +124,20 @@ def look_through(folder: Path) -> HandedIn:
         except ArchiveError as error:
             closed[place] = str(error)
         else:
-            members = (name for name in archive.members if not _is_junk(name))
+            members = (name for name in archive.members if not is_junk(name))
             items += [Item(f"{place}/{name}", path, archive, name) for name in members]
     return HandedIn(tuple(items), closed)
 
 
-def _is_junk(place: str) -> bool:
-    return any(part.startswith(_JUNK) for part in PurePosixPath(place.replace("\\", "/")).parts)
+def handed_out(release: Path) -> frozenset[str]:
+    """Return the places of the files that an assignment gives to students beside its notebooks."""
+    places = (normal(path.relative_to(release).as_posix()) for path in walk(release))
+    return frozenset(place for place in places if not place.endswith(NOTEBOOK))
+
+
+def is_junk(place: str) -> bool:
+    """Whether computers add a file of this place by themselves, or nbgrader's exchange does."""
+    path = PurePosixPath(place.replace("\\", "/"))
+    return path.name in NBGRADERS or any(
+        part.startswith(_JUNK) and part != ".." for part in path.parts
+    )

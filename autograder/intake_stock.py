@@ -15,6 +15,7 @@ from nbgrader.coursedir import CourseDirectory
 
 from autograder import intake_asked, intake_claims
 from autograder.intake import Intake, UnclearError
+from autograder.intake_files import handed_out
 from autograder.intake_names import entry, quoted
 from autograder.submission import SubmissionError
 
@@ -22,6 +23,12 @@ from autograder.submission import SubmissionError
 def submitted(coursedir: CourseDirectory, assignment: str, student: str) -> Path:
     """Return the folder of a submission, as nbgrader's configuration has it."""
     return Path(coursedir.format_path(coursedir.submitted_directory, student, assignment))
+
+
+def students(coursedir: CourseDirectory) -> frozenset[str]:
+    """Return the students whom the gradebook knows."""
+    with Gradebook(coursedir.db_url, coursedir.course_id) as gradebook:
+        return frozenset(student.id for student in gradebook.students)
 
 
 def look_into(
@@ -36,6 +43,7 @@ def look_into(
         released,
         intake_claims.of_student(Path(coursedir.root), assignment, student),
         whose=f"{quoted(assignment)} {quoted(student)}",
+        given=handed_out(Path(coursedir.format_path(coursedir.release_directory, ".", assignment))),
     )
 
 

@@ -1,8 +1,8 @@
 """Zip files that students hand in: looked into, never unpacked to disk.
 
 Everything in one is data: how many members there are and how many bytes of each are read is
-bounded before it is read, whatever the archive claims of itself; links, folders and encrypted
-members are passed over; a member's name is only ever shown and compared, never used as a path.
+bounded before it is read, whatever the archive claims of itself; links and folders are passed
+over; a member's name is only ever shown and compared, never used as a path.
 """
 
 from __future__ import annotations
@@ -49,12 +49,17 @@ class Archive:
         """Return at most the first ``most`` bytes of a member.
 
         Raises:
-            ArchiveError: it is damaged.
+            ArchiveError: it is damaged, encrypted, or packed in a way that is not read.
         """
+        entry = self.members[name]
+        if entry.flag_bits & _ENCRYPTED_FLAG:
+            raise ArchiveError("it is encrypted")
+        if entry.compress_type not in _METHODS:
+            raise ArchiveError("it is packed in a way that is not read")
         try:
             with (
                 zipfile.ZipFile(io.BytesIO(self.content)) as archive,
-                archive.open(self.members[name]) as member,
+                archive.open(entry) as member,
             ):
                 return member.read(most)
         except _DAMAGE as error:
@@ -98,9 +103,7 @@ def _bound(content: bytes) -> None:
 
 def _is_file(entry: zipfile.ZipInfo) -> bool:
     mode = entry.external_attr >> 16
-    plain = stat.S_IFMT(mode) in (0, stat.S_IFREG)
-    readable = entry.compress_type in _METHODS and not entry.flag_bits & _ENCRYPTED_FLAG
-    return plain and readable and not entry.is_dir()
+    return stat.S_IFMT(mode) in (0, stat.S_IFREG) and not entry.is_dir()
 
 
 def _name(entry: zipfile.ZipInfo) -> str:

@@ -114,7 +114,9 @@ class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ship
         if UNCLEAR_KEY in resources:
             ask(nb, resources.pop(UNCLEAR_KEY), graded_cells(nb))
         folder, root = intake_stock.submitted(coursedir, assignment, student), Path(coursedir.root)
-        for name, (why, command) in quiz_marks.questions(nb, folder, student, root).items():
+        class_ = intake_stock.students(coursedir)
+        quizzes = quiz_marks.questions(nb, folder, student, root, class_)
+        for name, (why, command) in quizzes.items():
             ask(nb, f"{why} Say it with `{command}`.", [name])
         screen.screen_texts(nb, released, Page())
         # The grading steps read what is written here: nothing of a submission's own metadata is.
@@ -180,7 +182,8 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
                 root / WORK_FOLDER / "outcomes", trust=self.trust_submissions, hidden=[root]
             )
             outcome = runner.with_notes(store.outcome(program, beside.files), beside.notes)
-        return quiz_marks.with_quizzes(outcome, nb, folder, student, root)
+        class_ = intake_stock.students(coursedir)
+        return quiz_marks.with_quizzes(outcome, nb, folder, student, root, class_)
 
 
 class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]

@@ -9,7 +9,7 @@ the feedback; a file that looks machine-made is marked for a person, with the re
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -70,7 +70,12 @@ def of_grade_cells(root: Path) -> dict[str, float]:
 
 
 def with_quizzes(
-    outcome: Outcome, notebook: NotebookNode, folder: Path, student: str, root: Path
+    outcome: Outcome,
+    notebook: NotebookNode,
+    folder: Path,
+    student: str,
+    root: Path,
+    roster: Collection[str] = (),
 ) -> Outcome:
     """Return an outcome that holds the marks of the notebook's quizzes, too.
 
@@ -80,13 +85,15 @@ def with_quizzes(
         folder: the submission, with the attempts file in it.
         student: whose submission it is.
         root: the course root, with banks of its own.
+        roster: the students whom the gradebook knows.
 
     Raises:
         QuizMarksError: a bank is not sound.
     """
     asked = [name for name in in_cells(notebook) if name in names(root)]
     marked = {
-        f"{PREFIX}{name}": verdict(find_bank(root, name), folder, student, root) for name in asked
+        f"{PREFIX}{name}": verdict(find_bank(root, name), folder, student, root, roster)
+        for name in asked
     }
     return replace(outcome, verdicts={**outcome.verdicts, **marked}) if marked else outcome
 
@@ -106,7 +113,7 @@ def unmarked(outcome: Outcome, notebook: NotebookNode, root: Path, reason: str) 
 
 
 def questions(
-    notebook: NotebookNode, folder: Path, student: str, root: Path
+    notebook: NotebookNode, folder: Path, student: str, root: Path, roster: Collection[str] = ()
 ) -> dict[str, tuple[str, str]]:
     """Return {grade id: (what a person is asked, the command that answers)} of its quizzes.
 
@@ -116,21 +123,27 @@ def questions(
     for name in in_cells(notebook):
         if name in names(root):
             with suppress(OSError):
-                found = intake_attempts.find(folder, name, student, root)
+                found = intake_attempts.find(folder, name, student, root, roster)
                 if found.question:
                     asked[f"{PREFIX}{name}"] = (found.question, found.command)
     return asked
 
 
-def verdict(bank: Bank, folder: Path, student: str, root: Path | None = None) -> Verdict:
-    """Mark the best attempt that lies in ``folder``.
+def verdict(
+    bank: Bank,
+    folder: Path,
+    student: str,
+    root: Path | None = None,
+    roster: Collection[str] = (),
+) -> Verdict:
+    """Mark the best attempt that lies in ``folder``; arguments as in `with_quizzes`.
 
     The course ``root`` is that above ``submitted/STUDENT/ASSIGNMENT`` if it is left out.
     """
     name = record.filename(bank.quiz)
     root = root or folder.parents[2]
     try:
-        found = intake_attempts.find(folder, bank.quiz, student, root)
+        found = intake_attempts.find(folder, bank.quiz, student, root, roster)
     except OSError as error:
         return _unmarked(bank, f"{name} cannot be read ({error.strerror or error}).")
     if found.content is None:
@@ -151,6 +164,8 @@ def verdict(bank: Bank, folder: Path, student: str, root: Path | None = None) ->
             "person has to look at them."
         )
         return _unmarked(bank, reason[:500], status="grader_error")
+    if marked.best is None and found.question:
+        return _unmarked(bank, found.question, tuple(_remarks(marked)), "not_examined")
     if marked.best is None:
         return _none_counts(bank, name, marked)
     checks = tuple(_check(mark) for mark in marked.best.marks)
@@ -159,9 +174,9 @@ def verdict(bank: Bank, folder: Path, student: str, root: Path | None = None) ->
         doubt = CheckResult("attempts", title, "not_examined", 0.0, 0.0, actual=marked.doubt)
         checks = (*checks, doubt)
     if found.question:
-        title = "The attempts are the student's own"
-        whose = CheckResult("login", title, "not_examined", 0.0, 0.0, actual=found.question)
-        checks = (*checks, whose)
+        title = "It is clear which attempts count, and whose they are"
+        unclear = CheckResult("file", title, "not_examined", 0.0, 0.0, actual=found.question)
+        checks = (*checks, unclear)
     notes = (*([found.note] if found.note else []), *_notes(marked, student))
     return Verdict(f"{PREFIX}{bank.quiz}", PART, checks, notes)
 

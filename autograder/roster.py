@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
 from autograder import intake_times
-from autograder.intake_names import entry, normal, same, shown
+from autograder.files import walk
+from autograder.intake_files import is_junk
+from autograder.intake_names import entry, listed, normal, same, shown
 from autograder.intake_times import UnclearTimeError
 from quizzes.record import read_plain
 
@@ -40,12 +42,17 @@ class Roster:
     closed: bool = False
 
 
-def submissions(root: Path, assignment: str, roster: Roster) -> tuple[list[str], dict[str, str]]:
-    """Return the students whose submissions can be graded, and {folder: what is wrong with it}."""
+def submissions(
+    root: Path, assignment: str, roster: Roster, assignments: Collection[str] = ()
+) -> tuple[list[str], dict[str, str]]:
+    """Return the students whose submissions can be graded, and {folder: what is wrong with it}.
+
+    ``assignments`` are those that the gradebook knows.
+    """
     good: dict[str, str] = {}
     wrong: dict[str, str] = {}
     for folder in _folders(root / "submitted"):
-        problem = _misplaced(folder, assignment)
+        problem = _misplaced(folder, assignment, assignments)
         if not problem and (folder / assignment).is_dir():
             student = _student(folder.name, roster)
             problem = _bad_id(folder.name) or _stranger(student, roster)
@@ -136,25 +143,45 @@ def of_people(people: Mapping[str, bool], create: bool) -> Roster:
 def _folders(submitted: Path) -> Iterator[Path]:
     if submitted.is_dir():
         yield from sorted(
-            path for path in submitted.iterdir() if path.is_dir() and path.name[0] != "."
+            path for path in submitted.iterdir() if path.is_dir() and not is_junk(path.name)
         )
 
 
-def _misplaced(folder: Path, assignment: str) -> str:
-    """Return what is wrong if a student's work is not where nbgrader looks for it."""
+def _misplaced(folder: Path, assignment: str, assignments: Collection[str] = ()) -> str:
+    """Return what is wrong if a student's work is not where nbgrader looks for it.
+
+    ``assignments`` are those that the gradebook knows: what lies in their folders is theirs.
+    """
     place = folder / assignment
     if place.is_dir():
         return _elsewhere(folder, place)
+    there = f"submitted/{shown(folder.name)}"
     if place.exists() or place.is_symlink():
+        return f"{there}/{assignment} is no folder: put the submission's files in one."
+    if names := _unclaimed(folder, assignments):
+        verb, them = ("is", "it") if len(names) == 1 else ("are", "them")
         return (
-            f"submitted/{folder.name}/{assignment} is no folder: put the submission's files in one."
-        )
-    if any(folder.glob("*.ipynb")):
-        return (
-            f"Its notebooks lie in submitted/{folder.name} itself: move them to "
-            f"submitted/{folder.name}/{assignment}, if they belong to this assignment."
+            f"There is no {there}/{assignment}, but there {verb} {listed(names)} in {there}: move "
+            f"{them} to {there}/{assignment} if that is this assignment's work, or out of {there} "
+            "if not; then grade again."
         )
     return ""
+
+
+def _unclaimed(folder: Path, assignments: Collection[str]) -> list[str]:
+    """Return what lies in a student's folder and is no assignment's."""
+    root = folder.parents[1]
+    known = {*assignments}
+    for step in ("source", "release"):
+        known |= {path.name for path in (root / step).glob("*")}
+    try:
+        there = sorted(folder.iterdir())
+    except OSError:
+        return []
+    return [
+        path.name for path in there
+        if path.name not in known and not is_junk(path.name) and (not path.is_dir() or walk(path))
+    ]  # fmt: skip
 
 
 def _elsewhere(folder: Path, place: Path) -> str:

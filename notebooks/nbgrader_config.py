@@ -24,6 +24,7 @@ from autograder.nbgrader_bridge import (
     SubmissionExporter,
 )
 from autograder.nbgrader_once import FeedbackExporter
+from autograder.settled_export import SettledExport
 
 c = get_config()  # noqa: F821 - given by nbgrader
 root = Path(__file__).resolve().parent
@@ -77,3 +78,6 @@ c.GenerateFeedback.post_convert_hook = IndexPages(c)
 
 # The formgrader shows the model answer above each written answer; no other page has it.
 c.HTMLExporter.preprocessors = [ShowModelAnswers]
+
+# `nbgrader export` leaves out whom a person is to be asked about: that is no score to pass on.
+c.ExportApp.plugin_class = SettledExport

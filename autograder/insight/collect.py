@@ -16,6 +16,7 @@ from autograder.insight.records import Record, RecordError
 from autograder.intake_names import normal
 from autograder.nbgrader_bridge import WORK_FOLDER
 from autograder.questions import Question
+from autograder.roster import Roster
 from autograder.submission import SubmissionError
 from quizzes.errors import guess
 
@@ -113,7 +114,7 @@ def collect(root: Path, assignment: str) -> ClassData:
         )
     found, notes = _records(gradebook.root, assignment, grades)
     known = {grade.student for grade in grades}
-    handed_in = _submitted(gradebook.root, assignment, known | people.keys())
+    handed_in = _submitted(gradebook, assignment, known | people.keys())
     absent = people.keys() - known - set(handed_in)
     return ClassData(
         gradebook.root, assignment, max(grade.max_score for grade in grades), grades, people,
@@ -195,14 +196,15 @@ def _questions(gradebook: CourseGradebook, assignment: str) -> dict[str, dict[st
         return {}
 
 
-def _submitted(root: Path, assignment: str, known: Collection[str]) -> list[str]:
-    """Return who has a folder; a name that is ``known`` in another form of Unicode is that."""
-    try:
-        folders = [f for f in (root / "submitted").iterdir() if (f / assignment).is_dir()]
-    except OSError:  # nothing is there (any more), so nothing waits there
-        return []
+def _submitted(gradebook: CourseGradebook, assignment: str, known: Collection[str]) -> list[str]:
+    """Return who has handed in something, be it where it is not looked for.
+
+    A name that is ``known`` in another form of Unicode is that.
+    """
+    assignments = gradebook.assignments()
+    students, wrong = roster.submissions(gradebook.root, assignment, Roster(), assignments)
     ids = {normal(student): student for student in known}
-    return sorted(ids.get(normal(folder.name), folder.name) for folder in folders)
+    return sorted({ids.get(normal(name), name) for name in (*students, *wrong)})
 
 
 def _reason(error: SQLAlchemyError) -> str:

@@ -87,7 +87,7 @@ def test_folders_that_are_not_what_they_should_be_stop_nobody(
 
     says = {
         "a-file": "is no folder",
-        "one-up": f"move them to submitted/one-up/{ASSIGNMENT}",
+        "one-up": f"move it to submitted/one-up/{ASSIGNMENT}",
         "tab\there": "characters that nobody can read: rename the folder",
         "q?": "for a pattern: rename the folder",
         "x" * 129: "at most 128 characters",

@@ -33,7 +33,7 @@ from autograder.insight import (
 )
 from autograder.insight import page as pages
 from autograder.insight import report as reports
-from autograder.insight.collect import ClassData, Person
+from autograder.insight.collect import ClassData, Person, collect
 from autograder.insight.own_text import GivenText, OwnText, tokens
 from autograder.insight.records import Record
 from autograder.questions import Question
@@ -586,6 +586,22 @@ def test_the_report_of_a_graded_class(graded: Path) -> None:
     for said in ("Nothing, by 1 student: Zoe Zest (zoe)", "Bob &lt;b&gt;Bee (bob)", "n = 5",
                  "By learning objective"):  # fmt: skip
         assert said in html, said
+
+
+@pytest.mark.parametrize("place", ["Ch05/qos-design.ipynb", "hand-in.zip"])
+def test_who_handed_in_in_another_place_is_asked_about_and_gets_no_zero(
+    graded: Path, place: str
+) -> None:
+    path = graded / "submitted" / "zoe" / place
+    path.parent.mkdir(parents=True)
+    path.write_text("x")
+    data = collect(graded, ASSIGNMENT)
+    assert (data.absent, data.not_entered) == ((), ("late", "zoe"))
+    written = rows_of(exports.canvas(data, zero_absent=True).text)
+    assert [row[-1] for row in written if row[3] == "zoe"] == [""]
+    [need] = [need for need in needs.people_needed(data) if "zoe" in need.students]
+    assert need.urgent
+    assert "There is a submission but no grade" in need.why
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ from autograder.intake_zip import ArchiveError
 from autograder.submission import SubmissionError
 
 from .test_intake_cells import WORK, released, stripped, worked_on
+from .test_quiz_marks import take
 
 NAME, OTHER = "qos-design", "patterns"
 
@@ -170,7 +171,41 @@ def test_what_may_be_the_notebook_is_asked_about(
     folder: Path, place: str, content: str | bytes
 ) -> None:
     put(folder, place, content)
-    assert f"'{intake_names.shown(place)}'" in str(asked(folder))
+    assert f"'{intake_names.shown(place)}" in str(asked(folder))
+
+
+UNCLAIMED: dict[str, str | bytes] = {
+    "rest.tar.gz": "x", "rest.rar": "x", "rest.7z": "x", "exercise1.pdf": "%PDF", "my_part.py": "",
+    "deep/er/photo.jpg": "x", "hand-in.zip": zipped(), "hand-in.zip/inner.zip": "PK",
+    "hand-in.zip/qos-design.pdf": "%PDF", "hand-in.zip/../up.pdf": "%PDF",
+}  # fmt: skip
+
+
+def put_unclaimed(folder: Path, place: str, content: str | bytes) -> None:
+    archive, _, member = place.partition(".zip/")
+    if member:
+        put(folder, f"{archive}.zip", zipped((member, str(content)), ("patterns.ipynb", "{}")))
+    else:
+        put(folder, place, content)
+
+
+@pytest.mark.parametrize("place", UNCLAIMED)
+def test_whatever_else_lies_beside_another_notebook_is_asked_about(
+    folder: Path, place: str
+) -> None:
+    put(folder, f"{OTHER}.ipynb", text(other()))
+    put_unclaimed(folder, place, UNCLAIMED[place])
+    assert f"'{place}'" in str(asked(folder))
+
+
+def test_an_encrypted_file_in_a_zip_file_is_asked_about(folder: Path) -> None:
+    put(folder, f"{OTHER}.ipynb", text(other()))
+    content = bytearray(zipped(("work", text())))
+    content[content.index(b"PK\x01\x02") + 8] |= 1
+    put(folder, "hand-in.zip", bytes(content))
+    assert "'hand-in.zip/work'" in str(asked(folder))
+    with pytest.raises(ArchiveError, match="encrypted"):
+        intake_zip.look_into(folder / "hand-in.zip").read("work", 1)
 
 
 def test_a_zip_file_with_ten_thousand_members_is_not_read(folder: Path) -> None:
@@ -211,11 +246,25 @@ def test_links_folders_and_odd_paths_in_zip_files_lead_nowhere(folder: Path) -> 
 def test_what_is_another_notebooks_is_not_asked_about(folder: Path) -> None:
     put(folder, f"{OTHER}.ipynb", text(other()))
     put(folder, f"{OTHER} (1).ipynb", text(other()))
-    put(folder, "helper.py", "x = 1")
-    put(folder, "timestamp.txt", "2026-11-27 20:15:05 UTC")
+    put(folder, "again.zip", zipped((f"ch05/{OTHER}.ipynb", text(other())), ("ch05/lab.py", "")))
+    put(folder, "data/lab.py", "x = 1")
+    take(folder, "ana", 1)
+    for place in ("timestamp.txt", "ch05/submission_secret.txt", ".hidden", "Thumbs.db"):
+        put(folder, place, "x")
+    released_with = Intake(
+        folder, {NAME: released(), OTHER: other()}, {}, whose="ch05 ana",
+        given=frozenset({"lab.py"}),
+    )  # fmt: skip
     with pytest.raises(SubmissionError, match=r"There is no qos-design.ipynb in the submission\.$"):
-        found(folder)
-    assert intake(folder).has_others
+        released_with.notebook(NAME)
+    assert released_with.has_others
+
+
+def test_what_a_person_has_said_of_another_notebook_is_not_asked_about(folder: Path) -> None:
+    put(folder, "mine.ipynb", text(new_notebook(cells=[new_code_cell(WORK)])))
+    said = {OTHER: claimed(folder, "mine.ipynb")[NAME]}
+    with pytest.raises(SubmissionError, match=r"There is no qos-design.ipynb in the submission\.$"):
+        found(folder, said)
 
 
 def test_an_empty_folder_asks_nothing(folder: Path) -> None:

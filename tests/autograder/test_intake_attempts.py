@@ -47,7 +47,8 @@ def asked(found: Verdict) -> str:
     [
         "quiz-ch05.attempts (1).jsonl", "Quiz-ch05.attempts.jsonl", "ada_quiz-ch05.attempts.jsonl",
         "quiz-ch05.attempts.jsonl.txt", "ch05-quiz/quiz-ch05.attempts.jsonl", "attempts\n.jsonl",
-        "quiz-ch05.attempts.jsonl.corrupt-1",
+        "quiz-ch05.attempts.jsonl.corrupt-1", "quiz_ch05.json", "my_quiz.txt", "answers.json",
+        "ada.txt", "quiz-ch05",
     ],
 )  # fmt: skip
 def test_attempts_under_another_name_count_and_that_is_said(folder: Path, name: str) -> None:
@@ -65,6 +66,8 @@ def test_attempts_in_a_zip_file_count(folder: Path) -> None:
         archive.write(folder / FILE, FILE)
     (folder / FILE).unlink()
     assert verdict(folder).score == 5.0
+    (folder / "hand-in.zip").write_bytes((folder / "hand-in.zip").read_bytes()[:-40])
+    assert "there is 'hand-in.zip'" in asked(verdict(folder))
 
 
 def test_of_several_files_a_person_says_which_counts(folder: Path) -> None:
@@ -74,7 +77,10 @@ def test_of_several_files_a_person_says_which_counts(folder: Path) -> None:
     assert "there are 'a.jsonl' and 'b.jsonl'" in asked(verdict(folder))
 
 
-@pytest.mark.parametrize("name", ["quiz-ch05.attempts (1).jsonl", "my quiz.txt"])
+@pytest.mark.parametrize(
+    "name",
+    ["quiz-ch05.attempts (1).jsonl", "my quiz.txt", "quiz-ch05", "hand-in.tar.gz", "screen.png"],
+)
 def test_a_file_that_may_hold_attempts_is_asked_about(folder: Path, name: str) -> None:
     (folder / name).write_text("{")
     assert f"there is '{name}'" in asked(verdict(folder))
@@ -82,8 +88,65 @@ def test_a_file_that_may_hold_attempts_is_asked_about(folder: Path, name: str) -
 
 def test_no_file_at_all_is_no_question(folder: Path) -> None:
     (folder / "quiz.ipynb").write_text("{}")
+    (folder / "map.png").write_text("handed out")
+    handed_out = folder.parents[2] / "release" / "ch05-quiz" / "map.png"
+    handed_out.parent.mkdir(parents=True)
+    handed_out.write_text("handed out")
+    (folder / "timestamp.txt").write_text("2026-11-27 20:15:05 UTC")
     found = verdict(folder)
     assert (found.score, found.needs_human) == (0.0, False)
+
+
+def beside(folder: Path, content: str | None, *rights: int) -> Verdict:
+    """Return the verdict with the attempts in "... (1).jsonl", and in their place ``content``."""
+    name = "quiz-ch05.attempts (1).jsonl"
+    take(folder, "ada", *rights)
+    rename(folder, name)
+    if content is not None:
+        (folder / FILE).write_text(content)
+    return verdict(folder)
+
+
+@pytest.mark.parametrize("content", ["", "{\n", "rubbish"])
+def test_an_empty_or_damaged_file_in_its_place_is_asked_about_if_there_is_another(
+    folder: Path, content: str
+) -> None:
+    found = beside(folder, content, 5)
+    assert "but there is 'quiz-ch05.attempts (1).jsonl'" in asked(found)
+
+
+@pytest.mark.parametrize("kind", ["link", "folder"])
+def test_something_else_in_its_place_is_asked_about_if_there_is_another(
+    folder: Path, kind: str
+) -> None:
+    beside(folder, None, 5)
+    if kind == "link":
+        (folder / FILE).symlink_to("nowhere")
+    else:
+        (folder / FILE).mkdir()
+    assert "but there is 'quiz-ch05.attempts (1).jsonl'" in asked(verdict(folder))
+
+
+def test_a_poorer_file_in_its_place_is_asked_about_and_counts_until_then(folder: Path) -> None:
+    take(folder, "ada", 1, 5)
+    whole = (folder / FILE).read_text()
+    (folder / "quiz-ch05.attempts (1).jsonl").write_text(whole)
+    (folder / FILE).write_text(whole.splitlines(keepends=True)[0])
+    found = verdict(folder)
+    assert "there is 'quiz-ch05.attempts (1).jsonl', too, with other attempts" in asked(found)
+    assert found.score < 5
+    claim(folder, "quiz-ch05.attempts (1).jsonl")
+    assert (verdict(folder).score, verdict(folder).needs_human) == (5.0, False)
+
+
+def test_an_earlier_state_of_the_file_is_no_question(folder: Path) -> None:
+    take(folder, "ada", 1, 5)
+    whole = (folder / FILE).read_text()
+    (folder / "quiz-ch05.attempts (1).jsonl").write_text(whole.splitlines(keepends=True)[0])
+    (folder / "copy.jsonl").write_text(whole)
+    assert (verdict(folder).score, verdict(folder).needs_human) == (5.0, False)
+    (folder / FILE).unlink()
+    assert (verdict(folder).score, verdict(folder).needs_human) == (5.0, False)
 
 
 @pytest.mark.parametrize("name", [FILE, "renamed.jsonl"])
@@ -93,6 +156,13 @@ def test_a_login_of_somebody_else_in_the_class_is_asked_about(folder: Path, name
     rename(folder, name)
     found = verdict(folder)
     assert found.score == 5.0, "the points stand until a person has looked"
+    assert "under the login of 'bob', who is in the class" in asked(found)
+
+
+def test_the_class_is_whom_the_gradebook_knows_too(folder: Path) -> None:
+    take(folder, "bob", 5)
+    (folder.parents[1] / "carl").mkdir()
+    found = quiz_marks.verdict(load_bank("ch05"), folder, "ada", roster=("ada", "bob"))
     assert "under the login of 'bob', who is in the class" in asked(found)
 
 

@@ -251,6 +251,27 @@ def test_an_answer_typed_into_a_question_that_was_changed_is_asked_about() -> No
     assert set(known.doubts) == {"answer-loss"}
 
 
+@pytest.mark.parametrize("above", ["question-loss", "task", "solution"])
+@pytest.mark.parametrize("kind", [new_markdown_cell, new_raw_cell])
+def test_text_above_the_question_of_a_blank_answer_is_asked_about(
+    kind: Callable[..., NotebookNode], above: str
+) -> None:
+    notebook = worked_on(answer_loss=BLANK)
+    notebook.cells.insert(at(notebook, above), kind(GIVEN["answer-loss"]))
+    texts, known, _ = mended(notebook)
+    assert texts == {**RIGHT, "answer-loss": BLANK}
+    assert set(known.doubts) == {"answer-loss"}
+
+
+@pytest.mark.parametrize("name", ["task", "question-depth"])
+def test_an_answer_typed_into_another_given_text_is_asked_about(name: str) -> None:
+    notebook = worked_on(answer_loss=BLANK)
+    here = notebook.cells[at(notebook, name)]
+    here.source = here.source.replace(".", f", and {GIVEN['answer-loss']}")
+    _, known, _ = mended(notebook)
+    assert set(known.doubts) == {"answer-loss"}
+
+
 def test_code_that_may_be_the_missing_solution_is_asked_about() -> None:
     notebook = worked_on()
     notebook.cells[at(notebook, "solution")] = new_code_cell("class Other:\n    pass")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import shutil
 import unicodedata
 import zipfile
 from datetime import datetime
@@ -17,12 +18,16 @@ from nbgrader.api import Gradebook
 from typer.testing import CliRunner
 
 from autograder import cli, engine, grades_csv, submission
+from autograder.build import build
 from autograder.corpus import Case
 from autograder.gradebook import CourseGradebook, Grade
 from autograder.insight import exports, needs
 from autograder.insight.collect import collect
+from autograder.release import release
+from course.content import content_root, copy_authoring
 from tests.machine import needs_sandbox
 
+from . import test_quiz_marks as quiz
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
 from .test_grading import nbgrader
 
@@ -53,23 +58,23 @@ def answered(notebook: NotebookNode) -> NotebookNode:
     return notebook
 
 
-def grade(course: Course) -> tuple[dict[str, Grade], dict[str, str]]:
-    problems = {g.student: g.problem for g in engine.grade(course.root, ASSIGNMENT, feedback=False)}
-    found = CourseGradebook(course.root).grades(ASSIGNMENT)
+def grade(course: Course, assignment: str = ASSIGNMENT) -> tuple[dict[str, Grade], dict[str, str]]:
+    problems = {g.student: g.problem for g in engine.grade(course.root, assignment, feedback=False)}
+    found = CourseGradebook(course.root).grades(assignment)
     return {one.student: one for one in found}, problems
 
 
-def scores(course: Course) -> dict[str, str]:
+def scores(course: Course, assignment: str = ASSIGNMENT) -> dict[str, str]:
     """Return {student: score} of grades.csv."""
     gradebook = CourseGradebook(course.root)
-    grades_csv.write({ASSIGNMENT: gradebook.grades(ASSIGNMENT)}, course.root / "grades.csv")
+    grades_csv.write({assignment: gradebook.grades(assignment)}, course.root / "grades.csv")
     rows = csv.DictReader(io.StringIO((course.root / "grades.csv").read_text()))
     return {row["student_id"]: row["score"] for row in rows}
 
 
-def exported(course: Course) -> tuple[set[str], set[str]]:
+def exported(course: Course, assignment: str = ASSIGNMENT) -> tuple[set[str], set[str]]:
     """Return who has a number in the files for Canvas and Moodle, be it one that may change."""
-    data = collect(course.root, ASSIGNMENT)
+    data = collect(course.root, assignment)
     texts = [export(data, provisional=True).text for export in (exports.canvas, exports.moodle)]
     students = {grade.student for grade in data.grades}
     tables = [list(csv.reader(io.StringIO(text))) for text in texts]
@@ -79,9 +84,17 @@ def exported(course: Course) -> tuple[set[str], set[str]]:
     return canvas, moodle
 
 
-def claim(course: Course, *arguments: str) -> str:
+def by_nbgrader(course: Course) -> dict[str, str]:
+    """Return {student: score} of the file that ``nbgrader export`` writes."""
+    done = nbgrader(course, "export", "--to", "by-nbgrader.csv")
+    assert done.returncode == 0, done.stderr
+    rows = csv.DictReader(io.StringIO((course.root / "by-nbgrader.csv").read_text()))
+    return {row["student_id"]: row["score"] for row in rows}
+
+
+def claim(course: Course, *arguments: str, assignment: str = ASSIGNMENT) -> str:
     done = CliRunner().invoke(
-        cli.app, ["claim", ASSIGNMENT, *arguments, "--root", str(course.root)]
+        cli.app, ["claim", assignment, *arguments, "--root", str(course.root)]
     )
     if done.exception is not None and not isinstance(done.exception, SystemExit):
         return str(done.exception)
@@ -149,6 +162,68 @@ def test_a_score_is_never_zero_because_of_a_name_or_lost_metadata(
     assert CourseGradebook(course.root).grades(ASSIGNMENT)
     settled = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}["lost"]
     assert (settled.asked, settled.score) == ({}, 4.0)
+
+
+@pytest.fixture
+def quiz_course(tmp_path: Path) -> Course:
+    root = copy_authoring(content_root(), tmp_path / "course")
+    build(root)
+    release(root, quiz.ASSIGNMENT)
+    return Course(root)
+
+
+def hand_in_attempts(course: Course, student: str, files: dict[str, int], login: str = "") -> None:
+    """Hand the quiz in, with an attempts file of each name and so many right answers."""
+    folder = course.root / "submitted" / student / quiz.ASSIGNMENT
+    folder.mkdir(parents=True)
+    shutil.copy(course.root / "release" / quiz.ASSIGNMENT / f"{quiz.NOTEBOOK}.ipynb", folder)
+    for number, (name, right) in enumerate(files.items()):
+        made = course.root / "made" / student / str(number)
+        made.mkdir(parents=True)
+        quiz.take(made, login or student, right)
+        (made / quiz.FILE).rename(folder / name)
+
+
+def test_a_quiz_waits_until_a_person_has_said_which_attempts_count(quiz_course: Course) -> None:
+    course, assignment, other = quiz_course, quiz.ASSIGNMENT, "quiz-ch05.attempts (1).jsonl"
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        book.add_student("bob")  # is in the class, and has handed in nothing
+    hand_in_attempts(course, "renamed", {"answers.json": 5})
+    hand_in_attempts(course, "two", {"a.txt": 2, "b.txt": 5})
+    hand_in_attempts(course, "poorer", {quiz.FILE: 1, other: 5})
+    hand_in_attempts(course, "borrowed", {quiz.FILE: 5}, login="bob")
+    hand_in_attempts(course, "picture", {})
+    (course.root / "submitted" / "picture" / assignment / "screen.png").write_bytes(b"PNG")
+    hand_in_attempts(course, "nothing", {})
+
+    found, problems = grade(course, assignment)
+
+    asked = {"two", "poorer", "borrowed", "picture"}
+    assert (found["renamed"].score, found["nothing"].score) == (5.0, 0.0)
+    assert {student for student, one in found.items() if one.needs_manual_grade} == asked
+    assert {student for student, one in found.items() if one.asked} == asked
+    for student in asked:
+        assert found[student].cells[quiz.NOTEBOOK][quiz.CELL] is None
+        assert f"`autograder claim {assignment} {student} {quiz.CELL} " in problems[student]
+    assert {student for student, score in scores(course, assignment).items() if not score} == asked
+    assert exported(course, assignment) == (set(found) - asked,) * 2
+    hand_in_attempts(course, "up", {quiz.FILE: 5})
+    folder = course.root / "submitted" / "up"
+    (folder / assignment).rename(folder / "Ch05-Quiz")
+    with Gradebook(f"sqlite:///{course.root / 'gradebook.db'}") as book:
+        book.add_student("up")
+    assert by_nbgrader(course) == {"renamed": "5.0", "nothing": "0.0", "bob": "0.0"}
+
+    claims = {"two": "b.txt", "poorer": other, "borrowed": quiz.FILE, "picture": "--nothing"}
+    for student, file in claims.items():
+        claim(course, student, quiz.CELL, file, assignment=assignment)
+    found, problems = grade(course, assignment)
+    assert {student: one.score for student, one in found.items()} == {
+        **dict.fromkeys(found, 5.0), "nothing": 0.0, "picture": 0.0,
+    }  # fmt: skip
+    assert not any(one.needs_manual_grade or one.asked for one in found.values())
+    assert exported(course, assignment) == (set(found),) * 2
+    assert by_nbgrader(course) == {**{s: str(one.score) for s, one in found.items()}, "bob": "0.0"}
 
 
 @pytest.mark.parametrize(

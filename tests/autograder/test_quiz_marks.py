@@ -204,7 +204,9 @@ def test_attempts_that_look_machine_made_go_to_a_person_with_the_reason(tmp_path
 
 @pytest.mark.parametrize("kind", ["link", "folder", "pipe", "rubbish", "empty"])
 def test_something_else_in_the_place_of_the_file_earns_nothing(tmp_path: Path, kind: str) -> None:
-    path = tmp_path / FILE
+    folder = tmp_path / "submission"
+    folder.mkdir()
+    path = folder / FILE
     if kind == "link":
         (tmp_path / "elsewhere").mkdir()
         take(tmp_path / "elsewhere", "ada", 5)
@@ -215,7 +217,7 @@ def test_something_else_in_the_place_of_the_file_earns_nothing(tmp_path: Path, k
         os.mkfifo(path)
     else:
         path.write_bytes(b"\x00rubbish" * 100 if kind == "rubbish" else b"")
-    found = verdict(tmp_path)
+    found = verdict(folder)
     assert (found.score, found.max_score, found.needs_human) == (0.0, 5.0, False)
     assert {check.status for check in found.checks} == {"not_checked"}
 

@@ -43,6 +43,39 @@ def test_links_that_an_instructor_makes_are_followed(submitted: Path, tmp_path: 
     assert found(submitted) == (["alice", "dora", "emil"], {})
 
 
+@pytest.mark.parametrize(
+    "place",
+    ["Ch05/qos-design.ipynb", "ch05 (1)/work/qos-design.ipynb", "hand-in.zip", "qos-design.ipynb",
+     "report.pdf"],
+)  # fmt: skip
+def test_what_lies_in_no_assignments_folder_is_asked_about(submitted: Path, place: str) -> None:
+    for other in ("ch05-quiz", "ch04"):
+        (submitted / "bob" / other).mkdir(parents=True)
+    (submitted.parent / "source" / "ch05-quiz").mkdir(parents=True)
+    (submitted / "bob" / "ch04" / "exercise.ipynb").write_text("{}")
+    (submitted / "bob" / place).parent.mkdir(parents=True, exist_ok=True)
+    (submitted / "bob" / place).write_text("x")
+    good, wrong = roster.submissions(submitted.parent, "ch05", Roster(), ["ch04", "ch05"])
+    assert good == ["alice"]
+    name = place.partition("/")[0]
+    assert wrong == {
+        "bob": f"There is no submitted/bob/ch05, but there is '{name}' in submitted/bob: move it "
+        "to submitted/bob/ch05 if that is this assignment's work, or out of submitted/bob if not; "
+        "then grade again."
+    }
+
+
+def test_who_has_handed_in_other_assignments_alone_is_not_asked_about(submitted: Path) -> None:
+    for place in ("ch04/exercise.ipynb", "ch06/exercise.ipynb", ".DS_Store", "timestamp.txt"):
+        (submitted / "bob" / place).parent.mkdir(parents=True, exist_ok=True)
+        (submitted / "bob" / place).write_text("x")
+    (submitted / "bob" / "Ch05").mkdir()
+    (submitted / "__MACOSX" / "Ch05").mkdir(parents=True)
+    (submitted / "__MACOSX" / "Ch05" / "exercise.ipynb").write_text("x")
+    (submitted.parent / "release" / "ch06").mkdir(parents=True)
+    assert roster.submissions(submitted.parent, "ch05", Roster(), ["ch04"]) == (["alice"], {})
+
+
 @pytest.mark.parametrize("kind", ["pipe", "huge", "link", "folder", "no date"])
 def test_a_time_stamp_that_is_none_is_not_waited_for(tmp_path: Path, kind: str) -> None:
     file = tmp_path / "timestamp.txt"
