@@ -7,7 +7,7 @@ from pathlib import Path
 from autograder import intake_claims, quiz_marks, roster, submission
 from autograder.intake_claims import Claim, ClaimError
 from autograder.intake_files import HandedIn, Item, look_through
-from autograder.intake_names import listed, quoted, same, shown
+from autograder.intake_names import listed, quoted, shown
 from autograder.intake_zip import ArchiveError
 from autograder.submission import MAX_NOTEBOOK
 from quizzes import record
@@ -29,6 +29,8 @@ def claim(
         ClaimError: there is no such thing; the message says what there is.
         SubmissionError: what is claimed cannot be read as a notebook.
     """
+    from autograder.gradebook import CourseGradebook
+
     names = _names(root, assignment)
     if name not in names:
         raise ClaimError(
@@ -45,7 +47,7 @@ def claim(
             "Name one file, or say --nothing or --withdraw: there is "
             f"{_there(look_through(folder))}."
         )
-    student = next((s for s in _known(root) if same(s, student)), student)
+    student = CourseGradebook(root).roster().student(student)
     made = None if withdraw else _claim(folder, name, names[name], file)
     intake_claims.keep(root, assignment, student, name, made)
     again = f"`autograder grade {quoted(assignment)}` takes it into account"
@@ -98,10 +100,3 @@ def _require(item: Item, name: str) -> None:
 
 def _there(handed_in: HandedIn) -> str:
     return listed(item.place for item in handed_in.items) or "nothing"
-
-
-def _known(root: Path) -> list[str]:
-    """Return the ids of the gradebook, whose forms of names count."""
-    from autograder.gradebook import CourseGradebook
-
-    return sorted(CourseGradebook(root).roster().known)
