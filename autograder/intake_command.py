@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from autograder import intake_claims, quiz_marks, roster, submission
+from autograder import nbgrader_bridge as bridge
 from autograder.intake_claims import Claim, ClaimError
 from autograder.intake_files import HandedIn, Item, look_through
 from autograder.intake_names import listed, quoted, shown
@@ -27,6 +28,7 @@ def claim(
 
     Raises:
         ClaimError: there is no such thing; the message says what there is.
+        NotReadyError: the assignment's source is damaged.
         SubmissionError: what is claimed cannot be read as a notebook.
     """
     from autograder.gradebook import CourseGradebook
@@ -69,7 +71,7 @@ def _names(root: Path, assignment: str) -> dict[str, str]:
         )
     found = {path.stem: path.name for path in notebooks}
     for path in notebooks:
-        for quiz in quiz_marks.in_cells(submission.read(path)):
+        for quiz in quiz_marks.in_cells(bridge.read_source(path)):
             found[f"{quiz_marks.PREFIX}{quiz}"] = record.filename(quiz)
     return found
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from autograder import intake_attempts, quiz_marks, submission
+from autograder import intake_attempts, quiz_marks
+from autograder import nbgrader_bridge as bridge
 from autograder.intake_names import normal
 from autograder.quiz_cli import QuizCommandError, as_course_errors
 from quizzes import record, sharing
@@ -74,13 +75,14 @@ def assignment_of(root: Path, name: str) -> str:
 
     Raises:
         QuizCommandError: several assignments have the quiz.
+        NotReadyError: the source of one is damaged.
     """
     source = root / "source"
     if (source / name).is_dir() or name not in quiz_marks.names(root):
         return name
     having = sorted({
         path.parent.name for path in source.glob("*/*.ipynb")
-        if name in quiz_marks.in_cells(submission.read(path))
+        if name in quiz_marks.in_cells(bridge.read_source(path))
     })  # fmt: skip
     if len(having) > 1:
         raise QuizCommandError(
