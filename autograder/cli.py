@@ -113,7 +113,8 @@ def grade(
     )  # fmt: skip
     gradebook = CourseGradebook(where)
     every = {name: gradebook.grades(name) for name in gradebook.assignments()}
-    grades = [grade for grade in every[assignment] if not student or grade.student in student]
+    meant = {graded.student for graded in done}
+    grades = [grade for grade in every[assignment] if not student or grade.student in meant]
     grades_csv.write(every, where / "grades.csv")
     problems = {
         graded.student: graded.problem if graded.entered else f"NOT ENTERED: {graded.problem}"

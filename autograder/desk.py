@@ -27,7 +27,7 @@ from autograder import nbgrader_bridge as bridge
 from autograder.feedback_page import INDEX
 from autograder.gradebook import CourseGradebook, GradebookError
 from autograder.intake import Found, Intake, NotHandedInError, UnclearError
-from autograder.intake_files import handed_out
+from autograder.intake import of_student as intake_of
 from autograder.intake_names import quoted
 from autograder.jobs import Job
 from autograder.ledger import Standing
@@ -138,7 +138,8 @@ class Desk:
         work.problems += roster.remarks(submitted, self.gradebook.zone)
         limits = self.gradebook.file_limits
         work.problems += staging.copy_files(submitted, staged, limits, self.notebooks)
-        intake = self._intake(work.student)
+        released = {name: released for name, (_, released) in self._originals.items()}
+        intake = intake_of(self.root, self.assignment, work.student, released)
         for name in self.notebooks:
             notebook, piece = self._piece(work, name, intake)
             whose = notebook, submitted, work.student, self.root, self._class
@@ -204,16 +205,6 @@ class Desk:
         staged.mkdir(parents=True)
         staging.copy_marks(self._submitted(student), staged, self.gradebook.zone)
         return staged
-
-    def _intake(self, student: str) -> Intake:
-        _, release = self.folders
-        return Intake(
-            self._submitted(student),
-            {name: released for name, (_, released) in self._originals.items()},
-            intake_claims.of_student(self.root, self.assignment, student),
-            whose=f"{quoted(self.assignment)} {quoted(student)}",
-            given=handed_out(release),
-        )
 
     def _piece(self, work: Work, name: str, intake: Intake) -> tuple[NotebookNode, Piece]:
         try:

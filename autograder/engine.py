@@ -24,6 +24,7 @@ from autograder.graded import Graded
 from autograder.interruption import Interruption
 from autograder.jobs import Job, Result
 from autograder.progress import Progress
+from autograder.roster import Roster
 from autograder.store import OutcomeStore
 from autograder.workers import LocalWorkers, Workers
 from course.errors import CourseError
@@ -92,7 +93,9 @@ def grade(
     """
     gradebook = CourseGradebook(root, staged=STAGED)
     names = _notebooks(gradebook, assignment)
-    found, wrong = _students(gradebook, assignment, students)
+    known = gradebook.roster()
+    students = sorted({known.student(name) for name in students})
+    found, wrong = _students(gradebook, assignment, known, students)
     if not trust and not scheduler:
         sandbox.warm_up()
         sandbox.require()
@@ -173,18 +176,17 @@ def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
 
 
 def _students(
-    gradebook: CourseGradebook, assignment: str, only: Collection[str]
+    gradebook: CourseGradebook, assignment: str, known: Roster, only: Collection[str]
 ) -> tuple[list[str], dict[str, str]]:
     """Return who has submitted, and what is wrong with the folders that cannot be graded.
 
-    ``only`` are the students that are meant; all if there are none.
+    ``only`` are the ids of the students that are meant; all if there are none.
     """
-    students, wrong = roster.submissions(
-        gradebook.root, assignment, gradebook.roster(), gradebook.assignments()
-    )
+    students, wrong = roster.submissions(gradebook.root, assignment, known, gradebook.assignments())
+    there = {*students, *map(known.student, wrong)}
     for student in only:
-        if student not in students and student not in wrong:
-            close = difflib.get_close_matches(student, [*students, *wrong], n=1)
+        if student not in there:
+            close = difflib.get_close_matches(student, there, n=1)
             meant = f" (is it '{close[0]}'?)" if close else ""
             raise AssignmentError(
                 f"'{student}' has not submitted '{assignment}'{meant}: there is no folder "
@@ -197,4 +199,5 @@ def _students(
         )
     if not only:
         return students, wrong
-    return [s for s in students if s in only], {s: p for s, p in wrong.items() if s in only}
+    wrong = {name: problem for name, problem in wrong.items() if known.student(name) in only}
+    return [student for student in students if student in only], wrong

@@ -10,12 +10,16 @@ from pathlib import Path
 from filelock import FileLock
 
 from autograder.files import write_whole
+from autograder.intake_names import normal
 
 FOLDER = "extensions"
 
 
 class WaitingExtensions:
-    """The extensions of one assignment whose students have not handed in yet."""
+    """The extensions of one assignment whose students have not handed in yet.
+
+    A student's name may come in any form of Unicode: nbgrader's own commands take it from a folder.
+    """
 
     def __init__(self, work: Path, assignment: str) -> None:
         """Keep them in the engine's folder ``work``."""
@@ -24,16 +28,16 @@ class WaitingExtensions:
     def put(self, student: str, hours: float) -> None:
         """Keep one for a student, or with 0 hours none."""
         with self._changing() as waiting:
-            waiting.pop(student, None)
+            waiting.pop(normal(student), None)
             if hours:
-                waiting[student] = hours
+                waiting[normal(student)] = hours
 
     def of(self, student: str) -> float:
         """Return the hours that wait for a student; 0 if none do."""
         if not self._path.exists():
             return 0.0
         with self._changing() as waiting:
-            return waiting.get(student, 0.0)
+            return waiting.get(normal(student), 0.0)
 
     @contextmanager
     def _changing(self) -> Iterator[dict[str, float]]:

@@ -15,6 +15,7 @@ from nbgrader.api import Gradebook, MissingEntry
 
 from autograder.extension_store import WaitingExtensions
 from autograder.gradebook import CourseGradebook
+from autograder.roster import Roster
 from course.errors import CourseError
 
 MAX_HOURS = 10 * 366 * 24.0
@@ -52,9 +53,11 @@ def extend(root: Path, assignment: str, students: list[str], hours: float) -> li
         raise ExtensionError(f"An extension has 0 to {MAX_HOURS:g} hours, not {hours:g}.")
     course = CourseGradebook(root)
     waiting = WaitingExtensions(course.work_folder, assignment)
+    known = course.roster()
+    students = [known.student(name) for name in students]
     with course.opened() as book:
         due = _due(book, assignment)
-        _require_known(book, course.root, students)
+        _require_known(known, course.root, students)
         dues = []
         for student in students:
             try:
@@ -85,13 +88,13 @@ def _due(book: Gradebook, assignment: str) -> datetime:
     return due
 
 
-def _require_known(book: Gradebook, root: Path, students: list[str]) -> None:
+def _require_known(known: Roster, root: Path, students: list[str]) -> None:
     folders = root / "submitted"
     handed_in = [path.name for path in folders.iterdir()] if folders.is_dir() else []
-    known = {*(student.id for student in book.students), *handed_in}
+    there = {*known.known, *map(known.student, handed_in)}
     for student in students:
-        if student not in known:
-            close = difflib.get_close_matches(student, known, n=1)
+        if student not in there:
+            close = difflib.get_close_matches(student, there, n=1)
             meant = f" (is it '{close[0]}'?)" if close else ""
             raise ExtensionError(
                 f"The course has no student '{student}'{meant}: add the student with `nbgrader db "

@@ -9,8 +9,9 @@ from typing import Any
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 
-from autograder import sheets, submission
+from autograder import roster, sheets, submission
 from autograder.sheets import Exercise, Line
+from autograder.staging import SECRET
 
 TEMPLATES = Path(__file__).parent / "templates"
 TEMPLATE = "course_feedback"
@@ -22,8 +23,8 @@ INDEX = "index.html"
 class Feedback:
     """What the template shows beside the notebook itself.
 
-    ``index`` is the link to the page about all exercises, ``has_math`` says that a script has to
-    draw formulas.
+    ``index`` is the link to the page about all exercises, empty where that does not lie beside it;
+    ``has_math`` says that a script has to draw formulas.
     """
 
     title: str
@@ -60,8 +61,18 @@ def describe(notebook: NotebookNode, resources: Any, converter: Any) -> Feedback
         Exercise(names["notebook"], names["notebook"], ()),
     )
     late = sheets.late(sheet.seconds_late, exercise.penalty)
-    has_index = names["notebook"] != Path(INDEX).stem
+    has_index = names["notebook"] != Path(INDEX).stem and not _goes_alone(converter, names)
     return Feedback(
         exercise.title, exercise.total, exercise.lines, late, INDEX if has_index else "",
         any("$" in cell.source for cell in notebook.cells if cell.cell_type == "markdown"),
     )  # fmt: skip
+
+
+def _goes_alone(converter: Any, names: Any) -> bool:
+    """Whether a student fetches the page through the exchange, which hands out none but notebooks'.
+
+    A link to the page about all exercises would lead nowhere there.
+    """
+    folder = roster.folder(Path(converter.coursedir.root), names["student"])
+    secret = folder / str(names["assignment"]) / SECRET
+    return secret.exists()

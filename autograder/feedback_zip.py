@@ -8,10 +8,12 @@ as a notebook with its marks in it, an archive as an archive of the pages.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import re
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Literal
@@ -19,9 +21,10 @@ from typing import Literal
 import nbformat
 from nbformat.v4 import new_markdown_cell
 
-from autograder import platform_names, roster, sheets, submission
+from autograder import intake, platform_names, roster, sheets, submission
 from autograder.gradebook import CourseGradebook
 from autograder.insight import collect
+from autograder.intake_zip import ArchiveError
 from autograder.platform_names import NamesError, Participant
 from autograder.sheets import Sheet
 from autograder.submission import SubmissionError
@@ -99,24 +102,42 @@ def _for_canvas(root: Path, assignment: str) -> Callable[[str, Participant], Ite
             return
         with gradebook.opened() as book:
             sheet = sheets.read(book, gradebook.coursedir, assignment, student)
+        taken = _taken(root, sheet)
         for file in participant.files:
             name = PurePosixPath(file.name).name
+            notebook = next((taken[d] for d in file.digests & taken.keys()), "")
             if name.lower().endswith(".zip"):
                 inner = io.BytesIO()
                 with zipfile.ZipFile(inner, "w") as archive:
                     for page in pages:
                         _add(archive, page.name, page.read_bytes())
                 yield name, inner.getvalue()
-            elif name.lower().endswith(".ipynb") and (
-                content := _with_marks(root, sheet, _notebook_of(name, sheet))
-            ):
+            elif content := _with_marks(root, sheet, notebook or _named(name, sheet)):
                 yield name, content
 
     return make
 
 
-def _notebook_of(name: str, sheet: Sheet) -> str:
-    """Return which exercise a file of a Canvas download is: `…_qos-design-1.ipynb`, say."""
+def _taken(root: Path, sheet: Sheet) -> dict[str, str]:
+    """Return {digest of a file: notebook} of what counts as a student's, whatever its name."""
+    release = root / "release" / sheet.assignment
+    released = {}
+    for exercise in sheet.exercises:
+        with suppress(SubmissionError):  # then names have to do
+            name = exercise.notebook
+            released[name] = submission.read(release / f"{name}.ipynb")
+    found = intake.of_student(root, sheet.assignment, sheet.student, released)
+    taken: dict[str, str] = {}
+    for name in released:
+        with suppress(SubmissionError, ArchiveError, OSError):
+            taken.setdefault(hashlib.sha256(found.content(name)).hexdigest(), name)
+    return taken
+
+
+def _named(name: str, sheet: Sheet) -> str:
+    """Return which exercise a file of a Canvas download is by name: `…_qos-design-1.ipynb`, say."""
+    if not name.lower().endswith(".ipynb"):
+        return ""
     # Canvas numbers the files of later attempts.
     stem = re.sub(r"-\d+$", "", name[: -len(".ipynb")])
     fits = [e.notebook for e in sheet.exercises if stem.endswith(f"_{e.notebook}")]

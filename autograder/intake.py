@@ -15,13 +15,14 @@ from pathlib import Path, PurePosixPath
 
 from nbformat import NotebookNode
 
-from autograder import intake_attempts, intake_cells, intake_claims, submission
+from autograder import intake_attempts, intake_cells, intake_claims, roster, submission
 from autograder.beside import MAX_BYTES, Beside, files_beside
 from autograder.intake_claims import Claim
-from autograder.intake_files import NOTEBOOK, HandedIn, Item, look_through
+from autograder.intake_files import NOTEBOOK, HandedIn, Item, handed_out, look_through
 from autograder.intake_names import entry, listed, normal, quoted, shown
 from autograder.intake_zip import ArchiveError
 from autograder.submission import MAX_NOTEBOOK, SubmissionError
+from quizzes.record import read_plain
 
 ALIKE = 0.5
 """Part of a notebook's given cells that a file must have to be taken for it."""
@@ -64,6 +65,23 @@ class Found:
     notes: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     claimed: bool = False
+
+
+def of_student(
+    root: Path, assignment: str, student: str, released: Mapping[str, NotebookNode]
+) -> Intake:
+    """Return the intake of what a student has handed in to the course at ``root``.
+
+    ``released`` is as for `Intake`.
+    """
+    release = root / "release" / assignment
+    return Intake(
+        roster.folder(root, student) / assignment,
+        released,
+        intake_claims.of_student(root, assignment, student),
+        whose=f"{quoted(assignment)} {quoted(student)}",
+        given=handed_out(release),
+    )
 
 
 @dataclass(frozen=True)
@@ -133,6 +151,16 @@ class Intake:
     def proper(self, name: str) -> Path:
         """Return where a notebook belongs."""
         return entry(self._folder, f"{name}.ipynb")
+
+    def content(self, name: str) -> bytes:
+        """Return what the file holds that counts as a notebook; raises as `notebook`, or OSError.
+
+        Of one that is larger than any notebook, no more than that.
+        """
+        found = self.notebook(name)
+        if found.item is not None:
+            return found.item.read(MAX_NOTEBOOK + 1)
+        return read_plain(self.proper(name), MAX_NOTEBOOK + 1)
 
     def beside(self, found: Found) -> Beside:
         """Return the files that a notebook's code finds: also those of the folder it lay in."""

@@ -18,7 +18,7 @@ from filelock import FileLock
 from autograder import ledger
 from autograder.files import write_whole
 from autograder.intake_files import HandedIn
-from autograder.intake_names import entry
+from autograder.intake_names import entry, normal
 from autograder.submission import MAX_NOTEBOOK
 from course.errors import CourseError
 
@@ -62,10 +62,12 @@ def state(folder: Path, handed_in: HandedIn, proper: str, file: str) -> str:
 def of_student(root: Path, assignment: str, student: str) -> dict[str, Claim]:
     """Return {name of what is claimed: claim} of one submission.
 
+    A student's name may come in any form of Unicode: nbgrader's own commands take it from a folder.
+
     Raises:
         ClaimError: the file of claims is damaged.
     """
-    claims = _load(root).get(assignment, {}).get(student, {})
+    claims = _load(root).get(assignment, {}).get(normal(student), {})
     return {name: Claim(data["file"], data["state"]) for name, data in claims.items()}
 
 
@@ -80,7 +82,7 @@ def keep(root: Path, assignment: str, student: str, name: str, claim: Claim | No
     lock.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(lock):
         found = _load(root)
-        of_student = found.setdefault(assignment, {}).setdefault(student, {})
+        of_student = found.setdefault(assignment, {}).setdefault(normal(student), {})
         of_student.pop(name, None)
         if claim is not None:
             of_student[name] = asdict(claim)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from autograder import intake_claims, quiz_marks, roster, submission
+from autograder import nbgrader_bridge as bridge
 from autograder.intake_claims import Claim, ClaimError
 from autograder.intake_files import HandedIn, Item, look_through
-from autograder.intake_names import listed, quoted, same, shown
+from autograder.intake_names import listed, quoted, shown
 from autograder.intake_zip import ArchiveError
 from autograder.submission import MAX_NOTEBOOK
 from quizzes import record
@@ -27,8 +28,11 @@ def claim(
 
     Raises:
         ClaimError: there is no such thing; the message says what there is.
+        NotReadyError: the assignment's source is damaged.
         SubmissionError: what is claimed cannot be read as a notebook.
     """
+    from autograder.gradebook import CourseGradebook
+
     names = _names(root, assignment)
     if name not in names:
         raise ClaimError(
@@ -45,7 +49,7 @@ def claim(
             "Name one file, or say --nothing or --withdraw: there is "
             f"{_there(look_through(folder))}."
         )
-    student = next((s for s in _known(root) if same(s, student)), student)
+    student = CourseGradebook(root).roster().student(student)
     made = None if withdraw else _claim(folder, name, names[name], file)
     intake_claims.keep(root, assignment, student, name, made)
     again = f"`autograder grade {quoted(assignment)}` takes it into account"
@@ -67,7 +71,7 @@ def _names(root: Path, assignment: str) -> dict[str, str]:
         )
     found = {path.stem: path.name for path in notebooks}
     for path in notebooks:
-        for quiz in quiz_marks.in_cells(submission.read(path)):
+        for quiz in quiz_marks.in_cells(bridge.read_source(path)):
             found[f"{quiz_marks.PREFIX}{quiz}"] = record.filename(quiz)
     return found
 
@@ -98,10 +102,3 @@ def _require(item: Item, name: str) -> None:
 
 def _there(handed_in: HandedIn) -> str:
     return listed(item.place for item in handed_in.items) or "nothing"
-
-
-def _known(root: Path) -> list[str]:
-    """Return the ids of the gradebook, whose forms of names count."""
-    from autograder.gradebook import CourseGradebook
-
-    return sorted(CourseGradebook(root).roster().known)

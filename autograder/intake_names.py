@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import shlex
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from pathlib import Path
 
 LONGEST_SHOWN = 300
@@ -25,6 +25,16 @@ def normal(name: str) -> str:
 def same(one: str, other: str) -> bool:
     """Whether two names read the same."""
     return normal(one) == normal(other)
+
+
+def meant(name: str, known: Collection[str]) -> str:
+    """Return which of the ``known`` names one means: that, or else one that reads the same.
+
+    A name that means none of them comes back in the composed form.
+    """
+    if name in known:
+        return name
+    return next((other for other in sorted(known) if same(other, name)), normal(name))
 
 
 def entry(folder: Path, name: str) -> Path:

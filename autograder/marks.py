@@ -12,7 +12,7 @@ import io
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from autograder.database import of_cells
 from autograder.gradebook import CourseGradebook
 from autograder.insight import records
 from autograder.insight.exports import as_csv, guarded, is_formula
+from autograder.intake_names import meant
 from autograder.nbgrader_bridge import WORK_FOLDER
 from autograder.questions import Question
 from autograder.submission import SubmissionError
@@ -210,6 +211,7 @@ def enter(gradebook: CourseGradebook, path: Path) -> Entered:
     done: dict[str, list[str]] = {"marked": [], "already": [], "blank": [], "changed": []}
     with gradebook.opened() as book:
         grades = _grades(book, file.assignment, question)
+        file.rows = [replace(row, student=meant(row.student, grades)) for row in file.rows]
         faults = list(_faults(file, grades, question))
         if faults:
             shown = " ".join(faults[:MOST_FAULTS])

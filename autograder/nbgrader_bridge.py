@@ -278,13 +278,22 @@ def _original(
     coursedir: CourseDirectory, step: str, assignment: str, notebook: str
 ) -> NotebookNode:
     path = Path(coursedir.format_path(step, ".", assignment)) / f"{notebook}.ipynb"
+    if step == coursedir.source_directory:
+        return read_source(path)
+    return _instructors(path, f"autograder release {assignment}")
+
+
+def read_source(path: Path) -> NotebookNode:
+    """Return a notebook of an assignment's source; raises as `originals`."""
+    return _instructors(path, "autograder build")
+
+
+def _instructors(path: Path, command: str) -> NotebookNode:
+    """Return a notebook of the instructor's, which a ``command`` makes again."""
     try:
         return submission.read(path)
     except SubmissionError:
         wrong = "damaged" if path.exists() else "missing"
-        command = f"autograder release {assignment}"
-        if step == coursedir.source_directory:
-            command = "autograder build"
         raise NotReadyError(
             f"The instructor's {path} is {wrong}, so nothing can be graded: make it again with "
             f"`{command}`, then grade."

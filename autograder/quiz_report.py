@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from autograder import quiz_marks, quiz_sharing, submission
+from autograder import intake_attempts, quiz_marks
+from autograder import nbgrader_bridge as bridge
+from autograder.intake_names import normal
 from autograder.quiz_cli import QuizCommandError, as_course_errors
 from quizzes import record, sharing
 
@@ -73,13 +75,14 @@ def assignment_of(root: Path, name: str) -> str:
 
     Raises:
         QuizCommandError: several assignments have the quiz.
+        NotReadyError: the source of one is damaged.
     """
     source = root / "source"
     if (source / name).is_dir() or name not in quiz_marks.names(root):
         return name
     having = sorted({
         path.parent.name for path in source.glob("*/*.ipynb")
-        if name in quiz_marks.in_cells(submission.read(path))
+        if name in quiz_marks.in_cells(bridge.read_source(path))
     })  # fmt: skip
     if len(having) > 1:
         raise QuizCommandError(
@@ -97,26 +100,57 @@ def of_assignment(root: Path, assignment: str) -> list[QuizReport]:
         QuizMarksError: a bank is not sound.
         QuizCommandError: the reports cannot be written.
     """
-    submitted = sorted((root / "submitted").glob(f"*/{assignment}"))
-    folders = {folder.parent.name: folder for folder in submitted}
     reports = []
     for name in quiz_marks.names(root):
-        if any((folder / record.filename(name)).exists() for folder in folders.values()):
+        taken = _taken(root, assignment, name)
+        if taken.unread or any(content is not None for content in taken.contents.values()):
             bank = quiz_marks.find_bank(root, name)
-            reports.append(_report(bank, folders, root, assignment))
+            reports.append(_report(bank, taken, root / "reports" / assignment))
     return reports
 
 
-def _report(bank: Bank, folders: dict[str, Path], root: Path, assignment: str) -> QuizReport:
+@dataclass
+class _Taken:
+    """What the gradebook takes as a class's attempts at a quiz.
+
+    Attributes:
+        contents: {learner: what their file holds, or None if there is none}.
+        unread: a sentence for each whose file cannot be read.
+        asked: one for each about whom a person is asked.
+    """
+
+    contents: dict[str, bytes | None] = field(default_factory=dict)
+    unread: list[str] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+
+
+def _taken(root: Path, assignment: str, quiz: str) -> _Taken:
+    taken = _Taken()
+    for folder in sorted((root / "submitted").glob(f"*/{assignment}")):
+        learner = normal(folder.parent.name)
+        try:
+            found = intake_attempts.find(folder, quiz, learner, root)
+        except OSError as error:
+            name = record.filename(quiz)
+            taken.unread.append(f"{name} of {learner} cannot be read ({error.strerror or error}).")
+            continue
+        if found.question:
+            taken.asked.append(f"{learner}: {found.question}")
+        if found.content is not None or not found.question:
+            taken.contents[learner] = found.content
+    return taken
+
+
+def _report(bank: Bank, taken: _Taken, target: Path) -> QuizReport:
     from quizzes import insight  # plots take a moment to import
 
-    target = root / "reports" / assignment
     with as_course_errors():
-        collected = insight.collect(bank, folders)
-        shared = quiz_sharing.same_attempts(root, assignment, bank.quiz, folders)
+        collected = insight.collect(bank, taken.contents)
+        handed_in = {who: what for who, what in taken.contents.items() if what is not None}
+        shared = sharing.same_attempts(bank.quiz, handed_in)
         notes = [
             *(f"The same attempts were handed in by {', '.join(group)}." for group in shared),
-            *collected.notes,
+            *sorted([*collected.notes, *taken.unread, *taken.asked]),
         ]
         analysis = insight.analyse(bank, collected.results, notes)
         return QuizReport(analysis, insight.write(analysis, target), tuple(shared))

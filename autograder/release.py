@@ -29,8 +29,9 @@ def release(root: Path, assignment: str) -> Path:
     """Write the student version of ``assignment`` to ``release/``; return its folder.
 
     The release holds the notebooks, the questions of closed quizzes, and nothing else. It is made
-    beside the earlier one, and takes its place, in the gradebook, too, once nothing can go wrong
-    any more: a release that fails leaves everything as it was.
+    beside the earlier one, with a copy of the gradebook, and takes its place before the gradebook
+    itself is changed; if that fails after all, the earlier one stands again. So a release that
+    fails leaves everything as it was.
 
     Args:
         root: the nbgrader course root.
@@ -57,7 +58,9 @@ def release(root: Path, assignment: str) -> Path:
                     f"authoring/assignments/{assignment}, then build and release again."
                     f"{_as_before(released)}"
                 )
-            CourseGradebook(root, released=place).generate_assignment(assignment)
+            with _in_place(place / assignment, released, place):
+                # For the gradebook: nbgrader enters an assignment only by making its release.
+                CourseGradebook(root, released=place).generate_assignment(assignment)
         except GradebookError as error:
             if not error.reason:
                 raise
@@ -65,7 +68,6 @@ def release(root: Path, assignment: str) -> Path:
                 f"'{assignment}' is not released, because nbgrader says: {error.reason.rstrip('.')}"
                 f": {_way_out(error.reason, assignment)}{_as_before(released)}"
             ) from error
-        _put_in_place(place / assignment, released, place / "earlier")
     return released
 
 
@@ -204,8 +206,13 @@ def _place_beside(released: Path) -> Iterator[Path]:
         yield Path(name)
 
 
-def _put_in_place(made: Path, released: Path, earlier: Path) -> None:
-    """Have a release that was ``made`` take the place of the earlier one, which is moved away."""
+@contextmanager
+def _in_place(made: Path, released: Path, aside: Path) -> Iterator[None]:
+    """Have a release that was ``made`` take the place of the earlier one.
+
+    If the block fails, the earlier one stands there again: what was there is kept ``aside``.
+    """
+    earlier = aside / "earlier"
     try:
         if released.exists():
             released.rename(earlier)
@@ -217,6 +224,13 @@ def _put_in_place(made: Path, released: Path, earlier: Path) -> None:
             raise
     except OSError as error:
         raise _cannot_write(released, error) from error
+    try:
+        yield
+    except BaseException:
+        released.rename(aside / "withdrawn")
+        if earlier.exists():
+            earlier.rename(released)
+        raise
 
 
 def _cannot_write(path: Path, error: OSError) -> ReleaseError:

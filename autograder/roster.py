@@ -12,7 +12,7 @@ from pathlib import Path
 from autograder import intake_times
 from autograder.files import walk
 from autograder.intake_files import is_junk
-from autograder.intake_names import entry, listed, normal, same, shown
+from autograder.intake_names import entry, listed, meant, shown
 from autograder.intake_times import UnclearTimeError
 from quizzes.record import read_plain
 
@@ -41,6 +41,13 @@ class Roster:
     known: frozenset[str] = frozenset()
     closed: bool = False
 
+    def student(self, name: str) -> str:
+        """Return the id that a name means, of a folder or as typed: macOS writes letters otherwise.
+
+        Every command takes names by this, so that all of them mean the same student.
+        """
+        return meant(name, self.known)
+
 
 def submissions(
     root: Path, assignment: str, roster: Roster, assignments: Collection[str] = ()
@@ -54,7 +61,7 @@ def submissions(
     for folder in _folders(root / "submitted"):
         problem = _misplaced(folder, assignment, assignments)
         if not problem and (folder / assignment).is_dir():
-            student = _student(folder.name, roster)
+            student = roster.student(folder.name)
             problem = _bad_id(folder.name) or _stranger(student, roster)
             if not problem and student in good:
                 problem = wrong[good[student]] = (
@@ -66,13 +73,6 @@ def submissions(
         if problem:
             wrong[folder.name] = problem
     return sorted(s for s, name in good.items() if name not in wrong), wrong
-
-
-def _student(name: str, roster: Roster) -> str:
-    """Return the id of the student whose folder has a ``name``: macOS writes letters otherwise."""
-    if name in roster.known:
-        return name
-    return next((known for known in sorted(roster.known) if same(known, name)), normal(name))
 
 
 def folder(root: Path, student: str) -> Path:

@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
+from secrets import token_hex
 
 from autograder import roster, screen
 from autograder.beside import named
@@ -82,19 +83,28 @@ class _LeftOut:
 
 
 def copy_marks(submitted: Path, staged: Path, zone: str = "") -> None:
-    """Copy when a submission was handed in, and the exchange's secret, as far as they are sound.
+    """Copy when a submission was handed in, and the exchange's secret.
 
-    ``zone`` is the course's own time zone (see `roster.timestamp`).
+    What came through the exchange has both, and nbgrader releases nobody's feedback if one student
+    lacks either. So a time that is not clear is left empty, which nbgrader takes for unknown, and
+    for a secret that is not sound there is one that nobody knows: nobody else's page is found by
+    it. ``zone`` is the course's own time zone (see `roster.timestamp`).
     """
-    time = roster.timestamp(submitted / TIME, zone)
-    if time is not None:
-        (staged / TIME).write_text(time, encoding="utf-8")
-    try:
-        secret = read_plain(submitted / SECRET, MAX_SECRET + 1)
-    except OSError:
+    if not any(os.path.lexists(submitted / name) for name in (TIME, SECRET)):
         return
-    if len(secret) <= MAX_SECRET:
-        (staged / SECRET).write_bytes(secret)
+    time = roster.timestamp(submitted / TIME, zone)
+    (staged / TIME).write_text(time or "", encoding="utf-8")
+    (staged / SECRET).write_bytes(_secret(submitted / SECRET) or token_hex().encode())
+
+
+def _secret(path: Path) -> bytes:
+    """Return the exchange's secret; nothing if there is none that is sound."""
+    try:
+        secret = read_plain(path, MAX_SECRET + 1)
+        secret.decode()
+    except (OSError, UnicodeError):
+        return b""
+    return secret if len(secret) <= MAX_SECRET else b""
 
 
 def copy_files(

@@ -75,18 +75,6 @@ def read_plain(path: Path, most: int) -> bytes:
         return file.read(most)
 
 
-def handed_in(folder: Path, quiz: str) -> bytes:
-    """Return what a submission's file of attempts holds, but not much more than is ever marked.
-
-    A link is not followed, and what is no plain file is not waited for.
-
-    Raises:
-        FileNotFoundError: there is no such file.
-        OSError: it cannot be read.
-    """
-    return read_plain(folder / filename(quiz), MAX_FILE + 1)
-
-
 def parse(content: bytes) -> tuple[list[Attempt], int]:
     """Return the attempts in a file's content, and how many of its lines are none."""
     attempts, damaged = [], 0

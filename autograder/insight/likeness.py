@@ -31,7 +31,7 @@ def texts_of(data: ClassData, given: GivenText) -> tuple[dict[str, dict[str, Own
     unread = []
     for grade in data.grades:
         folder = roster.folder(data.root, grade.student) / data.assignment
-        notebooks = {**_found_elsewhere(data, grade.student), **_notebooks(folder, names)}
+        notebooks = {**_notebooks(folder, names), **_graded(data, grade.student)}
         if not notebooks:
             unread.append(grade.student)
             continue
@@ -86,8 +86,11 @@ def _notebooks(folder: Path, names: list[str]) -> dict[str, NotebookNode]:
     return notebooks
 
 
-def _found_elsewhere(data: ClassData, student: str) -> dict[str, NotebookNode]:
-    """Return what was handed in under other names, as it was graded."""
+def _graded(data: ClassData, student: str) -> dict[str, NotebookNode]:
+    """Return what was graded, under whichever name it was handed in.
+
+    Its cells are recognised: one that came without metadata says there which it is.
+    """
     records = data.records.get(student, {})
     read = [name for name, record in records.items() if not record.unreadable]
     return _notebooks(data.root / "autograded" / student / data.assignment, read)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
 from quizzes import record, regrade
 from quizzes.bank import Bank
@@ -24,25 +23,21 @@ class ClassResults:
     notes: tuple[str, ...]
 
 
-def collect(bank: Bank, folders: Mapping[str, Path]) -> ClassResults:
-    """Read and mark the attempts of a class.
+def collect(bank: Bank, contents: Mapping[str, bytes | None]) -> ClassResults:
+    """Mark the attempts of a class.
 
     Args:
         bank: the quiz.
-        folders: for each learner the folder of their submission.
+        contents: {learner: content of the attempts file, or None if there is none}.
     """
     results: dict[str, Result] = {}
     notes = []
     name = record.filename(bank.quiz)
-    for learner, folder in sorted(folders.items()):
-        try:
-            marked = regrade.mark_file(bank, record.handed_in(folder, bank.quiz))
-        except FileNotFoundError:
+    for learner, content in sorted(contents.items()):
+        if content is None:
             notes.append(f"{learner} has handed in no {name}.")
             continue
-        except OSError as error:
-            notes.append(f"{name} of {learner} cannot be read ({error.strerror or error}).")
-            continue
+        marked = regrade.mark_file(bank, content)
         if marked.first is not None:
             results[learner] = marked.first
         elif marked.other_edition:

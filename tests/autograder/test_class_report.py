@@ -14,10 +14,11 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
+import nbformat
 import numpy as np
 import pytest
 
-from autograder import exercises, points, questions
+from autograder import exercises, points, questions, submission
 from autograder.database import GradebookUnusable
 from autograder.gradebook import Grade
 from autograder.insight import (
@@ -602,6 +603,31 @@ def test_who_handed_in_in_another_place_is_asked_about_and_gets_no_zero(
     [need] = [need for need in needs.people_needed(data) if "zoe" in need.students]
     assert need.urgent
     assert "There is a submission but no grade" in need.why
+
+
+def test_answers_of_notebooks_that_came_without_metadata_are_compared(graded: Path) -> None:
+    cell = "qos-explanation-loss"
+    mine = (
+        "A frame that is lost stays lost with best effort; my driver keeps the five newest ones, "
+        "so the operator sees at most half a second of old pictures before the live view is back."
+    )
+    for student in ("ann", "cy"):
+        copy = graded / "autograded" / student / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
+        notebook = submission.read(copy)
+        [answer] = [c for c in notebook.cells if submission.grade_id(c) == cell]
+        answer.source = mine
+        copy.chmod(0o644)
+        nbformat.write(notebook, copy)
+        for one in notebook.cells:
+            one.metadata = nbformat.from_dict({})
+        handed_in = graded / "submitted" / student / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
+        nbformat.write(notebook, handed_in)
+    report = reports.make(graded, ASSIGNMENT)
+    where = likeness.called(
+        questions.title_of_notebook(ASSIGNMENT, NOTEBOOK), report.data.questions[NOTEBOOK][cell]
+    )
+    pairs = [pair for pair in report.alike.pairs if pair.where == where]
+    assert pairs == [similarity.Pair("ann", "cy", 1.0, where)]
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+import shutil
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -130,6 +131,29 @@ def test_canvas_gets_files_under_the_names_that_it_gave_with_what_the_names_say(
     assert "HIDDEN TESTS" not in text
     assert 'part="hidden"' not in text
     assert not any("nbgrader" in cell.metadata for cell in notebook.cells)
+
+
+def test_canvas_gets_feedback_on_what_was_taken_whatever_its_name(
+    graded: Path, tmp_path: Path
+) -> None:
+    names = {"ann": "my work.ipynb", "bob": "work.json", "cy": "broken.ipynb"}
+    folder = tmp_path / "submissions"
+    folder.mkdir()
+    for number, (student, name) in enumerate(names.items(), 11):
+        own = graded / "submitted" / student / ASSIGNMENT
+        (own / f"{NOTEBOOK}.ipynb").rename(own / name)
+        shutil.copyfile(own / name, folder / f"{student}_{number}_9{number}_{name}")
+    (graded / "submitted" / "cy" / ASSIGNMENT / "other.ipynb").write_text("{}")
+    (folder / "cy_13_914_other.ipynb").write_text("{}")
+    done = feedback_zip.pack(graded, ASSIGNMENT, "canvas", folder, tmp_path / "out.zip")
+    assert done.students == ("ann", "bob", "cy")
+    with zipfile.ZipFile(done.path) as file:
+        assert set(file.namelist()) == {
+            "ann_11_911_my work.ipynb", "bob_12_912_work.json", "cy_13_913_broken.ipynb",
+        }  # fmt: skip
+        for name in file.namelist():
+            notebook = nbformat.reads(file.read(name).decode(), 4)
+            assert "QoS profile design: feedback" in notebook.cells[0].source
 
 
 def test_a_number_of_the_platform_or_an_address_says_who_it_is() -> None:

@@ -294,6 +294,7 @@ def test_an_assignment_that_is_not_released_says_so(course: Course) -> None:
         ("release", None, "missing", "autograder release ch05"),
         ("release", "{", "damaged", "autograder release ch05"),
         ("source", None, "missing", "autograder build"),
+        ("source", "{", "damaged", "autograder build"),
     ],
 )
 def test_what_the_instructor_lacks_is_not_blamed_on_a_submission(

@@ -17,12 +17,13 @@ from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 from typer.testing import CliRunner
 
-from autograder import cli, engine, grades_csv, submission
+from autograder import cli, engine, grades_csv, quiz_report, submission
 from autograder.build import build
 from autograder.corpus import Case
 from autograder.gradebook import CourseGradebook, Grade
 from autograder.insight import exports, needs
 from autograder.insight.collect import collect
+from autograder.nbgrader_bridge import NotReadyError
 from autograder.release import release
 from course.content import content_root, copy_authoring
 from tests.machine import needs_sandbox
@@ -251,6 +252,17 @@ def test_a_claim_of_no_assignment_names_those_there_are(tmp_path: Path, course: 
         cli.app, ["claim", "ch06", "ana", "x", "y", "--root", str(course.root)]
     )
     assert "there is 'ch05'" in str(done.exception)
+
+
+def test_a_damaged_source_is_not_blamed_on_what_is_claimed(course: Course) -> None:
+    (course.folder("ana") / "a.ipynb").write_text("{")
+    (course.root / "source" / ASSIGNMENT / f"{NOTEBOOK}.ipynb").write_text("{")
+    said = claim(course, "ana", NOTEBOOK, "a.ipynb")
+    assert f"The instructor's {course.root}/source/{ASSIGNMENT}/{NOTEBOOK}.ipynb is damaged" in said
+    assert "make it again with `autograder build`" in said
+    (course.root / "source" / ASSIGNMENT).rename(course.root / "source" / "week-7")
+    with pytest.raises(NotReadyError, match=r"week-7/.* is damaged.*`autograder build`"):
+        quiz_report.assignment_of(course.root, "ch05")  # as a quiz's name
 
 
 def test_nbgraders_own_command_asks_where_it_would_give_zero(

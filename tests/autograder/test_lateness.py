@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import unicodedata
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -155,6 +156,27 @@ def test_an_extension_may_come_before_the_work(course: Course, class_: Undisturb
     extensions.extend(course.root, ASSIGNMENT, ["early"], 0)
     _, found = again(course)
     assert found["early"].score == 0, "an extension that is taken away stays away"
+
+
+@pytest.mark.parametrize(("typed", "written"), [("NFC", "NFD"), ("NFD", "NFC"), ("NFD", "NFD")])
+def test_a_name_is_the_same_student_in_either_form_of_unicode(
+    course: Course, class_: Undisturbed, typed: str, written: str
+) -> None:
+    typed, written, name = (unicodedata.normalize(f, "Müller") for f in (typed, written, "NFC"))
+    configure(course, "\nc.LateSubmissionPlugin.penalty_method = 'zero'\n")
+    due(course, 2)
+    course.submit(written, (course.folder("right") / f"{NOTEBOOK}.ipynb").read_text())
+    (course.folder(written) / "timestamp.txt").write_text(f"{HANDED_IN} UTC")
+    [granted] = extensions.extend(course.root, ASSIGNMENT, [typed], 2.5)
+    assert (granted.student, granted.waits) == (name, True)
+    seen, found = again(course, typed)
+    assert seen.entered == [name]
+    assert found[name].score == class_.grades["right"].score, "it has its extension"
+    [granted] = extensions.extend(course.root, ASSIGNMENT, [typed], 0)
+    assert (granted.student, granted.waits) == (name, False)
+    only = ("--student", typed, "--root", str(course.root), "--json")
+    said = autograder("grade", ASSIGNMENT, *only, cwd=course.root.parent, timeout=600).stdout
+    assert [(g["student"], g["score"]) for g in json.loads(said)["grades"]] == [(name, 0)]
 
 
 def test_an_extension_that_makes_no_sense_is_one_sentence(course: Course) -> None:

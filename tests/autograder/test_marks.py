@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import unicodedata
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -115,6 +116,19 @@ def test_a_row_whose_answer_or_mark_has_changed_since_is_left_out_and_named(grad
     assert entry(graded, "bob")[:2] == (None, True)
     assert entry(graded, "cy")[:2] == (1.0, False)
     assert entry(graded, "ann")[0] == 1.0
+
+
+def test_a_spreadsheet_may_write_a_name_in_the_other_form_of_unicode(graded: Path) -> None:
+    name = unicodedata.normalize("NFC", "Müller")
+    file = exported(graded)
+    with Gradebook(f"sqlite:///{graded / 'gradebook.db'}") as book:
+        book.add_student(name)
+        with book.db.no_autoflush:
+            book.add_submission(ASSIGNMENT, name)
+    other = unicodedata.normalize("NFD", name)
+    fill_in(file, lambda row: {**row, "student": other, "points": "1"}
+            if row["student"] == "cy" else row)  # fmt: skip
+    assert marks.enter(CourseGradebook(graded), file).changed == (name,), "no answer was exported"
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,12 @@ from zipfile import ZipFile
 
 import pytest
 
-from autograder import cli, quiz_report
+from autograder import cli, intake_claims, quiz_report
 from autograder.gradebook import Grade
 from autograder.insight import needs
 from autograder.insight.collect import ClassData
+from autograder.intake_claims import Claim
+from autograder.intake_files import look_through
 from quizzes import loader, marking, model, record, schema, sharing
 from quizzes.record import Attempt, Given
 
@@ -207,6 +209,34 @@ def test_a_classs_quiz_is_analysed(tmp_path: Path) -> None:
     dealt = {i.variant.id for s in ("ann", "ben") for i in model.draw(BANK, s, 1).items}
     assert items.row_count == len(BANK.concepts) + len(dealt)
     assert beliefs.row_count == 0
+
+
+def test_attempts_that_the_gradebook_takes_are_in_the_report_whatever_their_name(
+    tmp_path: Path,
+) -> None:
+    places = {who: hand_in(tmp_path, who) for who in ("ann", "ben", "cem", "dee", "eli", "fay")}
+    places["ann"].rename(places["ann"].with_name("my attempts.jsonl"))
+    with ZipFile(places["ben"].with_name("hand-in.zip"), "w") as archive:
+        archive.write(places["ben"], f"work/{places['ben'].name}")
+    places["ben"].unlink()
+    places["cem"].rename(places["cem"].with_name("saved.bin"))
+    folder = places["cem"].parent
+    state = intake_claims.state(folder, look_through(folder), places["cem"].name, "saved.bin")
+    claim = Claim("saved.bin", state)
+    intake_claims.keep(tmp_path, "ch05-quiz", "cem", "quiz-ch05", claim)
+    places["dee"].write_bytes(places["ann"].with_name("my attempts.jsonl").read_bytes())
+    places["eli"].rename(places["eli"].with_name("attempts.docx"))
+    places["eli"].with_name("attempts.docx").write_bytes(b"PK")
+    places["fay"].unlink()
+    places["fay"].symlink_to(places["dee"])
+    [report] = quiz_report.of_assignment(tmp_path, "ch05-quiz")
+    assert report.analysis.learners == 4
+    notes = {note.split(":")[0]: note for note in report.analysis.notes}
+    assert "login of 'ann'" in notes["dee"]
+    assert "there is 'attempts.docx'" in notes["eli"]
+    assert not any("handed in no" in note for note in notes)
+    assert any("of fay cannot be read" in note for note in notes)
+    assert report.shared == (("ann", "dee"),)
 
 
 def test_an_assignment_without_a_quiz_has_no_report(tmp_path: Path) -> None:

@@ -18,6 +18,8 @@ import pytest
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 
+from autograder import gradebook
+from autograder.database import GradebookLockedError
 from autograder.release import ReleaseError, leaks, release
 from course.student_version import student_versions
 
@@ -180,6 +182,7 @@ def test_what_nbgrader_refuses_once_work_is_graded_is_said_with_the_way_out(
 def test_a_release_that_cannot_be_put_in_place_leaves_the_old_one(
     root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    change(root / "source" / "ch05" / "qos-design.ipynb", "qos-visible", "\n# another test")
     before = state(root)
     rename = Path.rename
 
@@ -192,6 +195,29 @@ def test_a_release_that_cannot_be_put_in_place_leaves_the_old_one(
     with pytest.raises(ReleaseError, match=r"cannot be replaced \(No space left"):
         release(root, "ch05")
     assert state(root) == before
+    monkeypatch.undo()
+    release(root, "ch05")
+    after = state(root)
+    assert [name for name in before if after[name] != before[name]] == [
+        "release/ch05/qos-design.ipynb", "gradebook",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("released_before", [True, False])
+def test_a_gradebook_that_cannot_be_written_leaves_the_old_release(
+    root: Path, monkeypatch: pytest.MonkeyPatch, released_before: bool
+) -> None:
+    change(root / "source" / "ch05" / "qos-design.ipynb", "qos-visible", "\n# another test")
+    if not released_before:
+        shutil.rmtree(root / "release" / "ch05")
+    before = state(root)
+    monkeypatch.setattr(gradebook, "LOCK_PATIENCE", 0.0)
+    with closing(sqlite3.connect(root / "gradebook.db")) as other:
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(GradebookLockedError):
+            release(root, "ch05")
+    assert state(root) == before
+    assert [path.name for path in (root / "release").iterdir()] == ["ch05"] * released_before
 
 
 def test_what_a_killed_release_leaves_is_cleared_away(root: Path) -> None:

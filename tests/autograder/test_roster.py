@@ -8,7 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from autograder import roster
+from autograder import intake_claims, roster
+from autograder.extension_store import WaitingExtensions
+from autograder.intake_claims import Claim
 from autograder.roster import Roster
 
 
@@ -128,6 +130,21 @@ def test_a_decomposed_folder_name_is_the_student_of_the_roster(submitted: Path) 
     for people in (Roster(), Roster(frozenset({"alice", MUELLER}), closed=True)):
         assert roster.submissions(root, "ch05", people) == ([MUELLER, "alice"], {})
     assert (roster.folder(root, MUELLER) / "ch05").is_dir()
+
+
+@pytest.mark.parametrize(("kept", "asked"), [("NFC", "NFD"), ("NFD", "NFC")])
+def test_what_waits_for_a_student_is_found_in_either_form_of_the_name(
+    tmp_path: Path, kept: str, asked: str
+) -> None:
+    kept, asked = unicodedata.normalize(kept, MUELLER), unicodedata.normalize(asked, MUELLER)
+    waiting = WaitingExtensions(tmp_path, "ch05")
+    waiting.put(kept, 2.0)
+    assert waiting.of(asked) == 2.0
+    waiting.put(asked, 0)
+    assert waiting.of(kept) == 0
+    claim = Claim("a.ipynb", "state")
+    intake_claims.keep(tmp_path, "ch05", kept, "qos", claim)
+    assert intake_claims.of_student(tmp_path, "ch05", asked) == {"qos": claim}
 
 
 def test_two_folders_whose_names_read_the_same_are_two(submitted: Path) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import nbformat
 import pytest
+from nbgrader.api import Gradebook
 
 from autograder import engine, staging
 from autograder.corpus import Case
@@ -94,17 +95,29 @@ def test_every_file_is_where_nbgrader_itself_puts_it(beside: Course, tmp_path: P
 def test_the_exchange_hands_feedback_out_to_whoever_has_the_secret(
     beside: Course, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    beside.submit("bob", "{")  # what cannot be run has feedback, too
-    for name in ("timestamp.txt", "submission_secret.txt"):
-        shutil.copy(beside.folder("ada") / name, beside.folder("bob"))
-    (beside.folder("bob") / "submission_secret.txt").write_text("b0" * 64)
+    # What cannot be run has feedback, too, and nobody's marks of the exchange stop the others.
+    for student, (time, secret) in {
+        "bob": (b"2030-01-31 12:00:00.000000 UTC", b"b0" * 64),
+        "cy": (b"01/02/2030 12:00", b"c" * 9),
+        "dan": (b"", b"\xff"),
+        "eve": (b"2030-01-31 12:00 UTC", b"e" * 2000),
+    }.items():
+        beside.submit(student, "{")
+        (beside.folder(student) / "timestamp.txt").write_bytes(time)
+        (beside.folder(student) / "submission_secret.txt").write_bytes(secret)
+    beside.submit("fay", "{")
+    (beside.folder("fay") / "submission_secret.txt").write_bytes(b"f" * 9)
     engine.grade(beside.root, ASSIGNMENT)
+    with Gradebook(f"sqlite:///{beside.root / 'gradebook.db'}") as book:
+        assert book.find_submission(ASSIGNMENT, "cy").timestamp is None, "nobody is late by it"
     exchange, cache = tmp_path / "exchange", tmp_path / "cache" / "ros2-course"
     exchange.mkdir()
     monkeypatch.setenv("JUPYTER_DATA_DIR", str(tmp_path))
     options = (f"--Exchange.root={exchange}", f"--Exchange.cache={cache.parent}")
     done = nbgrader(beside, "release_feedback", ASSIGNMENT, *options)
     assert done.returncode == 0, done.stderr
+    for student in ("ada", "bob", "cy", "dan", "eve", "fay"):
+        assert f"Releasing feedback for student '{student}'" in done.stderr
 
     mine = cache / f"ada+{ASSIGNMENT}+2030-01-31 12:00:00.000000 UTC"
     shutil.copytree(beside.folder("ada"), mine)
@@ -115,6 +128,9 @@ def test_the_exchange_hands_feedback_out_to_whoever_has_the_secret(
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     (page,) = home.rglob("*.html")
+    assert "All exercises of this assignment" not in page.read_text(), "it would lead nowhere"
+    assert "15 of 20 points so far" in page.read_text()
+    assert (beside.root / "feedback" / "ada" / ASSIGNMENT / "index.html").is_file()
     assert (
         page.read_bytes()
         == (beside.root / "feedback" / "ada" / ASSIGNMENT / f"{NOTEBOOK}.html").read_bytes()
@@ -134,7 +150,10 @@ def test_what_is_not_copied_is_said(tmp_path: Path) -> None:
     (submitted / "submission_secret.txt").symlink_to("/etc/hostname")
     staging.copy_marks(submitted, staged)
     said = staging.copy_files(submitted, staged, LIMITS, [NOTEBOOK])
-    assert sorted(path.name for path in staged.rglob("*")) == ["a", "b"]
+    marks = ["submission_secret.txt", "timestamp.txt"]
+    assert sorted(path.name for path in staged.rglob("*")) == ["a", "b", *marks]
+    assert len((staged / "submission_secret.txt").read_text()) == 64, "it is one that nobody knows"
+    assert (staged / "timestamp.txt").read_text() == ""
     assert said == [
         "'secret' is missing in the graded copy and the feedback: a link is not followed.",
         "'c', 'large' is missing in the graded copy and the feedback: it is too large.",
