@@ -16,6 +16,7 @@ from autograder import (
     intake_cells,
     intake_claims,
     ledger,
+    questions,
     quiz_marks,
     roster,
     runner,
@@ -99,7 +100,8 @@ class Desk:
         self.root = gradebook.root
         self.work_folder = self.root / bridge.WORK_FOLDER
         self._trust = trust
-        self._marks = Marks(self.work_folder, assignment)
+        asked = questions.known(gradebook.coursedir, assignment)
+        self._marks = Marks(self.work_folder, assignment, asked)
         self._originals = {
             name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
         }
