@@ -240,6 +240,25 @@ def test_what_was_not_examined_is_no_failure() -> None:
     assert "the grader itself failed" in y.advice
 
 
+def test_every_figure_says_of_how_many_it_is() -> None:
+    data = class_of({
+        "ada": [result("x", "passed"), result("y", "not_checked")],
+        "bob": [result("x", "failed"), result("y", "passed")],
+        "cy": [result("x", "passed"), result("y", "grader_error")],
+    })  # fmt: skip
+    nothing: dict[str, dict[str, OwnText]] = {}
+    report = reports.ClassReport(
+        data, figures.checks(data), figures.times(data), [], [],
+        likeness.compare(data, nothing, NOTHING_GIVEN, 0.9), nothing, NOTHING_GIVEN, 0.9, (),
+        means.Means((), (), ()),
+    )  # fmt: skip
+    scores, checks, times = re.findall(r"<svg.*?</svg>", pages.page(report), re.DOTALL)
+    assert ">points (n = 3)</text>" in scores
+    assert ">seconds that a submission took (n = 3)</text>" in times
+    rows = re.findall(r">n = (\d)</text>", checks)
+    assert rows == ["3", "3", "3", "1"], "submissions by check, then those that it was examined on"
+
+
 @pytest.mark.parametrize(
     ("asked", "called"),
     [({"qos-visible": "Checks in the notebook"}, "Checks in the notebook"), ({}, "qos-visible")],

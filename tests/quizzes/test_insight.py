@@ -294,8 +294,10 @@ def test_the_plots_show_the_figures_and_say_in_words_what_they_are(
     assert "discrimination" in plots[1]
     rows = list(csv.DictReader(written["quiz-ch05-items.csv"].splitlines()))
     drawn = [row for row in rows if row["kind"] != "concept" and row["discrimination"]]
-    numbers = re.findall(r">(\d)</text>", plots[1])
-    assert len(numbers) == len(drawn)
+    numbers = re.findall(r">\d \(n = (\d+)\)</text>", plots[1])
+    assert numbers == [row["learners"] for row in drawn]
+    assert ">points in the first attempt (n = 60)</text>" in plots[0]
+    assert re.search(r">\d+ of \d+</text>", plots[2])
 
 
 def test_page_and_csv_have_the_same_figures(written: dict[str, str]) -> None:
