@@ -16,6 +16,7 @@ from autograder import (
     intake_cells,
     intake_claims,
     ledger,
+    questions,
     quiz_marks,
     roster,
     runner,
@@ -100,7 +101,8 @@ class Desk:
         self.work_folder = self.root / bridge.WORK_FOLDER
         self._trust = trust
         self._class = gradebook.roster().known
-        self._marks = Marks(self.work_folder, assignment)
+        asked = questions.known(gradebook.coursedir, assignment)
+        self._marks = Marks(self.work_folder, assignment, asked)
         self._originals = {
             name: bridge.originals(gradebook.coursedir, assignment, name) for name in notebooks
         }

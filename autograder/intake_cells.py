@@ -62,12 +62,12 @@ class _Recognition(Answers):
         if len(self.taken) > len(self.reference) / 2:
             self.said.notes.append(LOST)
         elif self.taken:
-            named = ", ".join(f"'{name}'" for name in self.taken)
+            named = ", ".join(f"'{self.called(name)}'" for name in self.taken)
             self.said.notes.append(
                 f"Cells had lost nbgrader's marks and were recognised by what stands in them and "
                 f"where: {named}."
             )
-        for name in self.moved:
+        for name in map(self.called, self.moved):
             self.said.notes.append(f"Your answer to '{name}' stood in a cell beside it; it counts.")
         return self.said
 
@@ -111,7 +111,10 @@ class _Recognition(Answers):
         made = [self._piece(cell, source, of) for source, of in pieces if source.strip()]
         at = next(number for number, one in enumerate(self.cells) if one is cell)
         self.cells[at : at + 1] = made
-        self.said.notes.append(f"The cell '{name}' was merged with others; they were taken apart.")
+        called = self.called(name)
+        self.said.notes.append(
+            f"The cell '{called}' was merged with others; they were taken apart."
+        )
         return True
 
     def _piece(self, cell: NotebookNode, source: str, name: str) -> NotebookNode:

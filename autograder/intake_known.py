@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import nbformat
 from nbformat import NotebookNode
 
+from autograder import questions
 from autograder.submission import grade_id, is_locked, metadata
 
 LONGEST_ANSWER = 100_000
@@ -49,6 +50,7 @@ class Cells:
     def __init__(self, submitted: NotebookNode, released: NotebookNode) -> None:
         """Look at ``submitted``, which is changed on the way."""
         self.submitted = submitted
+        self._released = released
         self.reference = {grade_id(cell): cell for cell in released.cells if grade_id(cell)}
         self.answers = [name for name, cell in self.reference.items() if is_answer(cell)]
         self.work = [
@@ -64,6 +66,11 @@ class Cells:
         """All cells, in order."""
         cells: list[NotebookNode] = self.submitted.cells
         return cells
+
+    def called(self, name: str) -> str:
+        """Return what a cell is called: by its question, or by its grade id if it has none."""
+        question = questions.of_notebook(self._released, "").get(name)
+        return question.title if question else name
 
     def known(self) -> set[str]:
         """Return the grade ids that are there."""

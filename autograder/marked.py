@@ -19,8 +19,9 @@ from urllib.parse import unquote
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook, MissingEntry
 
-from autograder import staging, submission
+from autograder import questions, staging, submission
 from autograder.files import walk, write_whole
+from autograder.questions import Asked
 from autograder.submission import SubmissionError
 
 FOLDER = "marked"
@@ -90,20 +91,27 @@ def changes(before: MarkedCells, after: MarkedCells, *, same: bool) -> dict[Cell
     return found
 
 
-def remark(asked: Mapping[CellName, str]) -> str:
-    """Return the sentence that says what must be marked again, and why; empty if nothing."""
+def remark(asked: Mapping[str, str]) -> str:
+    """Return the sentence that says what must be marked again, and why; empty if nothing.
+
+    ``asked`` is {what the answer is called: why}.
+    """
     if not asked:
         return ""
-    cells = ", ".join(f"{cell} ({why})" for (_, cell), why in asked.items())
-    return f"To be marked again: {cells}."
+    answers = ", ".join(f"{called} ({why})" for called, why in asked.items())
+    return f"To be marked again: {answers}."
 
 
 class Marks:
     """The marks that people gave for one assignment, while nbgrader enters submissions again."""
 
-    def __init__(self, work: Path, assignment: str) -> None:
-        """Keep in the folder ``work`` what a run that is ended in between must not lose."""
+    def __init__(self, work: Path, assignment: str, asked: Asked) -> None:
+        """Keep in the folder ``work`` what a run that is ended in between must not lose.
+
+        The questions ``asked`` are what answers are called by.
+        """
         self._assignment = assignment
+        self._questions = asked
         self._folder = work / FOLDER / assignment
 
     def remember(self, book: Gradebook, student: str, copy: Path) -> None:
@@ -147,7 +155,10 @@ class Marks:
                 grade.needs_manual_grade = False
         book.db.commit()
         self._path(student).unlink(missing_ok=True)
-        return remark(asked)
+        return remark({
+            questions.called(self._questions, self._assignment, *name): why
+            for name, why in asked.items()
+        })  # fmt: skip
 
     def kept(self, student: str) -> MarkedCells:
         """Return what is remembered of a student who is not entered yet."""

@@ -18,6 +18,7 @@ from nbgrader.coursedir import CourseDirectory
 
 from autograder import cells, points, submission
 from autograder.quiz_marks import PREFIX
+from autograder.submission import SubmissionError
 from quizzes import rendering
 
 PARTS = {"visible": "Checks in the notebook", "hidden": "Checks at grading"}
@@ -51,6 +52,10 @@ class Question:
     rules: str = ""
     model: str = ""
     stub: str = ""
+
+
+Asked = Mapping[str, Mapping[str, Question]]
+"""The questions of an assignment: {notebook: {grade id: question}}."""
 
 
 @dataclass
@@ -92,6 +97,21 @@ def of_assignment(coursedir: CourseDirectory, assignment: str) -> dict[str, dict
         path.stem: dict(_of_file(path, path.stat().st_mtime_ns))
         for path in sorted(folder.glob("*.ipynb"))
     }
+
+
+def known(coursedir: CourseDirectory, assignment: str) -> dict[str, dict[str, Question]]:
+    """Return what `of_assignment` does, and nothing where the source cannot be read."""
+    try:
+        return of_assignment(coursedir, assignment)
+    except (SubmissionError, OSError):
+        return {}  # then cells are called by their grade ids: better than no word about them
+
+
+def called(asked: Asked, assignment: str, notebook: str, grade_id: str) -> str:
+    """Return what a graded cell is called where the reader does not see its exercise."""
+    question = asked.get(notebook, {}).get(grade_id)
+    exercise = title_of_notebook(assignment, notebook)
+    return f"“{question.title if question else grade_id}” of {exercise}"
 
 
 def title_of_notebook(assignment: str, notebook: str) -> str:

@@ -22,7 +22,6 @@ from nbgrader.coursedir import CourseDirectory
 from autograder import questions
 from autograder.database import of_cells
 from autograder.questions import Question
-from autograder.submission import SubmissionError
 from course.plain import counted
 
 
@@ -138,7 +137,7 @@ def read(gradebook: Gradebook, coursedir: CourseDirectory, assignment: str, stud
         MissingEntry: there is no such submission.
     """
     submission = gradebook.find_submission(assignment, student)
-    asked = _questions(coursedir, assignment)
+    asked = questions.known(coursedir, assignment)
     worth = gradebook.db.query(Notebook.name, SubmittedNotebook.late_submission_penalty)
     worth = worth.join(SubmittedNotebook, SubmittedNotebook.notebook_id == Notebook.id)
     worth = worth.filter(SubmittedNotebook.assignment_id == submission.id)
@@ -211,13 +210,6 @@ def _rows(
     query = of_cells(gradebook.db, kind, *columns)
     query = query.filter(SubmittedAssignment.id == submission.id)
     return [tuple(row)[1:] for row in query]
-
-
-def _questions(coursedir: CourseDirectory, assignment: str) -> dict[str, dict[str, Question]]:
-    try:
-        return questions.of_assignment(coursedir, assignment)
-    except (SubmissionError, OSError):
-        return {}  # then cells are called by their grade ids: better than no feedback
 
 
 def _ordered(found: dict[str, Line], asked: dict[str, Question]) -> list[Line]:

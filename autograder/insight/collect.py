@@ -17,7 +17,6 @@ from autograder.intake_names import normal
 from autograder.nbgrader_bridge import WORK_FOLDER
 from autograder.questions import Question
 from autograder.roster import Roster
-from autograder.submission import SubmissionError
 from quizzes.errors import guess
 
 
@@ -120,7 +119,7 @@ def collect(root: Path, assignment: str) -> ClassData:
         gradebook.root, assignment, max(grade.max_score for grade in grades), grades, people,
         found, tuple(student for student in handed_in if student not in known), tuple(notes),
         tuple(sorted(absent)), _left_out(gradebook.root, assignment, found),
-        _questions(gradebook, assignment),
+        questions.known(gradebook.coursedir, assignment),
     )  # fmt: skip
 
 
@@ -187,13 +186,6 @@ def _left_out(
         student: frozenset(n for n, record in notebooks.items() if is_missing(student, n, record))
         for student, notebooks in found.items()
     }
-
-
-def _questions(gradebook: CourseGradebook, assignment: str) -> dict[str, dict[str, Question]]:
-    try:
-        return questions.of_assignment(gradebook.coursedir, assignment)
-    except (SubmissionError, OSError):
-        return {}
 
 
 def _submitted(gradebook: CourseGradebook, assignment: str, known: Collection[str]) -> list[str]:

@@ -16,12 +16,10 @@ from dataclasses import dataclass
 from autograder.insight.collect import ClassData
 from autograder.quiz_marks import PREFIX
 from autograder.verdict import CheckResult, Status
-from quizzes.insight.analysis import discrimination
+from quizzes.insight.analysis import FEWEST_WRONG, discrimination
 
 FEW = 10
 """Submissions below which figures say little; they are shown all the same, and marked."""
-FEWEST_FAILURES = 5
-"""Failures below which nothing is advised: a single student can turn the figures."""
 EASY, HARD, FLAT = 0.05, 0.75, 0.1
 """Bounds for advice: failure rates that hardly anybody or nearly everybody has; hardly tells."""
 
@@ -154,7 +152,7 @@ def _advice(
         return "it was examined on no submission"
     if examined < FEW:
         return "too few submissions"
-    if counts["failed"] < FEWEST_FAILURES:
+    if counts["failed"] < FEWEST_WRONG:
         return ""
     if correlation is not None and correlation < -FLAT:
         return "those who do well on the rest fail it: look at the check and at the task's wording"

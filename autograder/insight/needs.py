@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from autograder import quiz_marks, quiz_sharing
+from autograder import questions, quiz_marks, quiz_sharing
 from autograder.gradebook import Grade
 from autograder.insight import feedback
 from autograder.insight.collect import ClassData
@@ -75,10 +75,12 @@ def _reasons(data: ClassData, grade: Grade) -> Iterator[tuple[bool, str]]:
         for cell in waiting:
             if cell not in examined:
                 explained = True
-                yield False, f"Written answers of {notebook} wait for their marks."
+                exercise = questions.title_of_notebook(data.assignment, notebook)
+                yield False, f"Written answers of {exercise} wait for their marks."
             elif not reasons:
                 explained = True
-                yield True, f"The cell '{cell}' of {notebook} was flagged for a manual grade."
+                called = questions.called(data.questions, data.assignment, notebook, cell)
+                yield True, f"{called} was flagged for a manual grade."
     if grade.needs_manual_grade and not explained:
         yield True, "nbgrader says that it needs a manual grade."
 

@@ -1,4 +1,7 @@
-"""The plots of the class report, as SVG to stand inside the page: no file, script or request."""
+"""The plots of the class report, as SVG to stand inside the page: no file, script or request.
+
+Each says itself of how many it is, so that nobody reads more out of it than is in it.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +43,7 @@ def scores(earned: Sequence[float], most: float) -> str:
         figure, axes = new_axes(8.0, 2.8)
         top = max([most, *earned]) or 1.0
         axes.hist(earned, bins=steps, range=(0, top), color="#0072b2", edgecolor="white")
-        axes.set(xlim=(0, top), xlabel="points", ylabel="students")
+        axes.set(xlim=(0, top), xlabel=f"points (n = {len(earned)})", ylabel="students")
         axes.yaxis.get_major_locator().set_params(integer=True)
         return svg_of(figure, "scores")
 
@@ -51,13 +54,14 @@ def times(seconds: Sequence[float]) -> str:
         figure, axes = new_axes(8.0, 2.4)
         top = max(seconds) or 1.0
         axes.hist(seconds, bins=20, range=(0, top), color="#56b4e9", edgecolor="white")
-        axes.set(xlim=(0, top), xlabel="seconds that a submission took", ylabel="submissions")
+        taken = f"seconds that a submission took (n = {len(seconds)})"
+        axes.set(xlim=(0, top), xlabel=taken, ylabel="submissions")
         axes.yaxis.get_major_locator().set_params(integer=True)
         return svg_of(figure, "times")
 
 
 def checks(shown: Sequence[CheckFigures], name: str) -> str:
-    """Return what came of each check, beside its discrimination.
+    """Return what came of each check, beside its discrimination, both with the n of each row.
 
     Args:
         shown: the checks of one notebook, from top to bottom.
@@ -68,6 +72,7 @@ def checks(shown: Sequence[CheckFigures], name: str) -> str:
         figure = Figure(figsize=(9.0, 1.6 + 0.5 * len(shown)), layout="constrained")
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=[3, 2])
         _bars(left, shown)
+        _say_n(left, [sum(_counts(c)) for c in shown])
         left.set_yticks(places, [textwrap.fill(c.title, 40) for c in shown], fontsize=8)
         left.set(xlim=(0, 100), xlabel="% of the submissions", ylim=(len(shown) - 0.4, -0.6))
         left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, fontsize=8,
@@ -80,11 +85,24 @@ def checks(shown: Sequence[CheckFigures], name: str) -> str:
         right.scatter([r for _, r in known], [place for place, _ in known], color="#0072b2", s=36)
         right.set(xlim=(-1.05, 1.05), xlabel="discrimination")
         right.tick_params(axis="y", length=0)
+        _say_n(right, [c.examined for c in shown])
         return svg_of(figure, name)
 
 
+def _counts(check: CheckFigures) -> tuple[int, ...]:
+    return check.passed, check.failed, check.not_checked, check.grader_errors
+
+
+def _say_n(axes: Any, numbers: Sequence[int]) -> None:
+    """Write at the end of each row of how many it is."""
+    for place, number in enumerate(numbers):
+        axes.annotate(f"n = {number}", (1, place), xycoords=("axes fraction", "data"),
+                      xytext=(4, 0), textcoords="offset points", va="center",
+                      fontsize=8)  # fmt: skip
+
+
 def _bars(axes: Any, shown: Sequence[CheckFigures]) -> None:
-    counts = [(c.passed, c.failed, c.not_checked, c.grader_errors) for c in shown]
+    counts = [_counts(c) for c in shown]
     starts = [0.0] * len(shown)
     for number, (label, colour, hatch) in enumerate(_PARTS):
         widths = [100 * row[number] / (sum(row) or 1) for row in counts]

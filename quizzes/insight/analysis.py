@@ -22,6 +22,11 @@ FEW = 10
 """Learners below which figures say little; they are shown all the same, and marked."""
 FEWEST = 3
 """Learners below which a correlation says nothing."""
+FEWEST_WRONG = 5
+"""Answers that are not all right below which nothing is advised: one learner can turn the figures.
+
+The checks of an exercise are judged by it, too.
+"""
 
 EASY, HARD, FLAT = 0.95, 0.25, 0.1
 """Bounds for advice: nearly all right; no better than guessing one of four; hardly tells."""
@@ -125,15 +130,18 @@ def discrimination(pairs: Iterable[tuple[float, float]]) -> float | None:
 def _figures(name: str, kind: str, concept: str, pairs: list[tuple[float, float]]) -> ItemFigures:
     difficulty = statistics.fmean(credit for credit, _ in pairs) if pairs else None
     correlation = discrimination(pairs)
-    advice = _advice(len(pairs), difficulty, correlation)
+    wrong = sum(credit < 1 for credit, _ in pairs)
+    advice = _advice(len(pairs), wrong, difficulty, correlation)
     return ItemFigures(name, kind, concept, len(pairs), difficulty, correlation, advice)
 
 
-def _advice(learners: int, difficulty: float | None, correlation: float | None) -> str:
+def _advice(learners: int, wrong: int, difficulty: float | None, correlation: float | None) -> str:
     if difficulty is None:
         return "nobody has answered it"
     if learners < FEW:
         return "too few learners"
+    if wrong < FEWEST_WRONG:
+        return ""
     if correlation is not None and correlation < -FLAT:
         return "those who know the rest get it wrong: check the key and the stem"
     if difficulty < HARD:

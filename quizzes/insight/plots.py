@@ -1,4 +1,7 @@
-"""The plots of the item report, as SVG to stand inside the page: no file, no script, no request."""
+"""The plots of the item report, as SVG to stand inside the page: no file, no script, no request.
+
+Each says itself of how many it is, so that nobody reads more out of it than is in it.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +57,8 @@ def items(analysis: Analysis) -> str:
                 color=colour, marker=marker, s=45, label=concept.id, zorder=3,
             )  # fmt: skip
             for figures, p, r in shown:
-                label = figures.id.removeprefix(f"{concept.id}-")
+                variant = figures.id.removeprefix(f"{concept.id}-")
+                label = f"{variant} (n = {figures.learners})"
                 axes.annotate(label, (p, r), xytext=(6, 3), textcoords="offset points", fontsize=8)
         axes.set(
             xlim=(-0.03, 1.06), ylim=(-1.05, 1.05),
@@ -88,10 +92,11 @@ def scores(analysis: Analysis) -> str:
     most = len(analysis.bank.concepts)
     steps = [half / 2 for half in range(2 * most + 1)]
     halves = [round(2 * score) / 2 for score in analysis.scores]
+    attempts = f"points in the first attempt (n = {len(halves)})"
     with mpl.rc_context(_STYLE):
         figure, axes = new_axes(8.0, 2.6)
         axes.bar(steps, [halves.count(step) for step in steps], width=0.42, color="#0072b2")
         axes.set(xlim=(-0.4, most + 0.4), xticks=range(most + 1),
-                 xlabel="points in the first attempt", ylabel="learners")  # fmt: skip
+                 xlabel=attempts, ylabel="learners")  # fmt: skip
         axes.yaxis.get_major_locator().set_params(integer=True)
         return svg_of(figure, "scores")

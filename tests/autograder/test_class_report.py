@@ -241,6 +241,40 @@ def test_what_was_not_examined_is_no_failure() -> None:
     assert "the grader itself failed" in y.advice
 
 
+def test_every_figure_says_of_how_many_it_is() -> None:
+    data = class_of({
+        "ada": [result("x", "passed"), result("y", "not_checked")],
+        "bob": [result("x", "failed"), result("y", "passed")],
+        "cy": [result("x", "passed"), result("y", "grader_error")],
+    })  # fmt: skip
+    nothing: dict[str, dict[str, OwnText]] = {}
+    report = reports.ClassReport(
+        data, figures.checks(data), figures.times(data), [], [],
+        likeness.compare(data, nothing, NOTHING_GIVEN, 0.9), nothing, NOTHING_GIVEN, 0.9, (),
+        means.Means((), (), ()),
+    )  # fmt: skip
+    scores, checks, times = re.findall(r"<svg.*?</svg>", pages.page(report), re.DOTALL)
+    assert ">points (n = 3)</text>" in scores
+    assert ">seconds that a submission took (n = 3)</text>" in times
+    rows = re.findall(r">n = (\d)</text>", checks)
+    assert rows == ["3", "3", "3", "1"], "submissions by check, then those that it was examined on"
+
+
+@pytest.mark.parametrize(
+    ("asked", "called"),
+    [({"qos-visible": "Checks in the notebook"}, "Checks in the notebook"), ({}, "qos-visible")],
+)
+def test_a_flagged_cell_is_called_by_its_question(asked: dict[str, str], called: str) -> None:
+    data = class_of({"ada": [result("a", "passed")]})
+    cells = {NOTEBOOK: {"qos-visible": None}}
+    flagged = replace(data.grades[0], needs_manual_grade=True, cells=cells)
+    known = {NOTEBOOK: {cell: question(cell, title, 1.0) for cell, title in asked.items()}}
+    (need,) = needs.people_needed(replace(data, grades=(flagged,), questions=known))
+    assert need.why == (
+        f"“{called}” of Exercise 1: QoS profile design was flagged for a manual grade."
+    )
+
+
 def test_a_check_that_good_students_fail_is_pointed_out() -> None:
     data = class_of({
         f"s{n}": [
@@ -560,7 +594,7 @@ def test_the_report_of_a_graded_class(graded: Path) -> None:
     assert "autograder grade ch05" in urgent[("late",)]
     [waiting] = [need for need in report.needs if not need.urgent]
     assert waiting.students == ("bob", "cy")
-    assert waiting.why == "Written answers of qos-design wait for their marks."
+    assert waiting.why == "Written answers of Exercise 1: QoS profile design wait for their marks."
     where = questions.title_of_notebook(ASSIGNMENT, NOTEBOOK)
     alike = {(p.left, p.right): p.similarity for p in report.alike.pairs if p.where == where}
     assert alike[("-dan", "ann")] == alike[("bob", "cy")] == 1.0

@@ -112,11 +112,22 @@ def test_a_notebook_without_any_metadata_is_recognised() -> None:
     assert known.notes == [intake_cells.LOST]
 
 
-@pytest.mark.parametrize("name", ["solution", "visible", *ANSWERS, "question-loss"])
-def test_a_cell_without_metadata_is_recognised(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "called"),
+    [
+        ("solution", "solution"),
+        ("visible", "Exercise 1: quality of service"),
+        ("answer-loss", "Why loss?"),
+        ("answer-depth", "Why depth?"),
+        ("question-loss", "question-loss"),
+    ],
+)
+def test_a_cell_without_metadata_is_recognised_and_called_by_its_question(
+    name: str, called: str
+) -> None:
     texts, known, _ = mended(stripped(worked_on(), name))
     assert (texts, known.doubts) == (RIGHT, {})
-    assert name in known.notes[0]
+    assert f"'{called}'" in known.notes[0]
 
 
 def test_a_cell_that_has_kept_its_id_alone_is_recognised() -> None:
@@ -216,7 +227,9 @@ def test_answers_below_the_empty_cells_count(blank: str) -> None:
         notebook.cells.insert(at(notebook, name) + 1, new_markdown_cell(GIVEN[name]))
     texts, known, _ = mended(notebook)
     assert (texts, known.doubts) == (RIGHT, {})
-    assert sum("stood in a cell beside it" in note for note in known.notes) == 2
+    assert known.notes == [
+        f"Your answer to 'Why {name}?' stood in a cell beside it; it counts." for name in QUESTIONS
+    ]
 
 
 def test_an_answer_in_two_cells_is_one_with_its_pictures() -> None:

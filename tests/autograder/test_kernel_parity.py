@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import operator
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -98,22 +100,37 @@ CHANGING = {
 """What differs from run to run."""
 
 
-def normal(outputs: list[Output]) -> list[Output]:
-    """Return outputs without what differs by nature, the text of each stream as one."""
-    texts: dict[str, str] = {}
-    others: list[Output] = []
-    for output in outputs:
-        if output["output_type"] == "stream":
-            # When a kernel sends what is printed depends on its threads.
-            texts[output["name"]] = texts.get(output["name"], "") + output["text"]
-        else:
-            others.append(settled(dict(output)))
-    return [*others, *({name: settled(text)} for name, text in sorted(texts.items()))]
+UNFLUSHED = ("streams", "bash")
+"""Probes that print to both streams and flush neither: how a kernel mixes their texts between two
+displays depends on when its threads get to run."""
+
+
+def normal(name: str, outputs: list[Output]) -> list[Output]:
+    """Return what a probe shows in its order, without what differs by nature.
+
+    A stream's text is sent in pieces as threads get to run, but never after what is shown later.
+    """
+    found: list[Output] = []
+    for printed, group in itertools.groupby(outputs, lambda o: bool(o["output_type"] == "stream")):
+        some = list(group)
+        found += texts(name, some) if printed else [settled(dict(output)) for output in some]
+    return found
+
+
+def texts(name: str, printed: Iterable[Output]) -> list[Output]:
+    """Return what was printed between two displays, what follows each other in a stream as one."""
+    by_stream = operator.itemgetter("name")
+    ordered = sorted(printed, key=by_stream) if name in UNFLUSHED else printed
+    found = [
+        {stream: settled("".join(output["text"] for output in group))}
+        for stream, group in itertools.groupby(ordered, by_stream)
+    ]
+    return [text for text in found if any(text.values())]
 
 
 def settled(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: settled(item) for name, item in value.items() if name != "image/svg+xml"}
+        return {name: settled(item) for name, item in value.items()}
     if isinstance(value, list):
         # Where Python and its packages are differs, and what raises within a kernel's own code.
         items = [settled(item) for item in value]
@@ -130,25 +147,35 @@ def settled(value: Any) -> Any:
 def test_a_cell_shows_the_same_as_in_a_kernel(
     name: str, stock: dict[str, list[Output]], warm: dict[str, list[Output]]
 ) -> None:
-    assert normal(warm[name]) == normal(stock[name])
+    assert normal(name, warm[name]) == normal(name, stock[name])
 
 
 @pytest.mark.parametrize("name", PROBES)
 def test_a_cell_shows_the_same_without_a_warm_start(
     name: str, stock: dict[str, list[Output]], cold: dict[str, list[Output]]
 ) -> None:
-    assert normal(cold[name]) == normal(stock[name])
+    assert normal(name, cold[name]) == normal(name, stock[name])
 
 
 def test_plots_come_as_pictures(warm: dict[str, list[Output]]) -> None:
-    for name, count in {
-        "plot without a magic": 1,
-        "inline": 1,
-        "two figures": 2,
-        "show": 1,
-    }.items():
-        pictures = [o for o in warm[name] if "image/png" in o.get("data", {})]
+    for name, kind, count in (
+        ("plot without a magic", "image/png", 1),
+        ("inline", "image/png", 1),
+        ("two figures", "image/png", 2),
+        ("show", "image/png", 1),
+        ("svg", "image/svg+xml", 1),
+    ):
+        pictures = [output for output in warm[name] if kind in output.get("data", {})]
         assert len(pictures) == count, name
+
+
+@pytest.mark.parametrize("kernel", ["stock", pytest.param("warm", marks=needs_warm_starts), "cold"])
+def test_what_a_cell_shows_stays_in_its_order(kernel: str, request: pytest.FixtureRequest) -> None:
+    outputs = request.getfixturevalue(kernel)["order of all"]
+    assert [output.get("text") or min(output["data"]) for output in outputs] == [
+        "first\n", "text/plain", "third\n", "image/svg+xml", "fifth\n", "text/html", "seventh\n",
+        "text/plain",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,10 @@ def test_an_answer_that_is_worth_more_is_looked_at_again(course: Course) -> None
     build(course.root, points={**points.of_grade_cells(), "qos-explanation-loss": 2.0})
     release(course.root, ASSIGNMENT)
     said = grade(course)
-    assert "To be marked again: qos-explanation-loss (2 points now, not 1)." in said
+    assert (
+        "To be marked again: “A lost camera frame” of Exercise 1: QoS profile design "
+        "(2 points now, not 1)." in said
+    )
     assert asked(course) == {"qos-explanation-loss"}
     assert grade(course) == "", "it is said once"
     assert asked(course) == {"qos-explanation-loss"}
@@ -80,7 +83,8 @@ def test_of_another_hand_in_only_the_answers_that_changed_are_asked_for(course: 
     (course.folder("right") / "timestamp.txt").write_text("2030-01-31 12:00:00 UTC")
     hand_in(course, change)
     said = grade(course)
-    assert "qos-explanation-depth (it changed)" in said
+    assert "“History and depth” of Exercise 1: QoS profile design (it changed)" in said
+    assert "qos-explanation" not in said
     assert asked(course) >= {"qos-explanation-depth", "qos-explanation-stop"}
     assert not asked(course) & {*ANSWERS[:1], "qos-explanation-durability"}
 
@@ -138,7 +142,7 @@ def test_what_must_be_looked_at_again(old: Marked, new: Marked, same: bool, why:
 
 
 def test_what_was_marked_is_kept_whole_or_not_at_all(course: Course) -> None:
-    marks = Marks(course.root / ".autograder", ASSIGNMENT)
+    marks = Marks(course.root / ".autograder", ASSIGNMENT, {})
     copy = course.root / "autograded" / "right" / ASSIGNMENT
     with book(course) as gradebook:
         for student in ("right", "wrong", "nobody"):

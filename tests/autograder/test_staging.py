@@ -10,9 +10,10 @@ from pathlib import Path
 
 import nbformat
 import pytest
+from nbformat.v4 import new_code_cell
 from nbgrader.api import Gradebook
 
-from autograder import engine, staging
+from autograder import engine, staging, submission
 from autograder.corpus import Case
 from autograder.staging import MAX_STAGED, Limits
 from tests.killing import fresh_copy
@@ -25,6 +26,7 @@ PICTURE = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 )
 SECRET = "5e" * 64
+PLOT = "import matplotlib.pyplot as plt\nplt.plot([1, 3, 2])\nplt.title('As ada drew it');"
 PAGES = (f"{NOTEBOOK}.html", "index.html")
 LIMITS = Limits((".ipynb_checkpoints", "*.pyc", "__pycache__", "feedback"), 1000, 2000)
 
@@ -38,12 +40,21 @@ def files(folder: Path) -> dict[str, tuple[int, bytes]]:
     }
 
 
+def own_plot(root: Path) -> bytes:
+    """Return the plot of ada's own cell, as the graded copy has it."""
+    graded = submission.read(root / "autograded" / "ada" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+    (cell,) = (cell for cell in graded.cells if cell.source == PLOT)
+    (output,) = cell.outputs
+    return base64.b64decode(output.data["image/png"])
+
+
 @pytest.fixture
 def beside(course: Course, cases: dict[str, Case]) -> Course:
     """A course in which ada has handed in everything that one can think of."""
     notebook = cases["right-chapter"].submission(course.source, course.released)
     (answer,) = (c for c in notebook.cells if c.id == "qos-explanation-depth")
     answer.source = "My idea, see ![a plot](my%20plots/plot.png) and <img src='plot.svg'>."
+    notebook.cells.append(new_code_cell(PLOT))
     course.submit("ada", notebook)
     folder = course.folder("ada")
     for name, content in {
@@ -66,6 +77,7 @@ def beside(course: Course, cases: dict[str, Case]) -> Course:
 
 
 @needs_sandbox
+@pytest.mark.timeout(900)
 def test_every_file_is_where_nbgrader_itself_puts_it(beside: Course, tmp_path: Path) -> None:
     engine.grade(beside.root, ASSIGNMENT)
     by_nbgrader = fresh_copy(beside.root, tmp_path / "by-nbgrader")
@@ -89,6 +101,8 @@ def test_every_file_is_where_nbgrader_itself_puts_it(beside: Course, tmp_path: P
         assert "My idea, see" in page, "a page of the student's own is not in the way"
         assert f"data:image/png;base64,{base64.b64encode(PICTURE).decode()}" in page
         assert "data:image/svg+xml;base64," in page
+        assert own_plot(root).startswith(b"\x89PNG"), "what a cell of the student's own drew"
+        assert f"data:image/png;base64,{base64.b64encode(own_plot(root)).decode()}" in page
 
 
 @needs_sandbox

@@ -129,6 +129,28 @@ def test_a_key_that_those_who_know_get_wrong_is_pointed_out() -> None:
     assert "check the key" in figures.advice
 
 
+def test_nothing_is_advised_on_fewer_than_five_wrong_answers() -> None:
+    asked, other = "qos-purpose", "service-vs-action"
+
+    def advice(learners: int, failing: int) -> str:
+        rng = random.Random(1)
+
+        def choose(n: int) -> Choose:
+            fails = {asked: n < failing, other: n % 2 == 0}
+            return lambda item: wrong(item, rng) if fails.get(item.concept.id) else model.key(item)
+
+        results = {
+            f"s{n}": answered(model.draw(BANK, f"s{n}", 1), choose(n)) for n in range(learners)
+        }
+        return figures_of(insight.analyse(BANK, results), asked).advice
+
+    assert advice(9, 8) == "too few learners"
+    assert [advice(learners, 4) for learners in (10, 12, 400)] == ["", "", ""]
+    assert "does not tell" in advice(12, 6)
+    assert "harder than guessing" in advice(12, 11)
+    assert advice(400, 5) == "nearly everybody knows it"
+
+
 def test_misconceptions_are_counted_among_those_whom_a_question_tempted() -> None:
     def falls_for(belief: str) -> Choose:
         def choose(item: Item) -> Answer:
@@ -258,8 +280,10 @@ def test_the_plots_show_the_figures_and_say_in_words_what_they_are(
     assert "discrimination" in plots[1]
     rows = list(csv.DictReader(written["quiz-ch05-items.csv"].splitlines()))
     drawn = [row for row in rows if row["kind"] != "concept" and row["discrimination"]]
-    numbers = re.findall(r">(\d)</text>", plots[1])
-    assert len(numbers) == len(drawn)
+    numbers = re.findall(r">\d \(n = (\d+)\)</text>", plots[1])
+    assert numbers == [row["learners"] for row in drawn]
+    assert ">points in the first attempt (n = 60)</text>" in plots[0]
+    assert re.search(r">\d+ of \d+</text>", plots[2])
 
 
 def test_page_and_csv_have_the_same_figures(written: dict[str, str]) -> None:
@@ -295,7 +319,8 @@ def test_a_class_that_knows_everything_gets_a_page(tmp_path: Path) -> None:
     found = insight.analyse(BANK, class_of(20, lambda n: 1.0))
     assert found.passed == 20
     text = Page(insight.write(found, tmp_path)[0].read_text(encoding="utf-8")).text
-    assert "nearly everybody knows it" in text
+    assert "20 passed" in text
+    assert {figures.advice for figures in found.concepts} == {""}, "nobody was wrong"
     assert json.dumps([f.holders for f in found.beliefs]).count("0") == len(found.beliefs)
 
 
