@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import nbformat
@@ -74,7 +75,7 @@ def test_the_release_has_no_key(root: Path) -> None:
 
 def test_the_subject_is_told_neither_the_key_nor_the_part(root: Path) -> None:
     program = submission.program(read(root, "source"))
-    shown = json.dumps([runner._shown(cell) for cell in program])
+    shown = json.dumps([runner._shown(program, number) for number in range(len(program))])
     for secret in ("choices\\", "key=", "hidden", '[\\"action'):
         assert secret not in shown.replace("choices = {", "")
 
@@ -98,13 +99,16 @@ def test_no_visible_check_of_the_node_says_which_pattern_to_take() -> None:
             assert word not in said, (name, word)
 
 
+def rig_with(right: dict[str, Any], choices: dict[str, str]) -> Any:
+    return SimpleNamespace(bench=SimpleNamespace(key=right), memory={"choices": choices})
+
+
 def test_the_report_of_a_wrong_choice_names_no_other_pattern(root: Path) -> None:
     """Every wrong answer to every question, as the student would read it."""
     checks = exercises.load("patterns").checks
     for scenario, right in key(root).items():
         for pattern in set(scenarios.PATTERNS) - set(right):
-            rig: Any = type("Rig", (), {})()
-            rig.key, rig.memory = key(root), {"choices": {scenario: pattern}}
+            rig = rig_with(key(root), {scenario: pattern})
             with pytest.raises(Failed) as failed:
                 compare(rig, scenario)
             said = f"{failed.value} {checks[f'{scenario}_choice'].hints}".lower()
@@ -114,7 +118,7 @@ def test_the_report_of_a_wrong_choice_names_no_other_pattern(root: Path) -> None
 
 
 def test_a_part_without_its_key_is_the_graders_fault() -> None:
-    rig: Any = type("Rig", (), {"key": {}, "memory": {"choices": {"camera": "topic"}}})()
+    rig = rig_with({}, {"camera": "topic"})
     with pytest.raises(LookupError, match="no answer key came along"):
         compare(rig, "camera")
 

@@ -1,15 +1,11 @@
 # title: A process that hangs and says that it is in the grader's own code
-# base: right-chapter
-# told: Your nodes were still being taken down 5 s after an examination (line 352 of
-# score: 10
+# told: Code cell 3 was still running after 5 s (line 352 of
 # seconds: 5
 
 import faulthandler
 import os
 import queue
 import signal
-
-import course.runtime.residents
 
 
 def forge(*_):
@@ -25,4 +21,4 @@ def forge(*_):
 
 faulthandler.unregister(signal.SIGUSR1)
 signal.signal(signal.SIGUSR1, forge)
-course.runtime.residents.destroy_node = lambda *_: queue.SimpleQueue().get()
+queue.SimpleQueue().get()
