@@ -125,6 +125,10 @@ class Subject:
         """
         reply = self._ask("declare", name, doing=f"bring up the nodes of `{name}`")
         labels = self._read(lambda: _texts(reply["labels"], MAX_NAME))
+        if not labels:
+            raise StudentError(
+                f"`{name}` declares no nodes: its node_factories() gave none.", missing=True
+            )
         # One by one: if a constructor does not return, it is known whose.
         return {label: self._start_declared(name, label) for label in labels}
 

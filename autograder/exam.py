@@ -11,7 +11,7 @@ import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from types import MappingProxyType, TracebackType
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from autograder import points as points_table
@@ -24,6 +24,9 @@ RigT = TypeVar("RigT")
 
 MAX_TEXT = 7000
 """Characters of a text in a verdict: of an error in a student's code, 6000 are told."""
+
+LONGEST_NAME = 200
+"""Bytes that are shown of a name that is no text."""
 
 
 class ExamError(CourseError):
@@ -244,10 +247,12 @@ def _run(check: Check[RigT], rig: RigT, gone: list[CheckResult]) -> CheckResult:
     except NotExaminable as reason:
         return replace(_result_of(check, "not_examined"), actual=str(reason))
     except Exception as error:  # noqa: BLE001 - whatever else goes wrong in here is our fault
+        if isinstance(error, UnicodeDecodeError) and _read_by_ros(error):
+            return _failed(check, *_no_text(error))
         return replace(
             _result_of(check, "grader_error"),
             actual=f"The grader itself failed ({type(error).__name__}: {error}, in "
-            f"{_innermost(error)}). This is not your fault; after a hand-in a person looks at it.",
+            f"{_place(error)}). This is not your fault; after a hand-in a person looks at it.",
         )
     return replace(_result_of(check, "passed"), note=note)
 
@@ -266,10 +271,30 @@ def _failed(check: Check[RigT], expected: str, actual: str) -> CheckResult:
     return replace(_result_of(check, "failed"), expected=expected, actual=actual)
 
 
-def _innermost(error: BaseException) -> str:
+def _read_by_ros(error: BaseException) -> bool:
+    """Whether rclpy raised it: it makes text of what it has heard from others."""
+    place = _innermost(error)
+    return place is not None and place.tb_frame.f_globals.get("__name__", "").startswith("rclpy.")
+
+
+def _no_text(error: UnicodeDecodeError) -> tuple[str, str]:
+    """Return what is needed of a name on the ROS graph, and what one was that is no text."""
+    return (
+        "The names and types on the ROS graph are text.",
+        f"A name on the ROS graph is no text: {error.object[:LONGEST_NAME]!r}. Did something in "
+        "the notebook make a node, a topic or a type of that name?",
+    )
+
+
+def _innermost(error: BaseException) -> TracebackType | None:
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
+    return trace
+
+
+def _place(error: BaseException) -> str:
+    trace = _innermost(error)
     return f"{trace.tb_frame.f_code.co_name}, line {trace.tb_lineno}" if trace else "unknown"
 
 

@@ -136,6 +136,21 @@ def test_the_graders_own_fault_is_never_the_students(exam: Exam[list[str]]) -> N
     assert "ZeroDivisionError" in verdict.checks[0].actual
 
 
+@pytest.mark.parametrize(
+    ("module", "status"), [("rclpy.node", "failed"), ("autograder.toy", "grader_error")]
+)
+def test_a_name_on_the_graph_that_is_no_text_is_whose_name_it_is(
+    exam: Exam[list[str]], module: str, status: str
+) -> None:
+    reader: dict[str, Any] = {"__name__": module}
+    exec("def read(rig): b'\\xffoo'.decode()", reader)
+    exam.checks["last"] = replace(exam.checks["last"], run=reader["read"])
+    (check,) = checks(exam, "hidden")
+    assert check.status == status
+    told = r"A name on the ROS graph is no text: b'\xffoo'."
+    assert check.actual.startswith(told) == (status == "failed")
+
+
 def test_a_subject_that_ends_fails_the_check(exam: Exam[list[str]]) -> None:
     @exam.check()
     def gone(rig: list[str]) -> None:

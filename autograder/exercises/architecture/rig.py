@@ -54,6 +54,7 @@ class ArchitectureRig:
         self._labels: list[str] = []
         self._marks: set[str] = set()
         self._drove: set[str] = set()  # nodes that could when a mark came to the motors
+        self._unread: UnicodeDecodeError | None = None  # of a name that is no text
 
     def start(self) -> None:
         """Bring up every node of the design and read the graph when all of it is there.
@@ -97,6 +98,8 @@ class ArchitectureRig:
 
     def new_faults(self) -> list[str]:
         """Return what is wrong with endpoints that have come since the start, a sentence each."""
+        if self._unread is not None:
+            raise self._unread
         now = self._read_graph()
         drivers = now.topic(MOTORS).written_by
         faults = link_faults(now.since(self.graph))
@@ -131,9 +134,17 @@ class ArchitectureRig:
         self._heard.add(topic)
         self.seen[topic].update(tags)
         if topic == MOTORS and tags:
-            ends = of_others(self.node.get_publishers_info_by_topic(MOTORS))
-            self._drove |= {node_of(end) for end in ends}
+            self._note_drivers()
         self._pours.overheard(topic, tags)
+
+    def _note_drivers(self) -> None:
+        """Note who can command the motors now; what cannot be read is for `new_faults` to tell."""
+        try:
+            ends = of_others(self.node.get_publishers_info_by_topic(MOTORS))
+        except UnicodeDecodeError as error:
+            self._unread = error
+        else:
+            self._drove |= {node_of(end) for end in ends}
 
     def knows(self, topic: Topic) -> bool:
         """Whether a topic's type is installed here."""

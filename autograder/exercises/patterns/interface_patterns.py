@@ -149,14 +149,17 @@ def parameter_node(rig: RobotRig) -> str | None:
 
 
 def speed_limit(rig: RobotRig, prefix: str) -> float | None:
-    """Return the value of the parameter on a node, or None if it has none there."""
+    """Return the value of the parameter on a node, or None if it has none there.
+
+    Whoever answers with something else than one value for one name has none.
+    """
     name = f"{prefix}/get_parameters"
     if not rig.node.count_services(name):
         return None
     answer = rig.call(GetParameters, name, GetParameters.Request(names=[SPEED]))
-    if answer is None or not answer.values:
+    if answer is None or len(answer.values) != 1:
         return None
-    (value,) = answer.values
+    value = answer.values[0]
     kinds = {
         ParameterType.PARAMETER_DOUBLE: "double_value",
         ParameterType.PARAMETER_INTEGER: "integer_value",

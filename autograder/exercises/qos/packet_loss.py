@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from rclpy.qos import ReliabilityPolicy
 
+from autograder.exam import Failed
 from autograder.exercises.qos.examiner_node import lossless, undemanding
 from autograder.exercises.qos.radio_link import radio
 from autograder.exercises.qos.readings import CAMERA, STOP, Heard, Sensor
@@ -66,9 +67,18 @@ def radio_gap(rig: SensorRig) -> dict[str, Aftermath]:
 
 
 def _require_silence(rig: SensorRig, heard: Heard) -> None:
+    """Fail if readings of the gap are at the far end, to which no packet got since they were made.
+
+    Somebody has published them who knew what they would be.
+    """
     for sensor in (STOP, CAMERA):
         if got := rig.indices(heard, sensor, "gap"):
-            raise RuntimeError(f"{len(got)} {sensor.name} readings came through the gap")
+            raise Failed(
+                expected=f"On {sensor.topic} comes what the hardware has delivered, and nothing "
+                "before it was.",
+                actual=f"{len(got)} of its readings that were still to come, or were lost on the "
+                "way, were there already: does something in the notebook make up readings?",
+            )
 
 
 def _heard_after(rig: SensorRig, sensor: Sensor, heard: Heard) -> list[int]:

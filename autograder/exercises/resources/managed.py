@@ -49,6 +49,11 @@ class Managed:
         parameters = [Parameter(name=name, value=_value(value)) for name, value in values.items()]
         request = SetParameters.Request(parameters=parameters)
         reply = self._ask(SetParameters, "set_parameters", request)
+        if len(reply.results) != len(parameters):
+            raise Failed(
+                expected=f"A request to set {len(parameters)} parameters gets a result for each.",
+                actual=f"{self._node}/set_parameters gave {len(reply.results)}.",
+            )
         return [
             f"{name}={value!r}" + (f" ({result.reason.rstrip('.')})" if result.reason else "")
             for (name, value), result in zip(values.items(), reply.results, strict=True)
@@ -86,10 +91,7 @@ class Managed:
 
     def attempt(self, transition: str) -> str:
         """Ask for a transition; return the state that came of it."""
-        if transition in TRANSITIONS:
-            number = TRANSITIONS[transition][0]
-        else:
-            number = SHUTDOWNS[self.state()]
+        number = TRANSITIONS[transition][0] if transition in TRANSITIONS else self._shutdown()
         client = self._rig.client(ChangeState, f"{self._node}/change_state")
         self._rig.wait(client.service_is_ready)
         reply = client.call_async(ChangeState.Request(transition=Transition(id=number)))
@@ -103,6 +105,16 @@ class Managed:
                 "method must return, and return a TransitionCallbackReturn.",
             )
         return states[-1]
+
+    def _shutdown(self) -> int:
+        """Return the number of the shutdown from the state that the node says it is in."""
+        state = self.state()
+        if state not in SHUTDOWNS:
+            raise Failed(
+                expected=f"Before it is shut down your node is {' or '.join(SHUTDOWNS)}.",
+                actual=f"It says that its state is “{state}”.",
+            )
+        return SHUTDOWNS[state]
 
     def go(self, *transitions: str) -> None:
         """Make transitions that must all succeed."""
