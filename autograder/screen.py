@@ -19,6 +19,7 @@ import re
 import xml.parsers.expat
 from collections.abc import Callable, Collection, Mapping
 from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
 
 import nh3
 from nbformat import NotebookNode
@@ -82,10 +83,17 @@ _TAG = re.compile(
 )
 _ATTRIBUTE = re.compile(r"""([a-z-]+)(?:=(?:"([^"]*)"|'([^']*)'|([\w.%#/-]+)))?""", re.IGNORECASE)
 _AUTOLINK = re.compile(r"<(?:https?://|mailto:)[^\s<>]{1,500}>|<[\w.+-]{1,64}@[\w.-]{1,255}>")
+_PICTURE_BEGINS = re.compile(r"!\[")
+_PICTURE = re.compile(
+    r"""!\[[^][\\`<$\n]{0,500}\]\(((?>[^\s()<>"\\`$]*))(?:[ ]"[^"\\`<$\n]{0,200}")?\)"""
+)
 _LINK_BEGINS = re.compile(r"\](?=[(:])")
 _PICTURE_DATA = re.compile(r"data:image/(?:png|jpeg|gif|webp|svg\+xml);base64,[A-Za-z0-9+/=]*")
 _BASE64 = re.compile(r"[A-Za-z0-9+/=\s]*")
 _RELATIVE = re.compile(r"[\w./%~+=,@-]*(?:[?#][\w./%~+=,@&;:?#-]*)?")
+_BESIDE = re.compile(r"[\w./%~+=,@-]+")
+_STYLE_LOADS = re.compile(r"\\|@import|url\(|image(?:-set)?\(|src\(", re.IGNORECASE)
+_STYLE_HOLDS = re.compile(r"""url\(\s*["']?(?:#|data:)[^()\s"'\\]*["']?\s*\)""", re.IGNORECASE)
 _DRAWING = re.compile(r"<svg\b.*?</svg\s*>", re.IGNORECASE | re.DOTALL)
 _MERMAID_ACTION = re.compile(r"^[ \t]*(?:click\b|%%\{).*$", re.MULTILINE)
 
@@ -93,16 +101,24 @@ LONGEST_LINK = 400
 """Characters of a link in Markdown that are read; one with a picture in it begins as it must."""
 
 
-def is_link(target: str, *, picture: bool = False) -> bool:
-    """Whether a link leads somewhere and runs nothing: to the web, into the page, or beside it.
-
-    ``picture`` says that it is the source of a picture, which may hold the picture itself.
-    """
-    if picture and _PICTURE_DATA.fullmatch(target):
-        return True
+def is_link(target: str) -> bool:
+    """Whether a link leads somewhere and runs nothing: to the web, into the page, or beside it."""
     if re.match(r"(?:https?://|mailto:|#)[\x21-\x7e\w]*\Z", target):
         return True
-    return bool(_RELATIVE.fullmatch(target)) or (picture and target.startswith("attachment:"))
+    return bool(_RELATIVE.fullmatch(target))
+
+
+def is_source(target: str) -> bool:
+    """Whether a browser may load something by itself: a picture held there, or a file beside it.
+
+    Nobody is asked before that. From any other address a page of the formgrader would be asked for
+    in the instructor's name, or a stranger would hear that, and when, somebody reads an answer.
+    """
+    if _PICTURE_DATA.fullmatch(target) or target.startswith("attachment:"):
+        return True
+    # An empty part stays when nbconvert takes away "files/", and is then a leading slash.
+    parts = unquote(target).split("/")
+    return bool(_BESIDE.fullmatch(target)) and not {"", ".."} & set(parts)
 
 
 _CLASSES = {"div": {"highlight"}, "span": set(STANDARD_TYPES.values()) - {""}}
@@ -123,10 +139,13 @@ def cleaned_html(text: str, *, coloured: bool = False) -> str:
     )  # fmt: skip
 
 
-def _kept(tag: str, name: str, value: str) -> str | None:
-    if name in ("href", "src"):
-        return value if is_link(value.strip(), picture=tag == "img") else None
+def _kept(_tag: str, name: str, value: str) -> str | None:
+    if name in _TARGETS:
+        return value if _TARGETS[name](value.strip()) else None
     return None if name == "style" and "(" in value else value
+
+
+_TARGETS: dict[str, Callable[[str], bool]] = {"href": is_link, "src": is_source}
 
 
 def _as_picture(svg: str) -> str:
@@ -138,12 +157,24 @@ def _as_picture(svg: str) -> str:
 
 
 def disarmed(text: str, *, tags: bool = True) -> str:
-    """Return Markdown in which no link is left that is not on the list, and no such tag.
+    """Return Markdown in which no link or picture is left that is not on the list, and no such tag.
 
     It reads as before: see the module's own words. No tag at all is left unless ``tags`` says so.
+    A picture that a browser may not load is a link to it instead.
     """
+    text = _PICTURE_BEGINS.sub(lambda found: _pictured(text, found.start()), text)
     text = _TAG_BEGINS.sub(lambda found: _opened(text, found.start(), tags), text)
     return _LINK_BEGINS.sub(lambda found: _linked(text, found.end()), text)
+
+
+def _pictured(text: str, place: int) -> str:
+    """Return the beginning of a picture, apart from its bracket if it may not be loaded.
+
+    It stays only where all readers of Markdown see the same picture: its words hold nothing that
+    could have them look for the target somewhere else.
+    """
+    found = _PICTURE.match(text, place)
+    return "![" if found and is_source(found[1]) else f"!{_JOINER}["
 
 
 def _opened(text: str, place: int, tags: bool) -> str:
@@ -160,7 +191,7 @@ def _is_listed(tag: str, attributes: str) -> bool:
         name, value = found[1].lower(), html.unescape(found[2] or found[3] or found[4] or "")
         if name not in TAGS[tag] | EVERYWHERE:
             return False
-        if name in ("href", "src") and not is_link(value, picture=tag == "img"):
+        if name in _TARGETS and not _TARGETS[name](value):
             return False
         if name == "style" and not _is_quiet(value):
             return False
@@ -185,7 +216,7 @@ def _linked(text: str, place: int) -> str:
     if target.startswith("data:image/"):
         target = target.partition(",")[0] + ","
         return "]" if _PICTURE_DATA.fullmatch(target) else f"]{_JOINER}"
-    return "]" if is_link(target, picture=True) else f"]{_JOINER}"
+    return "]" if is_link(target) or is_source(target) else f"]{_JOINER}"
 
 
 MAX_PLAIN = 100_000
@@ -353,32 +384,61 @@ def may_lie_beside(name: str, read: Callable[[], bytes]) -> bool:
 
 
 def is_still(svg: bytes) -> bool:
-    """Whether a drawing is nothing else: there is no script, no page and no entity in it."""
+    """Whether a drawing is nothing else: no script, no page and no entity, and it loads nothing."""
     if len(svg) > MAX_DRAWING:
         return False
-    parser = xml.parsers.expat.ParserCreate(namespace_separator=" ")
-
-    def refuse(*_: Any) -> None:
-        raise ValueError
-
-    def begin(tag: str, attributes: dict[str, str]) -> None:
-        space, _, name = tag.rpartition(" ")
-        if space == _PAGE_SPACE or (space == _SVG_SPACE and name not in _SVG_TAGS):
-            refuse()
-        for attribute, value in attributes.items():
-            name = attribute.rpartition(" ")[2].lower()
-            if name.startswith("on") or (name == "href" and not is_link(value, picture=True)):
-                refuse()
-
-    def doctype(_name: str, _system: Any, _public: Any, has_subset: bool) -> None:
-        if has_subset:
-            refuse()
-
-    parser.StartElementHandler = begin
-    parser.StartDoctypeDeclHandler = doctype
-    parser.ProcessingInstructionHandler = refuse
     try:
-        parser.Parse(svg, True)
+        _Drawing().read(svg)
     except (ValueError, xml.parsers.expat.ExpatError):
         return False
     return True
+
+
+class _Drawing:
+    """Reads a drawing, and raises a ValueError at the first thing in it that is not still."""
+
+    def __init__(self) -> None:
+        self._parser = xml.parsers.expat.ParserCreate(namespace_separator=" ")
+        self._parser.StartElementHandler = self._begin
+        self._parser.EndElementHandler = self._end
+        self._parser.CharacterDataHandler = self._text
+        self._parser.StartDoctypeDeclHandler = self._doctype
+        self._parser.ProcessingInstructionHandler = self._refuse
+        self._in_style = False
+        self._style = ""
+
+    def read(self, svg: bytes) -> None:
+        self._parser.Parse(svg, True)
+        self._require_quiet(self._style)
+
+    def _begin(self, tag: str, attributes: dict[str, str]) -> None:
+        space, _, name = tag.rpartition(" ")
+        if space == _PAGE_SPACE or (space == _SVG_SPACE and name not in _SVG_TAGS):
+            self._refuse()
+        self._in_style = self._in_style or name == "style"
+        for attribute, value in attributes.items():
+            its_space, _, its_name = attribute.rpartition(" ")
+            is_target = its_name.lower() == "href"
+            if its_name.lower().startswith("on"):
+                self._refuse()
+            if is_target and not (value.startswith("#") or is_source(value)):
+                self._refuse()
+            if not its_space and not is_target:
+                self._require_quiet(value)
+
+    def _end(self, tag: str) -> None:
+        self._in_style = self._in_style and tag.rpartition(" ")[2] != "style"
+
+    def _text(self, text: str) -> None:
+        self._style += text if self._in_style else ""
+
+    def _require_quiet(self, style: str) -> None:
+        if _STYLE_LOADS.search(_STYLE_HOLDS.sub("", style)):
+            self._refuse()
+
+    def _doctype(self, _name: str, _system: Any, _public: Any, has_subset: bool) -> None:
+        if has_subset:
+            self._refuse()
+
+    def _refuse(self, *_: Any) -> None:
+        raise ValueError

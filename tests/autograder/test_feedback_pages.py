@@ -77,10 +77,11 @@ def test_a_page_without_html_of_the_students_is_not_parsed_and_says_the_same(
         (new_code_cell("plot()", outputs=[PICTURE]), 'src="data:image/png;base64,iVBORw0KGgo="'),
         (new_code_cell("table", outputs=[REPORT]), "<p>right</p>"),
         (
-            new_markdown_cell("Look: <img src='https://example.org/x.png'>"),
+            new_markdown_cell("Look: <img src='data:image/png;base64,iVBORw0KGgo='>"),
             '<img alt="No description has been provided for this image" '
-            'src="https://example.org/x.png">',
+            'src="data:image/png;base64,iVBORw0KGgo=">',
         ),
+        (new_markdown_cell("[x](https://example.org/x.png)"), 'href="https://example.org/x.png"'),
         (new_markdown_cell("This is <b>mine."), "This is <b>mine.</b>"),
         (new_markdown_cell("| a |\n|---|\n| $x<y$ |"), "<td>$x&lt;y$</td>"),
         (
@@ -90,7 +91,17 @@ def test_a_page_without_html_of_the_students_is_not_parsed_and_says_the_same(
         (new_markdown_cell("```python\nif x: pass\n```"), '<span class="k">if</span>'),
         (new_markdown_cell("Code: `List<int>`, `<script>`"), "<code>&lt;script&gt;</code>"),
     ],
-    ids=["picture", "html output", "image tag", "open tag", "table", "mathml", "code", "types"],
+    ids=[
+        "picture",
+        "html output",
+        "image tag",
+        "link",
+        "open tag",
+        "table",
+        "mathml",
+        "code",
+        "types",
+    ],
 )
 def test_html_that_runs_nothing_is_kept_and_whole(cell: NotebookNode, kept: str) -> None:
     ours = page(FeedbackExporter, new_notebook(cells=[cell, cell_of_the_grader(REPORT)]))
@@ -162,6 +173,50 @@ def test_the_same_texts_would_run_if_they_were_not_screened() -> None:
     assert sum(ran) >= 10  # nbconvert itself sees to some of the others
 
 
+ELSEWHERE = [
+    "/logout", "//example.org/x.png", "https://example.org/x.png", "../../logout", "a/../../logout",
+    "%2e%2e/logout", "files//logout", "?logout", "HTTPS:x.png", "file:///etc/x.png",
+]  # fmt: skip
+
+
+def loaded(page_: str) -> list[str]:
+    """Return what a browser would ask for by itself where it shows a page."""
+    found = []
+    for element in read(page_, features="html.parser").body.find_all(True):
+        for name in ("src", "srcset", "poster", "background", "data"):
+            found += [element.attrs[name]] if name in element.attrs else []
+        found += re.findall(r"url\(.*", element.attrs.get("style", ""))
+    return [url for url in found if not url.startswith("data:")]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "![a]({})", '![a]({} "title")', "![a][1]\n\n[1]: {}", "![a]\n\n[a]: {}",
+        "![a [b](x.png)]({})", "[![a]({})](x)", "![a\\](x.png) b]({})",
+        "![`](x.png)` ]({})", "![$](x.png)$ ]({})",
+        '<img src="{}">', "<img src={}>", '<img alt="a" srcset="{}">',
+        '<video poster="{}"></video>',
+        '<table background="{}"><tr><td>a</td></tr></table>', '<object data="{}"></object>',
+        '<b style="background-color: url({})">a</b>', '<b style="border: 1px url({})">a</b>',
+    ],
+)  # fmt: skip
+def test_a_page_loads_nothing_by_itself_but_what_lies_beside_the_notebook(text: str) -> None:
+    """Neither where nbgrader shows what was written, nor in feedback: a page asks for nothing."""
+    hostile = new_notebook(cells=[new_markdown_cell(text.format(url)) for url in ELSEWHERE])
+    hostile.cells += [
+        new_code_cell("x", outputs=[new_output("display_data", data={kind: text.format(url)})])
+        for url in ELSEWHERE for kind in ("text/html", "text/markdown")
+    ]  # fmt: skip
+    assert loaded(page(FeedbackExporter, copy.deepcopy(hostile))) == []
+    screen.screen_texts(hostile, new_notebook(), Page())
+    for cell in hostile.cells:
+        cell.outputs = [
+            from_dict(screen.screened(output, Page())) for output in cell.get("outputs", [])
+        ]
+    assert loaded(page(HTMLExporter, hostile)) == []
+
+
 @pytest.mark.parametrize(
     "text",
     [
@@ -185,7 +240,8 @@ def test_an_answer_cannot_take_the_place_of_a_part_of_the_formgraders_page(text:
     "text",
     [
         "Depth 10, `List<int>` and *so* on: a < b, [0](https://example.org/?a=b)", "<b>x</b><br/>",
-        "![a](picture.png) ![b](attachment:b.png)", "| a | b |\n|---|---|\n| 1 | 2 |", "x[0]: 3",
+        "![a](picture.png) ![b](attachment:b.png)", '![a](files/my%20plots/a.png "my plot")',
+        "[![a](picture.png)](https://example.org)", "| a | b |\n|---|---|\n| 1 | 2 |", "x[0]: 3",
         '<img src="a.png" width="300"> <span style="color: red">r</span>', "[there](#Heading)",
         "<details><summary>More</summary>\n\ntext\n\n</details>", "<https://example.org>",
         "$$\\frac{a}{b}$$ <math><mi>x</mi></math>", "```python\nx = 1 < 2\n```", "me <a@b.org>",
@@ -247,12 +303,20 @@ def test_files_beside_a_notebook_run_nothing_where_they_are_served() -> None:
     svg = b'<svg xmlns="http://www.w3.org/2000/svg">%s</svg>'
     assert all(map(may, ("plot.png", "data.csv", "node.py", "notes.txt", "report.docx")))
     assert may("drawing.svg", svg % b'<g><path d="M0 0"/></g>')
+    for inside in (
+        b'<g fill="url(#a)"/><use href="#b"/>', b'<image href="a.png"/>',
+        b"<style>g {fill: url('data:image/png;base64,AA==')}</style><text>a\\b url(c)</text>",
+    ):  # fmt: skip
+        assert may("drawing.svg", svg % inside), inside
     for name in ("page.html", "page.XHTML", "feed.xml", "sheet.xsl", "letter.mht"):
         assert not may(name), name
     for inside in (
         b"<script>1</script>", b'<g onload="1"/>', b"<foreignObject/>", b'<a href="javascript:1"/>',
         b'<x:script xmlns:x="http://www.w3.org/1999/xhtml">1</x:script>',
-        b'<use href="data:text/html,x"/>', b"<g>",
+        b'<use href="data:text/html,x"/>', b"<g>", b'<image href="/logout"/>',
+        b'<image href="https://example.org/x.png"/>', b'<g fill="url(/logout)"/>',
+        b'<g style="fill: u\\72l(/logout)"/>', b"<style>@import '/logout';</style>",
+        b"<style>g {fill: ur<!-- -->l(/logout)}</style>",
     ):  # fmt: skip
         assert not may("drawing.svg", svg % inside), inside
     assert not may("drawing.svg", b'<!DOCTYPE svg [<!ENTITY x "y">]>' + svg % b"")

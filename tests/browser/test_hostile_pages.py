@@ -45,9 +45,12 @@ fetch(`${base_url}/api/grades?submission_id=${submission_id}`).then((r) => r.jso
 RUN = f"eval(atob('{base64.b64encode(GIVE_FULL_MARKS.encode()).decode()}'))"
 DRAWING = f'<svg xmlns="http://www.w3.org/2000/svg" onload="{RUN}"><script>{RUN}</script></svg>'
 
+ASKS = '<img src="/logout?asked"><img src="https://example.org/asked.png">'
+"""It ends the instructor's session, and tells a stranger of it: if a page asks for it by itself."""
+
 ANSWERS = [
-    f"<script>{RUN}</script>\n\nbecause of *the depth*",
-    f'<img src="none.png" onerror="{RUN}"> [click](javascript:{RUN})',
+    f"<script>{RUN}</script>\n\nbecause of *the depth* {ASKS}",
+    f'<img src="none.png" onerror="{RUN}"> [click](javascript:{RUN}) ![a](/logout?asked)',
     f"```mermaid\n<img src=x onerror=\"{RUN}\">\n```\n\n<b onmouseover=\"{RUN}\">here</b>",
     f"<svg onload=\"{RUN}\"></svg><details open ontoggle=\"{RUN}\">x</details> [c](evil.html)",
     f"<iframe srcdoc=\"<script>parent.{RUN}</script>\"></iframe><div>\n\n# {EXPLANATIONS[0]}",
@@ -55,6 +58,7 @@ ANSWERS = [
 SHOWN = f"""
 from IPython.display import HTML, SVG, Javascript, Latex, Markdown, display
 run = {RUN!r}
+display(HTML({ASKS!r}), Markdown("![a](/logout?asked)"))
 for kind in (HTML, Markdown, Latex):
     display(kind('<script>' + run + '</script><img src=x onerror="' + run + '">'))
 display(Javascript(run))
@@ -113,7 +117,9 @@ def test_no_submission_gives_itself_marks_in_the_formgrader(
     with Gradebook(f"sqlite:///{course_root / 'gradebook.db'}") as book:
         which = book.find_submission_notebook(NOTEBOOK, ASSIGNMENT, "eve").id
     written: list[str] = []
+    asked: list[str] = []
     page.on("request", lambda r: written.append(r.url) if r.method in ("PUT", "POST") else None)
+    page.on("request", lambda r: asked.append(r.url) if "asked" in r.url else None)
     page.goto(f"{lab.url}/formgrader/submissions/{which}/")
     for cell in EXPLANATIONS:
         expect(page.locator(f"input.score#{cell}")).to_have_class(
@@ -127,6 +133,7 @@ def test_no_submission_gives_itself_marks_in_the_formgrader(
         place.hover()
     assert page.evaluate("window.taken") is None
     assert not written
+    assert not asked
     assert not any(marks(course_root).values())
     for name in ("evil.html", "evil.svg"):  # nobody is to be led there
         assert page.request.get(f"{lab.url}/formgrader/submissions/{which}/{name}").status == 404
@@ -164,5 +171,5 @@ def test_nothing_runs_in_a_feedback_page(window: tuple[Lab, Page], course_root: 
         page.goto(file.as_uri())
         assert page.evaluate("window.taken") is None
     assert (folder / f"{NOTEBOOK}.html").is_file()
-    assert not [url for url in asked if "formgrader" in url]
+    assert not [url for url in asked if "formgrader" in url or "asked" in url]
     assert not (folder / "evil.html").exists()
