@@ -28,6 +28,9 @@ CELL_TIMEOUT = 30.0
 START_TIMEOUT = 60.0
 """Seconds until a subject must have started: it takes half a second on a machine that is idle."""
 
+EXCESS_TIMEOUT = 1.0
+"""Seconds in which a watch must have seen what is used: it counts sockets twice a second."""
+
 NOT_RUN = {
     "output_type": "error", "ename": "NotRun", "evalue": "this cell was not run to its end",
     "traceback": ["NotRun: this cell was not run to its end"],
@@ -130,6 +133,8 @@ def run(
 
         seed = fresh_seed() if seed is None else seed
         _follow(program, channel, examiner, subject, outcome, cell_timeout, seed, start)
+        if (excess := subject.excess()) and _ended(excess) not in outcome.notes:
+            outcome.notes.append(_ended(excess))  # an examiner sees no more than that it is gone
     outcome.seconds = round(time.monotonic() - started, 2)
     return outcome
 
@@ -196,13 +201,21 @@ def _follow(
             reached=number,
         )
     except ChannelClosed:
-        fate = f"The notebook's process ended: {subject.fate()}."
+        fate = subject.fate()
         status = "grader_error" if subject.unwatched else "not_checked"
-        _give_up(program, outcome, fate, status, reached=number)
+        _give_up(program, outcome, _ended(fate), status, reached=number)
     except ExaminerFloodedError as error:
         _give_up(program, outcome, str(error), reached=number)
     except ExaminerError as error:
-        _give_up(program, outcome, str(error), "grader_error", reached=number)
+        # What there is too much of in a network fails an examiner, too, and is the subject's.
+        excess = subject.excess(EXCESS_TIMEOUT)
+        reason = _ended(excess) if excess else str(error)
+        status = "not_checked" if excess else "grader_error"
+        _give_up(program, outcome, reason, status, reached=number)
+
+
+def _ended(fate: str) -> str:
+    return f"The notebook's process ended: {fate}."
 
 
 def _stuck(program: Program, number: int, seconds: float, frames: list[stuck.Frame]) -> str:

@@ -11,6 +11,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Self
 
+from autograder.descriptors import readable
 from autograder.outside.processes import Sandboxed, number_inside
 from autograder.sandbox import cgroups, network, warmth
 from autograder.sandbox.host import fate_of
@@ -99,6 +100,14 @@ class BoxedSubject:
     def unwatched(self) -> bool:
         """Whether it was ended because the watch over it failed."""
         return self._watch.failed
+
+    def excess(self, timeout: float = 0.0) -> str:
+        """Return in words what it was ended for using too much of; empty if it was not.
+
+        If it still runs, it has ``timeout`` seconds to be ended.
+        """
+        readable([self.handle], timeout)
+        return "" if self._watch.failed else self._watch.reason
 
     def ready(self) -> None:
         """Find the subject's process, bound it, and tell the warden of it."""

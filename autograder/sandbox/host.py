@@ -69,6 +69,10 @@ class HostSubject:
         self.pid = self._process.pid
         self.delay: RunDelay = of_process(self.pid)
 
+    def excess(self, timeout: float = 0.0) -> str:
+        """Return nothing: nobody watches what it uses."""
+        return ""
+
     def ready(self) -> None:
         """Need nothing: the process is the one that was started."""
 

@@ -34,7 +34,8 @@ class Limits:
         open_files: open file descriptors of one process.
         all_files: those of all its processes.
         sockets: in its network, those included that no process has open any more, as they are under
-            way to another; the kernel holds 200 KB of messages for one.
+            way to another; the kernel holds 200 KB of messages for one. None if the network is
+            another's: then what waits in it is not its memory, either.
         locks: of parts of files.
         inodes: files and folders in each of its scratch folders, which cost memory if empty, too.
         scratch: room in its home folder, in /tmp and in /dev/shm, each.
@@ -52,7 +53,7 @@ class Limits:
     file: int = 64 * MIB
     open_files: int = 1024
     all_files: int = 2048
-    sockets: int = 1200
+    sockets: int | None = 1200
     locks: int = 5000
     inodes: int = 20_000
     scratch: int = 64 * MIB
@@ -60,10 +61,13 @@ class Limits:
 
     @classmethod
     def of_examiner(cls) -> Limits:
-        """Return those of an examiner: a flood of messages ends it, not the machine."""
+        """Return those of an examiner: a flood of messages ends it, not the machine.
+
+        It is in its subject's network, where whatever there is too much of is the subject's doing.
+        """
         return cls(
             memory=EXAMINER_MEMORY, data=EXAMINER_MEMORY, processes=8, cpu=900, scratch=16 * MIB,
-            wall=1200,
+            wall=1200, sockets=None,
         )  # fmt: skip
 
     def to_json(self) -> str:

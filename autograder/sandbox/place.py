@@ -59,6 +59,12 @@ class RunningSubject(Protocol):
     def unwatched(self) -> bool:
         """Whether it was ended because the grader failed to watch over it."""
 
+    def excess(self, timeout: float = 0.0) -> str:
+        """Return in words what it was ended for using too much of; empty if it was not.
+
+        If it still runs, it has ``timeout`` seconds to be ended.
+        """
+
     def ready(self) -> None:
         """Note that the subject has started and has not run any of the student's code yet."""
 

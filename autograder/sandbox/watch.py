@@ -168,9 +168,12 @@ class Watch:
             return f"it held more than {self._limits.locks} locks on files"
         if own and set(locked) - own:
             return "it held a lock on a file that is not its own, and that others may wait for"
+        return "" if self._limits.sockets is None else self._in_network(self._limits.sockets)
+
+    def _in_network(self, most: int) -> str:
         tables = (*TCP, *UDP) if usage.has_connections(self._net) else UDP
         rows = [row for name in tables for row in usage.rows(f"{self._net}/{name}")]
         self._queued = sum(map(usage.queued, rows))
-        if len(rows) + len(usage.rows(f"{self._net}/unix")) > self._limits.sockets:
-            return f"there were more than {self._limits.sockets} sockets in its network"
+        if len(rows) + len(usage.rows(f"{self._net}/unix")) > most:
+            return f"there were more than {most} sockets in its network"
         return ""

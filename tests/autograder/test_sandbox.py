@@ -18,6 +18,7 @@ from autograder import engine, runner, sandbox
 from autograder.corpus import Case
 from autograder.descriptors import readable
 from autograder.gradebook import CourseGradebook
+from autograder.processes import ExaminerError, ExaminerProcess
 from autograder.sandbox import BoxError, SandboxError, network, probe, seccomp, usage, warmth
 from autograder.sandbox.box import Box
 from autograder.sandbox.limits import Limits
@@ -295,6 +296,44 @@ def test_a_failure_of_the_watch_is_left_to_a_person(monkeypatch: pytest.MonkeyPa
     outcome = runner.run((Cell(cell + "threading.Event().wait()"), EXAM))
     assert {check.status for check in outcome.verdicts["qos-hidden"].checks} == {"grader_error"}
     assert "the grader could not see what it used" in outcome.notes[0]
+
+
+def test_what_is_in_its_subjects_network_is_not_counted_against_an_examiner(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("autograder.sandbox.view.SCRATCH", ())  # of a sandbox, and here is none
+    monkeypatch.setattr(usage, "locked_devices", lambda _: [])
+    with subprocess.Popen(["sleep", "infinity"]) as process:
+        handle = os.pidfd_open(process.pid)
+        watches = [
+            Watch(process.pid, handle, limits)
+            for limits in (Limits(sockets=0), Limits.of_examiner())
+        ]
+        found = [watch._kept_by_kernel() for watch in watches]
+        for watch in watches:
+            watch.stop()
+        process.kill()
+        os.close(handle)
+    assert found == ["there were more than 0 sockets in its network", ""]
+    assert watches[1]._queued == 0
+
+
+@needs_sandbox
+def test_an_examiner_that_fails_with_an_excessive_subject_is_no_grader_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise ExaminerError("The examiner ended without a verdict.")
+
+    monkeypatch.setattr(ExaminerProcess, "verdict", fail)
+    cell = (
+        "import os, threading, time\n"
+        "fork = lambda: [os.fork() or time.sleep(60) for _ in range(40)]\n"
+        "threading.Timer(0.3, fork).start()"
+    )
+    outcome = runner.run((Cell(cell), EXAM))
+    assert {check.status for check in outcome.verdicts["qos-hidden"].checks} == {"not_checked"}
+    assert outcome.notes == ["The notebook's process ended: it started more than 32 processes."]
 
 
 @needs_sandbox
