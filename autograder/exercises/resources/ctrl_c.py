@@ -6,9 +6,10 @@ A program that is interrupted is not asked.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from statistics import median_low
 from typing import Any
 
 from rclpy.node import Node
@@ -16,12 +17,15 @@ from rclpy.node import Node
 from autograder.exam import Failed
 from autograder.exercises.resources.camera_duties import DRIVER, ENDED
 from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT
+from autograder.exercises.resources.process_usage import Usage
 from autograder.exercises.resources.rig import CameraRig
 from autograder.observe.patience import Patience
+from autograder.observe.phrases import phrase
 from autograder.observe.stillness import Stillness
 from autograder.programs import Program
 
 LIVES = 4
+MEMORY = 1024  # KiB a life: nobody has Python collect what is garbage
 WHEN = "When the driver runs in a program of its own, which is ended by Ctrl-C,"
 
 
@@ -31,14 +35,20 @@ class Lives:
 
     ``worked`` is whether it took pictures in each, ``raised`` whether its end was that of the
     program; ``left_open`` and ``left_on_graph`` are what it had not given back after one, and
-    ``threads`` how many there were after each.
+    ``usages`` what the program held after each; ``others`` tells of processes that were left then.
     """
 
     worked: bool = True
     raised: bool = False
     left_open: bool = False
     left_on_graph: bool = False
-    threads: tuple[int, ...] = ()
+    usages: tuple[Usage, ...] = ()
+    others: str = ""
+
+    def kept(self) -> Usage:
+        """Return what a life leaves behind: the median, as something else may come or go once."""
+        grown = [after.grown(before) for before, after in pairwise(self.usages)]
+        return Usage(*map(median_low, zip(*grown, strict=True)))
 
 
 def require_off_graph_at_the_end(rig: CameraRig) -> None:
@@ -61,13 +71,23 @@ def require_closed_at_the_end(rig: CameraRig) -> None:
         raise _failed("its destroy_node() closes the camera.", "It was still open.")
 
 
-def require_no_thread_at_the_end(rig: CameraRig) -> None:
-    """Fail if each life of a driver leaves a thread that goes on after Ctrl-C."""
+def require_nothing_kept_at_the_end(rig: CameraRig) -> None:
+    """Fail if each life of a driver leaves a thread, a file or memory in the program."""
     lives = _lives(rig)
-    if lives is None or len(lives.threads) < LIVES:
+    if lives is None or len(lives.usages) < LIVES:
         return
-    if all(later > earlier for earlier, later in pairwise(lives.threads)):
-        raise _failed("it ends its threads.", "Each of its lives left a thread behind.")
+    if left := _leaks(lives.kept()):
+        raise _failed(
+            "it leaves no thread and no file behind, and less than 1 MiB.",
+            f"Each of its lives left {phrase(left)} behind.{lives.others}",
+        )
+
+
+def _leaks(kept: Usage) -> list[str]:
+    left = ["a thread"] if kept.threads > 0 else []
+    left += ["an open file"] if kept.files > 0 else []
+    left += [f"{kept.memory // 1024} MiB of memory"] if kept.memory >= MEMORY else []
+    return left
 
 
 def _lives(rig: CameraRig) -> Lives | None:
@@ -95,7 +115,7 @@ def _watch(rig: CameraRig, program: Program, device: str) -> Lives:
     def comes(condition: Callable[[], Any]) -> bool:
         return Patience(still).wait(program.session, condition)
 
-    threads: list[int] = []
+    usages: list[Usage] = []
     for _ in range(LIVES):
         # A picture is asked for by a timer or a thread, once the nodes spin.
         if not program.up or not comes(lambda: any(rig.cameras(device))):
@@ -108,15 +128,18 @@ def _watch(rig: CameraRig, program: Program, device: str) -> Lives:
             return Lives(raised=True)
         if not closed or not off_graph:
             return Lives(left_open=not closed, left_on_graph=not off_graph)
-        threads.append(_threads(rig, program, min(threads, default=0)))
+        usages.append(_usage(rig, program, usages))
+        others = rig.others()
         program.interrupt()
-    return Lives(threads=tuple(threads))
+    return Lives(usages=tuple(usages), others=others)
 
 
-def _threads(rig: CameraRig, program: Program, before: int) -> int:
-    """Return how many threads there are, once no more end that the task gives a second to end."""
-    program.wait(lambda: len(rig.process.thread_ids()) <= before, ENDED if before else 0.0)
-    return len(rig.process.thread_ids())
+def _usage(rig: CameraRig, program: Program, before: Sequence[Usage]) -> Usage:
+    """Return what the program holds, once no more goes that the task gives a second to go."""
+    if before:
+        last = before[-1]
+        program.wait(lambda: not _leaks(rig.process.usage().grown(last)), ENDED)
+    return rig.process.usage()
 
 
 def _failed(expected: str, actual: str) -> Failed:

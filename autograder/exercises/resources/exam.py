@@ -39,7 +39,7 @@ from autograder.exercises.resources.camera_requests import (
 )
 from autograder.exercises.resources.ctrl_c import (
     require_closed_at_the_end,
-    require_no_thread_at_the_end,
+    require_nothing_kept_at_the_end,
     require_off_graph_at_the_end,
 )
 from autograder.exercises.resources.leak_test import MEMORY, growth
@@ -214,7 +214,7 @@ def lives_are_flat(rig: CameraRig) -> None:
         )
     with rig.trying():
         require_flat_snapshots(rig)
-    require_no_thread_at_the_end(rig)
+    require_nothing_kept_at_the_end(rig)
 
 
 @EXAM.check(
