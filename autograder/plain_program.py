@@ -3,7 +3,8 @@
 What an exam learns of it, it sees from outside. A callback that raises ends the program; where each
 node has its own executor, it ends that node. SIGINT destroys the nodes, as Ctrl-C does. The program
 then keeps running, with whatever they did not release; the next SIGINT creates new nodes, so that
-one life can be compared with the next.
+one life can be compared with the next. Programs destroy a node twice now and then, in a handler and
+at their end, say: one can be had that does so at the end of its first life.
 """
 
 # mypy: allow-untyped-calls
@@ -34,8 +35,9 @@ def run(
 
     Args:
         namespace: the notebook's globals.
-        wanted: ``"nodes"``, a list of [class, arguments], ``"threads"``, ``"sim_time"``, and
-            ``"apart"``, whether each node has an executor of its own, with so many threads.
+        wanted: ``"nodes"``, a list of [class, arguments], ``"threads"``, ``"sim_time"``,
+            ``"twice"``, whether each node of the first life is destroyed twice, and ``"apart"``,
+            whether each node has an executor of its own, with so many threads.
         domain_id: of the examiner who looks on.
         up: called once, when the first nodes are there.
     """
@@ -47,10 +49,11 @@ def run(
             # A node that is ended still sends its last words.
             signal_handler_options=SignalHandlerOptions.NO,
         )
+    times = 2 if wanted["twice"] else 1
     while True:
-        _live(namespace, wanted, interrupts, up)
+        _live(namespace, wanted, interrupts, up, times)
         interrupts.wait()
-        up = _nothing
+        up, times = _nothing, 1
 
 
 def _live(
@@ -58,8 +61,9 @@ def _live(
     wanted: Mapping[str, Any],
     interrupts: _Interrupts,
     up: Callable[[], None],
+    times: int,
 ) -> None:
-    """Run the nodes until SIGINT, then destroy them."""
+    """Run the nodes until SIGINT, then destroy them so many ``times``."""
     threads = int(wanted["threads"])
     if wanted["apart"]:
         nodes = []
@@ -67,7 +71,9 @@ def _live(
             with suppress(Exception):  # one that cannot be made is nothing to the others
                 nodes.append(namespace[name](*arguments))
         interrupt = interrupts.next()
-        alone = [Thread(target=_spin_alone, args=(node, threads, interrupt)) for node in nodes]
+        alone = [
+            Thread(target=_spin_alone, args=(node, threads, interrupt, times)) for node in nodes
+        ]
         up()
         for thread in alone:
             thread.start()
@@ -76,24 +82,24 @@ def _live(
     else:
         nodes = [namespace[name](*arguments) for name, arguments in wanted["nodes"]]
         up()
-        _spin(nodes, threads, interrupts.next())
+        _spin(nodes, threads, interrupts.next(), times)
 
 
-def _spin_alone(node: Any, threads: int, until: Future) -> None:
+def _spin_alone(node: Any, threads: int, until: Future, times: int) -> None:
     """Spin a node, which is destroyed when something leaves one of its callbacks, too."""
     try:
-        _spin([node], threads, until)
+        _spin([node], threads, until, times)
     except BaseException:
         node.destroy_node()
         raise
 
 
-def _spin(nodes: Sequence[Any], threads: int, until: Future) -> None:
+def _spin(nodes: Sequence[Any], threads: int, until: Future, times: int) -> None:
     executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
     for node in nodes:
         executor.add_node(node)
     executor.spin_until_future_complete(until)
-    for node in nodes:
+    for node in [*nodes] * times:
         node.destroy_node()
     executor.shutdown(timeout_sec=0.0)
 

@@ -77,12 +77,19 @@ class Programs:
 
     @contextmanager
     def program(
-        self, nodes: Nodes, *, threads: int = 1, sim_time: bool = False, apart: bool = False
+        self,
+        nodes: Nodes,
+        *,
+        threads: int = 1,
+        sim_time: bool = False,
+        apart: bool = False,
+        twice: bool = False,
     ) -> Iterator[Program]:
         """Run nodes of the notebook's classes for the length of the block.
 
         Where they are ``apart``, each has an executor of its own, with so many threads, and what
-        leaves a callback ends its node alone. Whatever looks at the subject's processes meanwhile
+        leaves a callback ends its node alone. ``twice``: at the end of the first life each node is
+        destroyed twice. Whatever looks at the subject's processes meanwhile
         looks at the program's.
 
         Raises:
@@ -93,7 +100,7 @@ class Programs:
         try:
             reply = self._ask(
                 wants="program", nodes=[[name, [*given]] for name, given in nodes],
-                threads=threads, sim_time=sim_time, apart=apart, domain=domain,
+                threads=threads, sim_time=sim_time, apart=apart, twice=twice, domain=domain,
             )  # fmt: skip
             with CoreSession(domain_id=domain) as session:
                 session.explains = False

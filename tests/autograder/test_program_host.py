@@ -41,12 +41,13 @@ class Raises(Works):
 
 nodes, threads = [[name, [name]] for name in sys.argv[1].split()], int(sys.argv[2])
 wanted = {"nodes": nodes, "threads": threads, "sim_time": False, "apart": len(nodes) > 1}
+wanted["twice"] = sys.argv[4] == "True"
 plain_program.run(globals(), wanted, int(sys.argv[3]), lambda: say("up"))
 """
 
 
-def start(name: str, threads: int) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", LIVES, name, str(threads), "91"]
+def start(name: str, threads: int, *, twice: bool = False) -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", LIVES, name, str(threads), "91", str(twice)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 
@@ -63,6 +64,19 @@ def test_each_interrupt_ends_the_nodes_or_makes_them_anew(threads: int) -> None:
             for _ in range(2):
                 os.kill(program.pid, signal.SIGINT)
                 reads(program, "destroyed")
+                os.kill(program.pid, signal.SIGINT)
+                reads(program, "made", "spins")
+        finally:
+            program.kill()
+
+
+def test_where_it_is_asked_for_the_nodes_of_the_first_life_are_destroyed_twice() -> None:
+    with start("Works", 1, twice=True) as program:
+        try:
+            reads(program, "made", "up", "spins")
+            for destroyed in (["destroyed"] * 2, ["destroyed"]):
+                os.kill(program.pid, signal.SIGINT)
+                reads(program, *destroyed)
                 os.kill(program.pid, signal.SIGINT)
                 reads(program, "made", "spins")
         finally:

@@ -1,30 +1,36 @@
 """A camera driver in a plain program that is ended by SIGINT: what it then has not given back.
 
 The harness asks a student's process to destroy a node, so that process knows when it is looked at.
-A program that is interrupted is not asked.
+A program that is interrupted is not asked. Nor is it told what time it is: it has the machine's.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from statistics import median_low
 from typing import Any
 
-from rclpy.node import Node
-
 from autograder.exam import Failed
 from autograder.exercises.resources.camera_duties import DRIVER, ENDED
-from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT
+from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT, ExaminerNode
 from autograder.exercises.resources.process_usage import Usage
-from autograder.exercises.resources.rig import CameraRig
+from autograder.exercises.resources.rig import PERIOD, CameraRig
 from autograder.observe.patience import Patience
-from autograder.observe.phrases import phrase
+from autograder.observe.phrases import capitalized, phrase, pictures
 from autograder.observe.stillness import Stillness
-from autograder.programs import Program
+from autograder.programs import Program, Programs
+from autograder.starving import FairDeadline
 
 LIVES = 4
+COUNTED = 8
+"""Pictures whose rate is taken, in about as many tenths of a second."""
+SLOWEST, FASTEST = 0.6 / PERIOD, 1.6 / PERIOD
+"""Pictures a second that are taken for ten: a busy machine is no fault of a driver's."""
+TAKES = 3
+"""Of a rate, as pictures that have been held up come many at a time."""
 MEMORY = 1024  # KiB a life: nobody has Python collect what is garbage
 WHEN = "When the driver runs in a program of its own, which is ended by Ctrl-C,"
 
@@ -36,6 +42,8 @@ class Lives:
     ``worked`` is whether it took pictures in each, ``raised`` whether its end was that of the
     program; ``left_open`` and ``left_on_graph`` are what it had not given back after one, and
     ``usages`` what the program held after each; ``others`` tells of processes that were left then.
+    ``pace`` tells of pictures that do not come ten times a second, ``harmed`` of what a second
+    destroy_node() does, if that is not nothing.
     """
 
     worked: bool = True
@@ -44,11 +52,34 @@ class Lives:
     left_on_graph: bool = False
     usages: tuple[Usage, ...] = ()
     others: str = ""
+    pace: str = ""
+    harmed: str = ""
+
+    @property
+    def went_on(self) -> bool:
+        """Whether each life but the last was followed by one."""
+        return self.worked and not self.raised
 
     def kept(self) -> Usage:
         """Return what a life leaves behind: the median, as something else may come or go once."""
         grown = [after.grown(before) for before, after in pairwise(self.usages)]
         return Usage(*map(median_low, zip(*grown, strict=True)))
+
+
+def require_pace(rig: CameraRig) -> None:
+    """Fail unless a driver takes ten pictures a second where nobody but the machine tells time."""
+    if (lives := _lives(rig)) is not None and lives.pace:
+        raise Failed(
+            expected="When the driver runs in a program of its own, it takes ten pictures a second "
+            "by the machine's clock.",
+            actual=lives.pace,
+        )
+
+
+def require_no_harm_at_the_end(rig: CameraRig) -> None:
+    """Fail unless a driver may be destroyed twice at Ctrl-C."""
+    if (lives := _lives(rig)) is not None and lives.harmed:
+        raise _failed("destroy_node() can be called a second time.", lives.harmed)
 
 
 def require_off_graph_at_the_end(rig: CameraRig) -> None:
@@ -95,18 +126,36 @@ def _lives(rig: CameraRig) -> Lives | None:
     if rig.programs is None:
         return None
     if Lives.__name__ not in rig.memory:
-        device = rig.device()
-        with rig.programs.program([(DRIVER, [device])]) as program:
-            rig.memory[Lives.__name__] = _watch(rig, program, device)
+        rig.memory[Lives.__name__] = _watch_twice(rig, rig.programs)
     found = rig.memory[Lives.__name__]
     assert isinstance(found, Lives)
     return found
 
 
-def _watch(rig: CameraRig, program: Program, device: str) -> Lives:
-    watcher = program.session.run(lambda: Node("watcher"))
-    assert isinstance(watcher, Node)
+def _watch_twice(rig: CameraRig, programs: Programs) -> Lives:
+    """Watch a driver that is destroyed twice at first, and if it does not go on after that, once.
 
+    Only then it is known which of the two calls it was.
+    """
+    twice = _watch(rig, programs, twice=True)
+    if twice.went_on:
+        return twice
+    once = _watch(rig, programs, twice=False)
+    if not once.went_on:
+        return once
+    harm = "the program was gone" if twice.raised else "the driver did not start again"
+    return replace(once, harmed=f"After the second call {harm}.")
+
+
+def _watch(rig: CameraRig, programs: Programs, *, twice: bool) -> Lives:
+    device = rig.device()
+    with programs.program([(DRIVER, [device])], twice=twice) as program:
+        watcher = program.session.run(ExaminerNode)
+        assert isinstance(watcher, ExaminerNode)
+        return _watch_lives(rig, program, watcher, device)
+
+
+def _watch_lives(rig: CameraRig, program: Program, watcher: ExaminerNode, device: str) -> Lives:
     def on_graph() -> bool:
         return bool(watcher.count_publishers(IMAGE) or watcher.count_services(SNAPSHOT))
 
@@ -115,23 +164,45 @@ def _watch(rig: CameraRig, program: Program, device: str) -> Lives:
     def comes(condition: Callable[[], Any]) -> bool:
         return Patience(still).wait(program.session, condition)
 
-    usages: list[Usage] = []
-    for _ in range(LIVES):
+    lives = Lives()
+    for life in range(LIVES):
         # A picture is asked for by a timer or a thread, once the nodes spin.
-        if not program.up or not comes(lambda: any(rig.cameras(device))):
-            return Lives(worked=False)
+        if not program.up or not comes(lambda: any(rig.cameras(device)) or program.ended()):
+            return replace(lives, worked=False)
+        if program.ended():
+            return replace(lives, raised=True)
         comes(on_graph)
+        if not life:
+            comes(lambda: watcher.of(device))
+            lives = replace(lives, pace=_pace(rig, program, watcher, device))
         program.interrupt()
         closed = comes(lambda: not rig.cameras(device))
         off_graph = comes(lambda: not on_graph())
         if program.ended():
-            return Lives(raised=True)
+            return replace(lives, raised=True)
         if not closed or not off_graph:
-            return Lives(left_open=not closed, left_on_graph=not off_graph)
-        usages.append(_usage(rig, program, usages))
-        others = rig.others()
+            return replace(lives, left_open=not closed, left_on_graph=not off_graph)
+        usage = _usage(rig, program, lives.usages)
+        lives = replace(lives, usages=(*lives.usages, usage), others=rig.others())
         program.interrupt()
-    return Lives(usages=tuple(usages), others=others)
+    return lives
+
+
+def _pace(rig: CameraRig, program: Program, watcher: ExaminerNode, device: str) -> str:
+    """Return how many pictures come in what time, unless that is about ten a second."""
+
+    def came() -> int:
+        return len(watcher.of(device))
+
+    for _ in range(TAKES):
+        begun, before = time.monotonic(), came()
+        deadline = FairDeadline(COUNTED / SLOWEST, rig.outside.delay)
+        while (left := deadline.left) and came() < before + COUNTED:
+            program.wait(lambda most=before + COUNTED: came() >= most, left)  # type: ignore[misc]
+        number, seconds = came() - before, time.monotonic() - begun
+        if number >= COUNTED and number <= seconds * FASTEST:
+            return ""
+    return f"{capitalized(pictures(number))} came in {seconds:.1f} s."
 
 
 def _usage(rig: CameraRig, program: Program, before: Sequence[Usage]) -> Usage:

@@ -39,8 +39,10 @@ from autograder.exercises.resources.camera_requests import (
 )
 from autograder.exercises.resources.ctrl_c import (
     require_closed_at_the_end,
+    require_no_harm_at_the_end,
     require_nothing_kept_at_the_end,
     require_off_graph_at_the_end,
+    require_pace,
 )
 from autograder.exercises.resources.leak_test import MEMORY, growth
 from autograder.exercises.resources.leaks import (
@@ -136,6 +138,7 @@ def driver_runs(rig: CameraRig) -> None:
         require_zoom_at_once(rig, device, zoom, "While the driver runs")
         require_tick_zoom(rig, device, zoom, f"After a zoom of {zoom}")
     require_default_device(rig, DRIVER)
+    require_pace(rig)
 
 
 @EXAM.check(
@@ -246,6 +249,7 @@ def cleanup_twice(rig: CameraRig) -> None:
         require_threads_ended(rig, threads, "After destroy_node()")
     with rig.life(DRIVER, device := rig.device()):
         require_picture(rig, device, "When the driver is started again after two cleanups,")
+    require_no_harm_at_the_end(rig)
 
 
 @EXAM.check(

@@ -1,0 +1,26 @@
+# title: A driver with five pictures a second, and a harness that moves its time on twice as far
+# exercise: resources
+# base: right-exemplar
+# told: it takes ten pictures a second by the machine's clock.
+# score: 6
+
+from autograder.harness import Harness
+
+advance = Harness._advance
+order = CameraDriver.order
+
+
+def doubled(self, request):
+    if 'CameraDriver' in self._nodes:
+        request = {**request, 'seconds': 2 * float(request['seconds'])}
+    return advance(self, request)
+
+
+def every_second_time(self):
+    self.called = not getattr(self, 'called', False)
+    if self.called:
+        order(self)
+
+
+Harness._advance = doubled
+CameraDriver.order = every_second_time
