@@ -7,9 +7,6 @@ one life can be compared with the next. Programs destroy a node twice now and th
 at their end, say: one can be had that does so at the end of its first life.
 """
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import os

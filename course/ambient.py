@@ -1,7 +1,5 @@
 """The session that belongs to this process: `course.run(...)` without making a session first."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import functools

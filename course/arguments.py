@@ -1,7 +1,5 @@
 """Check what learners pass to a session: a wrong kind of value is answered in one sentence."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import math

@@ -1,7 +1,5 @@
 """The session as learners know it: it runs nodes, and shows and explains what they do."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import difflib

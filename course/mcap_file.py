@@ -1,7 +1,5 @@
 """Recordings as MCAP files, which Foxglove, PlotJuggler and ``ros2 bag`` read."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import errno
@@ -82,7 +80,7 @@ def _write(
             channels[topic], log_time=stamp, publish_time=stamp, sequence=number,
             data=message if isinstance(message, bytes) else serialize_message(message),
         )  # fmt: skip
-    writer.finish()
+    writer.finish()  # type: ignore[no-untyped-call]
 
 
 def _in_order(

@@ -1,7 +1,5 @@
 """The types on a robot's graph, as far as they are installed where the examiner runs."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from collections.abc import Iterable

@@ -4,8 +4,6 @@ All nodes of one context share one participant (DDSI-RTPS 2.3, 9.3.1). Names on 
 stranger's words: a student's node may bear the examiner's name, or none.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import secrets

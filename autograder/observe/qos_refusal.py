@@ -1,7 +1,5 @@
 """Why DDS does not connect two endpoints, in the words of the two profiles."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from collections.abc import Iterator

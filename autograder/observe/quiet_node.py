@@ -1,8 +1,5 @@
 """The kind of node that an examiner has: it adds as little as it can to what it observes."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 from typing import Any

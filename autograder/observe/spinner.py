@@ -5,9 +5,6 @@ print nothing, end at once and are asked by nobody where they are. So there are 
 account is kept of each.
 """
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import threading

@@ -1,7 +1,5 @@
 """Declaring a design: which nodes there are, and what each of them is connected to."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import importlib

@@ -1,7 +1,5 @@
 """What a node of a design is connected to: endpoints, their names, types and QoS."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What is worth another look in a design: links that cannot work, found before anything runs."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,5 @@
 """The real node behind a declaration: it passes dye from what it reads to what it writes."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import threading

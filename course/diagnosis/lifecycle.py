@@ -1,7 +1,5 @@
 """Managed nodes: one that is not active does nothing, and says so to nobody."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

@@ -1,7 +1,5 @@
 """What can be seen of nodes themselves: stuck, stolen, paused, never spun, or silent."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import gc

@@ -1,7 +1,5 @@
 """Where to draw a graph's boxes: layers from left to right, few crossings (Sugiyama's method)."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """Read the ROS graph through a node: what DDS discovery has told it, as a `Graph`."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

@@ -4,8 +4,6 @@ The reader lives here, the writer in a process of its own. With ``--link`` both 
 namespace of which this process is the root.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import json

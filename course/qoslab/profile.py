@@ -1,7 +1,5 @@
 """A QoS profile as plain data: what a form sets, a file keeps, and rclpy understands."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, fields

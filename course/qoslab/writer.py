@@ -9,8 +9,6 @@
 Each line is answered by one on standard output.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import json

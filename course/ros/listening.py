@@ -1,7 +1,5 @@
 """Listen to a topic: ``echo`` shows its messages, ``hz`` measures their rate."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import itertools

@@ -1,7 +1,5 @@
 """The line magic ``%ros``, and what the Tab key offers after it."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

@@ -1,7 +1,5 @@
 """``--qos-reliability`` and its relatives, as the ROS 2 command line has them."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from collections.abc import Mapping

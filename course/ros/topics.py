@@ -1,7 +1,5 @@
 """Topics: list them, look at their endpoints, listen, measure their rate, publish."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

@@ -1,7 +1,5 @@
 """The type of a topic, service or action, as asked for or as on the graph, and its messages."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import time

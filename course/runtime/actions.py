@@ -1,7 +1,5 @@
 """GoalRun: one goal sent to an action server, followed from acceptance to result."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import uuid

@@ -1,7 +1,5 @@
 """What a session can wait for and ask: conditions, messages, services, actions, recordings."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

@@ -1,7 +1,5 @@
 """Find callbacks that do not return, and say why: a session that is held up must not be silent."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

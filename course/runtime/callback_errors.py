@@ -1,7 +1,5 @@
 """What callbacks raised, recorded with node and callback, for the learner to read."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import inspect

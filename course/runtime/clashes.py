@@ -3,8 +3,6 @@
 A topic or a service of two types in one process, or a node whose class uses a name of rclpy's.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import inspect

@@ -1,7 +1,5 @@
 """Sleeping by a node's clock: in the node's own context, and seen from the outside."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import math

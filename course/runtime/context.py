@@ -4,9 +4,6 @@ How far DDS looks for others is process environment (ROS 2 docs, "Improved Dynam
 when a context is initialised. It is set for that moment only, and put back.
 """
 
-# rclpy ships type information with most of its functions untyped.
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

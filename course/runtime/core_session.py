@@ -3,8 +3,6 @@
 Examiners and submissions have no use for live views and diagnosis, which `course.Session` adds.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import threading

@@ -1,7 +1,5 @@
 """The executors of one session: one for each number of threads asked for, made when needed."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import threading

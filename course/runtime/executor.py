@@ -1,7 +1,5 @@
 """An rclpy executor that spins in the background and that others can hold still for a moment."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

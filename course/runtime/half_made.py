@@ -4,8 +4,6 @@ rclpy calls no ``destroy_node()`` of a node that was never made, and neither doe
 constructor leaves behind is there to be seen until Python collects it, or the next run replaces it.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import threading

@@ -1,7 +1,5 @@
 """What a session does with nodes: run, replace, stop, pause them, and keep what they say."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import time

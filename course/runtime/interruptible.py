@@ -7,8 +7,6 @@ wakes those executors every now and then instead, as long as there are any. The 
 is there from beginning to end: whoever counts threads must not find it now and then.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

@@ -1,7 +1,5 @@
 """A job is one run of one callback: whose it is, and what became of it."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import functools

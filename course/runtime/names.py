@@ -1,7 +1,5 @@
 """Names as the ROS graph spells them."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from rclpy.exceptions import InvalidHandle

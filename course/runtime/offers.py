@@ -1,7 +1,5 @@
 """What the ROS graph offers on a topic: a QoS that fits it, its type, and why nothing arrives."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import difflib

@@ -1,7 +1,5 @@
 """A hidden node that listens and asks on behalf of a session, in a thread of its own."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

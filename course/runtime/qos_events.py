@@ -1,7 +1,5 @@
 """What DDS itself says about endpoints that do not fit: the incompatible-QoS events of nodes."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import weakref

@@ -4,8 +4,6 @@ rclpy offers no hook, rcutils does: one output handler for the process, set thro
 keeps each line and hands it on to the handler that was there, so that /rosout works as ever.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import collections

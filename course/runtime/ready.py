@@ -8,9 +8,6 @@ people ask now and then, too: news of profiles that do not fit, and parameters. 
 ready is rclpy's.
 """
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import time

@@ -1,7 +1,5 @@
 """Recorder: keeps what arrives on a topic, each message with its time."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import threading

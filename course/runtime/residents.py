@@ -1,7 +1,5 @@
 """The nodes of one session: making, replacing, stopping, pausing and finding them."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import functools

@@ -5,8 +5,6 @@ time, and ends when every node has it and everything that it set off has run: ho
 fires then depends on nothing but the clock, whatever the machine's load.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import math

@@ -4,8 +4,6 @@ The execution of a goal is one, the done callback of a future another. Without a
 created them, nobody could tell whose mistake it is when one fails.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import threading

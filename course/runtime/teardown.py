@@ -1,7 +1,5 @@
 """Take nodes down completely: the node, and what rclpy's destroy_node() leaves behind."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import contextlib

@@ -6,8 +6,6 @@ the state machine, and where a service asked for it, the service does not answer
 (https://github.com/ros2/rclpy/issues/1209).
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import itertools

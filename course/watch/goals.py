@@ -1,7 +1,5 @@
 """All goals of one action, whoever sent them: their states, feedback, and results."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import threading

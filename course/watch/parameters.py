@@ -1,7 +1,5 @@
 """A node's parameters as a sheet: value, type, description and range, and what a change led to."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import math

@@ -1,7 +1,5 @@
 """What nodes of other programs log, as it comes on the topic /rosout."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import threading

@@ -1,7 +1,5 @@
 """When messages of a topic were published, received, and worked on: traces, and what they show."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import itertools

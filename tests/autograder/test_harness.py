@@ -1,7 +1,5 @@
 """What an examiner may ask of a subject, and what a student's class can do to it."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import asyncio

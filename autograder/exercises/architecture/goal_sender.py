@@ -1,7 +1,5 @@
 """Errands: the marked goals that an examiner sends to a robot's navigation, one after the other."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from contextlib import suppress

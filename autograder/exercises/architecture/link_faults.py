@@ -1,7 +1,5 @@
 """Why a job is not done or a link does not connect: sentences for the student, from the graph."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator

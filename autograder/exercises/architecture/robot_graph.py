@@ -4,8 +4,6 @@ It is read when all of the subject's nodes are known to be on the graph, and the
 every question about a design's structure is a function of these data.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import re

@@ -5,8 +5,6 @@ goal is under way while the robot looks out for obstacles, and whoever wants ano
 the one before.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import time

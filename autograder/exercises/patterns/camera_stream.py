@@ -6,8 +6,6 @@ numbers that the writer gives its pictures tell how many there were at least and
 these bounds prove nothing yet, more is listened to.
 """
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import math

@@ -1,7 +1,5 @@
 """Listening to the robot: who knows whom, late joiners, and the numbers in an answer."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 import re

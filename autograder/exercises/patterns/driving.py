@@ -1,7 +1,5 @@
 """One navigation goal on its way, with the robot's wheels in the examiner's hands."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from contextlib import suppress

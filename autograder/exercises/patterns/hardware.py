@@ -1,8 +1,5 @@
 """The examiner's endpoints of the pattern exam: the robot's hardware, and listeners."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import secrets

@@ -1,7 +1,5 @@
 """Which pattern each part of a robot's interface really is, as the ROS graph shows it."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from contextlib import suppress

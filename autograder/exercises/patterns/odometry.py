@@ -1,7 +1,5 @@
 """Where the robot is: asking for it, overhearing it, and whether what comes is right."""
 
-# mypy: allow-untyped-calls
-
 from __future__ import annotations
 
 from std_msgs.msg import Float64

@@ -5,9 +5,6 @@ when a check has it roll on. So a drive takes as long as the student's code need
 or on the wall's, and what comes before what is known for certain.
 """
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import time

@@ -1,8 +1,5 @@
 """The examiner's node of the QoS exam: it feeds readings in, and hears what becomes of them."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import secrets

@@ -7,9 +7,6 @@ outside of it: so a design that recovers always does, one that does not never do
 no part in it.
 """
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 from collections import defaultdict

@@ -5,9 +5,6 @@ the sensor's topic, through the student's consumer node, and out on ``consumer/<
 ends belong to the examiner, and so does a witness that listens on the topic between them.
 """
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import time

@@ -1,8 +1,5 @@
 """The graph as it concerns a camera driver: which of its endpoints and nodes are there."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import re

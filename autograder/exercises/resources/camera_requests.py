@@ -1,8 +1,5 @@
 """What a camera driver does when it is asked: snapshots, zooms, and what happens in between."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import threading

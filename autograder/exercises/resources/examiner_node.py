@@ -1,8 +1,5 @@
 """The examiner's own node of the resources exam: its endpoints, and the pictures that it got."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import re

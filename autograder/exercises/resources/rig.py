@@ -5,9 +5,6 @@ and ``camera-stream:<device>`` for its stream, and moves the position in the fir
 somebody asks for a picture. So what a node does with its camera is seen from outside.
 """
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import re

@@ -1,8 +1,5 @@
 """The examiner's end of one part of the error-handling exam: what it hears, says and serves."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 from collections.abc import Callable

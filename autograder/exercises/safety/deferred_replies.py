@@ -1,8 +1,5 @@
 """Servers of the examiner's that wait within a callback until they are told to go on."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 from collections import deque

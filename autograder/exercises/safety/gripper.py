@@ -1,8 +1,5 @@
 """A gripper that fails on demand, and speed limits' operators: the examiner's side of services."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 from collections.abc import Callable

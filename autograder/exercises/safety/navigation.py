@@ -1,8 +1,5 @@
 """A navigator that fails on demand, and a dispatcher: the examiner's side of actions."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable

@@ -1,8 +1,5 @@
 """Part C, the navigator's client: goals that end, stall, cannot be stopped, or get lost."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 from collections.abc import Iterator

@@ -5,9 +5,6 @@ goes on, or it ends. All that the exam provokes is provoked once more, in short,
 at a time; how they deal with it is no matter here.
 """
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import math

@@ -1,8 +1,5 @@
 """Part B, the server of speed limits: good requests, nonsense, jammed wheels."""
 
-# mypy: allow-untyped-calls
-# rclpy leaves most of its functions untyped.
-
 from __future__ import annotations
 
 import math
