@@ -114,7 +114,7 @@ class Managed:
                 expected=f"Before it is shut down your node is {' or '.join(SHUTDOWNS)}.",
                 actual=f"It says that its state is “{state}”.",
             )
-        return SHUTDOWNS[state]
+        return int(SHUTDOWNS[state])
 
     def go(self, *transitions: str) -> None:
         """Make transitions that must all succeed."""
