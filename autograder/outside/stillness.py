@@ -90,7 +90,13 @@ class Stillness:
             before, looked = now, moment
 
     def all_asleep(self) -> bool:
-        """Return whether every thread of both sleeps just now; one that never does not count."""
+        """Return whether every thread of both sleeps just now; one that never does not count.
+
+        An examiner that asks for this has yet to fall asleep over it: so a second look decides.
+        """
+        if self._look().awake is None:
+            return True
+        self._nap.wait(_NAP)
         return self._look().awake is None
 
     def _blame(self, worked: Mapping[Task, float], most: float) -> None:

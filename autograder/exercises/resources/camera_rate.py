@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from autograder.exam import Failed
-from autograder.exercises.resources.rig import PERIOD, CameraRig
+from autograder.exercises.resources.rig import OVER, PERIOD, STEP, CameraRig
 from course.runtime.waiting import Deadline
 
 STEPS = 10  # at least, in which a rate is counted
@@ -79,10 +79,11 @@ def _count(rig: CameraRig, device: str, rate: float, seconds: int, pace: float) 
     """Count pictures of ``device`` while ``seconds`` of simulated time pass.
 
     Time moves on picture by picture: a thread may publish a moment after the timer, and a design
-    may keep one order at a time and drop the next one while it is busy.
+    may keep one order at a time and drop the next one while it is busy. Each step is a period, or
+    an even part of a long one, and a little more: see `OVER`.
     """
     wanted = rate * seconds
-    steps = max(STEPS, round(wanted), math.ceil(seconds / LONGEST_STEP))
+    steps = max(STEPS, round(wanted * math.ceil(1 / rate / LONGEST_STEP)))
     before, late, most, last = len(rig.pictures(device)), 0, 0, 0
     patience = rig.patience(LATE_ASLEEP if pace else KEEP_UP)
 
@@ -90,7 +91,7 @@ def _count(rig: CameraRig, device: str, rate: float, seconds: int, pace: float) 
         return len(rig.pictures(device)) - before
 
     for step in range(1, steps + 1):
-        _move_on(rig, seconds / steps, 1 / rate / SLICES, pace / steps)
+        _move_on(rig, OVER * seconds / steps, 1 / rate / SLICES, pace / steps)
         due = int(wanted * step / steps)
         # By its phase a design may be one picture behind, and stay so: it is not waited for twice.
         moment = KEEP_UP if patience.lasts() else 0.0
@@ -153,7 +154,7 @@ def _at_once(rig: CameraRig, device: str) -> int:
     rig.rest()  # one of before may be on its way
     before = len(rig.pictures(device))
     for _ in range(STEPS):
-        rig.advance(PERIOD)
+        rig.advance(STEP)
         rig.rest()
         if rig.wait(lambda: len(rig.pictures(device)) > before, KEEP_UP):
             break
@@ -178,7 +179,7 @@ def require_tick_zoom(rig: CameraRig, device: str, factor: int, when: str) -> No
     """Fail unless pictures that nobody asks for have the zoom ``factor``, too."""
     before = len(rig.pictures(device))
     for _ in range(2 * STEPS):
-        rig.advance(PERIOD)
+        rig.advance(STEP)
         if rig.wait(
             lambda: any(p.zoom == factor for p in rig.pictures(device)[before:]),
             PERIOD,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from autograder.exercises.resources.camera_duties import DRIVER, ENDED
 from autograder.exercises.resources.process_usage import Usage
-from autograder.exercises.resources.rig import PERIOD, CameraRig
+from autograder.exercises.resources.rig import PERIOD, STEP, CameraRig
 
 WARM_UP, FEWEST, LIVES = 3, 6, 50
 """Lives: at first, and then at least (a camera may need a second to get warm), and at most."""
@@ -44,12 +44,12 @@ def _film(rig: CameraRig, device: str) -> None:
     def asked() -> int:
         return sum(rig.cameras(device))
 
-    rig.advance(PICTURES * PERIOD)
+    rig.advance(PICTURES * STEP)
     for _ in range(PICTURES):
         before = asked()
         if before >= PICTURES:
             return
-        rig.advance(PERIOD)
+        rig.advance(STEP)
         rig.wait(lambda before=before: asked() > before, PERIOD)  # type: ignore[misc]
 
 

@@ -152,7 +152,8 @@ def _given_up(robot: Robot, user: GripUser, close: bool, *, held: bool = False) 
     if held:
         what = f"{ANSWER:g} s after the first try the next one came, or an outcome"
         robot.require_still(goes_on, what, HELD_S)
-    robot.run(goes_on, DEADLINE + began - user.now, STRIDE / 2)
+    robot.run(goes_on, 2 * FIRST_GAP + began - user.now, STRIDE / 2)
+    robot.run(goes_on, DEADLINE + began - user.now, COARSE)
     if len(user.tries) > 1:
         user.tries[1].crash()
     robot.run(lambda: len(user.tries) > 2 or user.outcomes, DEADLINE + began - user.now)
