@@ -104,7 +104,8 @@ def _naps(scene: Scene, given: Given) -> list[tuple[int, int]]:
 
 
 def _sleepers(scene: Scene, given: Given) -> list[tuple[int, float]]:
-    return sleepers(scene.subject.of(scene.pid), scene.code)
+    threads = _numbers(given, "threads", MOST_NUMBERS)
+    return sleepers(scene.subject.of(scene.pid), threads, scene.code)
 
 
 def _usage(scene: Scene, given: Given) -> usage.Usage:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 import struct
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 
 from autograder.outside.holding import DDS_LIBRARIES, code_of, points_into
@@ -35,29 +35,30 @@ Code = dict[str, list[range]]
 """Where the code of those libraries is in processes, by their folders."""
 
 
-def sleepers(process: str, code: Code) -> list[tuple[int, float]]:
-    """Return the sleeping threads of a process, and for how many s they will sleep.
+def sleepers(process: str, threads: Iterable[int], code: Code) -> list[tuple[int, float]]:
+    """Return which of a process's ``threads`` sleep, and for how many s they will.
 
     Where only the whole length is known it is that. None are told if the kernel does not let us
     look (ptrace(2)).
 
     Args:
         process: its folder.
+        threads: those to look at.
         code: what was found out at earlier looks; what is new is added.
     """
     found = []
     with suppress(OSError):
         memory = os.open(f"{process}/mem", os.O_RDONLY)
         try:
-            for name in os.listdir(f"{process}/task"):  # noqa: PTH208 - the names alone, very often
+            for thread in threads:
                 with suppress(OSError, ValueError, IndexError, OverflowError, struct.error):
-                    call = _read(f"{process}/task/{name}/syscall").split()
+                    call = _read(f"{process}/task/{thread}/syscall").split()
                     # "running" is no number
                     number, *given = int(call[0]), *(int(word, 16) for word in call[1:])
                     if (left := _left(number, given, memory)) is not None:
                         stack = os.pread(memory, _STACK, given[-2])
                         if not _waits_in_ros(process, stack, code):
-                            found.append((int(name), left))
+                            found.append((thread, left))
         finally:
             os.close(memory)
     return found

@@ -47,11 +47,15 @@ def running(wait: str) -> Iterator[str]:
             process.kill()
 
 
+def asleep(process: str) -> list[tuple[int, float]]:
+    return sleepers(process, thread_ids(process), {})
+
+
 @pytest.mark.parametrize("wait", WAITS.values(), ids=[*WAITS])
 def test_a_thread_that_waits_for_a_time_is_seen_with_what_is_left_of_it(wait: str) -> None:
     with running(wait) as process:
-        assert poll(lambda: sleepers(process, {}), 30.0, Pulse())
-        ((_, left),) = sleepers(process, {})
+        assert poll(lambda: asleep(process), 30.0, Pulse())
+        ((_, left),) = asleep(process)
     assert 200 < left <= 300
 
 
@@ -59,8 +63,8 @@ def test_a_thread_that_waits_for_a_time_is_seen_with_what_is_left_of_it(wait: st
 def test_one_that_waits_for_something_else_is_not(wait: str) -> None:
     with running(wait) as process:
         seen: list[int] = []
-        poll(lambda: seen.extend(t for t, _ in sleepers(process, {})), 1.5, Pulse())
-        assert not sleepers(process, {})
+        poll(lambda: seen.extend(t for t, _ in asleep(process)), 1.5, Pulse())
+        assert not asleep(process)
         assert len(seen) < 20  # while it starts, some may
 
 
@@ -69,6 +73,6 @@ def test_a_process_that_has_ended_has_no_threads_though_its_parent_has_not_heard
     try:
         assert poll(lambda: not thread_ids(f"/proc/{process.pid}"), 30.0, Pulse())
         assert process.returncode is None
-        assert not sleepers(f"/proc/{process.pid}", {})
+        assert not asleep(f"/proc/{process.pid}")
     finally:
         process.wait()

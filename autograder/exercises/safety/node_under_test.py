@@ -180,14 +180,15 @@ class Robot:
         """Return the threads that are there before the node is, but those that sleep already."""
         if not self._bench.outside.own_network:
             return frozenset()
-        sleeping = {int(thread) for thread, _ in self._bench.outside.ask("sleepers")}
-        return frozenset(map(int, self._bench.outside.ask("threads"))) - sleeping
+        threads = [*map(int, self._bench.outside.ask("threads"))]
+        sleeping = self._bench.outside.ask("sleepers", threads=threads)
+        return frozenset(threads) - {int(thread) for thread, _ in sleeping}
 
     def _sleeps(self) -> dict[int, float]:
         """Return until when threads of the session will sleep by the wall clock."""
         now = time.monotonic()
-        found = self._bench.outside.ask("sleepers")
-        return {int(thread): now + left for thread, left in found if thread in self._threads}
+        found = self._bench.outside.ask("sleepers", threads=[*self._threads])
+        return {int(thread): now + left for thread, left in found}
 
     @property
     def _by_the_clock(self) -> str:
