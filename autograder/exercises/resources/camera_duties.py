@@ -8,14 +8,13 @@ from __future__ import annotations
 from autograder.exam import Failed
 from autograder.exercises.resources.camera_graph import PUBLISHER
 from autograder.exercises.resources.examiner_node import IMAGE
-from autograder.exercises.resources.rig import CameraRig
+from autograder.exercises.resources.rig import ENDED, CameraRig
 from autograder.observe.patience import SETTLE_S
 from autograder.observe.phrases import capitalized, phrase, pictures
 from course.runtime.waiting import Deadline
 
 DRIVER = "CameraDriver"
 DEFAULT = "front"
-ENDED = 1.5  # s that a thread may take to end; the task says 1
 WAKES = 3.0  # s of wall time in which a thread does something that it has been given
 
 
@@ -104,7 +103,7 @@ def require_threads_ended(rig: CameraRig, among: set[int], when: str) -> None:
         return not new & rig.process.thread_ids()
 
     deadline = Deadline(SETTLE_S)
-    if rig.wait(over, ENDED):
+    if rig.ends(over):
         return
     # A busy machine may not have come to it yet. But when all is at rest, who is left just waits.
     rig.wait(lambda: over() or rig.rest(), deadline.left)

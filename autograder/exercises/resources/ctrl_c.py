@@ -14,11 +14,11 @@ from statistics import median_low
 from typing import Any
 
 from autograder.exam import Failed
-from autograder.exercises.resources.camera_duties import DRIVER, ENDED
+from autograder.exercises.resources.camera_duties import DRIVER
 from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT, ExaminerNode
 from autograder.exercises.resources.process_usage import Usage
-from autograder.exercises.resources.rig import PERIOD, CameraRig
-from autograder.observe.patience import Patience
+from autograder.exercises.resources.rig import ENDED, PERIOD, CameraRig
+from autograder.observe.patience import SETTLE_S, Patience
 from autograder.observe.phrases import capitalized, phrase, pictures
 from autograder.observe.stillness import Stillness
 from autograder.programs import Program, Programs
@@ -41,7 +41,8 @@ class Lives:
 
     ``worked`` is whether it took pictures in each, ``raised`` whether its end was that of the
     program; ``left_open`` and ``left_on_graph`` are what it had not given back after one, and
-    ``usages`` what the program held after each; ``others`` tells of processes that were left then.
+    ``usages`` what the program held after each, unless what came with them went
+    later; ``others`` tells of processes that were left then.
     ``pace`` tells of pictures that do not come ten times a second, ``harmed`` of what a second
     destroy_node() does, if that is not nothing.
     """
@@ -184,6 +185,8 @@ def _watch_lives(rig: CameraRig, program: Program, watcher: ExaminerNode, device
             return replace(lives, left_open=not closed, left_on_graph=not off_graph)
         usage = _usage(rig, program, lives.usages)
         lives = replace(lives, usages=(*lives.usages, usage), others=rig.others())
+        if life == LIVES - 1 and _goes(rig, program, lives):
+            lives = replace(lives, usages=())
         program.interrupt()
     return lives
 
@@ -206,11 +209,30 @@ def _pace(rig: CameraRig, program: Program, watcher: ExaminerNode, device: str) 
 
 
 def _usage(rig: CameraRig, program: Program, before: Sequence[Usage]) -> Usage:
-    """Return what the program holds, once no more goes that the task gives a second to go."""
-    if before:
+    """Return what the program holds, once no more goes that the task gives a second to go.
+
+    Where a life has left something once, each may: that is waited for at the end of them.
+    """
+    if len(before) == 1 or (before and not _leaks(before[-1].grown(before[-2]))):
         last = before[-1]
-        program.wait(lambda: not _leaks(rig.process.usage().grown(last)), ENDED)
+        rig.ends(lambda: not _leaks(rig.process.usage().grown(last)), program.session)
     return rig.process.usage()
+
+
+def _goes(rig: CameraRig, program: Program, lives: Lives) -> bool:
+    """Whether what each of these lives has left behind goes by itself, if late.
+
+    A thread that looks every few seconds whether it is to end is too slow, and no leak. One that
+    does not sleep for a time does not wake up by itself.
+    """
+    first = lives.usages[0]
+    if not _leaks(lives.kept()) or not (wakes := rig.process.wakes()):
+        return False
+
+    def a_life() -> Usage:
+        return Usage(*(more // (LIVES - 1) for more in rig.process.usage().grown(first)))
+
+    return program.wait(lambda: not _leaks(a_life()), min(SETTLE_S, max(wakes) + ENDED))
 
 
 def _failed(expected: str, actual: str) -> Failed:

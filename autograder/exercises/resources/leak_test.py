@@ -9,9 +9,11 @@ from __future__ import annotations
 import time
 from typing import NamedTuple
 
-from autograder.exercises.resources.camera_duties import DRIVER, ENDED
+from autograder.exercises.resources.camera_duties import DRIVER
 from autograder.exercises.resources.process_usage import Usage
-from autograder.exercises.resources.rig import PERIOD, STEP, CameraRig
+from autograder.exercises.resources.rig import ENDED, PERIOD, STEP, CameraRig
+from autograder.observe.patience import SETTLE_S
+from course.runtime.waiting import Deadline
 
 WARM_UP, FEWEST, LIVES = 3, 6, 50
 """Lives: at first, and then at least (a camera may need a second to get warm), and at most."""
@@ -75,7 +77,8 @@ def growth(rig: CameraRig) -> Growth:
     live(rig, WARM_UP)
     pace = (time.monotonic() - began) / WARM_UP
     lives = max(FEWEST, min(LIVES, int(TIME / pace))) // 2
-    first, second = (_grown(rig, lives) for _ in range(2))
+    first, late = _grown(rig, lives), Deadline(SETTLE_S)
+    second = _grown(rig, lives, late)
     usage = Usage(
         min(first.threads, second.threads),
         min(first.files, second.files),
@@ -84,10 +87,21 @@ def growth(rig: CameraRig) -> Growth:
     return Growth(usage, lives)
 
 
-def _grown(rig: CameraRig, lives: int) -> Usage:
-    before = rig.process.usage()
+def _grown(rig: CameraRig, lives: int, late: Deadline | None = None) -> Usage:
+    """Return what the process has grown by in so many lives.
+
+    A thread that looks every few seconds whether it is to end is too slow, and no leak: those of
+    lives before these may wake up until ``late``.
+    """
+    before, threads = rig.process.usage(), rig.process.thread_ids()
     live(rig, lives)
-    rig.wait(lambda: not _leaks(rig.process.usage().grown(before), lives), idle=ENDED)
+
+    def over() -> bool:
+        return not _leaks(rig.process.usage().grown(before), lives)
+
+    if not rig.ends(over) and late is not None:
+        wakes = rig.process.wakes(threads)
+        rig.wait(over, min(late.left, max(wakes) + ENDED) if wakes else 0.0)
     return rig.process.usage().grown(before)
 
 

@@ -11,10 +11,10 @@ from functools import partial
 
 from autograder.bench import StudentError
 from autograder.exam import Failed
-from autograder.exercises.resources.camera_duties import DRIVER, ENDED, require_picture
+from autograder.exercises.resources.camera_duties import DRIVER, require_picture
 from autograder.exercises.resources.camera_requests import require_snapshot
 from autograder.exercises.resources.process_usage import Usage
-from autograder.exercises.resources.rig import CameraRig
+from autograder.exercises.resources.rig import ENDED, CameraRig
 
 START_MEMORY = 1024  # KiB a failed start or a round: one of ten costs more than one of fifty
 WORDS = {"threads": "threads", "files": "open files"}
@@ -32,7 +32,7 @@ def require_flat(rig: CameraRig, before: Usage, times: int, expected: str, round
         def grown(what: str = what) -> int:
             return int(getattr(rig.process.usage().grown(before), what))
 
-        if not rig.wait(lambda grown=grown: grown() < times / 2, idle=ENDED):  # type: ignore[misc]
+        if not rig.ends(lambda grown=grown: grown() < times / 2):  # type: ignore[misc]
             raise Failed(
                 expected=f"{expected} no thread and no file.",
                 actual=f"After {times} {rounds} the process had {grown()} more {WORDS[what]} "

@@ -29,6 +29,11 @@ class Process:
         """Return how often each of these threads, if it is there, has gone to sleep of itself."""
         return dict(self._outside.ask("naps", threads=[*threads]))
 
+    def wakes(self, threads: Iterable[int] | None = None) -> list[float]:
+        """Return after how many s threads that sleep for a time wake up: all, or of these."""
+        threads = self.thread_ids() if threads is None else threads
+        return [float(left) for _, left in self._outside.ask("sleepers", threads=[*threads])]
+
     def usage(self) -> Usage:
         """Return what it holds now."""
         return Usage(*self._outside.ask("usage"))

@@ -22,7 +22,7 @@ from autograder.exercises.resources.camera_graph import CameraGraph
 from autograder.exercises.resources.camera_program import Program
 from autograder.exercises.resources.examiner_node import ExaminerNode, Picture
 from autograder.exercises.resources.process_usage import Process
-from autograder.observe.patience import IDLE_S, SETTLE_S, Patience
+from autograder.observe.patience import IDLE_S, SETTLE_S, Patience, Waits
 from autograder.observe.phrases import phrase
 from autograder.observe.stillness import Stillness
 from course.errors import WaitTimeout
@@ -30,6 +30,9 @@ from course.runtime.waiting import Deadline
 
 GHOSTS = 1.0
 """Seconds that endpoints of an earlier life are given to go off the graph."""
+ENDED, SOON = 1.5, 0.5
+"""Seconds in which all sleep that something may take to end: the task says 1. And to be woken up by
+another thread."""
 RESEND = 1.0
 """Seconds after which a request that has no response is made again."""
 NUDGE = 0.05
@@ -198,6 +201,23 @@ class CameraRig:
             self.session.until(condition, timeout=timeout, what="an observation")
             return True
         return False
+
+    def ends(self, over: Callable[[], Any], session: Waits | None = None) -> bool:
+        """Wait until what the task gives a second to end is ``over``; return whether it is.
+
+        Where no thread sleeps for such a time, and there is no other process, nobody wakes up by
+        itself.
+
+        Args:
+            over: whether it is.
+            session: the examiner's in the network of what ends; None for that of this rig.
+        """
+        session = session or self.session
+        if self.patience(SOON).wait(session, over):
+            return True
+        if min(self.process.wakes(), default=ENDED) >= ENDED and not self.process.others():
+            return False
+        return self.patience(ENDED).wait(session, over)
 
     @property
     def end_of_wait(self) -> str:
