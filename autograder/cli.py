@@ -36,10 +36,10 @@ Root = Annotated[
     Path | None,
     typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
 ]
-IN_FLIGHT = 3 * (os.cpu_count() or 1)
+IN_FLIGHT = 5 * (os.cpu_count() or 1)
 """Notebooks run at a time: most of its time a subject waits, for DDS or a timer.
 
-With more than three a processor, readings come less often at their rate.
+With fewer than five a processor it has nothing to do now and then, for up to a tenth of the time.
 """
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Notebooks run at a time.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
