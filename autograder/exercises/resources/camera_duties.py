@@ -103,7 +103,7 @@ def require_threads_ended(rig: CameraRig, among: set[int], when: str) -> None:
         return not new & rig.process.thread_ids()
 
     deadline = Deadline(SETTLE_S)
-    if rig.ends(over):
+    if rig.ends(over, among=new):
         return
     # A busy machine may not have come to it yet. But when all is at rest, who is left just waits.
     rig.wait(lambda: over() or rig.rest(), deadline.left)

@@ -173,7 +173,7 @@ def _watch_lives(rig: CameraRig, program: Program, watcher: ExaminerNode, device
         if program.ended():
             return replace(lives, raised=True)
         comes(on_graph)
-        if not life:
+        if life == LIVES - 1:  # so what the first has left has a second more to go by itself
             comes(lambda: watcher.of(device))
             lives = replace(lives, pace=_pace(rig, program, watcher, device))
         program.interrupt()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import secrets
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -202,7 +202,12 @@ class CameraRig:
             return True
         return False
 
-    def ends(self, over: Callable[[], Any], session: Waits | None = None) -> bool:
+    def ends(
+        self,
+        over: Callable[[], Any],
+        session: Waits | None = None,
+        among: Iterable[int] | None = None,
+    ) -> bool:
         """Wait until what the task gives a second to end is ``over``; return whether it is.
 
         Where no thread sleeps for such a time, and there is no other process, nobody wakes up by
@@ -211,11 +216,12 @@ class CameraRig:
         Args:
             over: whether it is.
             session: the examiner's in the network of what ends; None for that of this rig.
+            among: the threads that may have a part in it; None for all.
         """
         session = session or self.session
         if self.patience(SOON).wait(session, over):
             return True
-        if min(self.process.wakes(), default=ENDED) >= ENDED and not self.process.others():
+        if min(self.process.wakes(among), default=ENDED) >= ENDED and not self.process.others():
             return False
         return self.patience(ENDED).wait(session, over)
 
