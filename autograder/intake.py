@@ -81,6 +81,7 @@ def of_student(
         intake_claims.of_student(root, assignment, student),
         whose=f"{quoted(assignment)} {quoted(student)}",
         given=handed_out(release),
+        around=tuple(roster.unclaimed(roster.folder(root, student), (assignment,))),
     )
 
 
@@ -107,6 +108,7 @@ class Intake:
         *,
         whose: str,
         given: frozenset[str] = frozenset(),
+        around: tuple[str, ...] = (),
     ) -> None:
         """Prepare; nothing is read before it is asked for.
 
@@ -116,12 +118,14 @@ class Intake:
             claims: what a person has said of it.
             whose: the assignment and the student, as the command line wants them.
             given: places of other files that were handed out.
+            around: what lies beside the submission's folder and is no other assignment's.
         """
         self._folder = folder
         self._released = released
         self._claims = claims
         self._whose = whose
         self._given = given
+        self._around = around
 
     @cached_property
     def handed_in(self) -> HandedIn:
@@ -249,6 +253,8 @@ class Intake:
             raise self._unclear(name, f"{missing}, but there {verb} {names}{self._why(strange)}:")
         if before:  # what a person had said was there is not
             raise self._unclear(name, f"{missing}; {before} So")
+        if self._around:
+            raise self._beside_the_folder(name, missing)
         raise SubmissionError(f"{missing}.")
 
     def _unclear(self, name: str, said: str, found: list[_Candidate] | None = None) -> UnclearError:
@@ -258,6 +264,16 @@ class Intake:
             f"{said} a person has to say what counts.",
             f"Say it with `{command} {place}`, or with `{command} --nothing` if it was not handed "
             "in; then grade again.",
+        )
+
+    def _beside_the_folder(self, name: str, missing: str) -> UnclearError:
+        verb, them = ("is", "it") if len(self._around) == 1 else ("are", "them")
+        return UnclearError(
+            f"{missing}, but beside its folder there {verb} {listed(self._around)}: a person has "
+            "to say what counts.",
+            f"Move {them} into that folder if that is this assignment's work, and to another place "
+            f"if not, or say with `autograder claim {self._whose} {quoted(name)} --nothing` that "
+            "it was not handed in; then grade again.",
         )
 
     def _distinct(self, found: list[_Candidate], name: str) -> list[_Candidate]:

@@ -158,7 +158,7 @@ def _misplaced(folder: Path, assignment: str, assignments: Collection[str] = ())
     there = f"submitted/{shown(folder.name)}"
     if place.exists() or place.is_symlink():
         return f"{there}/{assignment} is no folder: put the submission's files in one."
-    if names := _unclaimed(folder, assignments):
+    if names := unclaimed(folder, assignments):
         verb, them = ("is", "it") if len(names) == 1 else ("are", "them")
         return (
             f"There is no {there}/{assignment}, but there {verb} {listed(names)} in {there}: move "
@@ -168,8 +168,11 @@ def _misplaced(folder: Path, assignment: str, assignments: Collection[str] = ())
     return ""
 
 
-def _unclaimed(folder: Path, assignments: Collection[str]) -> list[str]:
-    """Return what lies in a student's folder and is no assignment's."""
+def unclaimed(folder: Path, assignments: Collection[str] = ()) -> list[str]:
+    """Return what lies in a student's folder and is no assignment's.
+
+    ``assignments`` are those that the gradebook knows; others have a source or a release.
+    """
     root = folder.parents[1]
     known = {*assignments}
     for step in ("source", "release"):

@@ -16,7 +16,7 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_notebook
 
 from autograder import intake_claims, intake_names, intake_zip, submission
-from autograder.intake import Found, Intake, NotHandedInError, UnclearError
+from autograder.intake import Found, Intake, NotHandedInError, UnclearError, of_student
 from autograder.intake_claims import Claim, ClaimError
 from autograder.intake_files import look_through
 from autograder.intake_zip import ArchiveError
@@ -265,6 +265,20 @@ def test_what_a_person_has_said_of_another_notebook_is_not_asked_about(folder: P
     said = {OTHER: claimed(folder, "mine.ipynb")[NAME]}
     with pytest.raises(SubmissionError, match=r"There is no qos-design.ipynb in the submission\.$"):
         found(folder, said)
+
+
+def test_what_lies_beside_the_folder_is_asked_about(folder: Path) -> None:
+    put(folder, f"{OTHER}.ipynb", text(other()))
+    put(folder.with_name("ch05 (1)"), f"{NAME}.ipynb", text())
+    put(folder.with_name("ch04"), "lamp.ipynb", text())
+    (folder.parents[2] / "source" / "ch04").mkdir(parents=True)
+    notebooks = {NAME: released(), OTHER: other()}
+
+    taken = of_student(folder.parents[2], "ch05", "ana", notebooks)
+
+    assert taken.notebook(OTHER).item is None
+    with pytest.raises(UnclearError, match=r"beside its folder there is 'ch05 \(1\)'"):
+        taken.notebook(NAME)
 
 
 def test_an_empty_folder_asks_nothing(folder: Path) -> None:
