@@ -33,8 +33,10 @@ def run(
     Args:
         namespace: the notebook's globals.
         wanted: ``"nodes"``, a list of [class, arguments], ``"threads"``, ``"sim_time"``,
-            ``"twice"``, whether each node of the first life is destroyed twice, and ``"apart"``,
-            whether each node has an executor of its own, with so many threads.
+            ``"twice"``, whether each node of the first life is destroyed twice, ``"apart"``,
+            whether each node has an executor of its own, with so many threads, and
+            ``"shut_down"``, whether at a first SIGINT their ``shutdown()`` is called, and they
+            spin on until the next.
         domain_id: of the examiner who looks on.
         up: called once, when the first nodes are there.
     """
@@ -79,7 +81,8 @@ def _live(
     else:
         nodes = [namespace[name](*arguments) for name, arguments in wanted["nodes"]]
         up()
-        _spin(nodes, threads, interrupts.next(), times)
+        first = interrupts.next()
+        _spin(nodes, threads, first, times, interrupts.next if wanted["shut_down"] else None)
 
 
 def _spin_alone(node: Any, threads: int, until: Future, times: int) -> None:
@@ -91,11 +94,21 @@ def _spin_alone(node: Any, threads: int, until: Future, times: int) -> None:
         raise
 
 
-def _spin(nodes: Sequence[Any], threads: int, until: Future, times: int) -> None:
+def _spin(
+    nodes: Sequence[Any],
+    threads: int,
+    until: Future,
+    times: int,
+    shut_down_until: Callable[[], Future] | None = None,
+) -> None:
     executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
     for node in nodes:
         executor.add_node(node)
     executor.spin_until_future_complete(until)
+    if shut_down_until is not None:
+        for node in nodes:
+            node.shutdown()
+        executor.spin_until_future_complete(shut_down_until())
     for node in [*nodes] * times:
         node.destroy_node()
     executor.shutdown(timeout_sec=0.0)

@@ -84,13 +84,15 @@ class Programs:
         sim_time: bool = False,
         apart: bool = False,
         twice: bool = False,
+        shut_down: bool = False,
     ) -> Iterator[Program]:
         """Run nodes of the notebook's classes for the length of the block.
 
         Where they are ``apart``, each has an executor of its own, with so many threads, and what
         leaves a callback ends its node alone. ``twice``: at the end of the first life each node is
-        destroyed twice. Whatever looks at the subject's processes meanwhile
-        looks at the program's.
+        destroyed twice. ``shut_down``: at a first interrupt their ``shutdown()`` is called, and
+        they spin on until the next. Whatever looks at the subject's processes meanwhile looks at
+        the program's.
 
         Raises:
             ProgramError: the engine did not start it; that is never the student's fault.
@@ -100,7 +102,8 @@ class Programs:
         try:
             reply = self._ask(
                 wants="program", nodes=[[name, [*given]] for name, given in nodes],
-                threads=threads, sim_time=sim_time, apart=apart, twice=twice, domain=domain,
+                threads=threads, sim_time=sim_time, apart=apart, twice=twice, shut_down=shut_down,
+                domain=domain,
             )  # fmt: skip
             with CoreSession(domain_id=domain) as session:
                 session.explains = False

@@ -132,12 +132,12 @@ def _play(
     with programs.program(nodes, threads=THREADS, sim_time=True, apart=apart) as program:
         if not program.up:
             return None
-        stage = _Stage(program, still, parts)
+        stage = Stage(program, still, parts)
         stage.play()
         return stage.ended if apart else stage.under_way if program.ended() else {}
 
 
-class _Stage:
+class Stage:
     """Nodes in a program, their counterparts, and the clock of both.
 
     ``under_way`` is of each class the act that was begun last, ``ended`` the same of those whose
@@ -145,21 +145,22 @@ class _Stage:
     """
 
     def __init__(self, program: Program, still: Stillness, parts: Sequence[Part]) -> None:
+        """Make the counterparts of ``parts``, and wait until they and the nodes have met."""
         self._program, self._still, self._made = program, still, set[str]()
         node = program.session.run(lambda: QuietNode("clock"))
         assert isinstance(node, QuietNode)
         qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
         self._clock, self._now_ns = node.create_publisher(Clock, "/clock", qos), 0
-        self._players: dict[str, Any] = {
+        self.players: dict[str, Any] = {
             part.name: program.session.run(part.player) for part in parts
         }
-        players = self._players.values()
+        players = self.players.values()
         program.wait(lambda: not any(player.missing() for player in players), MEET_S)
         for player in players:
             player.attend()
         # They may be known here before they know of anybody: a request would then be lost.
         Patience(still, idle=MEET_IDLE_S).wait(program.session, lambda: False)
-        self._there = {name for name, player in self._players.items() if not player.missing()}
+        self._there = {name for name, player in self.players.items() if not player.missing()}
         self.under_way = {part.name: next(iter(part.acts)) for part in parts}
         self.ended = dict[str, str]()
         self._due: dict[str, tuple[float, Act]] = {
@@ -171,7 +172,7 @@ class _Stage:
             self.under_way[part.name] = name
             # A wrong node may leave its counterpart where that cannot go on.
             with suppress(Exception):
-                yield from act(self._players[part.name], self._run)
+                yield from act(self.players[part.name], self._run)
             # What a callback raised ends rclpy's executor when it has the next one to run.
             yield STRIDE_S
             yield STRIDE_S
@@ -202,13 +203,13 @@ class _Stage:
 
     def _note_ended(self) -> None:
         for name in self._there - {*self.ended}:
-            if self._players[name].missing():
+            if self.players[name].missing():
                 self.ended[name] = self.under_way[name]
                 self._due.pop(name, None)
 
     def _rest(self) -> None:
         self._still.reached()
-        for player in self._players.values():
+        for player in self.players.values():
             if player.resume():
                 self._still.reached()
 
@@ -217,12 +218,12 @@ class _Stage:
         for more_ns in (round(STRIDE_S * 1e9), 1):
             self._now_ns += more_ns
             self._clock.publish(Clock(clock=Time(nanoseconds=self._now_ns).to_msg()))
-        for player in self._players.values():
+        for player in self.players.values():
             player.now = self._now_ns / 1e9
         self._rest()
 
 
-def _till(happened: Callable[[], Any], most: float) -> Act:
+def until(happened: Callable[[], Any], most: float) -> Act:
     """Wait until something happened, for so many s at most."""
     for _ in range(round(most / STRIDE_S)):
         if happened():
@@ -232,24 +233,24 @@ def _till(happened: Callable[[], Any], most: float) -> Act:
 
 def _grip_without_gripper(user: GripUser, run: Run) -> Act:
     user.request(True)
-    yield from _till(lambda: user.outcomes, 8.0)
+    yield from until(lambda: user.outcomes, 8.0)
 
 
 def _grips_refused(user: GripUser, run: Run) -> Act:
     run(user.gripper)
     for success in (True, False):
         user.request(success)
-        yield from _till(lambda: user.tries, 1.0)
+        yield from until(lambda: user.tries, 1.0)
         user.tries[0].reply(success)
-        yield from _till(lambda: user.outcomes, 1.0)
+        yield from until(lambda: user.outcomes, 1.0)
 
 
 def _grip_unanswered(user: GripUser, run: Run) -> Act:
     run(user.gripper)
     user.request(True)
-    yield from _till(lambda: len(user.tries) > 1, 3.0)
+    yield from until(lambda: len(user.tries) > 1, 3.0)
     user.tries[1].crash()
-    yield from _till(lambda: user.outcomes, 6.0)
+    yield from until(lambda: user.outcomes, 6.0)
     user.tries[2].reply(True)
     yield STRIDE_S
 
@@ -257,11 +258,11 @@ def _grip_unanswered(user: GripUser, run: Run) -> Act:
 def _grip_answered_late(user: GripUser, run: Run) -> Act:
     run(user.gripper)
     user.request(True)
-    yield from _till(lambda: len(user.tries) > 1, 3.0)
+    yield from until(lambda: len(user.tries) > 1, 3.0)
     user.tries[0].reply(True)
     yield STRIDE_S
     user.tries[1].reply(True)
-    yield from _till(lambda: user.outcomes, 1.0)
+    yield from until(lambda: user.outcomes, 1.0)
 
 
 def _limits_that_are_bad(operator: Operator, run: Run) -> Act:
@@ -270,28 +271,28 @@ def _limits_that_are_bad(operator: Operator, run: Run) -> Act:
         good, [double("linear", math.nan)], [double("angular", math.inf)], [double("linear", -0.5)],
         [double("angular", 7.0)], [text("linear", "fast")], [double("warp", 0.5)], [], good,
     ):  # fmt: skip
-        yield from _till(operator.ask(parameters).done, 0.5)
+        yield from until(operator.ask(parameters).done, 0.5)
 
 
 def _limits_for_jammed_wheels(operator: Operator, run: Run) -> Act:
     half = [double("linear", 0.3), double("angular", math.nan)]
-    yield from _till(operator.ask(half).done, 0.5)
+    yield from until(operator.ask(half).done, 0.5)
     operator.jam(True)
     yield STRIDE_S
-    yield from _till(operator.ask([double("linear", 0.9)]).done, 0.5)
+    yield from until(operator.ask([double("linear", 0.9)]).done, 0.5)
     operator.jam(False)
     yield STRIDE_S
-    yield from _till(operator.ask([double("linear", 0.4)]).done, 0.5)
+    yield from until(operator.ask([double("linear", 0.4)]).done, 0.5)
 
 
 def _goals_that_are_lost(user: NavigatorUser, run: Run) -> Act:
     user.request(3)
-    yield from _till(lambda: user.outcomes, 3.0)  # there may be no navigator yet
+    yield from until(lambda: user.outcomes, 3.0)  # there may be no navigator yet
     run(user.navigator)
     user.request(3, obeys=False)
-    yield from _till(lambda: user.outcomes, 5.0)
+    yield from until(lambda: user.outcomes, 5.0)
     user.request(3, hesitates=True)
-    yield from _till(lambda: user.outcomes, 2.5)
+    yield from until(lambda: user.outcomes, 2.5)
     user.decide()
     yield STRIDE_S
 
@@ -300,41 +301,41 @@ def _goals_that_end(user: NavigatorUser, run: Run) -> Act:
     run(user.navigator)
     for how in (ServerGoalHandle.succeed, ServerGoalHandle.abort):
         user.request(3)
-        yield from _till(lambda: user.goals, 1.0)
+        yield from until(lambda: user.goals, 1.0)
         user.feedback(1)
         yield STRIDE_S
         user.end(how)
-        yield from _till(lambda: user.outcomes, 1.0)
+        yield from until(lambda: user.outcomes, 1.0)
     user.request(3, accepts=False)
-    yield from _till(lambda: user.outcomes, 1.0)
+    yield from until(lambda: user.outcomes, 1.0)
 
 
 def _goal_that_stalls(user: NavigatorUser, run: Run) -> Act:
     run(user.navigator)
     user.request(3)
-    yield from _till(lambda: user.cancels, 4.0)
+    yield from until(lambda: user.cancels, 4.0)
     user.end(ServerGoalHandle.canceled)
-    yield from _till(lambda: user.outcomes, 1.0)
+    yield from until(lambda: user.outcomes, 1.0)
 
 
 def _drives_that_are_canceled(dispatcher: Dispatcher, run: Run) -> Act:
     rejected = dispatcher.send(0)
-    yield from _till(lambda: rejected.handle, 0.5)
+    yield from until(lambda: rejected.handle, 0.5)
     drive = dispatcher.send(5)
-    yield from _till(lambda: any(dispatcher.speeds), 1.0)
+    yield from until(lambda: any(dispatcher.speeds), 1.0)
     dispatcher.cancel(drive)
-    yield from _till(lambda: drive.status, 1.0)
+    yield from until(lambda: drive.status, 1.0)
 
 
 def _drives_with_jammed_wheels(dispatcher: Dispatcher, run: Run) -> Act:
     drive = dispatcher.send(3)
-    yield from _till(lambda: any(dispatcher.speeds), 1.0)
+    yield from until(lambda: any(dispatcher.speeds), 1.0)
     dispatcher.jam(True)
-    yield from _till(lambda: drive.status, 2.0)
+    yield from until(lambda: drive.status, 2.0)
     dispatcher.jam(False)
     yield STRIDE_S
     again = dispatcher.send(1)
-    yield from _till(lambda: again.status, 3.0)
+    yield from until(lambda: again.status, 3.0)
 
 
 PARTS = (

@@ -9,7 +9,7 @@ from typing import TypeVar
 from rclpy.node import Node
 
 from autograder.bench import Bench, Endpoints
-from autograder.exercises.safety import plain_program_survival
+from autograder.exercises.safety import plain_program_shutdown, plain_program_survival
 from autograder.exercises.safety.counterpart import Player
 from autograder.exercises.safety.node_under_test import Robot
 from autograder.observe.stillness import Stillness
@@ -65,6 +65,10 @@ class RobotRig:
 
     def _ended_by(self, name: str, trial: str) -> bool:
         return plain_program_survival.ended_by(name, trial, self.bench, self._still)
+
+    def require_shutdown_unasked(self) -> None:
+        """Fail unless the drive's server in a program of its own stops at a shutdown, too."""
+        plain_program_shutdown.require_shutdown(self.bench, self._still)
 
     def renew(self) -> None:
         """Have the next check begin with a fresh node, in the same session."""

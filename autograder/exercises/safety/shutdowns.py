@@ -41,6 +41,7 @@ def shutdown(rig: RobotRig) -> None:
             )
         robot.require_no_errors()
         _goal_afterwards(robot, dispatcher, "")
+    rig.require_shutdown_unasked()
 
 
 def _goal_afterwards(robot: Robot, dispatcher: Dispatcher, last: str) -> None:
