@@ -35,19 +35,22 @@ class Works(Node):
         super().destroy_node()
         say("destroyed")
 
+    def shutdown(self):
+        say("shut down")
+
 class Raises(Works):
     def tick(self):
         raise RuntimeError("out of a callback")
 
 nodes, threads = [[name, [name]] for name in sys.argv[1].split()], int(sys.argv[2])
 wanted = {"nodes": nodes, "threads": threads, "sim_time": False, "apart": len(nodes) > 1}
-wanted["twice"] = sys.argv[4] == "True"
+wanted |= {how: how == sys.argv[4] for how in ("twice", "shut_down")}
 plain_program.run(globals(), wanted, int(sys.argv[3]), lambda: say("up"))
 """
 
 
-def start(name: str, threads: int, *, twice: bool = False) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", LIVES, name, str(threads), "91", str(twice)]
+def start(name: str, threads: int, how: str = "") -> subprocess.Popen[str]:
+    command = [sys.executable, "-c", LIVES, name, str(threads), "91", how]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
 
 
@@ -71,12 +74,28 @@ def test_each_interrupt_ends_the_nodes_or_makes_them_anew(threads: int) -> None:
 
 
 def test_where_it_is_asked_for_the_nodes_of_the_first_life_are_destroyed_twice() -> None:
-    with start("Works", 1, twice=True) as program:
+    with start("Works", 1, "twice") as program:
         try:
             reads(program, "made", "up", "spins")
             for destroyed in (["destroyed"] * 2, ["destroyed"]):
                 os.kill(program.pid, signal.SIGINT)
                 reads(program, *destroyed)
+                os.kill(program.pid, signal.SIGINT)
+                reads(program, "made", "spins")
+        finally:
+            program.kill()
+
+
+@pytest.mark.parametrize("threads", [1, 4])
+def test_where_it_is_asked_for_the_nodes_are_shut_down_and_spin_on(threads: int) -> None:
+    with start("Works", threads, "shut_down") as program:
+        try:
+            reads(program, "made", "up", "spins")
+            for _ in range(2):
+                os.kill(program.pid, signal.SIGINT)
+                reads(program, "shut down")
+                os.kill(program.pid, signal.SIGINT)
+                reads(program, "destroyed")
                 os.kill(program.pid, signal.SIGINT)
                 reads(program, "made", "spins")
         finally:
