@@ -8,7 +8,7 @@ Claimed are the assignment's notebooks, a quiz's attempts, and what was handed o
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path, PurePosixPath
@@ -81,7 +81,7 @@ def of_student(
         intake_claims.of_student(root, assignment, student),
         whose=f"{quoted(assignment)} {quoted(student)}",
         given=handed_out(release),
-        around=tuple(roster.unclaimed(roster.folder(root, student), (assignment,))),
+        around=lambda: roster.unclaimed(roster.folder(root, student), (assignment,)),
     )
 
 
@@ -108,7 +108,7 @@ class Intake:
         *,
         whose: str,
         given: frozenset[str] = frozenset(),
-        around: tuple[str, ...] = (),
+        around: Callable[[], list[str]] = list,
     ) -> None:
         """Prepare; nothing is read before it is asked for.
 
@@ -118,7 +118,7 @@ class Intake:
             claims: what a person has said of it.
             whose: the assignment and the student, as the command line wants them.
             given: places of other files that were handed out.
-            around: what lies beside the submission's folder and is no other assignment's.
+            around: gives the names in the student's folder that belong to no assignment.
         """
         self._folder = folder
         self._released = released
@@ -253,8 +253,8 @@ class Intake:
             raise self._unclear(name, f"{missing}, but there {verb} {names}{self._why(strange)}:")
         if before:  # what a person had said was there is not
             raise self._unclear(name, f"{missing}; {before} So")
-        if self._around:
-            raise self._beside_the_folder(name, missing)
+        if around := self._around():
+            raise self._beside_the_folder(name, missing, around)
         raise SubmissionError(f"{missing}.")
 
     def _unclear(self, name: str, said: str, found: list[_Candidate] | None = None) -> UnclearError:
@@ -266,10 +266,10 @@ class Intake:
             "in; then grade again.",
         )
 
-    def _beside_the_folder(self, name: str, missing: str) -> UnclearError:
-        verb, them = ("is", "it") if len(self._around) == 1 else ("are", "them")
+    def _beside_the_folder(self, name: str, missing: str, around: list[str]) -> UnclearError:
+        verb, them = ("is", "it") if len(around) == 1 else ("are", "them")
         return UnclearError(
-            f"{missing}, but beside its folder there {verb} {listed(self._around)}: a person has "
+            f"{missing}, but beside its folder there {verb} {listed(around)}: a person has "
             "to say what counts.",
             f"Move {them} into that folder if that is this assignment's work, and to another place "
             f"if not, or say with `autograder claim {self._whose} {quoted(name)} --nothing` that "

@@ -59,47 +59,34 @@ def reads(program: subprocess.Popen[str], *lines: str) -> None:
     assert [program.stdout.readline().strip() for _ in lines] == list(lines)
 
 
-@pytest.mark.parametrize("threads", [1, 4])
-def test_each_interrupt_ends_the_nodes_or_makes_them_anew(threads: int) -> None:
-    with start("Works", threads) as program:
+def live(threads: int, how: str, *lives: list[list[str]]) -> None:
+    """Interrupt a program for what it is to say in each life, and once more for the next life."""
+    with start("Works", threads, how) as program:
         try:
             reads(program, "made", "up", "spins")
-            for _ in range(2):
-                os.kill(program.pid, signal.SIGINT)
-                reads(program, "destroyed")
+            for said in lives:
+                for lines in said:
+                    os.kill(program.pid, signal.SIGINT)
+                    reads(program, *lines)
                 os.kill(program.pid, signal.SIGINT)
                 reads(program, "made", "spins")
         finally:
             program.kill()
+
+
+@pytest.mark.parametrize("threads", [1, 4])
+def test_each_interrupt_ends_the_nodes_or_makes_them_anew(threads: int) -> None:
+    live(threads, "", [["destroyed"]], [["destroyed"]])
 
 
 def test_where_it_is_asked_for_the_nodes_of_the_first_life_are_destroyed_twice() -> None:
-    with start("Works", 1, "twice") as program:
-        try:
-            reads(program, "made", "up", "spins")
-            for destroyed in (["destroyed"] * 2, ["destroyed"]):
-                os.kill(program.pid, signal.SIGINT)
-                reads(program, *destroyed)
-                os.kill(program.pid, signal.SIGINT)
-                reads(program, "made", "spins")
-        finally:
-            program.kill()
+    live(1, "twice", [["destroyed", "destroyed"]], [["destroyed"]])
 
 
 @pytest.mark.parametrize("threads", [1, 4])
 def test_where_it_is_asked_for_the_nodes_are_shut_down_and_spin_on(threads: int) -> None:
-    with start("Works", threads, "shut_down") as program:
-        try:
-            reads(program, "made", "up", "spins")
-            for _ in range(2):
-                os.kill(program.pid, signal.SIGINT)
-                reads(program, "shut down")
-                os.kill(program.pid, signal.SIGINT)
-                reads(program, "destroyed")
-                os.kill(program.pid, signal.SIGINT)
-                reads(program, "made", "spins")
-        finally:
-            program.kill()
+    life = [["shut down"], ["destroyed"]]
+    live(threads, "shut_down", life, life)
 
 
 @pytest.mark.parametrize("threads", [1, 4])

@@ -16,7 +16,7 @@ from autograder.exercises.safety.plain_program_survival import (
     Part,
     Run,
     Stage,
-    until,
+    wait_until,
 )
 from autograder.observe.patience import Patience
 from autograder.observe.stillness import Stillness
@@ -35,14 +35,14 @@ def require_shutdown(bench: Bench, still: Stillness) -> None:
 
         def on_the_way(dispatcher: Dispatcher, run: Run) -> Act:
             drive = dispatcher.send(drive_goal.LONGEST)
-            yield from until(lambda: any(dispatcher.speeds), SETTLES)
+            yield from wait_until(lambda: any(dispatcher.speeds), SETTLES)
             if any(dispatcher.speeds):
                 drives.append(drive)
                 program.interrupt()
                 Patience(still).wait(
                     program.session, lambda: not dispatcher.speeds[-1] or program.ended()
                 )
-                yield from until(lambda: drive.status is not None, SETTLES)
+                yield from wait_until(lambda: drive.status is not None, SETTLES)
 
         stage = Stage(
             program, still, [Part(Dispatcher.SERVER, Dispatcher, {"shutdown": on_the_way})]

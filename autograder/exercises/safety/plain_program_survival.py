@@ -223,7 +223,7 @@ class Stage:
         self._rest()
 
 
-def until(happened: Callable[[], Any], most: float) -> Act:
+def wait_until(happened: Callable[[], Any], most: float) -> Act:
     """Wait until something happened, for so many s at most."""
     for _ in range(round(most / STRIDE_S)):
         if happened():
@@ -233,24 +233,24 @@ def until(happened: Callable[[], Any], most: float) -> Act:
 
 def _grip_without_gripper(user: GripUser, run: Run) -> Act:
     user.request(True)
-    yield from until(lambda: user.outcomes, 8.0)
+    yield from wait_until(lambda: user.outcomes, 8.0)
 
 
 def _grips_refused(user: GripUser, run: Run) -> Act:
     run(user.gripper)
     for success in (True, False):
         user.request(success)
-        yield from until(lambda: user.tries, 1.0)
+        yield from wait_until(lambda: user.tries, 1.0)
         user.tries[0].reply(success)
-        yield from until(lambda: user.outcomes, 1.0)
+        yield from wait_until(lambda: user.outcomes, 1.0)
 
 
 def _grip_unanswered(user: GripUser, run: Run) -> Act:
     run(user.gripper)
     user.request(True)
-    yield from until(lambda: len(user.tries) > 1, 3.0)
+    yield from wait_until(lambda: len(user.tries) > 1, 3.0)
     user.tries[1].crash()
-    yield from until(lambda: user.outcomes, 6.0)
+    yield from wait_until(lambda: user.outcomes, 6.0)
     user.tries[2].reply(True)
     yield STRIDE_S
 
@@ -258,11 +258,11 @@ def _grip_unanswered(user: GripUser, run: Run) -> Act:
 def _grip_answered_late(user: GripUser, run: Run) -> Act:
     run(user.gripper)
     user.request(True)
-    yield from until(lambda: len(user.tries) > 1, 3.0)
+    yield from wait_until(lambda: len(user.tries) > 1, 3.0)
     user.tries[0].reply(True)
     yield STRIDE_S
     user.tries[1].reply(True)
-    yield from until(lambda: user.outcomes, 1.0)
+    yield from wait_until(lambda: user.outcomes, 1.0)
 
 
 def _limits_that_are_bad(operator: Operator, run: Run) -> Act:
@@ -271,28 +271,28 @@ def _limits_that_are_bad(operator: Operator, run: Run) -> Act:
         good, [double("linear", math.nan)], [double("angular", math.inf)], [double("linear", -0.5)],
         [double("angular", 7.0)], [text("linear", "fast")], [double("warp", 0.5)], [], good,
     ):  # fmt: skip
-        yield from until(operator.ask(parameters).done, 0.5)
+        yield from wait_until(operator.ask(parameters).done, 0.5)
 
 
 def _limits_for_jammed_wheels(operator: Operator, run: Run) -> Act:
     half = [double("linear", 0.3), double("angular", math.nan)]
-    yield from until(operator.ask(half).done, 0.5)
+    yield from wait_until(operator.ask(half).done, 0.5)
     operator.jam(True)
     yield STRIDE_S
-    yield from until(operator.ask([double("linear", 0.9)]).done, 0.5)
+    yield from wait_until(operator.ask([double("linear", 0.9)]).done, 0.5)
     operator.jam(False)
     yield STRIDE_S
-    yield from until(operator.ask([double("linear", 0.4)]).done, 0.5)
+    yield from wait_until(operator.ask([double("linear", 0.4)]).done, 0.5)
 
 
 def _goals_that_are_lost(user: NavigatorUser, run: Run) -> Act:
     user.request(3)
-    yield from until(lambda: user.outcomes, 3.0)  # there may be no navigator yet
+    yield from wait_until(lambda: user.outcomes, 3.0)  # there may be no navigator yet
     run(user.navigator)
     user.request(3, obeys=False)
-    yield from until(lambda: user.outcomes, 5.0)
+    yield from wait_until(lambda: user.outcomes, 5.0)
     user.request(3, hesitates=True)
-    yield from until(lambda: user.outcomes, 2.5)
+    yield from wait_until(lambda: user.outcomes, 2.5)
     user.decide()
     yield STRIDE_S
 
@@ -301,41 +301,41 @@ def _goals_that_end(user: NavigatorUser, run: Run) -> Act:
     run(user.navigator)
     for how in (ServerGoalHandle.succeed, ServerGoalHandle.abort):
         user.request(3)
-        yield from until(lambda: user.goals, 1.0)
+        yield from wait_until(lambda: user.goals, 1.0)
         user.feedback(1)
         yield STRIDE_S
         user.end(how)
-        yield from until(lambda: user.outcomes, 1.0)
+        yield from wait_until(lambda: user.outcomes, 1.0)
     user.request(3, accepts=False)
-    yield from until(lambda: user.outcomes, 1.0)
+    yield from wait_until(lambda: user.outcomes, 1.0)
 
 
 def _goal_that_stalls(user: NavigatorUser, run: Run) -> Act:
     run(user.navigator)
     user.request(3)
-    yield from until(lambda: user.cancels, 4.0)
+    yield from wait_until(lambda: user.cancels, 4.0)
     user.end(ServerGoalHandle.canceled)
-    yield from until(lambda: user.outcomes, 1.0)
+    yield from wait_until(lambda: user.outcomes, 1.0)
 
 
 def _drives_that_are_canceled(dispatcher: Dispatcher, run: Run) -> Act:
     rejected = dispatcher.send(0)
-    yield from until(lambda: rejected.handle, 0.5)
+    yield from wait_until(lambda: rejected.handle, 0.5)
     drive = dispatcher.send(5)
-    yield from until(lambda: any(dispatcher.speeds), 1.0)
+    yield from wait_until(lambda: any(dispatcher.speeds), 1.0)
     dispatcher.cancel(drive)
-    yield from until(lambda: drive.status, 1.0)
+    yield from wait_until(lambda: drive.status, 1.0)
 
 
 def _drives_with_jammed_wheels(dispatcher: Dispatcher, run: Run) -> Act:
     drive = dispatcher.send(3)
-    yield from until(lambda: any(dispatcher.speeds), 1.0)
+    yield from wait_until(lambda: any(dispatcher.speeds), 1.0)
     dispatcher.jam(True)
-    yield from until(lambda: drive.status, 2.0)
+    yield from wait_until(lambda: drive.status, 2.0)
     dispatcher.jam(False)
     yield STRIDE_S
     again = dispatcher.send(1)
-    yield from until(lambda: again.status, 3.0)
+    yield from wait_until(lambda: again.status, 3.0)
 
 
 PARTS = (
