@@ -39,7 +39,7 @@ MAX_VALUE = 64 * 1024
 MAX_TOLD = 500
 """Characters that are told of the error of a cell."""
 
-LAST_CALLBACKS_S = 1.5  # that callbacks of an exam's earlier session are given to end
+LAST_CALLBACKS_S = 0.5  # that callbacks of an exam's earlier session are given to end
 MOST_CLEANUPS = 100
 """Nodes whose cleanup may raise while a session is closed."""
 

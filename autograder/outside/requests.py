@@ -16,7 +16,7 @@ from typing import Any
 from autograder.outside import usage
 from autograder.outside.holding import Held, held
 from autograder.outside.processes import Processes, Sandboxed
-from autograder.outside.sleeping import Code, sleepers
+from autograder.outside.sleeping import Code, Sleeper, sleepers
 from autograder.outside.stillness import HANGS, Stillness
 from autograder.starving import SeenDelay
 from course import tools
@@ -103,7 +103,7 @@ def _naps(scene: Scene, given: Given) -> list[tuple[int, int]]:
     return [*usage.naps(scene.subject, _numbers(given, "threads", MOST_NUMBERS)).items()]
 
 
-def _sleepers(scene: Scene, given: Given) -> list[tuple[int, float]]:
+def _sleepers(scene: Scene, given: Given) -> list[Sleeper]:
     threads = _numbers(given, "threads", MOST_NUMBERS)
     return sleepers(scene.subject.of(scene.pid), threads, scene.code)
 

@@ -14,6 +14,7 @@ import struct
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
+from typing import NamedTuple
 
 from autograder.outside.holding import DDS_LIBRARIES, code_of, points_into
 
@@ -35,11 +36,20 @@ Code = dict[str, list[range]]
 """Where the code of those libraries is in processes, by their folders."""
 
 
-def sleepers(process: str, threads: Iterable[int], code: Code) -> list[tuple[int, float]]:
-    """Return which of a process's ``threads`` sleep, and for how many s they will.
+class Sleeper(NamedTuple):
+    """A thread that sleeps for a time."""
 
-    Where only the whole length is known it is that. None are told if the kernel does not let us
-    look (ptrace(2)).
+    thread: int
+    left_s: float
+    """Seconds until it wakes up at the latest; the whole length where only that is known."""
+    to_the_end: bool
+    """Nothing wakes it before, as what it waits for might: it does nothing but sleep."""
+
+
+def sleepers(process: str, threads: Iterable[int], code: Code) -> list[Sleeper]:
+    """Return which of a process's ``threads`` sleep for a time.
+
+    None are told if the kernel does not let us look (ptrace(2)).
 
     Args:
         process: its folder.
@@ -58,7 +68,8 @@ def sleepers(process: str, threads: Iterable[int], code: Code) -> list[tuple[int
                     if (left := _left(number, given, memory)) is not None:
                         stack = os.pread(memory, _STACK, given[-2])
                         if not _waits_in_ros(process, stack, code):
-                            found.append((thread, left))
+                            to_the_end = number in (_NANOSLEEP, _CLOCK_NANOSLEEP)
+                            found.append(Sleeper(thread, left, to_the_end))
         finally:
             os.close(memory)
     return found

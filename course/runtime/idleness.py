@@ -9,6 +9,7 @@ a row of looks can, with the lock let go in between (proc(5): `status`, `schedst
 from __future__ import annotations
 
 import os
+import platform
 import threading
 import time
 from typing import NamedTuple
@@ -16,6 +17,8 @@ from typing import NamedTuple
 PATIENCE = 0.2  # s that a callback must have slept
 LOOKS = 40  # that must have found it asleep: on a busy machine PATIENCE passes in a few
 WORK = 0.5e-3  # s of processor time a look: a loop that spins uses ten times as much, a nap a tenth
+_FUTEX = {"x86_64": 202, "aarch64": 98}.get(platform.machine())
+"""The number of that system call; None where it is not known."""
 RESTLESS = 8  # looks in a row at which a blocked thread may have stirred: it looks at a clock
 
 
@@ -52,6 +55,15 @@ def _worked(task: str) -> float:
         return 0.0
 
 
+def _waits_without_end(native_id: int) -> bool:
+    """Return whether a thread waits for a lock, and with no time-out (futex(2))."""
+    try:
+        call = _read(f"/proc/self/task/{native_id}/syscall").split()
+        return int(call[0]) == _FUTEX and int(call[4], 16) == 0
+    except (OSError, ValueError, IndexError):  # it runs, or the kernel does not say
+        return False
+
+
 def _read(path: str) -> str:
     """Return what a small file of the kernel's holds; looks are many, and `open` is slower."""
     file = os.open(path, os.O_RDONLY)
@@ -85,6 +97,10 @@ class Idleness:
         look = look_at(self._native_id, before)
         self._last = look
         return self._still_blocked(look, before) if self._found else self._by_now_blocked(look)
+
+    def until_woken(self) -> bool:
+        """Return whether it has been found blocked, and waits until another thread wakes it."""
+        return self._found and _waits_without_end(self._native_id)
 
     def _by_now_blocked(self, look: Look) -> bool:
         """Return whether it has been asleep, but for naps' ends, in enough looks by now."""

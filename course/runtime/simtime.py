@@ -121,7 +121,8 @@ class SimulatedTime:
         Nothing could tell the difference, unless others follow /clock or a callback looks at it.
         One that sleeps until a moment of the clock's, by rclpy's own means, is due like a timer.
         Callbacks that go on for ever, as a coroutine does that naps and looks again, can, but a few
-        steps are no more to them than a nap that took longer.
+        steps are no more to them than a nap that took longer. Nor are they to whoever will wake one
+        that waits for a lock.
         """
         followers = self._followers()
         if self._publisher.get_subscription_count() != len(followers):
@@ -133,6 +134,9 @@ class SimulatedTime:
             most = _POLLED_STRIDE
         else:
             for job in running:
+                if job.idleness is not None and job.idleness.until_woken():
+                    most = _POLLED_STRIDE
+                    continue
                 if (wakes := sleeps_until(job)) is None:
                     return step_ns
                 waits.append(wakes - self._now_ns)

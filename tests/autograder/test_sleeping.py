@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from autograder.outside.sleeping import sleepers
+from autograder.outside.sleeping import Sleeper, sleepers
 from autograder.outside.usage import thread_ids
 from course.runtime.waiting import Pulse, poll
 
@@ -47,7 +47,7 @@ def running(wait: str) -> Iterator[str]:
             process.kill()
 
 
-def asleep(process: str) -> list[tuple[int, float]]:
+def asleep(process: str) -> list[Sleeper]:
     return sleepers(process, thread_ids(process), {})
 
 
@@ -55,15 +55,16 @@ def asleep(process: str) -> list[tuple[int, float]]:
 def test_a_thread_that_waits_for_a_time_is_seen_with_what_is_left_of_it(wait: str) -> None:
     with running(wait) as process:
         assert poll(lambda: asleep(process), 30.0, Pulse())
-        ((_, left),) = asleep(process)
-    assert 200 < left <= 300
+        (sleeper,) = asleep(process)
+    assert 200 < sleeper.left_s <= 300
+    assert sleeper.to_the_end is (wait == WAITS["time.sleep"])
 
 
 @pytest.mark.parametrize("wait", FOR_EVER.values(), ids=[*FOR_EVER])
 def test_one_that_waits_for_something_else_is_not(wait: str) -> None:
     with running(wait) as process:
         seen: list[int] = []
-        poll(lambda: seen.extend(t for t, _ in asleep(process)), 1.5, Pulse())
+        poll(lambda: seen.extend(s.thread for s in asleep(process)), 1.5, Pulse())
         assert not asleep(process)
         assert len(seen) < 20  # while it starts, some may
 

@@ -124,6 +124,36 @@ def test_time_moves_at_once_to_the_moment_until_which_a_callback_sleeps():
         assert moved == [200_000_000, *due]  # its timer is due once more, and has to wait for it
 
 
+def test_time_moves_in_longer_strides_past_a_callback_that_waits_until_it_is_woken():
+    """Two timers wake it, one every 0.12 s, and time stops where they are due."""
+
+    class Waiter(Node):
+        def __init__(self):
+            super().__init__("waiter")
+            self.woke, self.over = [], False
+            self.wakes = threading.Semaphore(0)
+            group = ReentrantCallbackGroup()
+            self.create_timer(0.12, self.wakes.release, callback_group=group)
+            self.first = self.create_timer(0.1, self.wait, callback_group=group)
+
+        def wait(self):
+            self.first.cancel()
+            while self.wakes.acquire() and not self.over:
+                self.woke.append(self.get_clock().now().nanoseconds)
+
+    with course.Session(sim_time=True, threads=3) as lab:
+        waiter = lab.run(Waiter)
+        lab.sim.advance(0.1)
+        moved = []
+        move_to = lab.sim._move_to
+        lab.sim._move_to = lambda *move: moved.append(move[0]) or move_to(*move)
+        lab.sim.advance(0.4)
+        assert waiter.woke == [120_000_000, 240_000_000, 360_000_000, 480_000_000]
+        assert len(moved) < 20  # of 40 steps
+        waiter.over = True
+        waiter.wakes.release()
+
+
 def test_a_recorder_stamps_in_simulated_time(lab):
     lab.run(Sensors)
     recorder = lab.record("readings", String)

@@ -32,7 +32,7 @@ class Process:
     def wakes(self, threads: Iterable[int] | None = None) -> list[float]:
         """Return after how many s threads that sleep for a time wake up: all, or of these."""
         threads = self.thread_ids() if threads is None else threads
-        return [float(left) for _, left in self._outside.ask("sleepers", threads=[*threads])]
+        return [float(left) for _, left, _ in self._outside.ask("sleepers", threads=[*threads])]
 
     def usage(self) -> Usage:
         """Return what it holds now."""

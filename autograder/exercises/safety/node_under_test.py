@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, NamedTuple
 
 from autograder.bench import Bench, Endpoints, StudentError
 from autograder.exam import Failed
@@ -31,6 +31,15 @@ SAME_S = 0.02
 
 class WallWait(Failed):
     """A callback waits by the wall clock: what comes after that, and when, says nothing more."""
+
+
+class Sleep(NamedTuple):
+    """A thread that sleeps ``until`` a time as of time.monotonic(), if nothing wakes it before."""
+
+    thread: int
+    until: float
+    to_the_end: bool
+    """Nothing can: see `autograder.outside.sleeping`."""
 
 
 class Robot:
@@ -165,14 +174,15 @@ class Robot:
         """
         waits: list[str] = []
         if self._bench.outside.own_network:
-            sleeps = {t: end for t, end in self._sleeps().items() if end > time.monotonic() + NAP_S}
+            sleeps = [s for s in self._sleeps() if s.until > time.monotonic() + NAP_S]
             if not sleeps:
                 return
             waits = self._bench.subject.wall_waits()  # now: it may be over when it is certain
-            self.wait(lambda: False, NAP_S)
-            later = self._sleeps()
-            if not any(abs(later.get(t, 0.0) - end) < SAME_S for t, end in sleeps.items()):
-                return  # what wakes up at once has not waited
+            if not any(sleep.to_the_end for sleep in sleeps):
+                self.wait(lambda: False, NAP_S)
+                later = {sleep.thread: sleep.until for sleep in self._sleeps()}
+                if not any(abs(later.get(s.thread, 0.0) - s.until) < SAME_S for s in sleeps):
+                    return  # what wakes up at once has not waited
         waits = waits or self._bench.subject.wall_waits()
         if waits or self._bench.outside.own_network:
             told = _of_waits(waits).strip() or "A callback waits on the wall clock."
@@ -184,13 +194,13 @@ class Robot:
             return frozenset()
         threads = [*map(int, self._bench.outside.ask("threads"))]
         sleeping = self._bench.outside.ask("sleepers", threads=threads)
-        return frozenset(threads) - {int(thread) for thread, _ in sleeping}
+        return frozenset(threads) - {int(thread) for thread, _, _ in sleeping}
 
-    def _sleeps(self) -> dict[int, float]:
-        """Return until when threads of the session will sleep by the wall clock."""
+    def _sleeps(self) -> list[Sleep]:
+        """Return which threads of the session sleep by the wall clock."""
         now = time.monotonic()
         found = self._bench.outside.ask("sleepers", threads=[*self._threads])
-        return {int(thread): now + left for thread, left in found}
+        return [Sleep(int(thread), now + left, bool(sure)) for thread, left, sure in found]
 
     @property
     def _by_the_clock(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from autograder.bench import REPLY_TIMEOUT, StudentError, SubjectGone
+from autograder.bench import StudentError, SubjectGone
 from autograder.exam import Failed
 from autograder.exercises.safety import drive_goal
 from autograder.exercises.safety.navigation import Dispatcher
@@ -12,6 +12,7 @@ from autograder.exercises.safety.node_under_test import Robot
 from autograder.exercises.safety.rig import RobotRig
 
 AT_ONCE = 1.0  # s of wall time that shutdown() may take where it does not wait; 0.01 s as a rule
+RETURNS = 5.0  # s of wall time after which it waits for what does not come
 EXPECTED = "shutdown() does not wait: it tells the loop, and returns at once."
 AFTERWARDS = 2  # m of a goal that comes after shutdown(), and s in which it would drive, at most
 LOOKS = 3  # calls of it, if need be, of which the fastest counts: any may be held up by the machine
@@ -92,7 +93,7 @@ def _shutdown_on_the_way(rig: RobotRig) -> float:
 def _shut_down(rig: RobotRig, when: str) -> float:
     began = time.monotonic()
     try:
-        rig.bench.subject.call(Dispatcher.SERVER, "shutdown")
+        rig.bench.subject.call(Dispatcher.SERVER, "shutdown", timeout=RETURNS)
     except StudentError as error:
         raise Failed(
             expected=f"{Dispatcher.SERVER} has a method shutdown() that does not raise {when}.",
@@ -103,7 +104,7 @@ def _shut_down(rig: RobotRig, when: str) -> float:
             raise
         raise Failed(
             expected=EXPECTED,
-            actual=f"Called {when}, it had not returned {REPLY_TIMEOUT:.0f} s later. The node's "
+            actual=f"Called {when}, it had not returned {RETURNS:.0f} s later. The node's "
             "clock stands still during the call: does it wait for that, or for a callback?",
         ) from gone
     return time.monotonic() - began
