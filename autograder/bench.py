@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from autograder.draws import USUAL_SEED, Draws
 from autograder.outside.asking import Outside
 from autograder.programs import Programs
-from autograder.starving import RunDelay, of_process
+from autograder.starving import FairDeadline, RunDelay, of_process
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 from course.runtime.core_session import CoreSession
 
@@ -397,3 +397,7 @@ class Bench:
         self.key: Mapping[str, Any] = {}
         self.outside = outside
         self.draws = Draws(seed)
+
+    def deadline(self, seconds: float) -> FairDeadline:
+        """Begin a time that is put off while others keep the subject from running."""
+        return FairDeadline(seconds, self.outside.delay)

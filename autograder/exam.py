@@ -16,6 +16,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from autograder import points as points_table
 from autograder.bench import Bench, StudentError, SubjectGone
+from autograder.starving import FairDeadline
 from autograder.verdict import CheckResult, Status, Verdict
 from course.errors import CourseError
 
@@ -24,6 +25,13 @@ RigT = TypeVar("RigT")
 
 MAX_TEXT = 7000
 """Characters of a text in a verdict: of an error in a student's code, 6000 are told."""
+
+SITTING_S = 120.0
+"""Seconds in which checks of one sitting begin: an eighth of it is enough for all of them.
+
+A node that takes its time for each answer, and yet gives it, would keep the examiner for longer
+than it may take (`autograder.processes.EXAM_TIMEOUT`), and that would be the grader's fault.
+"""
 
 LONGEST_NAME = 200
 """Bytes that are shown of a name that is no text."""
@@ -138,6 +146,7 @@ class Exam(Generic[RigT]):
         done: dict[str, CheckResult] = {}
         gone: list[CheckResult] = []
         told: set[str] = set()
+        deadline = bench.deadline(SITTING_S)
         with ExitStack() as stack:
             rig: RigT | None = None
             for number, part in enumerate(parts):
@@ -152,7 +161,7 @@ class Exam(Generic[RigT]):
                         rig = None
                 table = self.part(part.name)
                 bench.key = part.key
-                results = [self._result(name, rig, done, gone) for name in table]
+                results = [self._result(name, rig, done, gone, deadline) for name in table]
                 told.update(table)
                 results = [self._with_reason(result, done, told) for result in results]
                 checks = tuple(_worth(result, table[result.name]) for result in results)
@@ -176,14 +185,17 @@ class Exam(Generic[RigT]):
         rig: RigT | None,
         done: dict[str, CheckResult],
         gone: list[CheckResult],
+        deadline: FairDeadline,
     ) -> CheckResult:
         if name not in done:
             check = self.checks[name]
             for need in check.needs:
-                self._result(need, rig, done, gone)
+                self._result(need, rig, done, gone, deadline)
             missing = [done[need] for need in check.needs if not done[need].passed]
             if missing:
                 done[name] = _not_checked(check, missing[0])
+            elif not deadline.left:
+                done[name] = _too_late(check)
             else:
                 assert rig is not None  # without one, what needs nothing has failed already
                 done[name] = _run(check, rig, gone)
@@ -216,6 +228,14 @@ def _not_checked(check: Check[RigT], missing: CheckResult) -> CheckResult:
     if missing.status in ("grader_error", "not_examined"):
         actual = f"This needs “{title}”, which could not be examined here. It is not your fault."
     return replace(_result_of(check, "not_checked"), actual=actual)
+
+
+def _too_late(check: Check[RigT]) -> CheckResult:
+    return replace(
+        _result_of(check, "not_checked"),
+        actual=f"What was examined before this took {SITTING_S:.0f} s in all: which of your "
+        "callbacks takes so long for each answer?",
+    )
 
 
 def _not_reached(check: Check[RigT], gone: CheckResult) -> CheckResult:

@@ -22,6 +22,17 @@ def no_rig(_bench: Any) -> Iterator[list[str]]:
     yield []
 
 
+class Deadline:
+    """Tells what is left in turn; without that, there is always some."""
+
+    def __init__(self, left: Iterator[float] | None) -> None:
+        self._left = left
+
+    @property
+    def left(self) -> float:
+        return next(self._left) if self._left else 1.0
+
+
 @pytest.fixture
 def exam(monkeypatch: pytest.MonkeyPatch) -> Exam[list[str]]:
     parts = {"visible": {"first": 1.0, "second": 2.0, "third": 4.0}, "hidden": {"last": 8.0}}
@@ -57,8 +68,11 @@ def exam(monkeypatch: pytest.MonkeyPatch) -> Exam[list[str]]:
     return exam
 
 
-def bench(*, ends: bool = False) -> Bench:
-    return cast(Bench, SimpleNamespace(ends=ends, key={}))
+def bench(*, ends: bool = False, left: Iterator[float] | None = None) -> Bench:
+    def deadline(_seconds: float) -> Deadline:
+        return Deadline(left)
+
+    return cast(Bench, SimpleNamespace(ends=ends, key={}, deadline=deadline))
 
 
 def sit(exam: Exam[list[str]], *parts: str) -> list[Verdict]:
@@ -185,6 +199,16 @@ def test_what_comes_after_a_subject_is_gone_is_not_at_fault(
     first, second = checks(exam, "late")
     assert (first.status, second.status) == ("failed", "not_checked")
     assert "“It comes back”" in second.actual
+
+
+def test_what_comes_after_too_long_a_time_is_not_checked_and_nobody_elses_fault(
+    exam: Exam[list[str]],
+) -> None:
+    late = bench(left=iter([1.0, 0.0, 0.0, 0.0]))
+    (verdict,) = exam.sit([Part("visible")], late)
+    assert [check.status for check in verdict.checks] == ["passed", "not_checked", "not_checked"]
+    assert "took 120 s in all" in verdict.checks[1].actual
+    assert "This needs “It runs” first." in verdict.checks[2].actual
 
 
 def test_each_check_runs_once_a_sitting(exam: Exam[list[str]]) -> None:

@@ -7,7 +7,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-TITLES = ("attack", "what the grade says", "points got / deserved", "neighbour's points")
+TITLES = (
+    "attack", "what the grade says", "points got / deserved", "neighbour's points",
+    "neighbour's time",
+)  # fmt: skip
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -19,7 +22,7 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     table = Table(*TITLES, title="Attacks", show_lines=True)
     for row in sorted(rows, key=lambda row: str(row["attack"])):
         table.add_row(*(Text(str(row[title])) for title in TITLES))
-    console = Console(width=140)
+    console = Console(width=160)
     with console.capture() as text:
         console.print(table)
     terminalreporter.ensure_newline()

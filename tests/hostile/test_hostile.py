@@ -207,10 +207,26 @@ def grade_text(outcome: Outcome) -> str:
     return "\n".join([*outcome.notes, *(f"{check.expected} {check.actual}" for check in checks)])
 
 
+def timed(class_: Class) -> tuple[Outcome, float]:
+    """Grade a right submission; return what became of it, and how long that took, in s."""
+    began = time.monotonic()
+    outcome = runner.run(class_.program("right-chapter"), hidden=[class_.root])
+    return outcome, time.monotonic() - began
+
+
+@pytest.fixture(scope="module")
+def usual(class_: Class) -> float:
+    """Return how many s a right submission takes beside another right one."""
+    with ThreadPoolExecutor(2) as pool:
+        (_, seconds), _ = pool.map(timed, [class_, class_])
+    return seconds
+
+
 @pytest.mark.parametrize("attack", attacks(), ids=lambda attack: attack.name)
 def test_an_attack_is_contained_and_explained_and_hurts_nobody(
     attack: Attack,
     class_: Class,
+    usual: float,
     scratch: Path,
     host: tuple[int, list[socket.socket]],
     namespaces: set[int],
@@ -219,17 +235,18 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
     port, listeners = host
     text = attack.text.replace("PORT", str(port)).replace("ROOT", repr(str(class_.root)))
     with ThreadPoolExecutor(2) as pool:
-        neighbour = pool.submit(runner.run, class_.program("right-chapter"), hidden=[class_.root])
+        neighbour = pool.submit(timed, class_)
         hostile = pool.submit(
             runner.run, class_.program(attack.base, text, attack.exercise), hidden=[class_.root],
             cell_timeout=attack.seconds, seed=SEED,
         )  # fmt: skip
-        outcome, beside = hostile.result(), neighbour.result()
+        outcome, (beside, seconds) = hostile.result(), neighbour.result()
     for name, value in {
         "attack": f"{attack.name}: {attack.title}",
         "what the grade says": gist(outcome),
         "points got / deserved": f"{score(outcome):g} / {attack.score}",
         "neighbour's points": f"{score(beside):g} of {FULL:g}",
+        "neighbour's time": f"{seconds:.1f} s (beside a right one: {usual:.1f} s)",
     }.items():
         record_property(name, value)
     assert score(beside) == FULL, grade_text(beside)

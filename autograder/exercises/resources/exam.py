@@ -52,6 +52,7 @@ from autograder.exercises.resources.leaks import (
     refuse_zooms,
     require_flat_refusals,
     require_flat_snapshots,
+    require_start_raises_unasked,
 )
 from autograder.exercises.resources.managed import Managed
 from autograder.exercises.resources.managed_holdings import (
@@ -285,6 +286,7 @@ def failed_start(rig: CameraRig) -> None:
         rig.program.stop(DRIVER)
         require_gone(rig, device, "After failed starts, one that worked, and its end,", node)
         failing_starts_memory(rig, kind, FAILING_STARTS, before)
+    require_start_raises_unasked(rig)
 
 
 @EXAM.check(

@@ -15,6 +15,8 @@ from autograder.exercises.resources.camera_duties import DRIVER, require_picture
 from autograder.exercises.resources.camera_requests import require_snapshot
 from autograder.exercises.resources.process_usage import Usage
 from autograder.exercises.resources.rig import ENDED, CameraRig
+from autograder.observe.patience import Patience
+from autograder.observe.stillness import Stillness
 
 START_MEMORY = 1024  # KiB a failed start or a round: one of ten costs more than one of fifty
 WORDS = {"threads": "threads", "files": "open files"}
@@ -131,3 +133,20 @@ def attempt(rig: CameraRig, device: str) -> None:
         "picture to give.",
         actual="It made a node as if all were well.",
     )
+
+
+def require_start_raises_unasked(rig: CameraRig) -> None:
+    """Fail unless a plain program ends where its driver cannot start; nothing if there is none.
+
+    That a constructor has raised is otherwise said by the student's process alone.
+    """
+    if rig.programs is None:
+        return
+    device = rig.device("unplugged")
+    with rig.programs.program([(DRIVER, [device])]) as program:
+        if not Patience(Stillness(rig.outside)).wait(program.session, program.ended):
+            raise Failed(
+                expected=f"{DRIVER}({device!r}) raises in a program of its own as well, which so "
+                "ends.",
+                actual="The program went on as if all were well.",
+            )
