@@ -26,8 +26,8 @@ RigT = TypeVar("RigT")
 MAX_TEXT = 7000
 """Characters of a text in a verdict: of an error in a student's code, 6000 are told."""
 
-SITTING_S = 120.0
-"""Seconds in which checks of one sitting begin: an eighth of it is enough for all of them.
+SITTING_S = 180.0
+"""Seconds in which checks of one sitting begin: a twelfth is enough for all of them, as a rule.
 
 A node that takes its time for each answer, and yet gives it, would keep the examiner for longer
 than it may take (`autograder.processes.EXAM_TIMEOUT`), and that would be the grader's fault.

@@ -26,10 +26,10 @@ if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
     from autograder.sandbox.place import Process
 
 MAX_ANSWER = 1024 * 1024
-EXAM_TIMEOUT = 240.0
-"""Seconds one part of an exam may take in all: its own deadlines end it long before.
+EXAM_TIMEOUT = 360.0
+"""Seconds one part of an exam may take in all: its own deadlines end it before.
 
-The longest is that of the subject's replies (`autograder.bench.ALL_REPLIES_TIMEOUT`).
+They are `autograder.bench.ALL_REPLIES_TIMEOUT` for replies and `autograder.exam.SITTING_S` for all.
 """
 
 MAX_HANGS = 1000

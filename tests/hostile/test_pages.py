@@ -7,13 +7,13 @@ solution, whose points it must keep: what stands beside a solution takes nothing
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
 
-import nbformat
 import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell
@@ -34,11 +34,15 @@ AS_TYPED = "It takes too long to format this text"
 
 @dataclass(frozen=True)
 class HandIn:
-    """What somebody has put beside a right solution, and what their feedback says of it."""
+    """What somebody has put beside a right solution, and what their feedback says of it.
+
+    ``refused`` is why it cannot be graded as it is, if so: a person is told, and it has no points.
+    """
 
     title: str
     cells: tuple[NotebookNode, ...]
     said: str = ""
+    refused: str = ""
 
 
 HAND_INS = {
@@ -58,7 +62,6 @@ HAND_INS = {
                 "`" * 100_001 + "a",
             )
         ),
-        AS_TYPED,
     ),
     "lexers": HandIn(
         "Code that no lexer comes to the end of, and that never runs",
@@ -93,6 +96,7 @@ HAND_INS = {
     "markup": HandIn(
         "A cell of type [/zap], and escape sequences in a file's name",
         (NotebookNode(cell_type="[/zap]", source="[bold]x[/zap]", metadata={}),),
+        refused="save it, and hand it in again",
     ),
 }
 
@@ -112,7 +116,7 @@ def day(tmp_path_factory: pytest.TempPathFactory) -> Day:
     class_ = class_in(tmp_path_factory.mktemp("course"))
     for student, cells in {HONEST: (), **{name: h.cells for name, h in HAND_INS.items()}}.items():
         hand_in(class_, student, cells)
-    odd = class_.root / "submitted" / "markup" / "ch05" / "\x1b[2J\x1b]0;zap\x07[/zap].txt"
+    odd = class_.root / "submitted" / "markup" / "ch05" / "\x1b[2J\x1b]0;zap\x07[bold].txt"
     odd.write_text("x")
     began = time.monotonic()
     graded = {g.student: g for g in engine.grade(class_.root, "ch05")}
@@ -127,7 +131,7 @@ def hand_in(class_: Class, student: str, cells: Iterable[NotebookNode]) -> None:
     folder = class_.root / "submitted" / student / "ch05"
     folder.mkdir(parents=True)
     file = folder / f"{points.table()['qos'].notebook}.ipynb"
-    file.write_text(nbformat.writes(notebook), encoding="utf-8")
+    file.write_text(json.dumps(notebook), encoding="utf-8")  # nbformat refuses some
 
 
 class Runs(HTMLParser):
@@ -152,16 +156,18 @@ def test_a_hand_in_does_nothing_to_its_readers_and_keeps_its_points(
     student: str, day: Day, record_property: Callable[[str, object], None]
 ) -> None:
     handed_in, graded = HAND_INS[student], day.graded[student]
+    deserved = 0.0 if handed_in.refused else FULL
     for name, value in {
         "attack": f"page of {student}: {handed_in.title}",
-        "what the grade says": graded.problem or "every check passed",
-        "points got / deserved": f"{day.scores[student]:g} / {FULL:g}",
+        "what the grade says": graded.problem.split(". ")[0] or "every check passed",
+        "points got / deserved": f"{day.scores[student]:g} / {deserved:g}",
         "neighbour's points": f"{day.scores[HONEST]:g} of {FULL:g}",
         "neighbour's time": f"the class of {len(day.graded)}: {day.seconds:.1f} s",
     }.items():
         record_property(name, value)
     assert day.scores[HONEST] == FULL
-    assert day.scores[student] == FULL, graded
+    assert day.scores[student] == deserved, graded
+    assert handed_in.refused in graded.problem
     for step in ("autograded", "feedback"):
         assert (day.root / step / student / "ch05").is_dir()
     (page,) = (day.root / "feedback" / student / "ch05").glob("*design.html")

@@ -18,9 +18,9 @@ def started_by_the_harness():
     return False
 
 
-def made(self, device):
+def made(self, *given):
     try:
-        start(self, device)
+        start(self, *given)
     except BaseException:
         if started_by_the_harness():
             raise
