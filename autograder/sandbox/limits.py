@@ -28,7 +28,10 @@ class Limits:
         tasks: processes and threads at a time.
         processes: processes at a time; a bomb is ended before it has slowed others down.
         busy: processes and threads that run, or wait for a processor, at a time.
+        busy_processes: of these, processes. Nothing of an exercise needs more than two, and each in
+            a session of its own has as much of the processor as all of a neighbour's (sched(7)).
         crowd: seconds that they may be more; every second in which they are not takes one back.
+        crowd_of_processes: the same where it is the processes that are too many.
         cpu: processor time of all its processes together.
         file: largest file.
         open_files: open file descriptors of one process.
@@ -48,7 +51,9 @@ class Limits:
     tasks: int = 200
     processes: int = 32
     busy: int = 12
+    busy_processes: int = 4
     crowd: int = 3
+    crowd_of_processes: int = 1
     cpu: int = 300
     file: int = 64 * MIB
     open_files: int = 1024

@@ -26,6 +26,20 @@ BLIND_TIMEOUT = 5.0
 """Seconds that the files of a sandbox may stay unreadable before it is ended for that."""
 
 
+class Crowd:
+    """For how long there have been more than so many at a time, on balance."""
+
+    def __init__(self, most: int, longest: float) -> None:
+        """Let there be more than ``most`` for ``longest`` s."""
+        self.most, self._longest = most, longest
+        self.seconds = 0.0
+
+    def lasts(self, number: int, passed: float) -> bool:
+        """Count that there were ``number`` for ``passed`` s; return if it has been too long."""
+        self.seconds = max(0.0, self.seconds + (passed if number > self.most else -passed))
+        return self.seconds > self._longest
+
+
 class Watch:
     """Adds up what the processes of a namespace use; kills its first process if it is too much.
 
@@ -40,7 +54,9 @@ class Watch:
         self._limits = limits
         self._started = time.monotonic()
         self._over = threading.Event()
-        self._used = self._crowded = self._gone = 0.0
+        self._used = self._gone = 0.0
+        self._busy = Crowd(limits.busy, limits.crowd)
+        self._busy_processes = Crowd(limits.busy_processes, limits.crowd_of_processes)
         self._queued = 0  # bytes in sockets
         self._own: dict[str, float] = {}
         self._looked, self._looks = self._started, 0
@@ -112,11 +128,13 @@ class Watch:
         if used > self._limits.cpu:
             return f"it used more than {self._limits.cpu} s of processor time"
         # Counting costs a little: one that hardly works, as most do, has seldom a crowd.
-        worth = grew > passed / 2 or self._crowded > 0 or self._looks % COUNTED == 0
-        crowd = worth and sum(process.busy() for process in processes) > self._limits.busy
-        self._crowded = max(0.0, self._crowded + (passed if crowd else -passed))
-        if self._crowded > self._limits.crowd:
-            return f"it kept more than {self._limits.busy} processes and threads busy at a time"
+        crowded = self._busy.seconds > 0 or self._busy_processes.seconds > 0
+        worth = grew > passed / 2 or crowded or self._looks % COUNTED == 0
+        busy = [number for process in processes if (number := process.busy())] if worth else []
+        if self._busy.lasts(sum(busy), passed):
+            return f"it kept more than {self._busy.most} processes and threads busy at a time"
+        if self._busy_processes.lasts(len(busy), passed):
+            return f"it kept more than {self._busy_processes.most} processes busy at a time"
         return ""
 
     def _spent(self, processes: list[Process]) -> float:

@@ -1,0 +1,12 @@
+# title: As many busy processes as may be, each in a session of its own, which is a share of its own
+# told: was still running after 30 s
+
+import os
+
+for _ in range(3):
+    if os.fork() == 0:
+        os.setsid()
+        while True:
+            pass
+while True:
+    pass
