@@ -1,5 +1,6 @@
 # title: As many busy processes as may be, each in a session of its own, which is a share of its own
-# told: was still running after 30 s
+# seconds: 5
+# told: was still running after 5 s
 
 import os
 
