@@ -29,7 +29,7 @@ from autograder.raised import (
 )
 from autograder.wall_waits import wall_waits
 from autograder.wire import Channel, ChannelClosed
-from course.runtime.context import default_context_beside
+from course.runtime.context.context import default_context_beside
 from course.runtime.core_session import CoreSession
 from course.runtime.teardown import sweep
 

@@ -43,14 +43,14 @@ if TYPE_CHECKING:
     from course.learner_session import Session as Session
     from course.notebook import load_ipython_extension as load_ipython_extension
     from course.notebook import unload_ipython_extension as unload_ipython_extension
-    from course.runtime.actions import GoalRun as GoalRun
-    from course.runtime.actions import GoalState as GoalState
-    from course.runtime.callback_errors import CallbackError as CallbackError
-    from course.runtime.closing import CloseReport as CloseReport
-    from course.runtime.logs import LogTable as LogTable
-    from course.runtime.recorder import Recorder as Recorder
-    from course.runtime.recorder import Stamped as Stamped
-    from course.runtime.simtime import SimulatedTime as SimulatedTime
+    from course.runtime.callbacks.errors import CallbackError as CallbackError
+    from course.runtime.context.closing import CloseReport as CloseReport
+    from course.runtime.logs.table import LogTable as LogTable
+    from course.runtime.requests.actions import GoalRun as GoalRun
+    from course.runtime.requests.actions import GoalState as GoalState
+    from course.runtime.requests.recorder import Recorder as Recorder
+    from course.runtime.requests.recorder import Stamped as Stamped
+    from course.runtime.simulated_time import SimulatedTime as SimulatedTime
 
 _HOMES = {
     "call": "course.ambient",
@@ -77,15 +77,15 @@ _HOMES = {
     "progress": "course.journal.progress",
     "load_ipython_extension": "course.notebook",
     "unload_ipython_extension": "course.notebook",
-    "GoalRun": "course.runtime.actions",
-    "GoalState": "course.runtime.actions",
-    "CallbackError": "course.runtime.callback_errors",
-    "CloseReport": "course.runtime.closing",
-    "LogTable": "course.runtime.logs",
-    "Recorder": "course.runtime.recorder",
-    "Stamped": "course.runtime.recorder",
+    "GoalRun": "course.runtime.requests.actions",
+    "GoalState": "course.runtime.requests.actions",
+    "CallbackError": "course.runtime.callbacks.errors",
+    "CloseReport": "course.runtime.context.closing",
+    "LogTable": "course.runtime.logs.table",
+    "Recorder": "course.runtime.requests.recorder",
+    "Stamped": "course.runtime.requests.recorder",
     "Session": "course.learner_session",
-    "SimulatedTime": "course.runtime.simtime",
+    "SimulatedTime": "course.runtime.simulated_time",
 }
 
 

@@ -12,15 +12,15 @@ from rclpy.qos import QoSProfile
 
 from course.errors import SessionError
 from course.learner_session import Session
-from course.runtime.actions import GoalRun
-from course.runtime.closing import CloseReport
-from course.runtime.context import (
+from course.runtime.context.closing import CloseReport
+from course.runtime.context.context import (
     default_context,
     release_default_context,
     set_default_context,
 )
-from course.runtime.logs import LogTable
-from course.runtime.recorder import Recorder
+from course.runtime.logs.table import LogTable
+from course.runtime.requests.actions import GoalRun
+from course.runtime.requests.recorder import Recorder
 
 T = TypeVar("T")
 

@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from course import arguments
 from course.errors import SessionError
 from course.runtime.core_session import CoreSession
-from course.runtime.offers import full_action, full_node, full_service
+from course.runtime.requests.graph_queries import full_action, full_node, full_service
 from course.types import load_type
 
 if TYPE_CHECKING:

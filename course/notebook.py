@@ -11,8 +11,8 @@ from rclpy.exceptions import NotInitializedException
 from course.interfaces import magic
 from course.journal.notes import CellNotes
 from course.ros import magic as ros_magic
-from course.runtime import closing
-from course.runtime.callback_errors import CallbackError
+from course.runtime.callbacks.errors import CallbackError
+from course.runtime.context import closing
 from course.runtime.core_session import CoreSession
 
 _LONG = 3.0  # s that a callback may hold all others up before the learner is told

@@ -19,7 +19,7 @@ from rclpy.executors import Executor, ExternalShutdownException, ShutdownExcepti
 from rclpy.subscription import Subscription
 
 from course.errors import WaitTimeout
-from course.runtime.ready import WaitList
+from course.runtime.executor.wait_list import WaitList
 from course.runtime.waiting import Pulse, poll
 
 MOST_AT_ONCE = 16

@@ -9,9 +9,9 @@ from course import neighbours
 from course.diagnosis.graph import lonely
 from course.doctor.finding import Finding, problem, warning
 from course.graph import reader
-from course.runtime import closing
-from course.runtime.actions import SEND_GOAL
+from course.runtime.context import closing
 from course.runtime.core_session import CoreSession
+from course.runtime.requests.actions import SEND_GOAL
 
 
 def on_another_domain(session: CoreSession) -> Iterator[Finding]:

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from course.doctor.finding import Finding, problem, warning
 from course.graph import reader, words
 from course.graph.model import Graph
-from course.runtime.actions import SEND_GOAL
 from course.runtime.core_session import CoreSession
+from course.runtime.requests.actions import SEND_GOAL
 
 NEARLY = " (is it "
 """Stands in a message that names another topic, service or action, which may have been meant."""

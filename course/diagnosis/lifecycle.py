@@ -14,7 +14,7 @@ from course.diagnosis.graph import lonely
 from course.diagnosis.nodes import ANSWER, MOST_ASKED
 from course.doctor.finding import Finding, problem, warning
 from course.graph import reader
-from course.runtime import transitions
+from course.runtime.callbacks import transitions
 from course.runtime.core_session import CoreSession
 
 _GET_STATE = "/get_state"

@@ -18,8 +18,8 @@ from rclpy.qos import HistoryPolicy, QoSCompatibility, QoSProfile, qos_check_com
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from course.graph.model import QOS_POLICIES, Endpoint, Exchange, Graph, Mismatch, Topic
-from course.runtime import qos_events
 from course.runtime.names import full_name
+from course.runtime.rclpy_fixes import incompatible_qos_events
 
 _PLUMBING = ("/rosout", "/parameter_events", "/clock")
 _PLUMBING_TYPES = ("rcl_interfaces/", "type_description_interfaces/")
@@ -81,7 +81,7 @@ def _known(nodes: Iterable[Node]) -> Own:
             for role, end in ends:
                 where = (name, end.topic_name, role)
                 own.queues[where] = end.qos_profile
-                own.broken[where] |= qos_events.policies(end)
+                own.broken[where] |= incompatible_qos_events.policies(end)
     return own
 
 

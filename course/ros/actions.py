@@ -9,7 +9,7 @@ from course.graph.model import Exchange
 from course.ros.options import Add, operands, type_and_values
 from course.ros.options import timeout as add_timeout
 from course.ros.types import agreed, message
-from course.runtime.offers import full_action
+from course.runtime.requests.graph_queries import full_action
 
 NOUN = "action"
 

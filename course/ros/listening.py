@@ -14,7 +14,7 @@ from course.ros.options import timeout as add_timeout
 from course.ros.qos import declare as declare_qos
 from course.ros.qos import profile
 from course.ros.types import message_type
-from course.runtime.offers import full_topic
+from course.runtime.requests.graph_queries import full_topic
 from course.runtime.waiting import Deadline
 
 _ENOUGH = 20  # messages for a rate that one late message does not spoil

@@ -8,7 +8,7 @@ from course import ambient, plain
 from course.errors import CourseError, SessionError
 from course.graph import reader
 from course.ros.options import Add
-from course.runtime.offers import full_node
+from course.runtime.requests.graph_queries import full_node
 from course.watch.parameter_values import TYPES, RefusedError
 from course.watch.parameters import ParameterSheet
 

@@ -12,7 +12,7 @@ from course.ros.options import Add, operands, type_and_values
 from course.ros.options import timeout as add_timeout
 from course.ros.repetitions import declare_rate, repetitions
 from course.ros.types import agreed, message
-from course.runtime.offers import full_service
+from course.runtime.requests.graph_queries import full_service
 from course.types import load_type, type_name
 
 NOUN = "service"

@@ -11,7 +11,7 @@ from rosidl_parser.definition import NamespacedType
 from course import ambient, values
 from course.errors import SessionError
 from course.runtime.core_session import CoreSession
-from course.runtime.offers import full_topic
+from course.runtime.requests.graph_queries import full_topic
 from course.types import load_type, type_name
 
 

@@ -17,14 +17,14 @@ from rclpy.subscription import Subscription
 from course import arguments, neighbours
 from course.domains import check_domain_id, lease_domain
 from course.errors import SessionError
-from course.runtime import closing, signals
-from course.runtime.asking import Asking
-from course.runtime.closing import CloseReport
-from course.runtime.context import Discovery, open_context
-from course.runtime.half_made import Remains
-from course.runtime.jobs import current_job
-from course.runtime.log_store import store
-from course.runtime.simtime import SimulatedTime
+from course.runtime.callbacks.jobs import current_job
+from course.runtime.context import closing, signals
+from course.runtime.context.closing import CloseReport
+from course.runtime.context.context import Discovery, open_context
+from course.runtime.logs.store import store
+from course.runtime.nodes.half_made import Remains
+from course.runtime.requests.requests import Asking
+from course.runtime.simulated_time import SimulatedTime
 from course.runtime.waiting import Pulse
 
 

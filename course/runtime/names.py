@@ -5,7 +5,7 @@ from __future__ import annotations
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
-from course.runtime.log_store import node_of
+from course.runtime.logs.store import node_of
 
 
 def node_name(node: Node | None) -> str:

@@ -7,8 +7,8 @@ import time
 from typing import Any
 
 from course.runtime.core_session import CoreSession
-from course.runtime.log_store import SEVERITIES, LogRow
-from course.runtime.logs import LogTable
+from course.runtime.logs.store import SEVERITIES, LogRow
+from course.runtime.logs.table import LogTable
 from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch.rosout import Rosout

@@ -17,8 +17,8 @@ from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
 from course import values
 from course.errors import CourseError
-from course.runtime.actions import GoalState
 from course.runtime.core_session import CoreSession
+from course.runtime.requests.actions import GoalState
 from course.watch import forms, progress
 
 KEPT = 40

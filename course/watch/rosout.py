@@ -9,7 +9,7 @@ from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from course.runtime.core_session import CoreSession
-from course.runtime.log_store import LogRow, level_name, node_of, store
+from course.runtime.logs.store import LogRow, level_name, node_of, store
 
 KEPT = 1000
 """Lines of other programs that are kept."""

@@ -15,7 +15,7 @@ from rclpy.qos import DurabilityPolicy
 
 from course.graph import reader
 from course.runtime.core_session import CoreSession
-from course.runtime.offers import fitting_qos, full_topic, type_on
+from course.runtime.requests.graph_queries import fitting_qos, full_topic, type_on
 
 KEPT = 20_000
 """Messages of one topic that a trace remembers: 20 s at 1 kHz. More take long to draw."""

@@ -32,7 +32,7 @@ from autograder.harness import Harness
 from autograder.raised import MUST_NOT_SPIN
 from autograder.wire import Channel, ChannelClosed, ChannelTimeout
 from course import Session
-from course.runtime.context import default_context_beside
+from course.runtime.context.context import default_context_beside
 
 
 class Named(Node):

@@ -153,12 +153,12 @@ class SensorDrivers(Node):
 def test_what_a_process_says_of_where_it_hangs_puts_no_blame_on_the_grader() -> None:
     source = """
 import queue
-import course.runtime.residents
+from course.runtime.nodes import registry
 from rclpy.node import Node
 class SensorDrivers(Node):
     def __init__(self):
         super().__init__('drivers')
-course.runtime.residents.destroy_node = queue.SimpleQueue().get  # waits, and is no line of theirs
+registry.destroy_node = queue.SimpleQueue().get  # waits, and is no line of theirs
 """
     hidden = Cell("", "qos-hidden", "qos", "hidden")
     outcome = runner.run((*program(source), Cell("x = 1"), hidden), cell_timeout=5)

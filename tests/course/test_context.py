@@ -7,7 +7,7 @@ import os
 from rclpy.node import Node
 
 import course
-from course.runtime.context import _environment, ensure_log_dir
+from course.runtime.context.context import _environment, ensure_log_dir
 
 RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 

@@ -12,7 +12,7 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from course import Session
-from course.runtime.context import as_default_context
+from course.runtime.context.context import as_default_context
 
 
 class Driver(Node):

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from course.runtime.idleness import LOOKS, Idleness
+from course.runtime.callbacks.idleness import LOOKS, Idleness
 
 DEADLINE = 30.0  # s
 

@@ -13,7 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 import course
-from course.runtime.interruptible import SessionContext
+from course.runtime.context.interruptible import SessionContext
 
 SCRIPT = """
 import course, rclpy, signal, sys

@@ -18,9 +18,9 @@ from std_msgs.msg import String
 
 import course
 from course.errors import SessionError
-from course.runtime.log_callers import spare_the_next_search
-from course.runtime.log_store import LogStore
-from course.runtime.logs import LogRow, LogTable
+from course.runtime.logs.store import LogStore
+from course.runtime.logs.table import LogRow, LogTable
+from course.runtime.rclpy_fixes.logger_callers import spare_the_next_search
 
 
 class Chatty(Node):

@@ -232,9 +232,9 @@ def test_without_simulated_time_there_is_no_sim(session):
 
 
 def test_a_node_that_cannot_follow_is_named(monkeypatch):
-    from course.runtime import simtime
+    from course.runtime import simulated_time
 
-    monkeypatch.setattr(simtime, "_STEP_TIMEOUT", 0.3)
+    monkeypatch.setattr(simulated_time, "_STEP_TIMEOUT", 0.3)
     release = threading.Event()
     with course.Session(sim_time=True) as lab:
         stuck = lab.run(Node, "stuck")

@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-import course.runtime.gate
+import course.runtime.executor.gate
 import course.runtime.waiting
-from course.runtime.gate import Gate
+from course.runtime.executor.gate import Gate
 from course.runtime.waiting import Pulse
 
-FILES = {course.runtime.gate.__file__, course.runtime.waiting.__file__, threading.__file__}
+FILES = {course.runtime.executor.gate.__file__, course.runtime.waiting.__file__, threading.__file__}
 PATIENCE = 30.0
 INTERRUPTIBLE = ("RESUME", "CALL", "JUMP_BACKWARD", "POP_JUMP_BACKWARD")
 

@@ -9,8 +9,8 @@ from autograder.observe.phrases import ended
 from course.design import dye
 from course.design.lifelike import AHEAD, lifelike
 from course.errors import WaitTimeout
-from course.runtime.actions import GoalRun, GoalState
 from course.runtime.core_session import CoreSession
+from course.runtime.requests.actions import GoalRun, GoalState
 
 SETTLE = 8.0
 """Seconds that something expected may take: discovery takes 0.3 s, on a busy machine a few."""

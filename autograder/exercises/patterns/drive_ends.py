@@ -12,7 +12,7 @@ from autograder.exercises.patterns.rig import SETTLE, STEP
 from autograder.exercises.patterns.stations import require_report
 from autograder.observe.phrases import ended
 from course.errors import WaitTimeout
-from course.runtime.actions import GoalState
+from course.runtime.requests.actions import GoalState
 
 LOOKING, STOPPING, UNDER_WAY = 0.6, 4.0, 2.0
 """Seconds of wall time for those who look by the wall's clock whether they are called off, for a

@@ -15,7 +15,7 @@ from autograder.exercises.patterns.scenarios import NAMES
 from autograder.observe.marked_types import load_type
 from autograder.observe.phrases import ended
 from course.errors import WaitTimeout
-from course.runtime.actions import GoalRun
+from course.runtime.requests.actions import GoalRun
 
 NAME = NAMES["navigation"]
 ACTIONS = "example_interfaces/action/Fibonacci or test_msgs/action/Fibonacci"

@@ -31,7 +31,7 @@ from autograder.exercises.patterns.driving import ACTIONS, SPEED_MARGIN, Drive
 from autograder.exercises.patterns.rig import LEVEL_MARGIN, NODE, RobotRig, robot_rig
 from autograder.exercises.patterns.scenarios import NAMES, SCENARIOS, Scenario
 from autograder.observe.phrases import with_reason
-from course.runtime.actions import GoalState
+from course.runtime.requests.actions import GoalState
 
 EXAM: Exam[RobotRig] = Exam("patterns", robot_rig, fresh_parts=True)
 

@@ -16,7 +16,7 @@ NODE = "the node "
 GUID_PROCESS = 8
 """Of these, the bytes that all participants of one process share, as Fast DDS makes them."""
 SESSIONS_OWN = re.compile(r"/_course_\d+_[0-9a-f]+")
-"""The one hidden node that a session of the course has (`course.runtime.probe`)."""
+"""The one hidden node that a session of the course has (`course.runtime.requests.hidden_node`)."""
 TYPES = {
     PUBLISHER: "sensor_msgs/msg/Image",
     SUBSCRIPTION: "std_msgs/msg/Int32",

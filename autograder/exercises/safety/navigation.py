@@ -19,7 +19,7 @@ from test_msgs.action import Fibonacci as Drive
 from autograder.exercises.safety.counterpart import Player
 from autograder.exercises.safety.deferred_replies import Held
 from autograder.observe.quiet_node import QuietNode
-from course.runtime.executor import BackgroundExecutor
+from course.runtime.executor.background import BackgroundExecutor
 
 
 class _PlainServer(ActionServer):

@@ -14,7 +14,7 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from course import Session
-from course.runtime.transitions import failed
+from course.runtime.callbacks.transitions import failed
 
 SUCCESS = TransitionCallbackReturn.SUCCESS
 

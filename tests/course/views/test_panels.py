@@ -21,7 +21,7 @@ from test_msgs.srv import Arrays
 
 from course import Session
 from course.errors import CourseError, SessionError, WaitTimeout
-from course.runtime.actions import GoalState
+from course.runtime.requests.actions import GoalState
 from course.values import MisfitError
 from course.views.live import MAX_FRAME, LiveView
 from course.watch import forms, goals

@@ -1,0 +1,1 @@
+"""The rclpy context of a session, from its start to its end."""

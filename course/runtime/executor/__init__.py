@@ -1,0 +1,1 @@
+"""Executors that spin in the background: waiting, running callbacks, standing still."""

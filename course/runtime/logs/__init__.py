@@ -1,0 +1,1 @@
+"""What a session logs, and the table of it that learners read."""

@@ -1,0 +1,351 @@
+"""The nodes of one session: making, replacing, stopping, pausing and finding them."""
+
+from __future__ import annotations
+
+import functools
+import threading
+import weakref
+from collections.abc import Callable, Container, Hashable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from rclpy.context import Context
+from rclpy.executors import Executor
+from rclpy.node import Node
+
+from course import arguments
+from course.errors import SessionError
+from course.runtime.callbacks.jobs import Job, current_job
+from course.runtime.context.context import as_default_context
+from course.runtime.executor.background import BackgroundExecutor
+from course.runtime.executor.blocked import describe
+from course.runtime.executor.pool import Crew
+from course.runtime.names import is_name, node_name
+from course.runtime.nodes import name_conflicts
+from course.runtime.nodes.half_made import HalfMade, Remains
+from course.runtime.output.rcutils_tap import hearing_constructors
+from course.runtime.teardown import destroy_node, is_alive, is_being_destroyed
+from course.runtime.waiting import Pulse, poll
+
+_CALLBACK_GRACE = 2.0  # s that stop() and pause() give a callback that is running
+
+Factory = Callable[..., Node]
+
+
+@dataclass
+class Resident:
+    """A node that a session runs; ``held`` are those that it brought along, while it is paused."""
+
+    node: Node
+    name: str
+    key: Hashable
+    factory: object
+    executor: BackgroundExecutor
+    paused: bool = False
+    held: list[Node] = field(default_factory=list)
+
+
+class Residents:
+    """Keeps the nodes of one session."""
+
+    def __init__(
+        self, context: Context, crew: Crew, pulse: Pulse, tell: Callable[[str], None]
+    ) -> None:
+        """Keep nodes of `context`, spun by `crew`; `tell` passes a sentence on to the learner."""
+        self.stopped: weakref.WeakSet[Node] = weakref.WeakSet()
+        self.on_made: list[Callable[[Node], None]] = []
+        self.half_made = HalfMade(tell)
+        self._context = context
+        self._crew = crew
+        self._pulse = pulse
+        self._tell = tell
+        self._residents: dict[Node, Resident] = {}
+        self._made_by: dict[str, object] = {}  # every name that ever ran
+        self._lock = threading.RLock()
+
+    def all(self) -> list[Resident]:
+        """Return the nodes that are kept now; those that somebody destroyed are let go of."""
+        with self._lock:
+            residents = list(self._residents.values())
+        for resident in residents:
+            if not is_alive(resident.node):
+                try:
+                    self.stop(resident.node)  # its action servers are still there
+                except Exception as error:  # noqa: BLE001 - its cleanup does not take a second call
+                    self._tell(
+                        f"{resident.name} had been destroyed already; destroying it once more, "
+                        f"which must be safe, raised {type(error).__name__}: {error}"
+                    )
+        return [resident for resident in residents if resident.node not in self.stopped]
+
+    def run(
+        self,
+        factory: Factory | Node,
+        args: tuple[Any, ...],
+        kwargs: dict[str, Any],
+        threads: int,
+        *,
+        replace: bool = True,
+    ) -> Node:
+        """Make a node and spin it; see `Session.run` and, for ``replace=False``, `run_beside`."""
+        arguments.factory(factory, args, kwargs)
+        key = _key(factory, args, kwargs) if replace else None
+        for resident in self.all():
+            if key is not None and resident.key == key:
+                self.stop(resident.node)
+        if key is not None:
+            self.half_made.clear(lambda remains: remains.key == key)
+        node = factory if isinstance(factory, Node) else self._make(factory, args, kwargs, key)
+        if node.context is not self._context:
+            instead = "pass its class to run()"
+            if node is not factory:
+                instead = "name its class, as factory=TheClass"
+            raise SessionError(
+                f"{node_name(node)} was made in another rclpy context: {instead}, and let the "
+                "session make the node."
+            )
+        name = node_name(node)
+        for resident in self.all():
+            if replace and resident.name == name and resident.node is not node:
+                self.stop(resident.node)
+        if replace:
+            self.half_made.clear(lambda remains: remains.name == name)
+        for callback in self.on_made:
+            callback(node)
+        executor = self._crew.executor(threads)
+        with self._lock:
+            self._residents[node] = Resident(node, name, key, factory, executor)
+            self._made_by[name] = factory
+            executor.add_node(node)  # under the lock: a node without executor looks stolen
+        return node
+
+    def is_leaving(self, node: Node | None) -> bool:
+        """Return whether `node` is being destroyed, by the session or by hand, or has been."""
+        return node is not None and (node in self.stopped or is_being_destroyed(node))
+
+    def stop(self, node: Node) -> None:
+        """Stop spinning `node`, let its running callback end, and destroy it. Idempotent."""
+        if self.let_go(node) and destroy_node(node):
+            self._tell(
+                f"The destroy_node() of {node_name(node)} left it on the graph, and the session "
+                "has taken it off; in a program it stays: let the method end with "
+                "super().destroy_node()."
+            )
+
+    def let_go(self, node: Node) -> bool:
+        """Stop spinning `node`, let its running callback end, and forget it; True if it ran."""
+        with self._lock:
+            resident = self._residents.pop(node, None)
+        if resident is None:
+            return False
+        self.stopped.add(node)
+        for job in self._take_out(resident.executor, resident.node):
+            blocked = describe(job)  # before its thread is another's business
+            if resident.executor.give_up(job):
+                self._tell(
+                    f"{resident.name} was stopped, but its callback {blocked.what} goes on: it has "
+                    f"been running for {blocked.seconds:.0f} s. {blocked.reason} The session goes "
+                    "on without it; only a restart of the kernel or program ends it for good."
+                )
+        return True
+
+    def pause(self, resident: Resident) -> None:
+        """Stop executing callbacks; DDS goes on receiving into the node's queues.
+
+        So with the nodes that it has brought to its executor: they are part of it.
+        """
+        resident.paused = True
+        jobs = self._take_out(resident.executor, resident.node)
+        # In rounds: a callback that was just running may have brought another one.
+        while brought := self._brought_along(resident):
+            resident.held += brought
+            jobs += [job for node in brought for job in self._take_out(resident.executor, node)]
+        for job in jobs:
+            self._tell(
+                f"{resident.name} is paused, but a callback that had begun has not ended: "
+                f"{describe(job)}"
+            )
+
+    def resume(self, resident: Resident) -> None:
+        """Execute callbacks again, beginning with what the queues hold."""
+        resident.executor.add_node(resident.node)  # first: it must not look stolen
+        held, resident.held = resident.held, []
+        for node in filter(is_alive, held):
+            resident.executor.add_node(node)
+        resident.paused = False
+
+    def stop_half_made(self, what: tuple[Any, ...]) -> None:
+        """Take half-made nodes off the graph that `what` stands for; without any, all."""
+        self.half_made.clear(
+            lambda remains: not what or any(_matches(remains, item) for item in what),
+            replaced=False,
+        )
+
+    def forget_all(self) -> list[str]:
+        """Destroy every node; no executor may be spinning. Return which cleanups raised what."""
+        problems = []
+        self.stop_half_made(())
+        residents = self.all()
+        nodes = {*(resident.node for resident in residents), *self._crew.nodes()}
+        nodes.update(node for resident in residents for node in resident.held)
+        with self._lock:
+            self._residents.clear()
+        for node in nodes:
+            self.stopped.add(node)
+            name = node_name(node)
+            try:
+                destroy_node(node)
+            except Exception as error:  # noqa: BLE001 - a mistake in one node's cleanup, not ours
+                problems.append(f"the cleanup of {name} raised {type(error).__name__}: {error}")
+        return problems
+
+    def find(self, what: tuple[Any, ...]) -> list[Resident]:
+        """Return what nodes, names or factories stand for; without any, everything.
+
+        Raises:
+            SessionError: a name that was never run.
+        """
+        residents = self.all()
+        if not what:
+            return residents
+        found = []
+        for item in what:
+            arguments.node_or_name(item)
+            matches = [resident for resident in residents if _matches(resident, item)]
+            if not matches and isinstance(item, str):
+                self._require_seen(item, residents)
+            found += matches
+        return found
+
+    def names(self, what: Any) -> list[str]:
+        """Return the names of nodes that run or ran and that `what` stands for.
+
+        Raises:
+            SessionError: a name that was never run.
+        """
+        arguments.node_or_name(what)
+        if isinstance(what, Node):
+            return [node_name(what)]
+        if isinstance(what, str):
+            with self._lock:
+                names = [known for known in self._made_by if is_name(known, what)]
+            return names or [resident.name for resident in self.find((what,))]
+        return [name for name, factory in self._made_by.items() if _same(factory, what)]
+
+    def stolen(self) -> list[Resident]:
+        """Return nodes that some other executor took over and then let go of.
+
+        `rclpy.spin_once(node)` does that: the node leaves its executor and does not come back. A
+        node that another executor still holds was moved there on purpose; so was one whose own
+        executor has been shut down.
+        """
+        return [resident for resident in self._elsewhere() if not _holder(resident)]
+
+    def moved(self) -> list[str]:
+        """Return the names of nodes that an executor holds which is not the session's."""
+        return [resident.name for resident in self._elsewhere() if _holder(resident)]
+
+    def take_back_stolen(self) -> list[str]:
+        """Spin nodes again that were `stolen`; return their names."""
+        stolen = self.stolen()
+        for resident in stolen:
+            resident.executor.add_node(resident.node)
+        return [resident.name for resident in stolen]
+
+    # Inside.
+
+    def _make(
+        self, factory: Factory, args: tuple[Any, ...], kwargs: dict[str, Any], key: Hashable
+    ) -> Node:
+        # Weakly: what the constructor raises is kept, and with it what this frame refers to.
+        before = weakref.WeakSet(threading.enumerate())
+        try:
+            with as_default_context(self._context), hearing_constructors():
+                node = factory(*args, **kwargs)
+        except BaseException as error:
+            with suppress(Exception):  # rclpy's own error, of a name that cannot be, say, is enough
+                name_conflicts.explain(error)
+            with suppress(Exception):
+                for name in self.half_made.note(error, factory, key, self._is_news(before)):
+                    self._made_by[name] = factory
+            raise
+        if not isinstance(node, Node):
+            name = getattr(factory, "__qualname__", repr(factory))
+            raise SessionError(
+                "run() needs a Node class, or a function that returns a node; "
+                f"{name} returned {type(node).__name__}."
+            )
+        return node
+
+    def _is_news(self, before: Container[threading.Thread]) -> Callable[[threading.Thread], bool]:
+        """Return what tells a learner's thread that was not there before."""
+        return lambda thread: thread not in before and not self._crew.owns(thread)
+
+    def _elsewhere(self) -> list[Resident]:
+        """Return the nodes that should be spinning and are not in the executor they belong to."""
+        return [
+            resident
+            for resident in self.all()
+            if not (resident.paused or resident.executor.ended)
+            and _holder(resident) is not resident.executor
+        ]
+
+    def _brought_along(self, resident: Resident) -> list[Node]:
+        """Return the nodes that a node brought to its executor, and that no session was given."""
+        with self._lock:
+            return [
+                node
+                for node in resident.executor.brought_by(resident.node)
+                if node not in self._residents
+            ]
+
+    def _take_out(self, executor: BackgroundExecutor, node: Node) -> list[Job]:
+        """Stop spinning a node; return its callbacks that have not ended after some time."""
+        with executor.held():
+            executor.remove_node(node)
+        if (job := current_job()) is None or job.node is not node:
+            poll(lambda: not executor.running_of(node), _CALLBACK_GRACE, self._pulse)
+        return [job for job in executor.running_of(node) if job.thread_id]
+
+    def _require_seen(self, name: str, residents: list[Resident]) -> None:
+        with self._lock:
+            seen = any(is_name(known, name) for known in self._made_by)
+        if not seen:
+            running = ", ".join(sorted(resident.name for resident in residents)) or "none"
+            raise SessionError(f"No node {name!r} ran in this session; running now: {running}.")
+
+
+def _holder(resident: Resident) -> Executor | None:
+    """Return the executor that has the node, whose wish it is or not."""
+    executor = resident.node.executor
+    return executor if executor is not None and resident.node in executor.get_nodes() else None
+
+
+def _matches(resident: Resident | Remains, what: Any) -> bool:
+    if isinstance(what, str):
+        return is_name(resident.name, what)
+    if isinstance(what, Node):
+        return resident.node is what
+    return _same(resident.factory, what)
+
+
+def _same(factory: object, other: object) -> bool:
+    # A class defined again in a cell is another object of the same name.
+    path = _path(other)
+    return factory is other or (path is not None and path == _path(factory))
+
+
+def _path(factory: object) -> tuple[str, str] | None:
+    factory = getattr(factory, "func", factory)
+    module, name = getattr(factory, "__module__", None), getattr(factory, "__qualname__", None)
+    # Every lambda has the same name: it says nothing about the node that it makes.
+    return (module, name) if module and name and "<lambda>" not in name else None
+
+
+def _key(factory: object, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Hashable:
+    if isinstance(factory, functools.partial):
+        args, kwargs = (*factory.args, *args), {**factory.keywords, **kwargs}
+    if isinstance(factory, Node) or (path := _path(factory)) is None:
+        return None
+    return (path, repr(args), repr(sorted(kwargs.items())))

@@ -1,0 +1,1 @@
+"""What libraries of ROS and callbacks print, taken to whom it concerns."""

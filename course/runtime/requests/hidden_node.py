@@ -1,0 +1,213 @@
+"""A hidden node that listens and asks on behalf of a session, in a thread of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from typing import Any
+
+from rclpy.client import Client
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+from rclpy.task import Future
+
+from course.errors import WaitTimeout
+from course.runtime.executor.pool import Crew
+from course.runtime.requests.graph_queries import (
+    fitting_qos,
+    full_service,
+    full_topic,
+    require_type,
+    why_no_message,
+    why_no_service,
+)
+from course.runtime.waiting import Deadline, Pulse, poll
+
+_LISTEN_DEPTH = 1000
+_LONGEST = 1e9  # s: a Duration counts nanoseconds in 64 bits
+
+
+class _HiddenNode(Node):
+    """Has nothing for its executor to wait on until it listens or asks.
+
+    A step of simulated time looks at every executor, time and again. And what rclpy would log of
+    QoS events of a node that nobody knows helps nobody: whoever listens in vain hears why.
+    """
+
+    def create_publisher(self, *args: Any, **options: Any) -> Publisher:
+        """Do what every node does, without handlers of QoS events."""
+        options.setdefault("event_callbacks", PublisherEventCallbacks(use_default_callbacks=False))
+        return super().create_publisher(*args, **options)
+
+
+class Probe:
+    """Subscribes, calls services and sends goals without disturbing the session's own nodes.
+
+    It has its own single-threaded executor: a callback that blocks cannot keep it from listening.
+    The leading underscore of its name makes the ROS tools hide it. What waits on its own, as a
+    recorder does, waits in a block of `explaining`, so that the session can say why it was in vain.
+    """
+
+    def __init__(self, context: Context, crew: Crew, pulse: Pulse) -> None:
+        """Make the hidden node in `context`."""
+        self.pulse = pulse
+        self.explaining: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext
+        self.node = _HiddenNode(
+            f"_course_{os.getpid()}_{id(self):x}",
+            context=context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+            parameter_overrides=[Parameter("start_type_description_service", value=False)],
+        )
+        self.executor = crew.executor(1, "probe")
+        self.executor.add_node(self.node)
+
+    def subscribe(
+        self,
+        msg_type: Any,
+        topic: str,
+        callback: Callable[..., None],
+        qos: QoSProfile | int,
+        *,
+        raw: bool = False,
+    ) -> Subscription:
+        """Subscribe, ``raw`` to messages as CDR; the caller drops it with `drop`.
+
+        Raises:
+            WaitTimeout: the topic has another type.
+        """
+        require_type(topic, msg_type, self.node.get_topic_names_and_types())
+        return self.node.create_subscription(msg_type, topic, callback, qos, raw=raw)
+
+    def drop(self, entity: Subscription | Client) -> None:
+        """Destroy a subscription or client of the hidden node. Idempotent."""
+        with self.executor.held():
+            if isinstance(entity, Subscription):
+                self.node.destroy_subscription(entity)
+            else:
+                self.node.destroy_client(entity)
+
+    def next_message(
+        self, msg_type: Any, topic: str, qos: QoSProfile | None, timeout: float
+    ) -> Any:
+        """Return the next message; see `Session.next_message`."""
+        topic = full_topic(self.node, topic)
+        inbox: list[Any] = []
+        deadline = Deadline(timeout)
+        profile = qos or fitting_qos(self.node, topic, _LISTEN_DEPTH)
+        with self._listening(msg_type, topic, inbox, profile):
+            # Listen at once, whatever is offered: the publisher may appear and publish meanwhile.
+            poll(lambda: inbox or self.node.count_publishers(topic), deadline.left, self.pulse)
+            better = profile if qos is not None else fitting_qos(self.node, topic, _LISTEN_DEPTH)
+            with contextlib.ExitStack() as stack:
+                if not inbox and better != profile:
+                    stack.enter_context(self._listening(msg_type, topic, inbox, better))
+                if poll(lambda: inbox, deadline.left, self.pulse):
+                    return inbox[0]
+        reason = why_no_message(self.node, topic, msg_type, better)
+        raise WaitTimeout(f"No message on {topic} in {timeout:g} s. {reason}", topic)
+
+    def publish(self, topic: str, message: Any, qos: QoSProfile, timeout: float) -> None:
+        """Publish one message as soon as a subscription matches; see `Session.publish`."""
+        with self.publisher(type(message), topic, qos, timeout) as publisher:
+            if not poll(publisher.get_subscription_count, timeout, self.pulse):
+                raise WaitTimeout(
+                    f"Nobody with a QoS that fits subscribes to {publisher.topic_name}, so nothing "
+                    f"was published in {timeout:g} s."
+                )
+            publisher.publish(message)
+
+    @contextlib.contextmanager
+    def publisher(
+        self, msg_type: Any, topic: str, qos: QoSProfile, timeout: float
+    ) -> Iterator[Publisher]:
+        """Give a publisher for a block; see `Session.publisher`."""
+        topic = full_topic(self.node, topic)
+        require_type(topic, msg_type, self.node.get_topic_names_and_types())
+        publisher = self.node.create_publisher(msg_type, topic, qos)
+        try:
+            yield publisher
+            publisher.wait_for_all_acked(Duration(seconds=min(timeout, _LONGEST)))
+        finally:
+            with self.executor.held():
+                self.node.destroy_publisher(publisher)
+
+    @contextlib.contextmanager
+    def client(self, srv_type: Any, name: str, deadline: Deadline) -> Iterator[Client]:
+        """Give a client whose server is there.
+
+        Raises:
+            WaitTimeout: no server by the deadline.
+        """
+        name = full_service(self.node, name)
+        require_type(name, srv_type, self.node.get_service_names_and_types())
+        client = self.node.create_client(srv_type, name)
+        try:
+            if not poll(client.service_is_ready, deadline.left, self.pulse):
+                reason = why_no_service(self.node, name, srv_type)
+                raise WaitTimeout(
+                    f"The service {name} was not ready in {deadline.total:g} s. {reason}", name
+                )
+            yield client
+        finally:
+            self.drop(client)
+
+    def call(self, srv_type: Any, name: str, request: Any, timeout: float) -> Any:
+        """Return a service's response; see `Session.call`."""
+        deadline = Deadline(timeout)
+        with self.client(srv_type, name, deadline) as client:
+            future = client.call_async(request)
+            return self.outcome(
+                future, deadline, f"The service {client.service_name} did not answer"
+            )
+
+    def answers(self, srv_type: Any, names: Sequence[str], timeout: float) -> dict[str, Any]:
+        """Return the responses that come in time; see `Session.answers`."""
+        clients = {name: self.node.create_client(srv_type, name) for name in names}
+        futures: dict[str, Future] = {}
+
+        def all_answered() -> bool:
+            for name, client in clients.items():
+                if name not in futures and client.service_is_ready():
+                    futures[name] = client.call_async(srv_type.Request())
+            done = [name for name, future in futures.items() if future.done()]
+            return len(done) == len(clients)
+
+        try:
+            poll(all_answered, timeout, self.pulse)
+            return {name: future.result() for name, future in futures.items() if future.done()}
+        finally:
+            for client in clients.values():
+                self.drop(client)
+
+    def outcome(self, future: Future, deadline: Deadline, complaint: str) -> Any:
+        """Return the result of `future`.
+
+        Raises:
+            WaitTimeout: none by the deadline; its message begins with `complaint`.
+        """
+        if not poll(future.done, deadline.left, self.pulse):
+            if not self.node.context.ok():
+                raise ExternalShutdownException
+            raise WaitTimeout(f"{complaint} in {deadline.total:g} s.")
+        return future.result()
+
+    @contextlib.contextmanager
+    def _listening(
+        self, msg_type: Any, topic: str, inbox: list[Any], qos: QoSProfile
+    ) -> Iterator[None]:
+        subscription = self.subscribe(msg_type, topic, inbox.append, qos)
+        try:
+            yield
+        finally:
+            self.drop(subscription)
