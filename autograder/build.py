@@ -61,9 +61,9 @@ def build(
     """
     if points is None:
         from autograder import points as exams
-        from autograder import quiz_marks
+        from autograder import quiz_cells
 
-        points = exams.of_grade_cells() | quiz_marks.of_grade_cells(root)
+        points = exams.of_grade_cells() | quiz_cells.of_grade_cells(root)
     built = dict(_built(root, points, with_solutions))
     if not built:
         raise BuildError(f"There is nothing to build: no {root / 'authoring'}/*/*.py.")

@@ -13,9 +13,9 @@ import nbformat
 from nbformat import NotebookNode
 
 from autograder import (
+    folder_digest,
     intake_cells,
     intake_claims,
-    ledger,
     questions,
     quiz_marks,
     roster,
@@ -120,7 +120,7 @@ class Desk:
 
     def work(self, student: str, course: str) -> Work:
         """Return a student's submission; ``course`` is a digest of what all depend on."""
-        made_of = ledger.of_folder(self._submitted(student))
+        made_of = folder_digest.of_folder(self._submitted(student))
         if claims := intake_claims.of_student(self.root, self.assignment, student):
             made_of = hashlib.sha256(f"{made_of} {sorted(claims.items())}".encode()).hexdigest()
         return Work(student, f"{course} {made_of}")

@@ -15,7 +15,7 @@ from typing import Any
 
 from filelock import FileLock
 
-from autograder import ledger
+from autograder import folder_digest
 from autograder.files import write_whole
 from autograder.intake_files import HandedIn
 from autograder.intake_names import entry, normal
@@ -52,10 +52,12 @@ def state(folder: Path, handed_in: HandedIn, proper: str, file: str) -> str:
     nothing (an empty ``file``) it is all that was handed in.
     """
     if not file:
-        return ledger.of_folder(folder)
+        return folder_digest.of_folder(folder)
     item = handed_in.at(file)
     content = item.digest(MAX_NOTEBOOK + 1) if item else ""
-    there = ledger.of_folder(entry(folder, proper)) if entry(folder, proper).is_file() else ""
+    there = (
+        folder_digest.of_folder(entry(folder, proper)) if entry(folder, proper).is_file() else ""
+    )
     return hashlib.sha256(f"{content} {there}".encode()).hexdigest()
 
 

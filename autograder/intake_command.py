@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from autograder import intake_claims, quiz_marks, roster, submission
+from autograder import intake_claims, quiz_cells, roster, submission
 from autograder import nbgrader_bridge as bridge
 from autograder.intake_claims import Claim, ClaimError
 from autograder.intake_files import HandedIn, Item, look_through
@@ -71,8 +71,8 @@ def _names(root: Path, assignment: str) -> dict[str, str]:
         )
     found = {path.stem: path.name for path in notebooks}
     for path in notebooks:
-        for quiz in quiz_marks.in_cells(bridge.read_source(path)):
-            found[f"{quiz_marks.PREFIX}{quiz}"] = record.filename(quiz)
+        for quiz in quiz_cells.in_cells(bridge.read_source(path)):
+            found[f"{quiz_cells.PREFIX}{quiz}"] = record.filename(quiz)
     return found
 
 
@@ -93,7 +93,7 @@ def _require(item: Item, name: str) -> None:
         content = item.read(MAX_NOTEBOOK + 1)
     except (OSError, ArchiveError) as error:
         raise ClaimError(f"{listed([item.place])} cannot be read ({error}).") from None
-    if name.startswith(quiz_marks.PREFIX):
+    if name.startswith(quiz_cells.PREFIX):
         if not record.parse(content)[0]:
             raise ClaimError(f"{listed([item.place])} holds no attempt at a quiz.")
     else:

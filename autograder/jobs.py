@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from autograder import descriptors, digests, outputs, runner, sandbox
+from autograder.program import Cell, Program, digest
 from autograder.runner import Outcome
-from autograder.submission import Cell, Program, digest
 from course.errors import CourseError
 
 MAX_OUTCOME = 16 * 1024 * 1024

@@ -8,22 +8,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import stat
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from autograder import digests
 from autograder.anew import is_since
-from autograder.beside import MAX_BYTES
-from autograder.files import walk, write_whole
-from autograder.submission import MAX_NOTEBOOK
+from autograder.files import write_whole
+from autograder.folder_digest import of_folder
 
 VERSION = 2
 FOLDER = "entered"
-MAX_FILE = MAX_NOTEBOOK + MAX_BYTES
-"""Bytes of one file beyond which only its size and date are looked at: it is not read anyway."""
 
 
 @dataclass(frozen=True)
@@ -113,24 +108,3 @@ def of_course(
     for path in (*sorted(root.glob("*.py")), root / "authoring" / "banks", *folders):
         state.update(of_folder(path).encode())
     return state.hexdigest()
-
-
-def of_folder(folder: Path) -> str:
-    """Return a digest of a file or of a folder's files: names, kinds and contents."""
-    state = hashlib.sha256()
-    paths = [folder] if folder.is_file() else sorted(walk(folder))
-    for path in paths:
-        name = os.fsencode(path.relative_to(folder) if path != folder else path.name)
-        state.update(name + b"\0" + _content(path) + b"\0")
-    return state.hexdigest()
-
-
-def _content(path: Path) -> bytes:
-    try:
-        status = path.lstat()
-        if not stat.S_ISREG(status.st_mode) or status.st_size > MAX_FILE:
-            return f"{status.st_mode} {status.st_size} {status.st_mtime_ns}".encode()
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").digest()
-    except OSError as error:
-        return str(error.errno).encode()

@@ -17,7 +17,7 @@ from nbformat import NotebookNode
 from nbgrader.coursedir import CourseDirectory
 
 from autograder import cells, points, submission
-from autograder.quiz_marks import PREFIX
+from autograder.quiz_cells import PREFIX
 from autograder.submission import SubmissionError
 from quizzes import rendering
 

@@ -121,7 +121,7 @@ def schema(
 
 def _banks(root: Path | None) -> Path | None:
     """Return the folder of the course's own banks; None if there is no course here."""
-    from autograder.quiz_marks import BANKS
+    from autograder.quiz_cells import BANKS
     from course.content import ContentError, working_root
 
     try:

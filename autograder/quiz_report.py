@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.table import Table
 
-from autograder import intake_attempts, quiz_marks
+from autograder import intake_attempts, quiz_cells
 from autograder import nbgrader_bridge as bridge
 from autograder.intake_names import normal
 from autograder.quiz_cli import QuizCommandError, as_course_errors
@@ -78,11 +78,11 @@ def assignment_of(root: Path, name: str) -> str:
         NotReadyError: the source of one is damaged.
     """
     source = root / "source"
-    if (source / name).is_dir() or name not in quiz_marks.names(root):
+    if (source / name).is_dir() or name not in quiz_cells.names(root):
         return name
     having = sorted({
         path.parent.name for path in source.glob("*/*.ipynb")
-        if name in quiz_marks.in_cells(bridge.read_source(path))
+        if name in quiz_cells.in_cells(bridge.read_source(path))
     })  # fmt: skip
     if len(having) > 1:
         raise QuizCommandError(
@@ -101,10 +101,10 @@ def of_assignment(root: Path, assignment: str) -> list[QuizReport]:
         QuizCommandError: the reports cannot be written.
     """
     reports = []
-    for name in quiz_marks.names(root):
+    for name in quiz_cells.names(root):
         taken = _taken(root, assignment, name)
         if taken.unread or any(content is not None for content in taken.contents.values()):
-            bank = quiz_marks.find_bank(root, name)
+            bank = quiz_cells.find_bank(root, name)
             reports.append(_report(bank, taken, root / "reports" / assignment))
     return reports
 

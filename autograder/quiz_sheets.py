@@ -7,7 +7,7 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
-from autograder import quiz_marks
+from autograder import quiz_cells
 from course.errors import CourseError
 from quizzes import closing, loader
 
@@ -27,20 +27,20 @@ def of_notebooks(root: Path, notebooks: Iterable[NotebookNode]) -> dict[Path, by
         QuizMarksError: a bank is not sound.
         QuizSheetError: students could not open the quiz, or a picture cannot be read.
     """
-    own, known = loader.names(root / quiz_marks.BANKS), quiz_marks.names(root)
+    own, known = loader.names(root / quiz_cells.BANKS), quiz_cells.names(root)
     found: dict[Path, bytes] = {}
     for notebook in notebooks:
-        for name in quiz_marks.in_cells(notebook):
+        for name in quiz_cells.in_cells(notebook):
             if name not in known:
                 continue
-            bank = quiz_marks.find_bank(root, name)
+            bank = quiz_cells.find_bank(root, name)
             if bank.closed:
                 found[Path(closing.filename(name))] = closing.sheet(bank).encode()
                 found |= {Path(source): _picture(bank.folder / source)
                           for source in closing.pictures(bank)}  # fmt: skip
             elif name in own:
                 raise QuizSheetError(
-                    f"{root / quiz_marks.BANKS / name}.yaml does not reach students with its keys: "
+                    f"{root / quiz_cells.BANKS / name}.yaml does not reach students with its keys: "
                     "write 'closed: true' into it, and they get its questions without them."
                 )
     return found

@@ -16,9 +16,9 @@ from typing import Any
 from autograder import outputs, own_interfaces, sandbox, stuck
 from autograder.draws import fresh_seed
 from autograder.processes import ExaminerError, ExaminerFloodedError, ExaminerProcess
+from autograder.program import Program
 from autograder.program_host import ProgramHost, Start
 from autograder.sandbox import Place, RunningSubject
-from autograder.submission import Program
 from autograder.verdict import Status, Verdict
 from autograder.wire import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 

@@ -9,8 +9,8 @@ from autograder import jobs, sandbox
 from autograder.anew import is_since
 from autograder.files import write_whole
 from autograder.jobs import Job
+from autograder.program import Program
 from autograder.runner import Outcome
-from autograder.submission import Program
 from course.errors import CourseError
 
 

@@ -19,7 +19,7 @@ from autograder.raised import is_students
 from autograder.wire import Channel
 
 if TYPE_CHECKING:  # a student's kernel has no use for nbgrader's notebooks
-    from autograder.submission import Program
+    from autograder.program import Program
 
 ASK = signal.SIGUSR1
 PATIENCE, SILENCE = 3.0, 0.5

@@ -7,12 +7,9 @@ test cell is put back, a duplicated one is disarmed), and each mend is noted for
 from __future__ import annotations
 
 import copy
-import hashlib
 import json
 import stat
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +19,7 @@ import nbformat.validator
 from nbformat import NotebookNode
 
 from autograder import bounds, keys, points
+from autograder.program import Cell, Program
 from course.errors import CourseError
 
 MAX_NOTEBOOK = 20 * 1024 * 1024
@@ -30,23 +28,6 @@ MAX_NOTEBOOK = 20 * 1024 * 1024
 
 class SubmissionError(CourseError):
     """A submission that cannot be read; the message says why, for the student's grade."""
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One code cell to run, or (``exam`` set) the place where a part of an exam is sat.
-
-    ``key`` is the answer key of that part, if its hidden cell has one: for the examiner only.
-    """
-
-    source: str
-    grade_id: str = ""
-    exam: str = ""
-    part: str = ""
-    key: Mapping[str, Any] = field(default_factory=dict)
-
-
-Program = tuple[Cell, ...]
 
 
 def read(path: Path) -> NotebookNode:
@@ -271,13 +252,3 @@ def program(notebook: NotebookNode) -> Program:
         else:
             cells.append(Cell(cell.source, name))
     return tuple(cells)
-
-
-def digest(program_: Program, files: Mapping[str, bytes], salt: str) -> str:
-    """Return a key for the results of a program: equal programs behave alike.
-
-    ``files`` are the other files it finds, ``salt`` is what else the results depend on: the exams.
-    """
-    beside = {name: hashlib.sha256(content).hexdigest() for name, content in files.items()}
-    content = json.dumps([salt, beside, [vars(cell) for cell in program_]], sort_keys=True)
-    return hashlib.sha256(content.encode()).hexdigest()

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from autograder.insight.collect import ClassData
-from autograder.quiz_marks import PREFIX
+from autograder.quiz_cells import PREFIX
 from autograder.verdict import CheckResult, Status
 from quizzes.insight.analysis import FEWEST_WRONG, discrimination
 

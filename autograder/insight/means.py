@@ -15,7 +15,7 @@ from importlib import resources
 
 from autograder import points, questions
 from autograder.insight.collect import ClassData
-from autograder.quiz_marks import PREFIX
+from autograder.quiz_cells import PREFIX
 
 
 @dataclass(frozen=True)

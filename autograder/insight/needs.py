@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from autograder import questions, quiz_marks, quiz_sharing
+from autograder import questions, quiz_cells, quiz_sharing
 from autograder.gradebook import Grade
 from autograder.insight import feedback
 from autograder.insight.collect import ClassData
@@ -45,8 +45,8 @@ def people_needed(data: ClassData) -> list[Need]:
 def _shared_attempts(data: ClassData) -> Iterator[Need]:
     """Yield who has handed in the same attempts at a quiz: no points are taken for it."""
     graded = {cell for grade in data.grades for cells in grade.cells.values() for cell in cells}
-    for name in sorted(cell for cell in graded if cell.startswith(quiz_marks.PREFIX)):
-        quiz = name.removeprefix(quiz_marks.PREFIX)
+    for name in sorted(cell for cell in graded if cell.startswith(quiz_cells.PREFIX)):
+        quiz = name.removeprefix(quiz_cells.PREFIX)
         students = [grade.student for grade in data.grades]
         for group in quiz_sharing.same_attempts(data.root, data.assignment, quiz, students):
             why = (

@@ -8,7 +8,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from autograder import points, quiz_marks
+from autograder import points, quiz_cells
 from autograder.build import BuildError, build, build_assignment, build_chapter, to_text
 from course.content import content_root
 from course.errors import CourseError
@@ -263,4 +263,4 @@ def test_every_grade_cell_of_the_table_of_points_is_in_an_assignment() -> None:
             data = cell["metadata"].get("nbgrader", {})
             if data.get("grade"):
                 found[data["grade_id"]] = data["points"]
-    assert found == points.of_grade_cells() | quiz_marks.of_grade_cells(content_root())
+    assert found == points.of_grade_cells() | quiz_cells.of_grade_cells(content_root())

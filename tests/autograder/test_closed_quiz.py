@@ -17,8 +17,8 @@ import quizzes
 from autograder import engine, quiz_report
 from autograder.build import build
 from autograder.gradebook import CourseGradebook
+from autograder.quiz_cells import QuizMarksError
 from autograder.quiz_cli import QuizCommandError
-from autograder.quiz_marks import QuizMarksError
 from autograder.quiz_sheets import QuizSheetError
 from autograder.release import ReleaseError, release
 from course.content import content_root, copy_authoring

@@ -17,8 +17,8 @@ import pytest
 
 from autograder import jobs
 from autograder.jobs import Job, JobError, Result
+from autograder.program import Cell
 from autograder.runner import Outcome
-from autograder.submission import Cell
 from tests.browser.lab import until
 from tests.killing import GONE, Engine, fresh_copy
 from tests.machine import needs_sandbox

@@ -21,6 +21,7 @@ from autograder.engine import AssignmentError
 from autograder.gradebook import CourseGradebook, Grade, GradebookError
 from autograder.nbgrader_bridge import NotReadyError
 from autograder.nbgrader_once import FeedbackExporter
+from autograder.program import Program
 from tests.machine import needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
@@ -202,10 +203,10 @@ def test_what_did_not_change_is_not_run_again(
     course: Course, cases: Cases, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     course.submit("right", cases["right-chapter"].submission(course.source, course.released))
-    runs: list[submission.Program] = []
+    runs: list[Program] = []
     really_run = runner.run
 
-    def spy(program: submission.Program, files: dict[str, bytes], **options: Any) -> runner.Outcome:
+    def spy(program: Program, files: dict[str, bytes], **options: Any) -> runner.Outcome:
         runs.append(program)
         return really_run(program, files, **options)
 

@@ -15,8 +15,8 @@ import pytest
 from nbclient import NotebookClient
 
 from autograder import runner
+from autograder.program import Cell
 from autograder.sandbox import probe
-from autograder.submission import Cell
 from tests.machine import needs_isolation, needs_warm_starts
 
 pytestmark = [needs_isolation, pytest.mark.xdist_group("kernel"), pytest.mark.timeout(600)]

@@ -19,8 +19,8 @@ from autograder.outside import requests
 from autograder.outside.asking import Here
 from autograder.outside.processes import Sandboxed, number_inside
 from autograder.outside.requests import CannotLoseError, RequestError
+from autograder.program import Cell
 from autograder.sandbox.box import Box
-from autograder.submission import Cell
 from autograder.verdict import Verdict, VerdictError
 from course.runtime.waiting import Pulse, poll
 from tests.machine import needs_sandbox, needs_warm_starts

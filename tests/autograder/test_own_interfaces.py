@@ -14,7 +14,7 @@ from tests.machine import needs_sandbox
 PROGRAM = """
 from autograder import runner
 from autograder.own_interfaces import DEFINITIONS, NAVIGATE_TO
-from autograder.submission import Cell
+from autograder.program import Cell
 
 sources = [
     "from course.interfaces import define, status, toolchain",

@@ -14,7 +14,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from autograder import engine, quiz_marks, submission
+from autograder import engine, quiz_cells, quiz_marks, submission
 from autograder.build import build
 from autograder.engine import Graded
 from autograder.gradebook import CourseGradebook, Grade
@@ -241,7 +241,7 @@ def test_a_verdict_tells_what_was_wrong_and_not_the_key(tmp_path: Path) -> None:
 
 
 def test_the_quiz_has_points_of_its_own_and_the_release_holds_no_key(root: Path) -> None:
-    assert quiz_marks.of_grade_cells(root)[CELL] == 5.0
+    assert quiz_cells.of_grade_cells(root)[CELL] == 5.0
     folder = root / "release" / ASSIGNMENT
     assert [path.name for path in folder.rglob("*") if path.is_file()] == [f"{NOTEBOOK}.ipynb"]
     text = student_versions(root)[Path(ASSIGNMENT) / f"{NOTEBOOK}.ipynb"]

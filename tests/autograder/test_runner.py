@@ -15,10 +15,10 @@ import pytest
 from autograder import jobs, outputs, runner
 from autograder.corpus.trials import busy_loops
 from autograder.processes import ExaminerError, ExaminerProcess
+from autograder.program import Cell, Program
 from autograder.runner import Outcome
 from autograder.sandbox import BoxError
 from autograder.store import OutcomeStore
-from autograder.submission import Cell, Program
 from autograder.wire import Channel
 from course.domains import lease_domain
 from tests.machine import needs_sandbox

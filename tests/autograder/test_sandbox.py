@@ -19,13 +19,13 @@ from autograder.corpus import Case
 from autograder.descriptors import readable
 from autograder.gradebook import CourseGradebook
 from autograder.processes import ExaminerError, ExaminerProcess
+from autograder.program import Cell
 from autograder.sandbox import BoxError, SandboxError, network, probe, seccomp, usage, warmth
 from autograder.sandbox.box import Box
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.usage import Process
 from autograder.sandbox.watch import Watch
 from autograder.store import OutcomeStore
-from autograder.submission import Cell
 from tests.machine import needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course

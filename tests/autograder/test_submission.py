@@ -13,6 +13,7 @@ from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from autograder import bounds, submission
+from autograder.program import digest
 from autograder.submission import SubmissionError
 from autograder.wire import MAX_LINE
 
@@ -144,11 +145,9 @@ def test_the_program_names_where_exams_are_sat() -> None:
 
 def test_equal_programs_have_equal_digests_and_exams_matter() -> None:
     program = submission.program(notebook())
-    assert submission.digest(program, {}, "a") == submission.digest(
-        submission.program(notebook()), {}, "a"
-    )
-    assert submission.digest(program, {}, "a") != submission.digest(program, {}, "b")
-    assert submission.digest(program, {}, "a") != submission.digest(program, {"x": b""}, "a")
+    assert digest(program, {}, "a") == digest(submission.program(notebook()), {}, "a")
+    assert digest(program, {}, "a") != digest(program, {}, "b")
+    assert digest(program, {}, "a") != digest(program, {"x": b""}, "a")
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from autograder import runner, sandbox
-from autograder.submission import Program
+from autograder.program import Program
 from tests.hostile.test_hostile import SEED, Attack, Class, attacks, class_in
 
 RIGHT = "right-chapter"

@@ -40,10 +40,10 @@ from autograder.build import build
 from autograder.corpus import Case
 from autograder.corpus.trials import notebooks_of
 from autograder.gradebook import CourseGradebook
+from autograder.program import Program
 from autograder.release import release
 from autograder.runner import CELL_TIMEOUT, Outcome
 from autograder.sandbox import network
-from autograder.submission import Program
 from tests.machine import needs_isolation
 
 HERE = Path(__file__).parent

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from autograder import descriptors, runner
-from autograder.submission import Cell
+from autograder.program import Cell
 from autograder.warm import ForkedProcess, Nursery, Zygote, ZygoteError
 from autograder.warm import nursery as nursery_module
 from autograder.warm.task import Task
@@ -245,7 +245,7 @@ def subjects_of(pid: int) -> list[int]:
 def test_a_subject_ends_with_an_engine_that_is_killed() -> None:
     program = """
 from autograder import descriptors, runner
-from autograder.submission import Cell
+from autograder.program import Cell
 runner.run((Cell("while True: pass"),), cell_timeout=600)
 """
     engine = subprocess.Popen([sys.executable, "-c", program])
