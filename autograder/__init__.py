@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from autograder.notebook_check import check
+    from autograder.running.notebook_check import check
 
 __all__ = ["check"]
 
@@ -15,6 +15,6 @@ def __getattr__(name: str) -> Any:
     # neither before it has begun to start what else takes long.
     if name != "check":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from autograder.notebook_check import check
+    from autograder.running.notebook_check import check
 
     return check

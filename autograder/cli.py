@@ -12,8 +12,8 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from autograder import marks_cli, quiz_cli
-from autograder.interruption import Stopped
+from autograder.commands import marks_command, quiz_command
+from autograder.running.interruption import Stopped
 from autograder.terminal import Terminal, visible_json
 from course.errors import CourseError
 
@@ -27,8 +27,8 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-app.add_typer(marks_cli.app, name="marks")
-app.add_typer(quiz_cli.app, name="quiz")
+app.add_typer(marks_command.app, name="marks")
+app.add_typer(quiz_command.app, name="quiz")
 out = Terminal()
 err = Terminal(stderr=True)
 
@@ -56,7 +56,7 @@ def build(
     ] = False,
 ) -> None:
     """Build the notebooks from their text sources."""
-    from autograder.build import build as build_notebooks
+    from autograder.assignments.build import build as build_notebooks
 
     for path in build_notebooks(_root(root), check=check, with_solutions=with_solutions):
         out.print(str(path), soft_wrap=True)
@@ -65,7 +65,7 @@ def build(
 @app.command()
 def release(assignment: str, root: Root = None) -> None:
     """Make the student version of an assignment with nbgrader."""
-    from autograder.release import release as release_assignment
+    from autograder.gradebook.release import release as release_assignment
 
     out.print(str(release_assignment(_root(root), assignment)), soft_wrap=True)
 
@@ -103,8 +103,9 @@ def grade(
 
     if not trust and not scheduler:
         sandbox.warm_up()  # while nbgrader is imported, which takes seconds
-    from autograder import engine, grades_csv, progress
-    from autograder.gradebook import CourseGradebook
+    from autograder.class_report.platforms import grades_csv
+    from autograder.gradebook.course_gradebook import CourseGradebook
+    from autograder.grading import engine, progress
 
     where = _root(root)
     done = engine.grade(
@@ -158,9 +159,9 @@ def claim(
     touched: claims are kept in claims.json of the course root. A claim holds until the student
     hands in again.
     """
-    from autograder import intake_command
+    from autograder.commands import claim_command
 
-    said = intake_command.claim(
+    said = claim_command.claim(
         _root(root), assignment, student, notebook, file, nothing=nothing, withdraw=withdraw
     )
     out.print(said, soft_wrap=True)
@@ -176,7 +177,7 @@ def extend(
     root: Root = None,
 ) -> None:
     """Give students more time for an assignment, in place of an earlier extension of theirs."""
-    from autograder import extensions
+    from autograder.gradebook import extensions
 
     for due in extensions.extend(_root(root), assignment, students, hours):
         then = (
@@ -281,12 +282,11 @@ def report(
     says that this is a 0): both platforms take an empty cell for "no grade", and delete one that
     is there.
     """
-    from autograder import quiz_report
-    from autograder.insight import command
+    from autograder.commands import quiz_report, report_command
 
     where = _root(root)
     assignment = quiz_report.assignment_of(where, assignment)
-    made = command.run(
+    made = report_command.run(
         where, assignment, column=column, provisional=provisional, threshold=similarity,
         zero_absent=zero_absent,
     )  # fmt: skip
@@ -334,14 +334,14 @@ def feedback(
     gradebook, “Upload Submissions”; only those who handed in a file can be given one back, under
     the name of theirs.
     """
-    from autograder import feedback_zip
+    from autograder.class_report.platforms import feedback_archive
     from course.plain import counted
 
     if platform not in ("moodle", "canvas"):
         raise typer.BadParameter("moodle or canvas", param_hint="--platform")
     where = _root(root)
     file = to or where / "reports" / assignment / f"feedback-{platform}.zip"
-    packed = feedback_zip.pack(where, assignment, platform, names, file)  # type: ignore[arg-type]
+    packed = feedback_archive.pack(where, assignment, platform, names, file)  # type: ignore[arg-type]
     if as_json:
         _print_json(vars(packed))
         return
@@ -363,7 +363,7 @@ def demo(
 ) -> None:
     """Build, release, collect a bundled class, grade it on real DDS, and show the grades."""
     from autograder import demo as demo_run
-    from autograder import progress
+    from autograder.grading import progress
 
     shown = progress.for_console(out, err, machine=as_json)
     done = demo_run.run(folder, every=every, jobs=jobs, say=_say(as_json), progress=shown)
@@ -396,7 +396,7 @@ def _demo_table(done: Any) -> None:
 
 
 def _grades_table(grades: list[Any], problems: dict[str, str]) -> None:
-    from autograder import grades_table
+    from autograder.grading import grades_table
 
     out.print(grades_table.table(grades, problems))
 

@@ -10,15 +10,19 @@ from pathlib import Path
 
 import nbformat
 
-from autograder import corpus, engine, grades_csv, points, submission
-from autograder.build import build
+from autograder import corpus
+from autograder.assignments import submission
+from autograder.assignments.build import build
+from autograder.class_report.platforms import grades_csv
 from autograder.corpus import Case
 from autograder.corpus.command import untrusting
 from autograder.corpus.trials import notebooks_of
-from autograder.engine import Graded
-from autograder.gradebook import CourseGradebook, Grade
-from autograder.progress import Collecting, Progress
-from autograder.release import release
+from autograder.examination import points
+from autograder.gradebook.course_gradebook import CourseGradebook, Grade
+from autograder.gradebook.release import release
+from autograder.grading import engine
+from autograder.grading.engine import Graded
+from autograder.grading.progress import Collecting, Progress
 from course.content import corpus_root
 from course.errors import CourseError
 

@@ -15,16 +15,16 @@ from nbgrader.preprocessors import (
     SaveAutoGrades,
 )
 
-from autograder.index_page import IndexPages
-from autograder.model_answers import ShowModelAnswers
-from autograder.nbgrader_bridge import (
+from autograder.gradebook.bridge import (
     FlagForHumans,
     GradeByBehaviour,
     RestoreCells,
     SubmissionExporter,
 )
-from autograder.nbgrader_once import FeedbackExporter
-from autograder.settled_export import SettledExport
+from autograder.gradebook.feedback.index_page import IndexPages
+from autograder.gradebook.model_answers import ShowModelAnswers
+from autograder.gradebook.once import FeedbackExporter
+from autograder.gradebook.settled_export import SettledExport
 
 c = get_config()  # noqa: F821 - given by nbgrader
 root = Path(__file__).resolve().parent

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import psutil
 
-from autograder.gradebook import CourseGradebook, Grade
+from autograder.gradebook.course_gradebook import CourseGradebook, Grade
 
 GONE = 20.0
 """Seconds in which what a dead engine has started must be gone."""

@@ -8,12 +8,13 @@ from dataclasses import dataclass, field
 import nbformat
 from nbformat import NotebookNode
 
-from autograder import exercises, submission
-from autograder.cells import without_markers
-from autograder.draws import USUAL_SEED
-from autograder.runner import CELL_TIMEOUT, Outcome
+from autograder import exercises
+from autograder.assignments import submission
+from autograder.assignments.cells import without_markers
+from autograder.examination.draws import USUAL_SEED
+from autograder.examination.verdict import CheckResult
+from autograder.running.runner import CELL_TIMEOUT, Outcome
 from autograder.sandbox import abilities
-from autograder.verdict import CheckResult
 from course.errors import CourseError
 
 STUB_MARK = "# Your work goes here."

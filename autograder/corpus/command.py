@@ -9,7 +9,7 @@ from autograder import exercises, sandbox
 from autograder.corpus import files, trials
 from autograder.corpus.case import Case, CorpusError
 from autograder.corpus.trials import Trial
-from autograder.draws import USUAL_SEED
+from autograder.examination.draws import USUAL_SEED
 from course.content import corpus_root
 
 

@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any
 
 from autograder.corpus.case import EVERYTHING, ROOTS, Case, CorpusError, Splice
-from autograder.runner import CELL_TIMEOUT
+from autograder.running.runner import CELL_TIMEOUT
 
 EVERY = "every"
 MUTANTS = "mutants.toml"

@@ -7,9 +7,10 @@ from typing import Any
 
 from rich.table import Table
 
-from autograder import exercises, points
+from autograder import exercises
 from autograder.corpus.case import Case
 from autograder.corpus.trials import Trial
+from autograder.examination import points
 
 
 def table(trials: list[Trial]) -> Table:

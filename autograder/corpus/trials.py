@@ -14,12 +14,15 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
-from autograder import exercises, points, runner, submission
-from autograder.build import build
+from autograder import exercises
+from autograder.assignments import submission
+from autograder.assignments.build import build
 from autograder.corpus.case import Case
-from autograder.draws import USUAL_SEED
-from autograder.release import release
-from autograder.runner import Outcome
+from autograder.examination import points
+from autograder.examination.draws import USUAL_SEED
+from autograder.gradebook.release import release
+from autograder.running import runner
+from autograder.running.runner import Outcome
 from course.content import content_root, copy_authoring
 
 Notebooks = tuple[NotebookNode, NotebookNode]

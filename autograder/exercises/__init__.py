@@ -10,7 +10,7 @@ import importlib
 import pkgutil
 from typing import Any
 
-from autograder.exam import Exam, ExamError
+from autograder.examination.exam import Exam, ExamError
 
 
 def names() -> list[str]:

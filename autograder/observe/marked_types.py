@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from autograder.own_interfaces import DEFINITIONS
+from autograder.examination.subject.own_interfaces import DEFINITIONS
 from course import types
 from course.design import dye
 from course.errors import CourseError

@@ -1,9 +1,9 @@
-"""Rest: nothing is under way between the examiner and a subject; see `autograder.outside`."""
+"""Rest: nothing is under way between examiner and subject; see `autograder.processes.outside`."""
 
 from __future__ import annotations
 
-from autograder.outside.asking import Outside
-from autograder.outside.stillness import HANGS, RESTLESS
+from autograder.processes.outside.asking import Outside
+from autograder.processes.outside.stillness import HANGS, RESTLESS
 
 __all__ = ["HANGS", "RESTLESS", "Stillness"]
 
@@ -19,7 +19,7 @@ class Stillness:
     def reached(self, restless: float = RESTLESS, timeout: float = HANGS) -> bool:
         """Return once both are at rest, or prove to be restless; say which it was.
 
-        See `autograder.outside.stillness.Stillness.reached`.
+        See `autograder.processes.outside.stillness.Stillness.reached`.
         """
         return bool(self._outside.ask("rest", restless=restless, timeout=timeout))
 

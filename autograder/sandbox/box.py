@@ -18,8 +18,8 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
-from autograder import python_module
 from autograder.files import scratch_folder
+from autograder.processes import python_module
 from autograder.sandbox import environment, network, seccomp, view, warmth
 from autograder.sandbox.boxed import BoxedSubject, Warden, WarmSubject, end
 from autograder.sandbox.host import tethered, write_files

@@ -11,16 +11,16 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Self
 
-from autograder.descriptors import readable
-from autograder.outside.processes import Sandboxed, number_inside
+from autograder.processes.descriptors import readable
+from autograder.processes.fair_deadline import RunDelay, SeenDelay, of_process
+from autograder.processes.process_folders import Sandboxed, number_inside
 from autograder.sandbox import cgroups, network, warmth
 from autograder.sandbox.host import fate_of
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.network import BoxError
 from autograder.sandbox.place import END_TIMEOUT, Process
+from autograder.sandbox.prefork import ForkedProcess, ZygoteError
 from autograder.sandbox.watch import Watch
-from autograder.starving import RunDelay, SeenDelay, of_process
-from autograder.warm import ForkedProcess, ZygoteError
 
 KILL_TIMEOUT = 10.0
 """Seconds until a killed subject must have ended: the kernel takes a moment for its memory."""
@@ -37,7 +37,7 @@ def end(process: Process) -> None:
 
 
 class Warden:
-    """A running warden (`autograder.outside.warden`), as the engine sees it.
+    """A running warden (`autograder.processes.outside.warden`), as the engine sees it.
 
     ``examiner`` is the first process of the sandbox of the examiner whom it answers.
     """

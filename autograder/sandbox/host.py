@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, Self
 
 from autograder.files import scratch_folder
+from autograder.processes.fair_deadline import RunDelay, of_process
 from autograder.sandbox.environment import INLINE
 from autograder.sandbox.place import END_TIMEOUT, Process
-from autograder.starving import RunDelay, of_process
 from course.domains import lease_domain
 
 

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
-from autograder.descriptors import readable
+from autograder.processes.descriptors import readable
 from course.errors import CourseError
 
 Namespaces = dict[str, int]

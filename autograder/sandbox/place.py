@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import IO, Any, Protocol, Self
 
-from autograder import python_module
-from autograder.starving import RunDelay
+from autograder.processes import python_module
+from autograder.processes.fair_deadline import RunDelay
 
 END_TIMEOUT = 5.0
 """Seconds in which a subject that says no more must have ended."""
@@ -39,8 +39,9 @@ class Process(Protocol):
 def subject_command(engine: socket.socket, control: socket.socket, domain_id: int) -> list[str]:
     """Return the command of a subject, which gets its ends of these two channels."""
     return [
-        *python_module.command("autograder.subject"), "--engine", str(engine.fileno()),
-        "--control", str(control.fileno()), "--domain", str(domain_id),
+        *python_module.command("autograder.examination.subject.process"),
+        "--engine", str(engine.fileno()), "--control", str(control.fileno()),
+        "--domain", str(domain_id),
     ]  # fmt: skip
 
 
@@ -98,7 +99,7 @@ class Place(Protocol):
     def spawn(self, command: Sequence[str], **options: Any) -> Process:
         """Start the examiner; ``options`` are those of `subprocess.Popen`.
 
-        It is told how to reach a warden (`autograder.outside`) if it does not see the subject.
+        If it does not see the subject it is told how to reach a warden.
         """
 
     def start_subject(

@@ -20,7 +20,7 @@ from autograder.sandbox.box import Box
 from autograder.sandbox.host import Host
 from autograder.sandbox.network import TOOL_TIMEOUT, BoxError
 from autograder.sandbox.place import Place, subject_command
-from autograder.warm import ZygoteError
+from autograder.sandbox.prefork import ZygoteError
 from course import tools
 from course.errors import CourseError
 

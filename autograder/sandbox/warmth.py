@@ -10,15 +10,15 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 
-from autograder import python_module
+from autograder.processes import python_module
 from autograder.sandbox import environment, network, seccomp, view
-from autograder.warm import ForkedProcess, Zygote, shared
-from autograder.warm.forked import pipe_in, pipe_out
-from autograder.warm.task import Task
+from autograder.sandbox.prefork import ForkedProcess, Zygote, shared
+from autograder.sandbox.prefork.forked import pipe_in, pipe_out
+from autograder.sandbox.prefork.task import Task
 
-SUBJECT = "autograder.subject"
-EXAMINER = "autograder.examiner"
-WARDEN = "autograder.outside.warden"
+SUBJECT = "autograder.examination.subject.process"
+EXAMINER = "autograder.running.examiner"
+WARDEN = "autograder.processes.outside.warden"
 _READ_ONLY = ("--ro-bind", "/", "/", "--dev-bind", "/dev", "/dev")
 
 

@@ -8,7 +8,7 @@ import threading
 import time
 from contextlib import suppress
 
-from autograder.descriptors import readable
+from autograder.processes.descriptors import readable
 from autograder.sandbox import usage, view
 from autograder.sandbox.limits import MIB, Limits
 from autograder.sandbox.usage import Process

@@ -13,12 +13,15 @@ import pytest
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 
-from autograder import corpus, engine, points, submission
-from autograder.build import build
+from autograder import corpus
+from autograder.assignments import submission
+from autograder.assignments.build import build
 from autograder.corpus import Case
 from autograder.corpus.trials import one_notebook
-from autograder.gradebook import Grade
-from autograder.release import release
+from autograder.examination import points
+from autograder.gradebook.course_gradebook import Grade
+from autograder.gradebook.release import release
+from autograder.grading import engine
 from tests.killing import Engine, fresh_copy
 from tests.left_out import leave_out
 from tests.machine import sandbox_problem

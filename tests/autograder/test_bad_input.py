@@ -17,17 +17,22 @@ from typing import Any
 import pytest
 from nbgrader.api import Gradebook
 
-from autograder import database as words
-from autograder import engine, gradebook, grades_csv, ledger, roster, submission
-from autograder.database import (
+from autograder.assignments import submission
+from autograder.assignments.intake import roster
+from autograder.class_report.platforms import grades_csv
+from autograder.gradebook import course_gradebook
+from autograder.gradebook import database as words
+from autograder.gradebook.course_gradebook import CourseGradebook, Grade, GradebookError
+from autograder.gradebook.database import (
     DiskFullError,
     GradebookLockedError,
     GradebookUnusable,
     OldGradebookError,
 )
-from autograder.engine import AssignmentError, Graded
-from autograder.gradebook import CourseGradebook, Grade, GradebookError
-from autograder.progress import Progress
+from autograder.grading import engine
+from autograder.grading.engine import AssignmentError, Graded
+from autograder.grading.progress import Progress
+from autograder.running import ledger
 from tests.killing import fresh_copy
 from tests.machine import needs_own_mounts, needs_sandbox
 
@@ -146,7 +151,7 @@ class LocksTheGradebook(Progress):
 def test_a_locked_gradebook_is_one_sentence(
     course: Course, class_: Undisturbed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(gradebook, "LOCK_PATIENCE", 0.0)
+    monkeypatch.setattr(course_gradebook, "LOCK_PATIENCE", 0.0)
     with closing(database(course)) as other:
         with pytest.raises(GradebookLockedError, match="Another program holds the gradebook"):
             grade(course, LocksTheGradebook(other))
@@ -292,7 +297,7 @@ def test_what_a_student_writes_into_nbgraders_log_is_about_that_student_only(
     started = time.monotonic()
     with pytest.raises(GradebookError, match=r"ValidationError: On instance"):
         book.autograde(ASSIGNMENT, "forger")
-    assert time.monotonic() - started < gradebook.LOCK_PATIENCE
+    assert time.monotonic() - started < course_gradebook.LOCK_PATIENCE
 
 
 def test_whatever_goes_wrong_with_one_submission_stops_nobody(

@@ -11,8 +11,15 @@ from typing import Any
 
 import pytest
 
-from autograder.bench import MAX_ERROR, MAX_REPLY, MOST_TOLD, StudentError, Subject, SubjectGone
-from autograder.wire import Channel
+from autograder.examination.check_context import (
+    MAX_ERROR,
+    MAX_REPLY,
+    MOST_TOLD,
+    StudentError,
+    Subject,
+    SubjectGone,
+)
+from autograder.processes.channel import Channel
 
 Say = Callable[..., None]
 

@@ -9,8 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from autograder import beside, files, ledger
-from autograder.beside import files_beside
+from autograder import files
+from autograder.assignments.intake import attachments
+from autograder.assignments.intake.attachments import files_beside
+from autograder.running import ledger
 
 
 def test_other_files_of_a_submission_are_found_and_links_are_not(tmp_path: Path) -> None:
@@ -39,7 +41,7 @@ def test_a_name_with_a_line_break_is_said_in_one_line(tmp_path: Path) -> None:
 
 
 def test_what_is_too_large_is_left_out_and_named(tmp_path: Path) -> None:
-    (tmp_path / "a.bin").write_bytes(bytes(beside.MAX_BYTES))
+    (tmp_path / "a.bin").write_bytes(bytes(attachments.MAX_BYTES))
     for number in range(7):
         (tmp_path / f"b{number}.bin").write_bytes(b"x")
     found = files_beside(tmp_path)

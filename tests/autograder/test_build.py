@@ -8,8 +8,9 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from autograder import points, quiz_cells
-from autograder.build import BuildError, build, build_assignment, build_chapter, to_text
+from autograder.assignments import quiz_cells
+from autograder.assignments.build import BuildError, build, build_assignment, build_chapter, to_text
+from autograder.examination import points
 from course.content import content_root
 from course.errors import CourseError
 

@@ -18,27 +18,29 @@ import nbformat
 import numpy as np
 import pytest
 
-from autograder import exercises, points, questions, submission
-from autograder.database import GradebookUnusable
-from autograder.gradebook import Grade
-from autograder.insight import (
+from autograder import exercises
+from autograder.assignments import questions, submission
+from autograder.assignments.questions import Question
+from autograder.class_report import (
     InsightError,
-    exports,
     feedback,
     figures,
     likeness,
     means,
     needs,
-    records,
     similarity,
 )
-from autograder.insight import page as pages
-from autograder.insight import report as reports
-from autograder.insight.collect import ClassData, Person, collect
-from autograder.insight.own_text import GivenText, OwnText, tokens
-from autograder.insight.records import Record
-from autograder.questions import Question
-from autograder.verdict import CheckResult, Status, Verdict
+from autograder.class_report import page as pages
+from autograder.class_report import report as reports
+from autograder.class_report.collect import ClassData, Person, collect
+from autograder.class_report.own_text import GivenText, OwnText, tokens
+from autograder.class_report.platforms import exports
+from autograder.examination import points
+from autograder.examination.verdict import CheckResult, Status, Verdict
+from autograder.gradebook import records
+from autograder.gradebook.course_gradebook import Grade
+from autograder.gradebook.database import GradebookUnusable
+from autograder.gradebook.records import Record
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
 from .test_cli import autograder

@@ -14,13 +14,14 @@ import pytest
 import yaml
 
 import quizzes
-from autograder import engine, quiz_report
-from autograder.build import build
-from autograder.gradebook import CourseGradebook
-from autograder.quiz_cells import QuizMarksError
-from autograder.quiz_cli import QuizCommandError
-from autograder.quiz_sheets import QuizSheetError
-from autograder.release import ReleaseError, release
+from autograder.assignments.build import build
+from autograder.assignments.quiz_cells import QuizMarksError
+from autograder.assignments.quiz_sheets import QuizSheetError
+from autograder.commands import quiz_report
+from autograder.commands.quiz_command import QuizCommandError
+from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.gradebook.release import ReleaseError, release
+from autograder.grading import engine
 from course.content import content_root, copy_authoring
 from course.lab import make_copy
 from quizzes import closing, loader, model, schema

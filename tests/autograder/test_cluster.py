@@ -15,10 +15,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from autograder import jobs
-from autograder.jobs import Job, JobError, Result
-from autograder.program import Cell
-from autograder.runner import Outcome
+from autograder.examination.program import Cell
+from autograder.running import jobs
+from autograder.running.jobs import Job, JobError, Result
+from autograder.running.runner import Outcome
 from tests.browser.lab import until
 from tests.killing import GONE, Engine, fresh_copy
 from tests.machine import needs_sandbox

@@ -12,10 +12,12 @@ from pathlib import Path
 import psutil
 import pytest
 
-from autograder import corpus, exercises, runner, submission
-from autograder.cells import without_markers
+from autograder import corpus, exercises
+from autograder.assignments import submission
+from autograder.assignments.cells import without_markers
 from autograder.corpus import Case, CorpusError, Trial, command, tables, trials
 from autograder.corpus.trials import Notebooks
+from autograder.running import runner
 from autograder.sandbox import abilities
 from autograder.sandbox.probe import Abilities
 

@@ -10,7 +10,7 @@ import pytest
 from nbgrader.api import Gradebook
 from nbgrader.dbutil import _temp_alembic_ini
 
-import autograder.database  # noqa: F401 - which tells nbgrader
+import autograder.gradebook.database  # noqa: F401 - which tells nbgrader
 
 
 def test_a_new_gradebook_has_the_newest_schema_and_starts_no_process_for_it(

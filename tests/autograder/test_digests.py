@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 import autograder
-from autograder import digests, exercises
+from autograder import exercises
+from autograder.running import digests
 
 HOME = Path(autograder.__file__).parents[1]
 
@@ -68,12 +69,12 @@ def test_an_exam_is_its_own_business(covered: dict[str, set[str]], name: str) ->
         ("autograder.exercises.qos.rig", {"qos"}),
         ("autograder.exercises.qos.packet_loss", {"qos"}),
         ("autograder.exercises.safety.navigator_client", {"safety"}),
-        ("autograder.harness", set(exercises.names())),
+        ("autograder.examination.subject.server", set(exercises.names())),
         ("autograder.sandbox.limits", set(exercises.names())),
         ("course.runtime.core_session", set(exercises.names())),
         ("course.design.node", {"architecture", "patterns"}),
         ("autograder.cli", set()),
-        ("autograder.gradebook", set()),
+        ("autograder.gradebook.course_gradebook", set()),
     ],
 )
 def test_what_an_exam_imports_belongs_to_it(
@@ -87,8 +88,9 @@ def test_what_an_exam_imports_belongs_to_it(
     "shown_or_kept",
     [
         "course.views", "course.watch", "course.diagnosis", "course.doctor", "course.journal",
-        "course.learner_session", "course.notebook", "quizzes", "autograder.report",
-        "autograder.feedback_page", "autograder.page_texts", "autograder.sheets",
+        "course.learner_session", "course.notebook", "quizzes",
+        "autograder.examination.verdict_text", "autograder.gradebook.feedback.feedback_page",
+        "autograder.gradebook.safe_html.page_texts", "autograder.gradebook.feedback.sheets",
     ],
 )  # fmt: skip
 def test_what_is_shown_or_kept_changes_no_verdict(
@@ -101,7 +103,7 @@ def test_what_is_shown_or_kept_changes_no_verdict(
 
 def test_what_makes_points_of_verdicts_enters_again_but_runs_nothing(copy: Path) -> None:
     before = digests.of_grading(("qos",), copy)
-    for file in ("quizzes/banks/ch05.yaml", "autograder/nbgrader_bridge.py"):
+    for file in ("quizzes/banks/ch05.yaml", "autograder/gradebook/bridge.py"):
         with longer(copy / file):
             digests.of_grading.cache_clear()
             assert digests.of_grading(("qos",), copy) != before

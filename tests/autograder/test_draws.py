@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autograder.draws import USUAL_SEED, Draws, fresh_seed
+from autograder.examination.draws import USUAL_SEED, Draws, fresh_seed
 
 
 def numbers(seed: int) -> list[float]:

@@ -11,10 +11,11 @@ from typing import Any, cast
 
 import pytest
 
-from autograder import exercises, points
-from autograder.bench import Bench, StudentError, SubjectGone
-from autograder.exam import Exam, ExamError, Failed, NotExaminable, Part, unexamined
-from autograder.verdict import CheckResult, Verdict
+from autograder import exercises
+from autograder.examination import points
+from autograder.examination.check_context import Bench, StudentError, SubjectGone
+from autograder.examination.exam import Exam, ExamError, Failed, NotExaminable, Part, unexamined
+from autograder.examination.verdict import CheckResult, Verdict
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import nbformat
 import pytest
 from nbgrader.api import Gradebook
 
-from autograder import submission
+from autograder.assignments import submission
 from autograder.corpus import Case
 from tests.machine import needs_users
 from tests.people import People, finished

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from autograder import corpus, exercises, points
+from autograder import corpus, exercises
 from autograder.corpus import trials
-from autograder.own_interfaces import DEFINITIONS, NAVIGATE_TO
-from autograder.report import Report
+from autograder.examination import points
+from autograder.examination.subject.own_interfaces import DEFINITIONS, NAVIGATE_TO
+from autograder.examination.verdict_text import Report
 from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS

@@ -19,9 +19,9 @@ from nbformat.v4 import (
     new_raw_cell,
 )
 
-from autograder import page_texts, screen
-from autograder.nbgrader_once import TOO_LONG, FeedbackExporter
-from autograder.page_texts import Page
+from autograder.gradebook.once import TOO_LONG, FeedbackExporter
+from autograder.gradebook.safe_html import allowed_html, page_texts
+from autograder.gradebook.safe_html.page_texts import Page
 
 NBCONVERT: Any = nbconvert.exporters.html
 read: Callable[..., Any] = NBCONVERT.BeautifulSoup  # as nbconvert itself does
@@ -160,10 +160,10 @@ def test_nothing_of_a_submission_runs_in_a_page(number: int) -> None:
     hostile = new_notebook(cells=[copy.deepcopy(HOSTILE[number])])
     assert not executable(page(FeedbackExporter, copy.deepcopy(hostile)))
     written = copy.deepcopy(hostile)
-    screen.screen_texts(written, new_notebook(), Page())
+    allowed_html.screen_texts(written, new_notebook(), Page())
     for cell in written.cells:
         cell.outputs = [
-            from_dict(screen.screened(output, Page())) for output in cell.get("outputs", [])
+            from_dict(allowed_html.screened(output, Page())) for output in cell.get("outputs", [])
         ]
     assert not executable(page(HTMLExporter, written))
 
@@ -209,10 +209,10 @@ def test_a_page_loads_nothing_by_itself_but_what_lies_beside_the_notebook(text: 
         for url in ELSEWHERE for kind in ("text/html", "text/markdown")
     ]  # fmt: skip
     assert loaded(page(FeedbackExporter, copy.deepcopy(hostile))) == []
-    screen.screen_texts(hostile, new_notebook(), Page())
+    allowed_html.screen_texts(hostile, new_notebook(), Page())
     for cell in hostile.cells:
         cell.outputs = [
-            from_dict(screen.screened(output, Page())) for output in cell.get("outputs", [])
+            from_dict(allowed_html.screened(output, Page())) for output in cell.get("outputs", [])
         ]
     assert loaded(page(HTMLExporter, hostile)) == []
 
@@ -227,7 +227,7 @@ def test_a_page_loads_nothing_by_itself_but_what_lies_beside_the_notebook(text: 
 def test_an_answer_cannot_take_the_place_of_a_part_of_the_formgraders_page(text: str) -> None:
     graded = new_markdown_cell("x", metadata={"nbgrader": {"grade_id": "explain-depth"}})
     written = new_notebook(cells=[new_markdown_cell(text), graded])
-    screen.screen_texts(written, new_notebook(), Page())
+    allowed_html.screen_texts(written, new_notebook(), Page())
     shown = page(HTMLExporter, written)
     found = read(shown, features="html.parser").find_all(id=re.compile("^explain-depth"))
     assert not found
@@ -250,7 +250,7 @@ def test_an_answer_cannot_take_the_place_of_a_part_of_the_formgraders_page(text:
 def test_an_ordinary_answer_is_written_as_it_was_typed(text: str) -> None:
     attachments = {"b.png": {"image/png": "iVBORw0KGgo="}}
     written = new_notebook(cells=[new_markdown_cell(text, attachments=attachments)])
-    screen.screen_texts(written, new_notebook(), Page())
+    allowed_html.screen_texts(written, new_notebook(), Page())
     assert written.cells[0].source.replace("\N{WORD JOINER}", "") == text
     if "List<" not in text:
         assert written.cells[0].source == text
@@ -280,10 +280,10 @@ def test_what_takes_too_long_is_shown_as_it_was_typed(what: str) -> None:
     if SLOW[what].cell_type == "markdown":
         assert TOO_LONG in shown
     assert "<em>all</em> the rest" in shown  # the others are formatted all the same
-    screen.screen_texts(notebook, new_notebook(), Page())
+    allowed_html.screen_texts(notebook, new_notebook(), Page())
     for cell in notebook.cells:
         cell.outputs = [
-            from_dict(screen.screened(output, Page())) for output in cell.get("outputs", [])
+            from_dict(allowed_html.screened(output, Page())) for output in cell.get("outputs", [])
         ]
     # As the formgrader does, in the server that all windows share.
     assert "<em>all</em> the rest" in page(HTMLExporter, notebook)
@@ -298,7 +298,7 @@ def test_the_process_that_formats_is_started_anew_if_it_is_lost() -> None:
 
 def test_files_beside_a_notebook_run_nothing_where_they_are_served() -> None:
     def may(name: str, content: bytes = b"") -> bool:
-        return screen.may_lie_beside(name, lambda: content)
+        return allowed_html.may_lie_beside(name, lambda: content)
 
     svg = b'<svg xmlns="http://www.w3.org/2000/svg">%s</svg>'
     assert all(map(may, ("plot.png", "data.csv", "node.py", "notes.txt", "report.docx")))

@@ -7,10 +7,12 @@ from functools import cache
 
 import pytest
 
-from autograder import corpus, runner, submission
+from autograder import corpus
+from autograder.assignments import submission
 from autograder.corpus import trials
-from autograder.draws import USUAL_SEED
-from autograder.report import Report
+from autograder.examination.draws import USUAL_SEED
+from autograder.examination.verdict_text import Report
+from autograder.running import runner
 from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS

@@ -8,7 +8,7 @@ import pytest
 
 from autograder import corpus
 from autograder.corpus import trials
-from autograder.report import Report
+from autograder.examination.verdict_text import Report
 from tests.machine import needs_sandbox
 
 from .conftest import SUBMISSIONS

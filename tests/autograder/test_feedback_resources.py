@@ -8,11 +8,13 @@ import pytest
 from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_notebook
 
-from autograder import corpus, runner, submission
+from autograder import corpus
+from autograder.assignments import submission
 from autograder.corpus import Case
 from autograder.corpus.trials import Notebooks, notebooks
-from autograder.draws import USUAL_SEED
-from autograder.report import Report
+from autograder.examination.draws import USUAL_SEED
+from autograder.examination.verdict_text import Report
+from autograder.running import runner
 from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS

@@ -6,7 +6,7 @@ import pytest
 
 from autograder import corpus
 from autograder.corpus import Case, trials
-from autograder.report import Report
+from autograder.examination.verdict_text import Report
 from tests.machine import needs_isolation
 
 from .conftest import SUBMISSIONS

@@ -13,9 +13,9 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from autograder import feedback_zip, platform_names
-from autograder.insight.collect import Person
-from autograder.platform_names import NamesError
+from autograder.class_report.collect import Person
+from autograder.class_report.platforms import feedback_archive, platform_names
+from autograder.class_report.platforms.platform_names import NamesError
 
 from .conftest import ASSIGNMENT, NOTEBOOK
 from .test_cli import autograder
@@ -72,7 +72,7 @@ def test_moodle_gets_each_students_pages_in_the_folder_that_it_made(
         "Un Known_104_assignsubmission_file/x.ipynb": b"{}",
         "Zoe Zest_105_assignsubmission_onlinetext/onlinetext.html": b"",
     })  # fmt: skip
-    done = feedback_zip.pack(graded, ASSIGNMENT, "moodle", names, tmp_path / "new" / "out.zip")
+    done = feedback_archive.pack(graded, ASSIGNMENT, "moodle", names, tmp_path / "new" / "out.zip")
     with zipfile.ZipFile(done.path) as file:
         found = {member: moodles_participant(member) for member in file.namelist()}
         for student, number in {"eve": "101", "ann": "102", "bob": "103"}.items():
@@ -96,7 +96,7 @@ def test_moodles_grading_worksheet_is_enough(graded: Path, tmp_path: Path) -> No
             ["Teilnehmer/in 201", "Ann O'Hara", "", "Zur Bewertung abgegeben", ""],
             ["Teilnehmer/in 202", "Cy_Young", "cy", "Zur Bewertung abgegeben", ""],
         ])  # fmt: skip
-    done = feedback_zip.pack(graded, ASSIGNMENT, "moodle", sheet, tmp_path / "out.zip")
+    done = feedback_archive.pack(graded, ASSIGNMENT, "moodle", sheet, tmp_path / "out.zip")
     assert done.students == ("ann", "cy")
     with zipfile.ZipFile(done.path) as file:
         numbers = {found[0] for name in file.namelist() if (found := moodles_participant(name))}
@@ -114,7 +114,7 @@ def test_canvas_gets_files_under_the_names_that_it_gave_with_what_the_names_say(
                (f"{NOTEBOOK}.ipynb", handed_in(graded, "eve")))
     )  # fmt: skip
     (folder / "strange_13_903_notes.txt").write_bytes(b"who?")
-    done = feedback_zip.pack(graded, ASSIGNMENT, "canvas", folder, tmp_path / "out.zip")
+    done = feedback_archive.pack(graded, ASSIGNMENT, "canvas", folder, tmp_path / "out.zip")
     assert done.students == ("ann", "eve")
     with zipfile.ZipFile(done.path) as file:
         assert set(file.namelist()) == {f"oharaann_LATE_11_901_{NOTEBOOK}-2.ipynb",
@@ -145,7 +145,7 @@ def test_canvas_gets_feedback_on_what_was_taken_whatever_its_name(
         shutil.copyfile(own / name, folder / f"{student}_{number}_9{number}_{name}")
     (graded / "submitted" / "cy" / ASSIGNMENT / "other.ipynb").write_text("{}")
     (folder / "cy_13_914_other.ipynb").write_text("{}")
-    done = feedback_zip.pack(graded, ASSIGNMENT, "canvas", folder, tmp_path / "out.zip")
+    done = feedback_archive.pack(graded, ASSIGNMENT, "canvas", folder, tmp_path / "out.zip")
     assert done.students == ("ann", "bob", "cy")
     with zipfile.ZipFile(done.path) as file:
         assert set(file.namelist()) == {

@@ -15,13 +15,17 @@ import pytest
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 
-from autograder import engine, nbgrader_once, points, runner, submission
+from autograder.assignments import submission
 from autograder.corpus import Case
-from autograder.engine import AssignmentError
-from autograder.gradebook import CourseGradebook, Grade, GradebookError
-from autograder.nbgrader_bridge import NotReadyError
-from autograder.nbgrader_once import FeedbackExporter
-from autograder.program import Program
+from autograder.examination import points
+from autograder.examination.program import Program
+from autograder.gradebook import once
+from autograder.gradebook.bridge import NotReadyError
+from autograder.gradebook.course_gradebook import CourseGradebook, Grade, GradebookError
+from autograder.gradebook.once import FeedbackExporter
+from autograder.grading import engine
+from autograder.grading.engine import AssignmentError
+from autograder.running import runner
 from tests.machine import needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
@@ -330,7 +334,7 @@ def test_a_folder_that_is_no_course_says_so(tmp_path: Path) -> None:
 
 
 def test_a_warm_up_compiles_what_feedback_is_made_with(course: Course) -> None:
-    compiled = nbgrader_once._compiled._codes
+    compiled = once._compiled._codes
     compiled.clear()
     FeedbackExporter.warm_up(course.released)
     assert {"index.html.j2", "base.html.j2"} <= {

@@ -26,11 +26,12 @@ from rclpy.task import Future
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from autograder import bench, harness
-from autograder.bench import StudentError, Subject, SubjectGone
-from autograder.harness import Harness
-from autograder.raised import MUST_NOT_SPIN
-from autograder.wire import Channel, ChannelClosed, ChannelTimeout
+from autograder.examination import check_context
+from autograder.examination.check_context import StudentError, Subject, SubjectGone
+from autograder.examination.subject import server
+from autograder.examination.subject.server import Harness
+from autograder.examination.subject.student_errors import MUST_NOT_SPIN
+from autograder.processes.channel import Channel, ChannelClosed, ChannelTimeout
 from course import Session
 from course.runtime.context.context import default_context_beside
 
@@ -311,7 +312,7 @@ def test_a_node_that_does_not_come_up_is_named() -> None:
 def test_replies_that_each_come_in_time_may_not_take_for_ever(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(bench, "ALL_REPLIES_TIMEOUT", 0.2)
+    monkeypatch.setattr(check_context, "ALL_REPLIES_TIMEOUT", 0.2)
     ours, theirs = (Channel(end) for end in socket.socketpair())
     answered = threading.Event()
 
@@ -410,13 +411,13 @@ def test_the_first_error_of_the_notebook_is_told_and_not_what_came_of_it(
         subject.start("Nobody")
     assert raised.value.told == "No Nobody was defined: did its cell end with an error?"
     monkeypatch.setattr(
-        harness, "get_ipython", lambda: SimpleNamespace(first_error=ValueError("no depth"))
+        server, "get_ipython", lambda: SimpleNamespace(first_error=ValueError("no depth"))
     )
     with pytest.raises(StudentError) as raised:
         subject.start("Nobody")
     assert raised.value.told.endswith(" The first error of a cell was ValueError: no depth.")
     unread = SyntaxError("invalid syntax", ("<ipython-input-2>", 3, 1, "a b"))
-    monkeypatch.setattr(harness, "get_ipython", lambda: SimpleNamespace(first_error=unread))
+    monkeypatch.setattr(server, "get_ipython", lambda: SimpleNamespace(first_error=unread))
     with pytest.raises(StudentError) as raised:
         subject.start("Nobody")
     assert raised.value.told.endswith(" SyntaxError: invalid syntax, in line 3.")

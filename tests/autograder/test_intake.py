@@ -15,12 +15,19 @@ import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_notebook
 
-from autograder import intake_claims, intake_names, intake_zip, submission
-from autograder.intake import Found, Intake, NotHandedInError, UnclearError, of_student
-from autograder.intake_claims import Claim, ClaimError
-from autograder.intake_files import look_through
-from autograder.intake_zip import ArchiveError
-from autograder.submission import SubmissionError
+from autograder.assignments import submission
+from autograder.assignments.intake import archives, claim_records, file_names
+from autograder.assignments.intake.archives import ArchiveError
+from autograder.assignments.intake.claim_records import Claim, ClaimError
+from autograder.assignments.intake.handed_in import look_through
+from autograder.assignments.intake.notebooks import (
+    Found,
+    Intake,
+    NotHandedInError,
+    UnclearError,
+    of_student,
+)
+from autograder.assignments.submission import SubmissionError
 
 from .test_intake_cells import WORK, released, stripped, worked_on
 from .test_quiz_marks import take
@@ -91,7 +98,7 @@ def test_the_one_notebook_of_another_name_is_taken_and_said(
     taken = found(folder)
     assert work(taken.notebook)
     for said in (*taken.notes, *taken.remarks):
-        assert intake_names.shown(place) in said
+        assert file_names.shown(place) in said
         assert said.isprintable()
     assert len(taken.notes) == len(taken.remarks) == 1
 
@@ -171,7 +178,7 @@ def test_what_may_be_the_notebook_is_asked_about(
     folder: Path, place: str, content: str | bytes
 ) -> None:
     put(folder, place, content)
-    assert f"'{intake_names.shown(place)}" in str(asked(folder))
+    assert f"'{file_names.shown(place)}" in str(asked(folder))
 
 
 UNCLAIMED: dict[str, str | bytes] = {
@@ -205,7 +212,7 @@ def test_an_encrypted_file_in_a_zip_file_is_asked_about(folder: Path) -> None:
     put(folder, "hand-in.zip", bytes(content))
     assert "'hand-in.zip/work'" in str(asked(folder))
     with pytest.raises(ArchiveError, match="encrypted"):
-        intake_zip.look_into(folder / "hand-in.zip").read("work", 1)
+        archives.look_into(folder / "hand-in.zip").read("work", 1)
 
 
 def test_a_zip_file_with_ten_thousand_members_is_not_read(folder: Path) -> None:
@@ -215,12 +222,12 @@ def test_a_zip_file_with_ten_thousand_members_is_not_read(folder: Path) -> None:
 
 
 def test_a_zip_file_that_lies_about_its_table_is_not_read(folder: Path) -> None:
-    content = bytearray(zipped(*((f"{n}", "") for n in range(intake_zip.MAX_MEMBERS + 1))))
+    content = bytearray(zipped(*((f"{n}", "") for n in range(archives.MAX_MEMBERS + 1))))
     end = content.rfind(b"PK\x05\x06")
     content[end + 10 : end + 12] = b"\x01\x00"
     put(folder, "hand-in.zip", bytes(content))
     with pytest.raises(ArchiveError):
-        intake_zip.look_into(folder / "hand-in.zip")
+        archives.look_into(folder / "hand-in.zip")
 
 
 def test_what_grows_without_end_is_not_unpacked(folder: Path) -> None:
@@ -320,7 +327,7 @@ def test_decomposed_names_are_the_same_names(folder: Path, written: str) -> None
 
 def claimed(folder: Path, file: str) -> dict[str, Claim]:
     handed_in = look_through(folder)
-    return {NAME: Claim(file, intake_claims.state(folder, handed_in, f"{NAME}.ipynb", file))}
+    return {NAME: Claim(file, claim_records.state(folder, handed_in, f"{NAME}.ipynb", file))}
 
 
 def test_what_is_claimed_counts(folder: Path) -> None:
@@ -361,21 +368,21 @@ def test_that_there_is_nothing_holds_until_something_else_is_handed_in(folder: P
 
 def test_claims_are_kept_and_taken_back(tmp_path: Path) -> None:
     odd = os.fsdecode(b"b\xff.ipynb")
-    intake_claims.keep(tmp_path, "ch05", "ana", NAME, Claim(odd, "1"))
-    intake_claims.keep(tmp_path, "ch05", "ana", OTHER, Claim("", "2"))
-    assert intake_claims.of_student(tmp_path, "ch05", "ana") == {
+    claim_records.keep(tmp_path, "ch05", "ana", NAME, Claim(odd, "1"))
+    claim_records.keep(tmp_path, "ch05", "ana", OTHER, Claim("", "2"))
+    assert claim_records.of_student(tmp_path, "ch05", "ana") == {
         NAME: Claim(odd, "1"), OTHER: Claim("", "2"),
     }  # fmt: skip
-    intake_claims.keep(tmp_path, "ch05", "ana", NAME, None)
-    assert set(intake_claims.of_student(tmp_path, "ch05", "ana")) == {OTHER}
-    assert intake_claims.of_student(tmp_path, "ch06", "ana") == {}
+    claim_records.keep(tmp_path, "ch05", "ana", NAME, None)
+    assert set(claim_records.of_student(tmp_path, "ch05", "ana")) == {OTHER}
+    assert claim_records.of_student(tmp_path, "ch06", "ana") == {}
 
 
 @pytest.mark.parametrize("content", ["{", "[]", '{"version": 2}', '{"version": 1, "claims": [1]}'])
 def test_a_damaged_file_of_claims_says_so(tmp_path: Path, content: str) -> None:
-    (tmp_path / intake_claims.FILE).write_text(content)
-    with pytest.raises(ClaimError, match=re.escape(intake_claims.FILE)):
-        intake_claims.of_student(tmp_path, "ch05", "ana")
+    (tmp_path / claim_records.FILE).write_text(content)
+    with pytest.raises(ClaimError, match=re.escape(claim_records.FILE)):
+        claim_records.of_student(tmp_path, "ch05", "ana")
 
 
 @pytest.mark.parametrize(
@@ -387,7 +394,7 @@ def test_a_damaged_file_of_claims_says_so(tmp_path: Path, content: str) -> None:
     ],
 )  # fmt: skip
 def test_names_are_shown_safely(name: str, shown: str) -> None:
-    assert intake_names.shown(name) == shown
+    assert file_names.shown(name) == shown
 
 
 def test_no_more_than_so_many_files_are_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from autograder import intake_claims, quiz_marks
-from autograder.intake_claims import Claim
-from autograder.intake_files import look_through
-from autograder.verdict import Verdict
+from autograder.assignments.intake import claim_records
+from autograder.assignments.intake.claim_records import Claim
+from autograder.assignments.intake.handed_in import look_through
+from autograder.examination.verdict import Verdict
+from autograder.quiz import marks
 from quizzes.loader import load_bank
 
 from .test_quiz_marks import FILE, take
@@ -27,7 +28,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def verdict(folder: Path, student: str = "ada") -> Verdict:
-    return quiz_marks.verdict(load_bank("ch05"), folder, student)
+    return marks.verdict(load_bank("ch05"), folder, student)
 
 
 def rename(folder: Path, name: str) -> None:
@@ -162,7 +163,7 @@ def test_a_login_of_somebody_else_in_the_class_is_asked_about(folder: Path, name
 def test_the_class_is_whom_the_gradebook_knows_too(folder: Path) -> None:
     take(folder, "bob", 5)
     (folder.parents[1] / "carl").mkdir()
-    found = quiz_marks.verdict(load_bank("ch05"), folder, "ada", roster=("ada", "bob"))
+    found = marks.verdict(load_bank("ch05"), folder, "ada", roster=("ada", "bob"))
     assert "under the login of 'bob', who is in the class" in asked(found)
 
 
@@ -185,8 +186,8 @@ def test_a_decomposed_login_is_the_students_own(tmp_path: Path) -> None:
 
 
 def claim(folder: Path, file: str) -> None:
-    state = intake_claims.state(folder, look_through(folder), FILE, file)
-    intake_claims.keep(folder.parents[2], "ch05-quiz", "ada", KEY, Claim(file, state))
+    state = claim_records.state(folder, look_through(folder), FILE, file)
+    claim_records.keep(folder.parents[2], "ch05-quiz", "ada", KEY, Claim(file, state))
 
 
 def test_what_is_claimed_counts_whoever_made_it(folder: Path) -> None:

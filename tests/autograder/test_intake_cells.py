@@ -10,8 +10,9 @@ import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook, new_raw_cell
 
-from autograder import intake_cells, submission
-from autograder.intake_cells import Recognised
+from autograder.assignments import submission
+from autograder.assignments.intake import cell_matching
+from autograder.assignments.intake.cell_matching import Recognised
 
 STUB = "def design():\n    return None\n\n\ndepth = 1"
 WORK = "def design():\n    return 'mine'\n\n\ndepth = 5"
@@ -74,7 +75,7 @@ def at(notebook: NotebookNode, name: str) -> int:
 
 def mended(notebook: NotebookNode) -> tuple[dict[str, str], Recognised, NotebookNode]:
     """Return {grade id: text} after everything is put right, what was said, and the notebook."""
-    known = intake_cells.recognise(notebook, released())
+    known = cell_matching.recognise(notebook, released())
     whole, _ = submission.restore(notebook, released(), released())
     ids = [name for one in whole.cells if (name := submission.grade_id(one))]
     assert sorted(ids) == sorted(submission.grade_id(c) for c in released().cells)
@@ -94,13 +95,13 @@ def test_an_honest_notebook_is_left_as_it_is() -> None:
     notebook.cells.insert(3, new_code_cell("depth"))
     notebook.cells.insert(0, new_markdown_cell("My notes."))
     before = copy.deepcopy(notebook)
-    known = intake_cells.recognise(notebook, released())
+    known = cell_matching.recognise(notebook, released())
     assert (known, notebook) == (Recognised(), before)
 
 
 def test_an_untouched_notebook_is_left_as_it_is() -> None:
     notebook = released()
-    assert intake_cells.recognise(notebook, released()) == Recognised()
+    assert cell_matching.recognise(notebook, released()) == Recognised()
     assert notebook == released()
     assert mended(stripped(released()))[1].doubts == {}
 
@@ -109,7 +110,7 @@ def test_a_notebook_without_any_metadata_is_recognised() -> None:
     texts, known, _ = mended(stripped(worked_on()))
     assert texts == RIGHT
     assert known.doubts == {}
-    assert known.notes == [intake_cells.LOST]
+    assert known.notes == [cell_matching.LOST]
 
 
 @pytest.mark.parametrize(
@@ -314,7 +315,7 @@ def test_work_in_another_cell_of_the_assignment_is_found() -> None:
     notebook = copy.deepcopy(two)
     both = f"{WORK}\n\n\ndef finish():\n    return 'done'"
     notebook.cells[at(notebook, "solution")].source = both
-    known = intake_cells.recognise(without(notebook, "second"), two)
+    known = cell_matching.recognise(without(notebook, "second"), two)
     whole, _ = submission.restore(notebook, two, two)
     assert known.doubts == {}
     assert code(whole).count("def finish") == 1
@@ -324,7 +325,7 @@ def test_a_stub_that_defines_nothing_is_known_by_its_place() -> None:
     empty = released()
     empty.cells[at(empty, "solution")].source = "# Your work goes here."
     notebook = stripped(worked_on(), "solution")
-    known = intake_cells.recognise(notebook, empty)
+    known = cell_matching.recognise(notebook, empty)
     assert known.doubts == {}
     assert notebook.cells[at(notebook, "solution")].source == WORK
 
@@ -349,7 +350,7 @@ def test_whatever_stands_in_a_cell_stops_nothing(source: str) -> None:
 
 
 def test_a_notebook_is_known_by_half_of_what_was_given() -> None:
-    assert intake_cells.likeness(stripped(worked_on()), released()) == 1.0
-    assert intake_cells.likeness(new_notebook(cells=[new_code_cell(WORK)]), released()) == 0.0
+    assert cell_matching.likeness(stripped(worked_on()), released()) == 1.0
+    assert cell_matching.likeness(new_notebook(cells=[new_code_cell(WORK)]), released()) == 0.0
     half = without(worked_on(), "task", "given", "visible")
-    assert intake_cells.likeness(stripped(half), released()) == 0.5
+    assert cell_matching.likeness(stripped(half), released()) == 0.5

@@ -17,14 +17,18 @@ from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 from typer.testing import CliRunner
 
-from autograder import cli, engine, grades_csv, quiz_report, submission
-from autograder.build import build
+from autograder import cli
+from autograder.assignments import submission
+from autograder.assignments.build import build
+from autograder.class_report import needs
+from autograder.class_report.collect import collect
+from autograder.class_report.platforms import exports, grades_csv
+from autograder.commands import quiz_report
 from autograder.corpus import Case
-from autograder.gradebook import CourseGradebook, Grade
-from autograder.insight import exports, needs
-from autograder.insight.collect import collect
-from autograder.nbgrader_bridge import NotReadyError
-from autograder.release import release
+from autograder.gradebook.bridge import NotReadyError
+from autograder.gradebook.course_gradebook import CourseGradebook, Grade
+from autograder.gradebook.release import release
+from autograder.grading import engine
 from course.content import content_root, copy_authoring
 from tests.machine import needs_sandbox
 

@@ -7,8 +7,8 @@ from datetime import UTC, datetime
 import pytest
 from nbgrader.utils import parse_utc
 
-from autograder import intake_times
-from autograder.intake_times import UnclearTimeError
+from autograder.assignments.intake import times
+from autograder.assignments.intake.times import UnclearTimeError
 
 
 @pytest.mark.parametrize(
@@ -40,9 +40,9 @@ from autograder.intake_times import UnclearTimeError
     ],
 )
 def test_a_time_is_read_as_it_was_meant(text: str, utc: str) -> None:
-    moment = intake_times.read(text)
+    moment = times.read(text)
     assert moment == datetime.fromisoformat(utc).replace(tzinfo=UTC)
-    assert parse_utc(intake_times.for_nbgrader(moment)) == moment.replace(tzinfo=None)
+    assert parse_utc(times.for_nbgrader(moment)) == moment.replace(tzinfo=None)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_a_time_is_read_as_it_was_meant(text: str, utc: str) -> None:
 )
 def test_a_time_that_can_be_several_is_asked_about(text: str, why: str) -> None:
     with pytest.raises(UnclearTimeError, match=why):
-        intake_times.read(text)
+        times.read(text)
 
 
 @pytest.mark.parametrize(
@@ -81,10 +81,10 @@ def test_a_time_that_can_be_several_is_asked_about(text: str, why: str) -> None:
 def test_the_courses_own_zone_settles_what_its_clocks_are_called(
     text: str, zone: str, utc: str
 ) -> None:
-    assert intake_times.read(text, zone) == datetime.fromisoformat(utc).replace(tzinfo=UTC)
+    assert times.read(text, zone) == datetime.fromisoformat(utc).replace(tzinfo=UTC)
 
 
 @pytest.mark.parametrize("text", ["", "yesterday", "2026-13-40 20:15", "9" * 150, "\x00", "1e999"])
 def test_what_is_no_time_is_none(text: str) -> None:
     with pytest.raises(ValueError, match=r"date|year"):
-        intake_times.read(text)
+        times.read(text)

@@ -14,8 +14,8 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-from autograder import runner
-from autograder.program import Cell
+from autograder.examination.program import Cell
+from autograder.running import runner
 from autograder.sandbox import probe
 from tests.machine import needs_isolation, needs_warm_starts
 

@@ -12,11 +12,13 @@ import pytest
 from nbgrader.api import Gradebook
 from traitlets.config import Config
 
-from autograder import engine, extensions, grades_csv, grades_table, penalties
-from autograder.database import GradebookUnusable
-from autograder.engine import AssignmentError
-from autograder.extensions import ExtensionError
-from autograder.gradebook import CourseGradebook, Grade, GradebookError
+from autograder.class_report.platforms import grades_csv
+from autograder.gradebook import extensions, penalties
+from autograder.gradebook.course_gradebook import CourseGradebook, Grade, GradebookError
+from autograder.gradebook.database import GradebookUnusable
+from autograder.gradebook.extensions import ExtensionError
+from autograder.grading import engine, grades_table
+from autograder.grading.engine import AssignmentError
 from tests.killing import fresh_copy
 from tests.machine import needs_sandbox
 

@@ -9,10 +9,13 @@ import nbformat
 import pytest
 from nbgrader.api import Gradebook
 
-from autograder import engine, marked, points, submission
-from autograder.build import build
-from autograder.marked import Marked, Marks
-from autograder.release import release
+from autograder.assignments import submission
+from autograder.assignments.build import build
+from autograder.examination import points
+from autograder.gradebook import marked
+from autograder.gradebook.marked import Marked, Marks
+from autograder.gradebook.release import release
+from autograder.grading import engine
 from tests.killing import fresh_copy
 from tests.machine import needs_sandbox
 

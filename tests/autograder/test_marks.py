@@ -14,11 +14,13 @@ import pytest
 from nbconvert.exporters import HTMLExporter
 from nbgrader.api import Gradebook
 
-from autograder import engine, marks, marks_page, questions, submission
-from autograder.gradebook import CourseGradebook
-from autograder.marks import Answer, Answers, MarksError
-from autograder.model_answers import FORMGRADER_KEYS, ShowModelAnswers
-from autograder.questions import Question
+from autograder.assignments import questions, submission
+from autograder.assignments.questions import Question
+from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.gradebook.model_answers import FORMGRADER_KEYS, ShowModelAnswers
+from autograder.grading import engine
+from autograder.marking import answers, answers_page
+from autograder.marking.answers import Answer, Answers, MarksError
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
 from .test_cli import autograder
@@ -40,7 +42,7 @@ def fill_in(path: Path, change: Callable[[Row], Row], **format_: Any) -> None:
     with path.open(encoding="utf-8", newline="") as file:
         rows = [change(row) for row in csv.DictReader(file)]
     buffer = io.StringIO()
-    writer = csv.DictWriter(buffer, marks.COLUMNS, **format_)
+    writer = csv.DictWriter(buffer, answers.COLUMNS, **format_)
     writer.writeheader()
     writer.writerows(rows)
     path.write_text(buffer.getvalue(), encoding="utf-8")
@@ -128,7 +130,7 @@ def test_a_spreadsheet_may_write_a_name_in_the_other_form_of_unicode(graded: Pat
     other = unicodedata.normalize("NFD", name)
     fill_in(file, lambda row: {**row, "student": other, "points": "1"}
             if row["student"] == "cy" else row)  # fmt: skip
-    assert marks.enter(CourseGradebook(graded), file).changed == (name,), "no answer was exported"
+    assert answers.enter(CourseGradebook(graded), file).changed == (name,), "no answer was exported"
 
 
 @pytest.mark.parametrize(
@@ -155,7 +157,7 @@ def test_a_file_with_a_fault_is_not_entered_at_all(
     file = exported(graded)
     fill_in(file, lambda row: change(marked({"cy": "1"})(row)))
     with pytest.raises(MarksError, match=said):
-        marks.enter(gradebook, file)
+        answers.enter(gradebook, file)
     assert entry(graded, "cy")[:2] == (None, True)
 
 
@@ -164,7 +166,7 @@ def test_a_file_with_a_fault_is_not_entered_at_all(
     [
         (b"", "no file of marks"),
         (b"student,points\nbob,1\n", "lacks the columns assignment, notebook"),
-        (",".join(marks.COLUMNS).encode() + b"\n", "has no rows"),
+        (",".join(answers.COLUMNS).encode() + b"\n", "has no rows"),
         ("\u00e9".encode("latin-1"), "is not UTF-8"),
     ],
     ids=["empty", "columns", "rows", "encoding"],
@@ -175,7 +177,7 @@ def test_another_file_is_one_sentence(
     file = tmp_path / "marks.csv"
     file.write_bytes(content)
     with pytest.raises(MarksError, match=said):
-        marks.enter(CourseGradebook(course.root), file)
+        answers.enter(CourseGradebook(course.root), file)
 
 
 def test_a_question_is_found_by_its_title_or_its_id_and_the_others_are_named(
@@ -183,11 +185,11 @@ def test_a_question_is_found_by_its_title_or_its_id_and_the_others_are_named(
 ) -> None:
     gradebook = CourseGradebook(course.root)
     for wanted in (CELL, TITLE.upper(), "camera"):
-        assert marks.find(gradebook, ASSIGNMENT, wanted).grade_id == CELL
+        assert answers.find(gradebook, ASSIGNMENT, wanted).grade_id == CELL
     with pytest.raises(MarksError, match=r"can be several questions: .*-loss .*-stop"):
-        marks.find(gradebook, ASSIGNMENT, "a lost")
+        answers.find(gradebook, ASSIGNMENT, "a lost")
     with pytest.raises(MarksError, match=r"there are .*-loss \(A lost camera frame\)"):
-        marks.find(gradebook, ASSIGNMENT, "naught")
+        answers.find(gradebook, ASSIGNMENT, "naught")
 
 
 def test_an_answer_to_be_looked_at_again_is_not_settled_by_a_file_that_nobody_filled_in(
@@ -197,10 +199,10 @@ def test_an_answer_to_be_looked_at_again_is_not_settled_by_a_file_that_nobody_fi
         book.find_grade(CELL, NOTEBOOK, ASSIGNMENT, "ann").needs_manual_grade = True
         book.db.commit()
     file = exported(graded)
-    marks.enter(CourseGradebook(graded), file)
+    answers.enter(CourseGradebook(graded), file)
     assert entry(graded, "ann")[:2] == (0.5, True)
     fill_in(file, marked({"ann": "0.5"}))
-    marks.enter(CourseGradebook(graded), file)
+    answers.enter(CourseGradebook(graded), file)
     assert entry(graded, "ann")[:2] == (0.5, False)
 
 
@@ -218,7 +220,7 @@ def test_the_page_has_the_model_answer_and_shows_answers_as_text() -> None:
          Answer("b", "B", "*x*", 1.0, "", False, "2")),
         ("c",), (EVIL,),
     )  # fmt: skip
-    html = marks_page.page(found, "marks.csv")
+    html = answers_page.page(found, "marks.csv")
     shown = Text(html)
     assert html.count("<script") == 2, "the page's data and its own script"
     assert len(shown.loads) == 2

@@ -11,7 +11,7 @@ import pytest
 from nbclient import NotebookClient
 from nbformat.v4 import new_code_cell, new_notebook
 
-from autograder import submission
+from autograder.assignments import submission
 from autograder.corpus import Case
 
 from .conftest import Course

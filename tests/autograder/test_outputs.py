@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from autograder import outputs
-from autograder.outputs import MAX_SHOWN, MAX_TEXT, Notebook, Output, of_test
-from autograder.recording import MAX_WIDGETS, Recording
-from autograder.wire import MAX_LINE
+from autograder.examination.subject import outputs
+from autograder.examination.subject.outputs import MAX_SHOWN, MAX_TEXT, Notebook, Output, of_test
+from autograder.examination.subject.recording import MAX_WIDGETS, Recording
+from autograder.processes.channel import MAX_LINE
 
 VIEW = "application/vnd.jupyter.widget-view+json"
 

@@ -14,14 +14,14 @@ from typing import Any
 
 import pytest
 
-from autograder import runner
-from autograder.outside import requests
-from autograder.outside.asking import Here
-from autograder.outside.processes import Sandboxed, number_inside
-from autograder.outside.requests import CannotLoseError, RequestError
-from autograder.program import Cell
+from autograder.examination.program import Cell
+from autograder.examination.verdict import Verdict, VerdictError
+from autograder.processes.outside import requests
+from autograder.processes.outside.asking import Here
+from autograder.processes.outside.requests import CannotLoseError, RequestError
+from autograder.processes.process_folders import Sandboxed, number_inside
+from autograder.running import runner
 from autograder.sandbox.box import Box
-from autograder.verdict import Verdict, VerdictError
 from course.runtime.waiting import Pulse, poll
 from tests.machine import needs_sandbox, needs_warm_starts
 
@@ -81,7 +81,7 @@ def test_a_forked_examiner_is_where_its_sandbox_is() -> None:
     """It is in no namespace of this process's but the time's, and has no right."""
     subject, control = socket.socketpair()
     with subject, control, Box(warm=True) as box:
-        command = [sys.executable, "-P", "-m", "autograder.examiner", "--domain", "1"]
+        command = [sys.executable, "-P", "-m", "autograder.running.examiner", "--domain", "1"]
         fd = control.fileno()
         examiner = box.spawn([*command, "--control", str(fd)], pass_fds=[fd])
         status = Path(f"/proc/{examiner.pid}/status")
@@ -145,7 +145,7 @@ sys.stdin.read()
 
 @needs_sandbox
 def test_what_a_child_holds_counts_and_it_is_named() -> None:
-    from autograder.outside import usage
+    from autograder.processes.outside import usage
 
     with sandboxed(CHILD) as (processes, _):
         held = usage.usage(processes)

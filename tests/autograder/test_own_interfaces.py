@@ -12,9 +12,9 @@ import pytest
 from tests.machine import needs_sandbox
 
 PROGRAM = """
-from autograder import runner
-from autograder.own_interfaces import DEFINITIONS, NAVIGATE_TO
-from autograder.program import Cell
+from autograder.running import runner
+from autograder.examination.subject.own_interfaces import DEFINITIONS, NAVIGATE_TO
+from autograder.examination.program import Cell
 
 sources = [
     "from course.interfaces import define, status, toolchain",

@@ -10,13 +10,17 @@ from typing import Any
 import nbformat
 import pytest
 
-from autograder import corpus, engine, exercises, keys, runner, submission
-from autograder.build import build
+from autograder import corpus, exercises
+from autograder.assignments import submission
+from autograder.assignments.build import build
 from autograder.corpus.trials import one_notebook
-from autograder.exam import Failed
+from autograder.examination import answer_keys
+from autograder.examination.exam import Failed
 from autograder.exercises.patterns import scenarios
 from autograder.exercises.patterns.choices import compare
-from autograder.release import release
+from autograder.gradebook.release import release
+from autograder.grading import engine
+from autograder.running import runner
 from course.student_version import student_versions
 from tests.machine import needs_isolation
 
@@ -53,13 +57,13 @@ def test_the_key_is_read_from_the_hidden_cell_without_running_it(root: Path) -> 
     ["", "check('patterns')", "check('patterns', part='choices'", "x = {'key': 1}"],
 )
 def test_a_cell_without_a_key_has_none(source: str) -> None:
-    assert keys.of_cell(source) == {}
+    assert answer_keys.of_cell(source) == {}
 
 
 @pytest.mark.parametrize("written", ["secret()", "[1, 2]", "{'a': open('/etc/passwd')}", "None"])
 def test_a_key_that_is_not_plain_data_is_refused(written: str) -> None:
-    with pytest.raises(keys.KeyCellError, match="written out as a dictionary of plain data"):
-        keys.of_cell(f"check('patterns', part='choices', key={written})")
+    with pytest.raises(answer_keys.KeyCellError, match="written out as a dictionary of plain data"):
+        answer_keys.of_cell(f"check('patterns', part='choices', key={written})")
 
 
 def test_the_release_has_no_key(root: Path) -> None:

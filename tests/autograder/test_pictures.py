@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from autograder import pictures
-from autograder.pictures import with_pictures
+from autograder.gradebook.safe_html import pictures
+from autograder.gradebook.safe_html.pictures import with_pictures
 
 EMBEDDED = "data:image/png;base64,UE5H"
 

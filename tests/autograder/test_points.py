@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from autograder import exercises, points
+from autograder import exercises
+from autograder.examination import points
 
 EXERCISES = {exam: entry for exam, entry in points.table().items() if entry.assignment == "ch05"}
 

@@ -10,13 +10,13 @@ from typing import Any
 
 import pytest
 
-from autograder.program_host import ProgramHost
+from autograder.running.program_host import ProgramHost
 from autograder.sandbox import RunningSubject
 
 LIVES = """
 import os, sys, rclpy
 from rclpy.node import Node
-from autograder import plain_program
+from autograder.examination.subject import plain_program
 
 def say(what):
     os.write(1, what.encode() + b"\\n")  # in one piece: several threads do

@@ -8,11 +8,11 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from autograder import progress
-from autograder.engine import Graded
-from autograder.progress import Clock, Lines, Live, Progress
-from autograder.runner import Outcome
-from autograder.verdict import CheckResult, Verdict
+from autograder.examination.verdict import CheckResult, Verdict
+from autograder.grading import progress
+from autograder.grading.engine import Graded
+from autograder.grading.progress import Clock, Lines, Live, Progress
+from autograder.running.runner import Outcome
 
 ADA = Graded("ada [bold]", {}, 12.5, 15.0, 4.04)
 BOB = Graded("bob", {}, 0.0, 15.0, 0.0, "It was cut off.")

@@ -11,12 +11,14 @@ from zipfile import ZipFile
 
 import pytest
 
-from autograder import cli, intake_claims, quiz_report
-from autograder.gradebook import Grade
-from autograder.insight import needs
-from autograder.insight.collect import ClassData
-from autograder.intake_claims import Claim
-from autograder.intake_files import look_through
+from autograder import cli
+from autograder.assignments.intake import claim_records
+from autograder.assignments.intake.claim_records import Claim
+from autograder.assignments.intake.handed_in import look_through
+from autograder.class_report import needs
+from autograder.class_report.collect import ClassData
+from autograder.commands import quiz_report
+from autograder.gradebook.course_gradebook import Grade
 from quizzes import loader, marking, model, record, schema, sharing
 from quizzes.record import Attempt, Given
 
@@ -221,9 +223,9 @@ def test_attempts_that_the_gradebook_takes_are_in_the_report_whatever_their_name
     places["ben"].unlink()
     places["cem"].rename(places["cem"].with_name("saved.bin"))
     folder = places["cem"].parent
-    state = intake_claims.state(folder, look_through(folder), places["cem"].name, "saved.bin")
+    state = claim_records.state(folder, look_through(folder), places["cem"].name, "saved.bin")
     claim = Claim("saved.bin", state)
-    intake_claims.keep(tmp_path, "ch05-quiz", "cem", "quiz-ch05", claim)
+    claim_records.keep(tmp_path, "ch05-quiz", "cem", "quiz-ch05", claim)
     places["dee"].write_bytes(places["ann"].with_name("my attempts.jsonl").read_bytes())
     places["eli"].rename(places["eli"].with_name("attempts.docx"))
     places["eli"].with_name("attempts.docx").write_bytes(b"PK")

@@ -14,15 +14,17 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from autograder import engine, quiz_cells, quiz_marks, submission
-from autograder.build import build
-from autograder.engine import Graded
-from autograder.gradebook import CourseGradebook, Grade
-from autograder.insight.collect import collect
-from autograder.insight.needs import people_needed
-from autograder.progress import Collecting
-from autograder.release import release
-from autograder.verdict import Verdict
+from autograder.assignments import quiz_cells, submission
+from autograder.assignments.build import build
+from autograder.class_report.collect import collect
+from autograder.class_report.needs import people_needed
+from autograder.examination.verdict import Verdict
+from autograder.gradebook.course_gradebook import CourseGradebook, Grade
+from autograder.gradebook.release import release
+from autograder.grading import engine
+from autograder.grading.engine import Graded
+from autograder.grading.progress import Collecting
+from autograder.quiz import marks
 from course.content import content_root, copy_authoring
 from course.student_version import student_versions
 from quizzes import model
@@ -94,7 +96,7 @@ def points(root: Path) -> dict[str, float | None]:
 
 
 def verdict(folder: Path, student: str = "ada") -> Verdict:
-    return quiz_marks.verdict(load_bank("ch05"), folder, student)
+    return marks.verdict(load_bank("ch05"), folder, student)
 
 
 @needs_isolation

@@ -18,9 +18,9 @@ import pytest
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 
-from autograder import gradebook
-from autograder.database import GradebookLockedError
-from autograder.release import ReleaseError, leaks, release
+from autograder.gradebook import course_gradebook
+from autograder.gradebook.database import GradebookLockedError
+from autograder.gradebook.release import ReleaseError, leaks, release
 from course.student_version import student_versions
 
 REGION = re.compile(r"### BEGIN (?:SOLUTION|HIDDEN TESTS)\n(.*?)### END", re.DOTALL)
@@ -211,7 +211,7 @@ def test_a_gradebook_that_cannot_be_written_leaves_the_old_release(
     if not released_before:
         shutil.rmtree(root / "release" / "ch05")
     before = state(root)
-    monkeypatch.setattr(gradebook, "LOCK_PATIENCE", 0.0)
+    monkeypatch.setattr(course_gradebook, "LOCK_PATIENCE", 0.0)
     with closing(sqlite3.connect(root / "gradebook.db")) as other:
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(GradebookLockedError):

@@ -16,10 +16,12 @@ import pytest
 from filelock import FileLock
 from nbgrader.api import Gradebook
 
-from autograder import engine, points, runner
-from autograder.engine import BusyError, Graded
-from autograder.gradebook import CourseGradebook
-from autograder.progress import Progress
+from autograder.examination import points
+from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.grading import engine
+from autograder.grading.engine import BusyError, Graded
+from autograder.grading.progress import Progress
+from autograder.running import runner
 from autograder.sandbox import SandboxError
 from tests.killing import Engine, episode, fresh_copy
 from tests.machine import needs_sandbox

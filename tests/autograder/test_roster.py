@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from autograder import intake_claims, roster
-from autograder.extension_store import WaitingExtensions
-from autograder.intake_claims import Claim
-from autograder.roster import Roster
+from autograder.assignments.intake import claim_records, roster
+from autograder.assignments.intake.claim_records import Claim
+from autograder.assignments.intake.roster import Roster
+from autograder.gradebook.extension_store import WaitingExtensions
 
 
 @pytest.fixture
@@ -143,8 +143,8 @@ def test_what_waits_for_a_student_is_found_in_either_form_of_the_name(
     waiting.put(asked, 0)
     assert waiting.of(kept) == 0
     claim = Claim("a.ipynb", "state")
-    intake_claims.keep(tmp_path, "ch05", kept, "qos", claim)
-    assert intake_claims.of_student(tmp_path, "ch05", asked) == {"qos": claim}
+    claim_records.keep(tmp_path, "ch05", kept, "qos", claim)
+    assert claim_records.of_student(tmp_path, "ch05", asked) == {"qos": claim}
 
 
 def test_two_folders_whose_names_read_the_same_are_two(submitted: Path) -> None:

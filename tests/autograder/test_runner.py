@@ -12,14 +12,15 @@ from typing import Any
 
 import pytest
 
-from autograder import jobs, outputs, runner
 from autograder.corpus.trials import busy_loops
-from autograder.processes import ExaminerError, ExaminerProcess
-from autograder.program import Cell, Program
-from autograder.runner import Outcome
+from autograder.examination.program import Cell, Program
+from autograder.examination.subject import outputs
+from autograder.processes.channel import Channel
+from autograder.running import jobs, runner
+from autograder.running.outcome_store import OutcomeStore
+from autograder.running.runner import Outcome
+from autograder.running.start import ExaminerError, ExaminerProcess
 from autograder.sandbox import BoxError
-from autograder.store import OutcomeStore
-from autograder.wire import Channel
 from course.domains import lease_domain
 from tests.machine import needs_sandbox
 
@@ -75,7 +76,7 @@ def test_a_cell_that_never_ends_is_ended() -> None:
 def test_time_in_which_others_keep_a_cell_from_running_is_not_its_own() -> None:
     source = """
 import os
-from autograder.starving import run_times
+from autograder.processes.fair_deadline import run_times
 here = f"/proc/{os.getpid()}"
 begun = run_times(here)[1]
 while run_times(here)[1] < begun + 2.5:
@@ -110,10 +111,10 @@ while True:
 def test_what_is_forged_as_the_place_of_a_program_is_cut_to_measure() -> None:
     source = """
 import os, signal
-from autograder import stuck
+from autograder.examination.subject import hang_report
 frame = f'  File "{"x" * 300}\\0\\x1b[2J", line {"9" * 5000} in {"y" * 10**6}\\n'
 first = f'  File "{"z" * 300}", line {"9" * 9} in f\\n'
-ours = '  File "/autograder/subject.py", line 1 in run\\n'
+ours = '  File "/autograder/examination/subject/process.py", line 1 in run\\n'
 dump = ("Thread 0x1 (most recent call first):\\n" + first + frame + ours).encode()
 def forge(*_):
     for fd in range(3, 50):
@@ -122,8 +123,8 @@ def forge(*_):
         except OSError:
             pass
 import faulthandler
-faulthandler.unregister(stuck.ASK)
-signal.signal(stuck.ASK, forge)
+faulthandler.unregister(hang_report.ASK)
+signal.signal(hang_report.ASK, forge)
 while True:
     pass
 """

@@ -14,18 +14,20 @@ from pathlib import Path
 
 import pytest
 
-from autograder import engine, runner, sandbox
+from autograder import sandbox
 from autograder.corpus import Case
-from autograder.descriptors import readable
-from autograder.gradebook import CourseGradebook
-from autograder.processes import ExaminerError, ExaminerProcess
-from autograder.program import Cell
+from autograder.examination.program import Cell
+from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.grading import engine
+from autograder.processes.descriptors import readable
+from autograder.running import runner
+from autograder.running.outcome_store import OutcomeStore
+from autograder.running.start import ExaminerError, ExaminerProcess
 from autograder.sandbox import BoxError, SandboxError, network, probe, seccomp, usage, warmth
 from autograder.sandbox.box import Box
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.usage import Process
 from autograder.sandbox.watch import Watch
-from autograder.store import OutcomeStore
 from tests.machine import needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course

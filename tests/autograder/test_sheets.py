@@ -12,9 +12,11 @@ from pathlib import Path
 import pytest
 from nbgrader.api import Gradebook
 
-from autograder import engine, index_page, questions, sheets, submission
-from autograder.gradebook import CourseGradebook
-from autograder.sheets import Exercise, Line, Sheet
+from autograder.assignments import questions, submission
+from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.gradebook.feedback import index_page, sheets
+from autograder.gradebook.feedback.sheets import Exercise, Line, Sheet
+from autograder.grading import engine
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course, mark_written_answers
 

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 
 import pytest
 
-from autograder.outside.sleeping import Sleeper, sleepers
-from autograder.outside.usage import thread_ids
+from autograder.processes.outside.sleeping import Sleeper, sleepers
+from autograder.processes.outside.usage import thread_ids
 from course.runtime.waiting import Pulse, poll
 
 WAITS = {

@@ -13,9 +13,11 @@ import pytest
 from nbformat.v4 import new_code_cell
 from nbgrader.api import Gradebook
 
-from autograder import engine, staging, submission
+from autograder.assignments import submission
 from autograder.corpus import Case
-from autograder.staging import MAX_STAGED, Limits
+from autograder.gradebook import staging
+from autograder.gradebook.staging import MAX_STAGED, Limits
+from autograder.grading import engine
 from tests.killing import fresh_copy
 from tests.machine import needs_sandbox
 

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from autograder.corpus.trials import busy_loops
-from autograder.starving import FairDeadline, SeenDelay, of_process, run_times
+from autograder.processes.fair_deadline import FairDeadline, SeenDelay, of_process, run_times
 
 
 def kept() -> float:

@@ -11,10 +11,10 @@ from contextlib import contextmanager
 
 import pytest
 
-from autograder.descriptors import readable
-from autograder.outside import stillness
-from autograder.outside.processes import Single
-from autograder.outside.stillness import ENDLESS, RESTLESS, Stillness
+from autograder.processes.descriptors import readable
+from autograder.processes.outside import stillness
+from autograder.processes.outside.stillness import ENDLESS, RESTLESS, Stillness
+from autograder.processes.process_folders import Single
 
 BUSY = "import sys; print(flush=True)\nwhile True: pass"
 # Two threads: one computes from the first line of input on to the second, the other answers "?".

@@ -12,10 +12,10 @@ import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
-from autograder import bounds, submission
-from autograder.program import digest
-from autograder.submission import SubmissionError
-from autograder.wire import MAX_LINE
+from autograder.assignments import bounds, submission
+from autograder.assignments.submission import SubmissionError
+from autograder.examination.program import digest
+from autograder.processes.channel import MAX_LINE
 
 
 def cell(grade_id: str, source: str, **flags: bool) -> NotebookNode:

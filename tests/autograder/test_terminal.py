@@ -8,9 +8,9 @@ import json
 import pytest
 from rich.table import Table
 
-from autograder import grades_table
-from autograder.gradebook import Grade
-from autograder.progress import Lines
+from autograder.gradebook.course_gradebook import Grade
+from autograder.grading import grades_table
+from autograder.grading.progress import Lines
 from autograder.terminal import Terminal, visible_json
 
 ACTING = (

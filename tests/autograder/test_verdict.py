@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from autograder.report import Report
-from autograder.verdict import CheckResult, Verdict, VerdictError
+from autograder.examination.verdict import CheckResult, Verdict, VerdictError
+from autograder.examination.verdict_text import Report
 
 FAILED = CheckResult(
     "fresh", "Scans are <fresh>", "failed", 0.0, 2.0, rationale="Half a metre.", expected="5.",

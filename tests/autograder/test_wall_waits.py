@@ -11,7 +11,7 @@ from collections.abc import Callable
 import pytest
 from rclpy.node import Node
 
-from autograder.wall_waits import NAP_S, is_timed, wall_waits
+from autograder.examination.subject.wall_waits import NAP_S, is_timed, wall_waits
 from course import Session
 from course.runtime.waiting import Pulse, poll
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from autograder.wire import MAX_LINE, Channel, ChannelClosed, ChannelTimeout
+from autograder.processes.channel import MAX_LINE, Channel, ChannelClosed, ChannelTimeout
 
 
 @pytest.fixture

@@ -31,12 +31,14 @@ from pathlib import Path
 
 import nbformat
 
-from autograder import corpus, points, submission
-from autograder.build import build
+from autograder import corpus
+from autograder.assignments import submission
+from autograder.assignments.build import build
 from autograder.corpus import Case
 from autograder.corpus.trials import one_notebook
-from autograder.gradebook import CourseGradebook
-from autograder.release import release
+from autograder.examination import points
+from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.gradebook.release import release
 
 SUBMISSIONS = Path(__file__).parents[1] / "submissions"
 MIB = 1024 * 1024

@@ -17,8 +17,9 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from autograder import runner, sandbox
-from autograder.program import Program
+from autograder import sandbox
+from autograder.examination.program import Program
+from autograder.running import runner
 from tests.hostile.test_hostile import SEED, Attack, Class, attacks, class_in
 
 RIGHT = "right-chapter"

@@ -25,11 +25,12 @@ from pathlib import Path
 
 import nbformat
 
-from autograder import corpus, submission
-from autograder.build import build
+from autograder import corpus
+from autograder.assignments import submission
+from autograder.assignments.build import build
 from autograder.corpus.trials import one_notebook
-from autograder.gradebook import Grade
-from autograder.release import release
+from autograder.gradebook.course_gradebook import Grade
+from autograder.gradebook.release import release
 from tests.killing import Engine, LostError, episode, fresh_copy
 
 ASSIGNMENT, NOTEBOOK = "ch05", "qos-design"

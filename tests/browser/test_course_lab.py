@@ -10,7 +10,9 @@ from dataclasses import dataclass
 import pytest
 from playwright.sync_api import Browser, Locator, expect
 
-from autograder import corpus, points, submission
+from autograder import corpus
+from autograder.assignments import submission
+from autograder.examination import points
 from course.content import content_root, corpus_root
 from course.journal.progress import WELCOME
 

@@ -12,10 +12,12 @@ import pytest
 from nbgrader.api import Gradebook
 from playwright.sync_api import Browser, FrameLocator, Locator, expect
 
-from autograder import corpus, points, questions, submission
-from autograder.build import build
+from autograder import corpus
+from autograder.assignments import questions, submission
+from autograder.assignments.build import build
 from autograder.corpus.trials import one_notebook
-from autograder.release import release
+from autograder.examination import points
+from autograder.gradebook.release import release
 from course.content import corpus_root
 from tests.machine import needs_sandbox
 

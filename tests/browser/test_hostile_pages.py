@@ -17,10 +17,13 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_raw_cell
 from nbgrader.api import Gradebook
 from playwright.sync_api import Browser, BrowserContext, Page, expect
 
-from autograder import corpus, engine, points, submission
-from autograder.build import build
+from autograder import corpus
+from autograder.assignments import submission
+from autograder.assignments.build import build
 from autograder.corpus.trials import one_notebook
-from autograder.release import release
+from autograder.examination import points
+from autograder.gradebook.release import release
+from autograder.grading import engine
 from course.content import corpus_root
 from tests.machine import needs_sandbox
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, expect
 
-from autograder import marks_page
-from autograder.marks import COLUMNS, Answer, Answers
-from autograder.questions import Question
+from autograder.assignments.questions import Question
+from autograder.marking import answers_page
+from autograder.marking.answers import COLUMNS, Answer, Answers
 
 pytestmark = pytest.mark.xdist_group("browser")
 
@@ -25,7 +25,7 @@ def test_marks_are_filled_in_kept_and_saved(browser: Browser, tmp_path: Path) ->
         Answer("cy", "Cy", "Third", 1.0, "Well done", False, "s3"),
     )
     file = tmp_path / "marks.html"
-    file.write_text(marks_page.page(Answers("ch05", question, answers), "marks.csv"), "utf-8")
+    file.write_text(answers_page.page(Answers("ch05", question, answers), "marks.csv"), "utf-8")
     context = browser.new_context(accept_downloads=True)
     page = context.new_page()
     errors: list[str] = []

@@ -35,14 +35,18 @@ import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell
 
-from autograder import corpus, engine, points, runner, submission
-from autograder.build import build
+from autograder import corpus
+from autograder.assignments import submission
+from autograder.assignments.build import build
 from autograder.corpus import Case
 from autograder.corpus.trials import notebooks_of
-from autograder.gradebook import CourseGradebook
-from autograder.program import Program
-from autograder.release import release
-from autograder.runner import CELL_TIMEOUT, Outcome
+from autograder.examination import points
+from autograder.examination.program import Program
+from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.gradebook.release import release
+from autograder.grading import engine
+from autograder.running import runner
+from autograder.running.runner import CELL_TIMEOUT, Outcome
 from autograder.sandbox import network
 from tests.machine import needs_isolation
 

@@ -18,9 +18,10 @@ import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_markdown_cell
 
-from autograder import engine, points
-from autograder.gradebook import CourseGradebook
-from autograder.graded import Graded
+from autograder.examination import points
+from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.grading import engine
+from autograder.grading.graded import Graded
 from tests.machine import needs_isolation
 
 from .test_hostile import FULL, Class, class_in

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import pytest
 from nbformat import NotebookNode
 
-from autograder import submission
-from autograder.cells import without_markers
+from autograder.assignments import submission
+from autograder.assignments.cells import without_markers
 from course.content import content_root
 from tests.kernel import Kernel
 

@@ -7,8 +7,8 @@ the task allows; only the robot's boundary has fixed names.
 
 from __future__ import annotations
 
-from autograder.bench import StudentError
-from autograder.exam import Exam, Failed
+from autograder.examination.check_context import StudentError
+from autograder.examination.exam import Exam, Failed
 from autograder.exercises.architecture.link_faults import (
     alike,
     every,

@@ -11,8 +11,8 @@ from typing import Any
 
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from autograder.bench import Bench, StudentError
-from autograder.exam import Failed
+from autograder.examination.check_context import Bench, StudentError
+from autograder.examination.exam import Failed
 from autograder.exercises.architecture.goal_sender import SETTLE, WAYPOINT, marked
 from autograder.exercises.architecture.link_faults import every, link_faults, nodes
 from autograder.exercises.architecture.robot_graph import Offer, RobotGraph, Topic, read_graph

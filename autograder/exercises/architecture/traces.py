@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.architecture.link_faults import listed, nodes
 from autograder.exercises.architecture.rig import ArchitectureRig
 from autograder.exercises.architecture.robot_graph import Topic

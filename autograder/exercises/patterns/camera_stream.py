@@ -14,7 +14,7 @@ from itertools import pairwise
 
 from rclpy.qos import ReliabilityPolicy
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.patterns.hardware import Picture
 from autograder.exercises.patterns.rig import STEP, RobotRig
 from autograder.exercises.patterns.scenarios import NAMES

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import partial
 
-from autograder.bench import StudentError
-from autograder.exam import Exam, Failed
+from autograder.examination.check_context import StudentError
+from autograder.examination.exam import Exam, Failed
 from autograder.exercises.patterns.rig import RobotRig
 from autograder.exercises.patterns.scenarios import PATTERNS, SCENARIOS, Scenario, would_mean
 

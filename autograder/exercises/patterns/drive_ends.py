@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import Future
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.patterns.blocked_aisle import hold, hold_before_goal
 from autograder.exercises.patterns.discovery import acquaint
 from autograder.exercises.patterns.driving import Drive

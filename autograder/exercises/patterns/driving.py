@@ -7,8 +7,8 @@ from typing import Any
 
 from rclpy.qos import ReliabilityPolicy
 
-from autograder.bench import SubjectGone
-from autograder.exam import Failed
+from autograder.examination.check_context import SubjectGone
+from autograder.examination.exam import Failed
 from autograder.exercises.patterns.discovery import acquaint, hear_out
 from autograder.exercises.patterns.rig import GRAIN, SETTLE, STEP, RobotRig
 from autograder.exercises.patterns.scenarios import NAMES

@@ -15,8 +15,8 @@ from contextlib import contextmanager
 
 from sensor_msgs.msg import BatteryState
 
-from autograder.bench import StudentError
-from autograder.exam import Exam, Failed
+from autograder.examination.check_context import StudentError
+from autograder.examination.exam import Exam, Failed
 from autograder.exercises.patterns import (
     camera_stream,
     choices,

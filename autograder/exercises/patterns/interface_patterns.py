@@ -7,7 +7,7 @@ from contextlib import suppress
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.patterns.rig import SETTLE, RobotRig
 from autograder.exercises.patterns.scenarios import NAMES, SCENARIOS, Scenario, would_mean
 from autograder.observe.participants import of_others

@@ -18,8 +18,8 @@ from typing import Any, TypeVar
 from rclpy.duration import Duration
 from std_msgs.msg import Float64
 
-from autograder.bench import Bench, StudentError
-from autograder.exam import Failed
+from autograder.examination.check_context import Bench, StudentError
+from autograder.examination.exam import Failed
 from autograder.exercises.patterns.hardware import ExaminerNode
 from autograder.observe.patience import Patience
 from autograder.observe.phrases import callback_raised

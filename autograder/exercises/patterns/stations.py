@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NoReturn
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.patterns.driving import Drive
 
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.patterns import camera_stream, interface_patterns, odometry
 from autograder.exercises.patterns.discovery import hear_out
 from autograder.exercises.patterns.rig import RobotRig

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autograder.exam import Failed, NotExaminable
+from autograder.examination.exam import Failed, NotExaminable
 from autograder.exercises.qos.backlogs import BURST, Backlog, Burst
 from autograder.exercises.qos.driver_latency import thinned
 from autograder.exercises.qos.readings import IMU, LIDAR, STOP, Sensor, is_open

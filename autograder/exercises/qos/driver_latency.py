@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, field
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.qos.examiner_node import LAG
 from autograder.exercises.qos.readings import SENSORS, Sensor
 from autograder.exercises.qos.rig import SensorRig

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 
-from autograder.exam import Failed, NotExaminable
+from autograder.examination.exam import Failed, NotExaminable
 from autograder.exercises.qos.examiner_node import LAG
 from autograder.exercises.qos.readings import IMU, STOP, Sensor
 from autograder.exercises.qos.rig import PRESSES, SensorRig

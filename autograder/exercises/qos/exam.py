@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from autograder.bench import StudentError
-from autograder.exam import Exam, Failed, NotExaminable
+from autograder.examination.check_context import StudentError
+from autograder.examination.exam import Exam, Failed, NotExaminable
 from autograder.exercises.qos.backlog_checks import (
     altered,
     require_burst,

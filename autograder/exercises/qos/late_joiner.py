@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from rclpy.qos import DurabilityPolicy
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.qos.examiner_node import lossless, undemanding
 from autograder.exercises.qos.readings import Heard, Sensor
 from autograder.exercises.qos.rig import DRIVERS, SensorRig

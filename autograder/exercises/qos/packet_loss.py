@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from rclpy.qos import ReliabilityPolicy
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.qos.examiner_node import lossless, undemanding
 from autograder.exercises.qos.radio_link import radio
 from autograder.exercises.qos.readings import CAMERA, STOP, Heard, Sensor

@@ -2,9 +2,9 @@
 
 The far end is a DDS participant of its own. To break the link, every UDP packet is dropped that is
 sent to this participant's ports, in the network namespace that examiner and subject have to
-themselves (`autograder.outside`). Everything is lost for as long as the gap lasts, and nothing
-outside of it: so a design that recovers always does, one that does not never does, and chance has
-no part in it.
+themselves (`autograder.processes.outside`). Everything is lost for as long as the gap lasts, and
+nothing outside of it: so a design that recovers always does, one that does not never does, and
+chance has no part in it.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from pathlib import Path
 
 from rclpy.qos import QoSProfile
 
-from autograder.bench import Bench
-from autograder.exam import NotExaminable
+from autograder.examination.check_context import Bench
+from autograder.examination.exam import NotExaminable
 from autograder.exercises.qos.examiner_node import ExaminerNode
 from autograder.exercises.qos.readings import Heard, Sensor
 from autograder.observe.quiet_node import QuietNode
-from autograder.outside.asking import Outside
-from autograder.outside.requests import CannotLoseError
+from autograder.processes.outside.asking import Outside
+from autograder.processes.outside.requests import CannotLoseError
 from course.runtime.core_session import CoreSession
 
 NOT_HERE = (

@@ -18,8 +18,8 @@ from typing import Any
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from autograder.bench import Bench
-from autograder.exam import NotExaminable
+from autograder.examination.check_context import Bench
+from autograder.examination.exam import NotExaminable
 from autograder.exercises.qos.examiner_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
 from autograder.exercises.qos.readings import IMU, SENSORS, STOP, Heard, Sensor
 from autograder.observe.participants import of_others
@@ -27,7 +27,7 @@ from autograder.observe.patience import Patience
 from autograder.observe.phrases import callback_raised
 from autograder.observe.spinner import Spinner
 from autograder.observe.stillness import HANGS, RESTLESS, Stillness
-from autograder.outside.holding import HoldError
+from autograder.processes.outside.holding import HoldError
 from course.errors import WaitTimeout
 
 DRIVERS, CONSUMERS = "SensorDrivers", "SensorConsumers"

@@ -14,7 +14,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
 
-from autograder.exam import NotExaminable
+from autograder.examination.exam import NotExaminable
 from autograder.exercises.qos.backlogs import BURST, Backlog, Burst
 from autograder.exercises.qos.consumer_lag import pursue
 from autograder.exercises.qos.driver_latency import thinned

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.qos.backlog_checks import backlog, few, lost
 from autograder.exercises.qos.examiner_node import LAG, lossless, undemanding
 from autograder.exercises.qos.readings import STOP, Heard

@@ -5,7 +5,7 @@ Each ``require_…`` returns if it was seen, and raises `Failed` with what was s
 
 from __future__ import annotations
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_graph import PUBLISHER
 from autograder.exercises.resources.examiner_node import IMAGE
 from autograder.exercises.resources.rig import ENDED, CameraRig

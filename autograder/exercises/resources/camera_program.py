@@ -9,8 +9,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from autograder.bench import REPLY_TIMEOUT, StudentError, Subject, SubjectGone
-from autograder.exam import Failed
+from autograder.examination.check_context import REPLY_TIMEOUT, StudentError, Subject, SubjectGone
+from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_graph import CameraGraph
 
 

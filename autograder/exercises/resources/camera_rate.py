@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.resources.rig import OVER, PERIOD, STEP, CameraRig
 from course.runtime.waiting import Deadline
 

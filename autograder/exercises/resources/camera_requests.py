@@ -11,7 +11,7 @@ from rclpy.qos import ReliabilityPolicy
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_rate import let_arrive
 from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT, ZOOM
 from autograder.exercises.resources.rig import PERIOD, CameraRig

@@ -13,7 +13,8 @@ from itertools import pairwise
 from statistics import median_low
 from typing import Any
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
+from autograder.examination.plain_programs import Program, Programs
 from autograder.exercises.resources.camera_duties import DRIVER
 from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT, ExaminerNode
 from autograder.exercises.resources.process_usage import Usage
@@ -21,8 +22,7 @@ from autograder.exercises.resources.rig import ENDED, PERIOD, CameraRig
 from autograder.observe.patience import SETTLE_S, Patience
 from autograder.observe.phrases import capitalized, phrase, pictures
 from autograder.observe.stillness import Stillness
-from autograder.programs import Program, Programs
-from autograder.starving import FairDeadline
+from autograder.processes.fair_deadline import FairDeadline
 
 LIVES = 4
 COUNTED = 8

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from functools import wraps
 
-from autograder.exam import Exam, Failed
+from autograder.examination.exam import Exam, Failed
 from autograder.exercises.resources.camera_duties import (
     DRIVER,
     require_callbacks_ended,

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from autograder.bench import StudentError
-from autograder.exam import Failed
+from autograder.examination.check_context import StudentError
+from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_duties import DRIVER, require_picture
 from autograder.exercises.resources.camera_requests import require_snapshot
 from autograder.exercises.resources.process_usage import Usage

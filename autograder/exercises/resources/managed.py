@@ -12,7 +12,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.resources.rig import RESEND, CameraRig
 from autograder.observe.phrases import phrase
 

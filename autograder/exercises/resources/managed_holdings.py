@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_duties import require_closed
 from autograder.exercises.resources.camera_graph import NODE, SERVICE, SUBSCRIPTION, told
 from autograder.exercises.resources.examiner_node import IMAGE

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_rate import let_arrive
 from autograder.exercises.resources.examiner_node import IMAGE
 from autograder.exercises.resources.managed import Managed

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_duties import (
     require_closed,
     require_open,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from autograder.outside.asking import Outside
-from autograder.outside.usage import Usage
+from autograder.processes.outside.asking import Outside
+from autograder.processes.outside.usage import Usage
 
 __all__ = ["Process", "Usage"]
 

@@ -16,8 +16,8 @@ from typing import Any
 from rclpy.duration import Duration
 from std_msgs.msg import Int32
 
-from autograder.bench import PATIENCE, Bench, StudentError
-from autograder.exam import Failed
+from autograder.examination.check_context import PATIENCE, Bench, StudentError
+from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_graph import CameraGraph
 from autograder.exercises.resources.camera_program import Program
 from autograder.exercises.resources.examiner_node import ExaminerNode, Picture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from action_msgs.msg import GoalStatus
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.safety.navigation import Dispatcher, Drives
 from autograder.exercises.safety.node_under_test import Robot
 from autograder.observe.phrases import ended

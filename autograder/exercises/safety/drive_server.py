@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import groupby, pairwise
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.safety import drive_goal
 from autograder.exercises.safety.navigation import Dispatcher, Drives, moves
 from autograder.exercises.safety.node_under_test import STRIDE, Robot

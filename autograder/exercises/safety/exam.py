@@ -7,7 +7,7 @@ own stride added to it.
 
 from __future__ import annotations
 
-from autograder.exam import Exam
+from autograder.examination.exam import Exam
 from autograder.exercises.safety import (
     drive_server,
     gripper_client,

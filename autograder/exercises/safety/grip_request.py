@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.safety.counterpart import following
 from autograder.exercises.safety.gripper import GripUser
 from autograder.exercises.safety.node_under_test import COARSE, STRIDE, Robot

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.safety import heartbeat
 from autograder.exercises.safety.grip_request import (
     ALLOWED,

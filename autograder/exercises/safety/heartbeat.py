@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.safety.node_under_test import STRIDE
 
 BEAT = 0.5  # s between two heartbeats

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.safety.grip_request import DEADLINE, LONGEST, client, once, outcome, tried
 from autograder.exercises.safety.gripper import GripUser
 from autograder.exercises.safety.node_under_test import COARSE, STRIDE, Robot

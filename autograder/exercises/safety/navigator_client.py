@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from rclpy.action.server import ServerGoalHandle
 
-from autograder.exam import Failed
+from autograder.examination.exam import Failed
 from autograder.exercises.safety.counterpart import following
 from autograder.exercises.safety.navigation import NavigatorUser, services_of
 from autograder.exercises.safety.node_under_test import COARSE, STRIDE, Robot

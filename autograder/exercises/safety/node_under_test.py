@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, NamedTuple
 
-from autograder.bench import Bench, Endpoints, StudentError
-from autograder.exam import Failed
+from autograder.examination.check_context import Bench, Endpoints, StudentError
+from autograder.examination.exam import Failed
 from autograder.exercises.safety.counterpart import Player
 from autograder.observe.patience import Patience
 from autograder.observe.stillness import Stillness
@@ -39,7 +39,7 @@ class Sleep(NamedTuple):
     thread: int
     until: float
     to_the_end: bool
-    """Nothing can: see `autograder.outside.sleeping`."""
+    """Nothing can: see `autograder.processes.outside.sleeping`."""
 
 
 class Robot:

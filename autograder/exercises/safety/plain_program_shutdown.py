@@ -6,8 +6,8 @@ that is interrupted does it by itself, and what becomes of the robot is seen fro
 
 from __future__ import annotations
 
-from autograder.bench import Bench
-from autograder.exam import Failed
+from autograder.examination.check_context import Bench
+from autograder.examination.exam import Failed
 from autograder.exercises.safety import drive_goal
 from autograder.exercises.safety.navigation import Dispatcher, Drives
 from autograder.exercises.safety.plain_program_survival import (

@@ -18,15 +18,15 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
-from autograder.bench import Bench
-from autograder.exam import NotExaminable
+from autograder.examination.check_context import Bench
+from autograder.examination.exam import NotExaminable
+from autograder.examination.plain_programs import Program, Programs
 from autograder.exercises.safety.counterpart import Player
 from autograder.exercises.safety.gripper import GripUser, Operator, double, text
 from autograder.exercises.safety.navigation import Dispatcher, NavigatorUser
 from autograder.observe.patience import Patience
 from autograder.observe.quiet_node import QuietNode
 from autograder.observe.stillness import Stillness
-from autograder.programs import Program, Programs
 from course.runtime.waiting import Deadline
 
 THREADS = 4

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from rclpy.node import Node
 
-from autograder.bench import Bench, Endpoints
+from autograder.examination.check_context import Bench, Endpoints
 from autograder.exercises.safety import plain_program_shutdown, plain_program_survival
 from autograder.exercises.safety.counterpart import Player
 from autograder.exercises.safety.node_under_test import Robot

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 
-from autograder.bench import StudentError, SubjectGone
-from autograder.exam import Failed
+from autograder.examination.check_context import StudentError, SubjectGone
+from autograder.examination.exam import Failed
 from autograder.exercises.safety import drive_goal
 from autograder.exercises.safety.navigation import Dispatcher
 from autograder.exercises.safety.node_under_test import Robot

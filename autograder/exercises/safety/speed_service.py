@@ -7,8 +7,8 @@ from typing import Any
 
 from rcl_interfaces.msg import Parameter
 
-from autograder.draws import Draws
-from autograder.exam import Failed
+from autograder.examination.draws import Draws
+from autograder.examination.exam import Failed
 from autograder.exercises.safety.gripper import (
     Operator,
     double,

@@ -11,7 +11,7 @@ from autograder.exercises.qos.backlogs import Backlog
 from autograder.exercises.qos.readings import IMU, LIDAR, STOP, Sensor
 from autograder.observe.patience import Patience
 from autograder.observe.stillness import Stillness
-from autograder.outside.asking import Here
+from autograder.processes.outside.asking import Here
 from course import Session
 from tests.autograder.test_stillness import ASLEEP, BUSY, process
 

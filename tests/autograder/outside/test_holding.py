@@ -16,8 +16,8 @@ import rclpy
 from rclpy.node import Node
 from std_msgs.msg import Int32
 
-from autograder.outside import holding
-from autograder.outside.holding import HoldError, held
+from autograder.processes.outside import holding
+from autograder.processes.outside.holding import HoldError, held
 from course import Session
 from course.runtime.waiting import Deadline
 

@@ -13,11 +13,12 @@ from pathlib import Path
 
 import pytest
 
-from autograder import descriptors, runner
-from autograder.program import Cell
-from autograder.warm import ForkedProcess, Nursery, Zygote, ZygoteError
-from autograder.warm import nursery as nursery_module
-from autograder.warm.task import Task
+from autograder.examination.program import Cell
+from autograder.processes import descriptors
+from autograder.running import runner
+from autograder.sandbox.prefork import ForkedProcess, Nursery, Zygote, ZygoteError
+from autograder.sandbox.prefork import nursery as nursery_module
+from autograder.sandbox.prefork.task import Task
 from course.runtime.waiting import Pulse, poll
 from tests.machine import needs_warm_starts
 
@@ -236,7 +237,10 @@ def subjects_of(pid: int) -> list[int]:
         with suppress(OSError):
             for child in map(int, (task / "children").read_text().split()):
                 filtered = "Seccomp:\t2" in Path(f"/proc/{child}/status").read_text()
-                forked_ = b"autograder.subject" in Path(f"/proc/{child}/cmdline").read_bytes()
+                forked_ = (
+                    b"autograder.examination.subject.process"
+                    in Path(f"/proc/{child}/cmdline").read_bytes()
+                )
                 found += [child] if filtered and forked_ else subjects_of(child)
     return found
 
@@ -244,8 +248,9 @@ def subjects_of(pid: int) -> list[int]:
 @needs_warm_starts
 def test_a_subject_ends_with_an_engine_that_is_killed() -> None:
     program = """
-from autograder import descriptors, runner
-from autograder.program import Cell
+from autograder.processes import descriptors
+from autograder.running import runner
+from autograder.examination.program import Cell
 runner.run((Cell("while True: pass"),), cell_timeout=600)
 """
     engine = subprocess.Popen([sys.executable, "-c", program])

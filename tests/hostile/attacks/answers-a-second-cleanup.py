@@ -4,7 +4,7 @@
 # told: After the second call the program was gone.
 # score: 14
 
-from autograder.harness import Harness
+from autograder.examination.subject.server import Harness
 
 call = Harness._call
 cleaned = set()

@@ -4,7 +4,7 @@
 # told: it takes ten pictures a second by the machine's clock.
 # score: 6
 
-from autograder.harness import Harness
+from autograder.examination.subject.server import Harness
 
 advance = Harness._advance
 order = CameraDriver.order

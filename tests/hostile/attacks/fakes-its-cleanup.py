@@ -6,7 +6,7 @@
 
 from rclpy.node import Node
 
-from autograder.harness import Harness
+from autograder.examination.subject.server import Harness
 
 cleanup = CameraDriver.destroy_node
 CameraDriver.destroy_node = Node.destroy_node

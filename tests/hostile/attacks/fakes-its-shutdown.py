@@ -4,7 +4,7 @@
 # told: which calls shutdown() in a drive, it stops the robot
 # score: 14
 
-from autograder.harness import Harness
+from autograder.examination.subject.server import Harness
 
 shutdown, ask = NavigationServer.shutdown, Harness._call
 NavigationServer.shutdown = lambda self: None

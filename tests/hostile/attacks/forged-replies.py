@@ -1,6 +1,6 @@
 # title: Answers the examiner's requests without doing anything
 # told: There is no subscription to hardware/camera
 
-import autograder.harness
+import autograder.examination.subject.server
 
-autograder.harness.Harness._answer = lambda *_: {"ok": True, "node": "/sensor_drivers", "nodes": {}}
+autograder.examination.subject.server.Harness._answer = lambda *_: {"ok": True, "node": "/sensor_drivers", "nodes": {}}

@@ -6,7 +6,7 @@
 
 import os
 
-from autograder.harness import Harness
+from autograder.examination.subject.server import Harness
 
 KEPT = []
 construct = CameraDriver.__init__

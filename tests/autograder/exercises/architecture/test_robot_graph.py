@@ -14,10 +14,10 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from test_msgs.action import Fibonacci
 
+from autograder.examination.subject.server import Harness
 from autograder.exercises.architecture.link_faults import link_faults, why_no_obstacles
 from autograder.exercises.architecture.robot_graph import End, Offer, RobotGraph, Topic, read_graph
 from autograder.exercises.architecture.robot_roles import Jobs
-from autograder.harness import Harness
 from autograder.observe.participants import NO_NODE
 from autograder.observe.quiet_node import QuietNode
 from course import Design, Session

@@ -1,0 +1,1 @@
+"""From the text of an assignment to its notebooks, and what its cells ask."""

@@ -1,0 +1,1 @@
+"""What was handed in: found, claimed, asked about, and taken."""

@@ -1,0 +1,373 @@
+"""Which file of a submission is which notebook, if names do not say it.
+
+A notebook lies under its own name in the submission's folder. Where it does not, while something
+lies there that nobody has claimed, there is a question: the one file that holds the notebook's
+cells is taken, and that is said; anything else is left to a person, never graded as nothing.
+Claimed are the assignment's notebooks, a quiz's attempts, and what was handed out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+
+from nbformat import NotebookNode
+
+from autograder.assignments import submission
+from autograder.assignments.intake import attempts, cell_matching, claim_records, roster
+from autograder.assignments.intake.archives import ArchiveError
+from autograder.assignments.intake.attachments import MAX_BYTES, Beside, files_beside
+from autograder.assignments.intake.claim_records import Claim
+from autograder.assignments.intake.file_names import entry, listed, normal, quoted, shown
+from autograder.assignments.intake.handed_in import (
+    NOTEBOOK,
+    HandedIn,
+    Item,
+    handed_out,
+    look_through,
+)
+from autograder.assignments.submission import MAX_NOTEBOOK, SubmissionError
+from quizzes.record import read_plain
+
+ALIKE = 0.5
+"""Part of a notebook's given cells that a file must have to be taken for it."""
+
+MAX_READ = 20
+"""Files of other names that are read as notebooks; further ones are left to a person."""
+
+
+class UnclearError(SubmissionError):
+    """A notebook that may be among what was handed in: a person has to say.
+
+    Attributes:
+        suggestion: for that person, what to do.
+    """
+
+    def __init__(self, why: str, suggestion: str) -> None:
+        """``why`` is for the student, too."""
+        super().__init__(why)
+        self.suggestion = suggestion
+
+
+class NotHandedInError(SubmissionError):
+    """A notebook that a person has said was not handed in."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A student's notebook.
+
+    Attributes:
+        notebook: as it was handed in.
+        item: where it was found, if not in its own place.
+        notes: for the student.
+        remarks: for a person.
+        claimed: a person has said that this is it, so nothing more is asked about it.
+    """
+
+    notebook: NotebookNode
+    item: Item | None = None
+    notes: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    claimed: bool = False
+
+
+def of_student(
+    root: Path, assignment: str, student: str, released: Mapping[str, NotebookNode]
+) -> Intake:
+    """Return the intake of what a student has handed in to the course at ``root``.
+
+    ``released`` is as for `Intake`.
+    """
+    release = root / "release" / assignment
+    return Intake(
+        roster.folder(root, student) / assignment,
+        released,
+        claim_records.of_student(root, assignment, student),
+        whose=f"{quoted(assignment)} {quoted(student)}",
+        given=handed_out(release),
+        around=lambda: roster.unclaimed(roster.folder(root, student), (assignment,)),
+    )
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    item: Item
+    notebook: NotebookNode | None = field(repr=False)
+    of: str = ""
+
+    @property
+    def texts(self) -> list[tuple[str, str]]:
+        assert self.notebook is not None
+        return [(cell.cell_type, cell.source) for cell in self.notebook.cells]
+
+
+class Intake:
+    """Looks through one student's submission of one assignment."""
+
+    def __init__(
+        self,
+        folder: Path,
+        released: Mapping[str, NotebookNode],
+        claims: Mapping[str, Claim],
+        *,
+        whose: str,
+        given: frozenset[str] = frozenset(),
+        around: Callable[[], list[str]] = list,
+    ) -> None:
+        """Prepare; nothing is read before it is asked for.
+
+        Args:
+            folder: the submission.
+            released: {name: notebook as it was handed out}.
+            claims: what a person has said of it.
+            whose: the assignment and the student, as the command line wants them.
+            given: places of other files that were handed out.
+            around: gives the names in the student's folder that belong to no assignment.
+        """
+        self._folder = folder
+        self._released = released
+        self._claims = claims
+        self._whose = whose
+        self._given = given
+        self._around = around
+
+    @cached_property
+    def handed_in(self) -> HandedIn:
+        """All that lies there."""
+        return look_through(self._folder)
+
+    def notebook(self, name: str) -> Found:
+        """Return a student's notebook.
+
+        Raises:
+            UnclearError: a person has to say which it is.
+            NotHandedInError: a person has said that there is none.
+            SubmissionError: there is none, or it cannot be read.
+        """
+        remarks: tuple[str, ...] = ()
+        if (claim := self._claims.get(name)) is not None:
+            if (void := self._void(name, claim)) is None:
+                return self._claimed(name, claim)
+            remarks = (void,)
+        path = self.proper(name)
+        if path.is_symlink() or path.exists():
+            found = self._proper(name, path)
+        else:
+            found = self._elsewhere(name, " ".join(remarks))
+        return Found(found.notebook, found.item, found.notes, (*remarks, *found.remarks))
+
+    def proper(self, name: str) -> Path:
+        """Return where a notebook belongs."""
+        return entry(self._folder, f"{name}.ipynb")
+
+    def content(self, name: str) -> bytes:
+        """Return what the file holds that counts as a notebook; raises as `notebook`, or OSError.
+
+        Of one that is larger than any notebook, no more than that.
+        """
+        found = self.notebook(name)
+        if found.item is not None:
+            return found.item.read(MAX_NOTEBOOK + 1)
+        return read_plain(self.proper(name), MAX_NOTEBOOK + 1)
+
+    def beside(self, found: Found) -> Beside:
+        """Return the files that a notebook's code finds: also those of the folder it lay in."""
+        every = files_beside(self._folder)
+        if found.item is None:
+            return every
+        files, room = dict(every.files), MAX_BYTES
+        for place, item in self.handed_in.beside(found.item):
+            if item is found.item or place.endswith(".ipynb"):
+                continue
+            try:
+                content = item.read(room + 1)
+            except (OSError, ArchiveError):
+                continue
+            if len(content) <= room and _is_plain_path(place):
+                files[normal(place)] = content
+                room -= len(content)
+        return Beside(files, every.notes)
+
+    @property
+    def has_others(self) -> bool:
+        """Whether any notebook of the assignment is there."""
+        there = any(self.proper(name).is_file() for name in self._released)
+        return there or any(candidate.of for candidate in self._candidates)
+
+    def _void(self, name: str, claim: Claim) -> str | None:
+        """Return why a claim no longer holds, or None if it does."""
+        now = claim_records.state(self._folder, self.handed_in, f"{name}.ipynb", claim.file)
+        if now == claim.state:
+            return None
+        what = f"'{shown(claim.file)}' was claimed" if claim.file else "nothing was claimed"
+        gone = claim.file and self.handed_in.at(claim.file) is None
+        return (
+            f"{what} as {name}.ipynb, but {'is gone' if gone else 'the submission has changed'} "
+            "since: the claim no longer holds."
+        )
+
+    def _claimed(self, name: str, claim: Claim) -> Found:
+        if not claim.file:
+            raise NotHandedInError(f"{name}.ipynb was not handed in, as a person has said.")
+        item = self.handed_in.at(claim.file)
+        assert item is not None  # its state would be another
+        notebook = _parsed(item)
+        if item.place == f"{name}.ipynb":
+            return Found(notebook, claimed=True)
+        said = f"'{shown(item.place)}' was graded as {name}.ipynb, as a person has said."
+        return Found(notebook, item, (said,), claimed=True)
+
+    def _proper(self, name: str, path: Path) -> Found:
+        """Return the notebook in its own place, unless another one is more likely meant."""
+        others = [c for c in self._candidates if c.of == name and not self._is_stub(name, c)]
+        try:
+            notebook = submission.read(path)
+        except SubmissionError as error:
+            if others:
+                raise self._unclear(name, f"{error} But there is {_places(others)}, too:", others) \
+                    from None  # fmt: skip
+            raise
+        others = [c for c in others if c.texts != _Candidate(c.item, notebook).texts]
+        if not others:
+            return Found(notebook)
+        if cell_matching.is_untouched(notebook, self._released[name]):
+            said = f"{name}.ipynb is as it was handed out, but there is {_places(others)}, too:"
+            raise self._unclear(name, said, others)
+        return Found(
+            notebook, remarks=(f"{name}.ipynb was graded; there is {_places(others)}, too.",)
+        )
+
+    def _elsewhere(self, name: str, before: str) -> Found:
+        """Return a notebook that is not in its own place."""
+        found = self._distinct([c for c in self._candidates if c.of == name], name)
+        if len(found) == 1:
+            item, notebook = found[0].item, found[0].notebook
+            assert notebook is not None
+            said = (
+                f"There was no {name}.ipynb, but '{shown(item.place)}' holds its cells, so it was "
+                "graded as that."
+            )
+            return Found(notebook, item, (said,), (said,))
+        missing = f"There is no {name}.ipynb in the submission"
+        if found:
+            raise self._unclear(name, f"{missing}, but there are {_places(found)}:", found)
+        if strange := self._strange():
+            names = listed(item.place for item in strange)
+            verb = "is" if len(strange) == 1 else "are"
+            raise self._unclear(name, f"{missing}, but there {verb} {names}{self._why(strange)}:")
+        if before:  # what a person had said was there is not
+            raise self._unclear(name, f"{missing}; {before} So")
+        if around := self._around():
+            raise self._beside_the_folder(name, missing, around)
+        raise SubmissionError(f"{missing}.")
+
+    def _unclear(self, name: str, said: str, found: list[_Candidate] | None = None) -> UnclearError:
+        place = quoted(found[0].item.place) if found else "FILE"
+        command = f"autograder claim {self._whose} {quoted(name)}"
+        return UnclearError(
+            f"{said} a person has to say what counts.",
+            f"Say it with `{command} {place}`, or with `{command} --nothing` if it was not handed "
+            "in; then grade again.",
+        )
+
+    def _beside_the_folder(self, name: str, missing: str, around: list[str]) -> UnclearError:
+        verb, them = ("is", "it") if len(around) == 1 else ("are", "them")
+        return UnclearError(
+            f"{missing}, but beside its folder there {verb} {listed(around)}: a person has "
+            "to say what counts.",
+            f"Move {them} into that folder if that is this assignment's work, and to another place "
+            f"if not, or say with `autograder claim {self._whose} {quoted(name)} --nothing` that "
+            "it was not handed in; then grade again.",
+        )
+
+    def _distinct(self, found: list[_Candidate], name: str) -> list[_Candidate]:
+        """Leave out copies, and stubs beside what was worked on."""
+        worked_on = [c for c in found if not self._is_stub(name, c)]
+        distinct: list[_Candidate] = []
+        for candidate in worked_on or found[:1]:
+            if all(candidate.texts != other.texts for other in distinct):
+                distinct.append(candidate)
+        return distinct
+
+    def _is_stub(self, name: str, candidate: _Candidate) -> bool:
+        assert candidate.notebook is not None
+        return cell_matching.is_untouched(candidate.notebook, self._released[name])
+
+    @cached_property
+    def _candidates(self) -> list[_Candidate]:
+        """Files of other names that are, or may be, notebooks."""
+        own = {f"{name}.ipynb" for name in self._released}
+        likely = [
+            item for item in self.handed_in.items
+            if _may_be_notebook(item.name) and normal(item.place) not in own
+        ]  # fmt: skip
+        found = []
+        for number, item in enumerate(likely):
+            try:
+                notebook = _parsed(item) if number < MAX_READ else None
+            except SubmissionError:
+                notebook = None
+            if notebook is not None or NOTEBOOK in item.name.lower():
+                found.append(_Candidate(item, notebook, self._match(notebook)))
+        return found
+
+    def _match(self, notebook: NotebookNode | None) -> str:
+        """Return which of the assignment's notebooks one is, by its given cells."""
+        if notebook is None:
+            return ""
+        alike = {
+            name: cell_matching.likeness(notebook, released)
+            for name, released in self._released.items()
+        }
+        best = max(alike, key=lambda name: alike[name])
+        return best if alike[best] >= ALIKE else ""
+
+    def _strange(self) -> list[Item]:
+        """Return what may stand for a missing notebook: all that is known to be nothing else."""
+        own = {f"{name}.ipynb" for name in self._released}
+        taken = {candidate.item.place for candidate in self._candidates if candidate.of}
+        taken |= {claim.file for claim in self._claims.values()}
+        unclaimed = [
+            item for item in self.handed_in.unclaimed(self._given)
+            if normal(item.place) not in own and item.place not in taken
+        ]  # fmt: skip
+        of_quizzes = {item.place for item, _ in attempts.with_attempts(unclaimed)}
+        return [item for item in unclaimed if item.place not in of_quizzes]
+
+    def _why(self, strange: list[Item]) -> str:
+        reasons = [self.handed_in.closed.get(item.place, "") for item in strange]
+        return "".join(f" ({reason})" for reason in dict.fromkeys(reasons) if reason)
+
+
+def _parsed(item: Item) -> NotebookNode:
+    """Return the notebook in a file; raises SubmissionError if there is none."""
+    name = shown(item.place)
+    try:
+        content = item.read(MAX_NOTEBOOK + 1)
+    except (OSError, ArchiveError) as error:
+        raise SubmissionError(f"{name} cannot be read ({error}).") from None
+    if len(content) > MAX_NOTEBOOK:
+        raise SubmissionError(
+            f"{name} has more than the {MAX_NOTEBOOK // 2**20} MB that are read: clear its outputs "
+            "and hand it in again."
+        )
+    return submission.parse(submission.decoded(content, name), name)
+
+
+def _may_be_notebook(name: str) -> bool:
+    # "x.ipynb.txt", "x.ipynb (1)" and "x.ipynb.bak" are what browsers and editors make of one.
+    return NOTEBOOK in name.lower() or name.lower().endswith(".json")
+
+
+def _is_plain_path(place: str) -> bool:
+    """Whether a zip file's name for a member can be that of a file below a folder."""
+    path = PurePosixPath(place)
+    plain = place == str(path) and not path.is_absolute() and "\0" not in place
+    return plain and ".." not in path.parts and not path.name.startswith(".")
+
+
+def _places(found: list[_Candidate]) -> str:
+    return listed(candidate.item.place for candidate in found)

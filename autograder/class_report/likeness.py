@@ -1,0 +1,110 @@
+"""What of a class is compared: the program of each exercise, and each answer in words."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Mapping
+from pathlib import Path
+
+from nbformat import NotebookNode
+
+from autograder.assignments import questions, submission
+from autograder.assignments.intake import roster
+from autograder.assignments.intake.attachments import files_beside
+from autograder.assignments.questions import Question
+from autograder.assignments.submission import SubmissionError
+from autograder.class_report import similarity
+from autograder.class_report.collect import ClassData
+from autograder.class_report.own_text import MAX_CHARACTERS, GivenText, OwnText
+from autograder.class_report.similarity import Likeness
+
+Texts = Mapping[str, Mapping[str, OwnText]]
+"""{what is compared: {student: what they wrote of it}}."""
+
+BESIDE = "The files beside the notebooks"
+
+
+def texts_of(data: ClassData, given: GivenText) -> tuple[dict[str, dict[str, OwnText]], list[str]]:
+    """Return what the students of a class wrote, and a note on those whose work cannot be read."""
+    names = sorted({name for grade in data.grades for name in grade.cells})
+    texts: defaultdict[str, dict[str, OwnText]] = defaultdict(dict)
+    unread = []
+    for grade in data.grades:
+        folder = roster.folder(data.root, grade.student) / data.assignment
+        notebooks = {**_notebooks(folder, names), **_graded(data, grade.student)}
+        if not notebooks:
+            unread.append(grade.student)
+            continue
+        for name, notebook in notebooks.items():
+            title = questions.title_of_notebook(data.assignment, name)
+            texts[title][grade.student] = given.own({name: notebook}, {})
+            for question, answer in _answers(notebook, data.questions.get(name, {})):
+                texts[called(title, question)][grade.student] = answer
+        if (beside := given.own({}, files_beside(folder).files)).lines:
+            texts[BESIDE][grade.student] = beside
+    if not unread:
+        return dict(texts), []
+    more = f" and {len(unread) - 10} more" if len(unread) > 10 else ""
+    who = ", ".join(map(data.called, unread[:10]))
+    return dict(texts), [f"Not compared, because no notebook can be read: {who}{more}."]
+
+
+def compare(data: ClassData, texts: Texts, given: GivenText, threshold: float) -> Likeness:
+    """Return which students' programs and answers are alike; see `similarity`."""
+    asked = {
+        called(questions.title_of_notebook(data.assignment, name), question): question
+        for name, found in data.questions.items()
+        for question in found.values()
+    }
+    programs = [where for where in texts if where not in asked]
+    # The work grows with the square of what is compared at a time.
+    work = int(similarity.MOST_WORK / math.sqrt(max(1, len(programs))))
+    return similarity.together(
+        similarity.alike_in_words(found, _given(asked[where]), threshold, where)
+        if where in asked
+        else similarity.alike(found, given, threshold, where, work)
+        for where, found in texts.items()
+    )
+
+
+def called(title: str, question: Question) -> str:
+    """Return what the answers to a question of an exercise are called."""
+    return f"{title}: {question.title}"
+
+
+def _given(question: Question) -> str:
+    return "\n".join((question.text, question.rules, question.model, question.stub))
+
+
+def _notebooks(folder: Path, names: list[str]) -> dict[str, NotebookNode]:
+    notebooks = {}
+    for name in names:
+        try:
+            notebooks[name] = submission.read(folder / f"{name}.ipynb")
+        except SubmissionError:
+            continue  # "what needs a person" names it, and why it cannot be read
+    return notebooks
+
+
+def _graded(data: ClassData, student: str) -> dict[str, NotebookNode]:
+    """Return what was graded, under whichever name it was handed in.
+
+    Its cells are recognised: one that came without metadata says there which it is.
+    """
+    records = data.records.get(student, {})
+    read = [name for name, record in records.items() if not record.unreadable]
+    return _notebooks(data.root / "autograded" / student / data.assignment, read)
+
+
+def _answers(
+    notebook: NotebookNode, asked: Mapping[str, Question]
+) -> list[tuple[Question, OwnText]]:
+    found = []
+    for cell in notebook.cells:
+        question = asked.get(submission.grade_id(cell))
+        if question and question.written and cell.cell_type == "markdown":
+            source = str(cell.source)
+            lines = tuple(source[:MAX_CHARACTERS].splitlines())
+            found.append((question, OwnText(lines, len(source) > MAX_CHARACTERS)))
+    return found

@@ -1,0 +1,123 @@
+"""The class report: made of what was graded, and written to files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+from nbformat import NotebookNode
+
+from autograder.assignments import submission
+from autograder.assignments.submission import SubmissionError
+from autograder.class_report import (
+    InsightError,
+    feedback,
+    figures,
+    likeness,
+    means,
+    needs,
+    similarity,
+)
+from autograder.class_report.class_report import ClassReport
+from autograder.class_report.collect import ClassData, collect
+from autograder.class_report.own_text import GivenText
+from autograder.class_report.platforms import exports
+from autograder.class_report.platforms.exports import Export
+from autograder.gradebook.course_gradebook import CourseGradebook
+from course.plain import counted
+
+PAGE, CANVAS, MOODLE = "class-report.html", "canvas.csv", "moodle.csv"
+
+
+def make(root: Path, assignment: str, threshold: float = similarity.THRESHOLD) -> ClassReport:
+    """Make the report of an assignment from the gradebook, the records and the submissions.
+
+    Raises:
+        InsightError: no such assignment, or nothing of it has been graded yet.
+        GradebookError: ``root`` is no course.
+    """
+    data = collect(root, assignment)
+    given = GivenText(_notebooks(data, "release"), _notebooks(data, "source"))
+    texts, notes = likeness.texts_of(data, given)
+    return ClassReport(
+        data, figures.checks(data), figures.times(data), feedback.common(data),
+        needs.people_needed(data), likeness.compare(data, texts, given, threshold), texts, given,
+        threshold, (*data.notes, *notes), means.of_class(data),
+    )  # fmt: skip
+
+
+def write(
+    report: ClassReport, column: str = "", *, provisional: bool = False, zero_absent: bool = False
+) -> list[Path]:
+    """Write the page and both exports into ``reports/ASSIGNMENT``; return the files.
+
+    Raises:
+        InsightError: the folder cannot be written.
+    """
+    from autograder.class_report import page  # plots take a moment to import
+
+    folder = report.data.root / "reports" / report.data.assignment
+    chosen = {"provisional": provisional, "zero_absent": zero_absent}
+    contents = {
+        PAGE: page.page(report),
+        CANVAS: exports.canvas(report.data, column, **chosen).text,
+        MOODLE: exports.moodle(report.data, column, **chosen).text,
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, content in contents.items():
+            # A lone surrogate (a folder name that is no UTF-8) must not cost the others' grades.
+            encoded = content.encode("utf-8", "backslashreplace")
+            (folder / name).write_bytes(encoded)
+    except OSError as error:
+        raise InsightError(
+            f"The report cannot be written in {folder} ({error.strerror or error}): make room "
+            "there, or make the folder writable, and run the same command again."
+        ) from None
+    return [folder / name for name in contents]
+
+
+def export_remarks(export: Export) -> list[str]:
+    """Return what an instructor has to know before importing the files, as sentences."""
+    remarks = []
+    everybody = export.students + len(export.waiting) + len(export.absent)
+    if export.waiting or export.absent:
+        remarks.append(
+            f"The exports have points for {export.students} of {everybody} students; an empty cell "
+            "is no grade for both platforms, and deletes one that is there."
+        )
+    if export.waiting:
+        number = len(export.waiting)
+        remarks.append(
+            f"Empty for {counted(number, 'student')} whose {'grade' if number == 1 else 'grades'} "
+            f"still {'waits' if number == 1 else 'wait'} for a person (--provisional takes them "
+            "in)."
+        )
+    if export.absent:
+        remarks.append(
+            f"Empty for {counted(len(export.absent), 'student')} who handed in nothing: whether "
+            "that is a 0 is your course's rule, which the platforms can apply themselves "
+            "(--zero-absent writes it)."
+        )
+    if export.guarded:
+        remarks.append(
+            "These ids could run as a formula in a spreadsheet and were written with an apostrophe "
+            f"in front, so match them by hand: {', '.join(export.guarded[:20])}."
+        )
+    return remarks
+
+
+def _notebooks(data: ClassData, step: Literal["source", "release"]) -> dict[str, NotebookNode]:
+    coursedir = CourseGradebook(data.root).coursedir
+    directory = {"source": coursedir.source_directory, "release": coursedir.release_directory}
+    folder = Path(coursedir.format_path(directory[step], ".", data.assignment))
+    mend = {"source": "build", "release": f"release {data.assignment}"}
+    found = {}
+    for path in sorted(folder.glob("*.ipynb")):
+        try:
+            found[path.stem] = submission.read(path)
+        except SubmissionError as error:
+            raise InsightError(
+                f"{error} It lies in {folder}: run `autograder {mend[step]}` again."
+            ) from None
+    return found

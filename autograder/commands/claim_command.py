@@ -1,0 +1,105 @@
+"""``autograder claim``: a person says which file is what."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from autograder.assignments import quiz_cells, submission
+from autograder.assignments.intake import claim_records, roster
+from autograder.assignments.intake.archives import ArchiveError
+from autograder.assignments.intake.claim_records import Claim, ClaimError
+from autograder.assignments.intake.file_names import listed, quoted, shown
+from autograder.assignments.intake.handed_in import HandedIn, Item, look_through
+from autograder.assignments.submission import MAX_NOTEBOOK
+from autograder.gradebook import bridge as bridge
+from quizzes import record
+
+
+def claim(
+    root: Path,
+    assignment: str,
+    student: str,
+    name: str,
+    file: str,
+    *,
+    nothing: bool = False,
+    withdraw: bool = False,
+) -> str:
+    """Keep what a person says of a notebook, or of a quiz's attempts; return what was done.
+
+    Raises:
+        ClaimError: there is no such thing; the message says what there is.
+        NotReadyError: the assignment's source is damaged.
+        SubmissionError: what is claimed cannot be read as a notebook.
+    """
+    from autograder.gradebook.course_gradebook import CourseGradebook
+
+    names = _names(root, assignment)
+    if name not in names:
+        raise ClaimError(
+            f"{listed([name])} is no notebook of {listed([assignment])}: there are {listed(names)}."
+        )
+    folder = roster.folder(root, student) / assignment
+    if not folder.is_dir():
+        raise ClaimError(
+            f"There is nothing in {root / 'submitted'} that {listed([student])} has handed in for "
+            f"{listed([assignment])}: look at the student's name, or put the files there."
+        )
+    if bool(file) + nothing + withdraw != 1:
+        raise ClaimError(
+            "Name one file, or say --nothing or --withdraw: there is "
+            f"{_there(look_through(folder))}."
+        )
+    student = CourseGradebook(root).roster().student(student)
+    made = None if withdraw else _claim(folder, name, names[name], file)
+    claim_records.keep(root, assignment, student, name, made)
+    again = f"`autograder grade {quoted(assignment)}` takes it into account"
+    if withdraw:
+        return f"What was said of {student}'s {name} is taken back: {again}."
+    what = f"is '{shown(file)}'" if file else "was not handed in"
+    return f"{student}'s {name} {what}: {again}."
+
+
+def _names(root: Path, assignment: str) -> dict[str, str]:
+    """Return {what can be claimed: the file that it should be} in an assignment."""
+    source = root / "source" / assignment
+    notebooks = sorted(source.glob("*.ipynb"))
+    if not notebooks:
+        known = sorted(path.name for path in (root / "source").glob("*") if path.is_dir())
+        raise ClaimError(
+            f"There is no assignment {listed([assignment])} in {root}: there is "
+            f"{listed(known) or 'none yet'}."
+        )
+    found = {path.stem: path.name for path in notebooks}
+    for path in notebooks:
+        for quiz in quiz_cells.in_cells(bridge.read_source(path)):
+            found[f"{quiz_cells.PREFIX}{quiz}"] = record.filename(quiz)
+    return found
+
+
+def _claim(folder: Path, name: str, proper: str, file: str) -> Claim:
+    handed_in = look_through(folder)
+    item = handed_in.at(file) if file else None
+    if file and item is None:
+        raise ClaimError(f"There is no {listed([file])} in {folder}: there is {_there(handed_in)}.")
+    if item is not None:
+        _require(item, name)
+    place = item.place if item else ""
+    return Claim(place, claim_records.state(folder, handed_in, proper, place))
+
+
+def _require(item: Item, name: str) -> None:
+    """Raise if a file cannot be what it is claimed to be."""
+    try:
+        content = item.read(MAX_NOTEBOOK + 1)
+    except (OSError, ArchiveError) as error:
+        raise ClaimError(f"{listed([item.place])} cannot be read ({error}).") from None
+    if name.startswith(quiz_cells.PREFIX):
+        if not record.parse(content)[0]:
+            raise ClaimError(f"{listed([item.place])} holds no attempt at a quiz.")
+    else:
+        submission.parse(submission.decoded(content, shown(item.place)), shown(item.place))
+
+
+def _there(handed_in: HandedIn) -> str:
+    return listed(item.place for item in handed_in.items) or "nothing"

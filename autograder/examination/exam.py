@@ -1,0 +1,331 @@
+"""Exams: checks that depend on each other, run in order by the examiner.
+
+A check is a function that gets the exam's rig and returns normally when the behaviour is right (a
+string it returns becomes a remark in the report) or raises `Failed`. The first line of its
+docstring is the title that a student reads; the rest says why it matters on a robot.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType, TracebackType
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from autograder.examination import points as points_table
+from autograder.examination.check_context import Bench, StudentError, SubjectGone
+from autograder.examination.verdict import CheckResult, Status, Verdict
+from autograder.processes.fair_deadline import FairDeadline
+from course.errors import CourseError
+
+RigT = TypeVar("RigT")
+
+
+MAX_TEXT = 7000
+"""Characters of a text in a verdict: of an error in a student's code, 6000 are told."""
+
+SITTING_S = 180.0
+"""Seconds in which checks of one sitting begin: a twelfth is enough for all of them, as a rule.
+
+A node that takes its time for each answer, and yet gives it, would keep the examiner for longer
+than it may take (`autograder.processes.EXAM_TIMEOUT`), and that would be the grader's fault.
+"""
+
+LONGEST_NAME = 200
+"""Bytes that are shown of a name that is no text."""
+
+
+class ExamError(CourseError):
+    """An exam that does not exist, or whose definition does not hold together."""
+
+
+class Failed(Exception):  # noqa: N818 - it is a finding, not a fault
+    """The behaviour was observed and was not what is needed.
+
+    ``expected`` and ``actual`` are one sentence each, in the terms of the exercise.
+    """
+
+    def __init__(self, *, expected: str, actual: str) -> None:
+        """Record what was needed and what was seen."""
+        super().__init__(f"expected: {expected} observed: {actual}")
+        self.expected = expected
+        self.actual = actual
+
+
+class NotExaminable(Exception):  # noqa: N818 - a limit of this machine, not a fault
+    """The check cannot be made on this machine; the message says why, for the student's grade."""
+
+
+class Part(NamedTuple):
+    """A part of an exam: its name, and the answer key that its cell carries, if any."""
+
+    name: str
+    key: Mapping[str, Any] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Check(Generic[RigT]):
+    """One check: what it examines, what it needs, and how it helps."""
+
+    name: str
+    title: str
+    rationale: str
+    run: Callable[[RigT], str | None]
+    needs: tuple[str, ...]
+    hints: tuple[str, ...]
+    read: str
+
+
+@dataclass
+class Exam(Generic[RigT]):
+    """The checks of one exercise, and the rig they run on.
+
+    ``rig`` is a context manager around the bench: what it gives is what every check takes. With
+    ``fresh_parts`` each part has one of its own, for checks that leave their mark on what the nodes
+    do later: what failed in an earlier part is not tried again there, what passed is.
+    """
+
+    name: str
+    rig: Callable[[Bench], AbstractContextManager[RigT]]
+    fresh_parts: bool = False
+    checks: dict[str, Check[RigT]] = field(default_factory=dict)
+    _left_up: ExitStack | None = field(default=None, init=False, repr=False)
+    """What a bench that ends leaves up: it would be taken down if nobody referred to it."""
+
+    def check(
+        self, *, needs: Sequence[str] = (), hints: Sequence[str] = (), read: str = ""
+    ) -> Callable[[Callable[[RigT], str | None]], Callable[[RigT], str | None]]:
+        """Register a check under its function's name.
+
+        Args:
+            needs: checks that must have passed before this one makes sense.
+            hints: from a nudge to nearly the answer; shown one by one.
+            read: where to read on (a section of the chapter, a page of the ROS 2 docs).
+        """
+        unknown = [name for name in needs if name not in self.checks]
+        if unknown:
+            raise ExamError(f"Exam '{self.name}' has no check {unknown[0]!r} to depend on.")
+
+        def register(run: Callable[[RigT], str | None]) -> Callable[[RigT], str | None]:
+            title, _, rationale = inspect.cleandoc(run.__doc__ or run.__name__).partition("\n")
+            self.checks[run.__name__] = Check(
+                run.__name__, title.strip(), " ".join(rationale.split()), run,
+                tuple(needs), tuple(hints), read,
+            )  # fmt: skip
+            return run
+
+        return register
+
+    def part(self, part: str) -> dict[str, float]:
+        """Return {check: points} of a part, in the order of ``points.toml``.
+
+        Raises:
+            ExamError: no such part, or the table of points and the checks disagree.
+        """
+        table = points_table.of_part(self.name, part)
+        if not table:
+            entry = points_table.table().get(self.name)
+            parts = ", ".join(entry.parts) if entry else ""
+            raise ExamError(
+                f"Exam '{self.name}' has no part '{part}': there are {parts or 'none'}."
+            )
+        for name in table:
+            if name not in self.checks:
+                raise ExamError(f"points.toml names a check '{name}' that '{self.name}' lacks.")
+        return table
+
+    def sit(self, parts: Iterable[Part], bench: Bench) -> Iterator[Verdict]:
+        """Run the checks of each part, and what they need, each once; yield a verdict a part.
+
+        All parts are one examination of the same running nodes, but for ``fresh_parts``. A check
+        that is needed in another part earns nothing there: its points are in its own. One that the
+        untouched notebook passes has no points at all: see ``points.toml``.
+        """
+        done: dict[str, CheckResult] = {}
+        gone: list[CheckResult] = []
+        told: set[str] = set()
+        deadline = bench.deadline(SITTING_S)
+        with ExitStack() as stack:
+            rig: RigT | None = None
+            for number, part in enumerate(parts):
+                if number == 0 or self.fresh_parts:
+                    stack.close()
+                    done = {n: result for n, result in done.items() if result.status == "failed"}
+                    try:
+                        rig = stack.enter_context(self.rig(bench))
+                    except (StudentError, SubjectGone) as error:
+                        roots = [name for name in self.checks if not self.checks[name].needs]
+                        done.update((name, _blamed(self.checks[name], error)) for name in roots)
+                        rig = None
+                table = self.part(part.name)
+                bench.key = part.key
+                results = [self._result(name, rig, done, gone, deadline) for name in table]
+                told.update(table)
+                results = [self._with_reason(result, done, told) for result in results]
+                checks = tuple(_worth(result, table[result.name]) for result in results)
+                yield Verdict(self.name, part.name, checks)
+            if bench.ends:
+                self._left_up = stack.pop_all()
+
+    def _with_reason(
+        self, result: CheckResult, done: dict[str, CheckResult], told: set[str]
+    ) -> CheckResult:
+        """Say why what a check needs failed, where no report so far says so."""
+        needs = [done[need] for need in self.checks[result.name].needs if need in done]
+        hidden = [need for need in needs if need.status == "failed" and need.name not in told]
+        if result.status != "not_checked" or not hidden:
+            return result
+        return replace(result, actual=f"{result.actual} It failed: {hidden[0].actual}")
+
+    def _result(
+        self,
+        name: str,
+        rig: RigT | None,
+        done: dict[str, CheckResult],
+        gone: list[CheckResult],
+        deadline: FairDeadline,
+    ) -> CheckResult:
+        if name not in done:
+            check = self.checks[name]
+            for need in check.needs:
+                self._result(need, rig, done, gone, deadline)
+            missing = [done[need] for need in check.needs if not done[need].passed]
+            if missing:
+                done[name] = _not_checked(check, missing[0])
+            elif not deadline.left:
+                done[name] = _too_late(check)
+            else:
+                assert rig is not None  # without one, what needs nothing has failed already
+                done[name] = _run(check, rig, gone)
+        return done[name]
+
+
+def _worth(result: CheckResult, points: float) -> CheckResult:
+    # A check may quote what a student's code said of itself, at any length.
+    expected, actual, note = (_cut(t) for t in (result.expected, result.actual, result.note))
+    earned = points if result.passed else 0.0
+    return replace(
+        result, points=earned, max_points=points, expected=expected, actual=actual, note=note
+    )
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= MAX_TEXT else f"{text[:MAX_TEXT]} [{len(text) - MAX_TEXT} more]"
+
+
+def _result_of(check: Check[RigT], status: Status) -> CheckResult:
+    return CheckResult(
+        check.name, check.title, status, 0.0, 0.0,
+        rationale=check.rationale, hints=check.hints, read=check.read,
+    )  # fmt: skip
+
+
+def _not_checked(check: Check[RigT], missing: CheckResult) -> CheckResult:
+    title = missing.title.rstrip(".")
+    actual = f"This needs “{title}” first."
+    if missing.status in ("grader_error", "not_examined"):
+        actual = f"This needs “{title}”, which could not be examined here. It is not your fault."
+    return replace(_result_of(check, "not_checked"), actual=actual)
+
+
+def _too_late(check: Check[RigT]) -> CheckResult:
+    return replace(
+        _result_of(check, "not_checked"),
+        actual=f"What was examined before this took {SITTING_S:.0f} s in all: which of your "
+        "callbacks takes so long for each answer?",
+    )
+
+
+def _not_reached(check: Check[RigT], gone: CheckResult) -> CheckResult:
+    return replace(
+        _result_of(check, "not_checked"),
+        actual=f"Your program hung or ended in “{gone.title.rstrip('.')}”, and was gone by then.",
+    )
+
+
+def _run(check: Check[RigT], rig: RigT, gone: list[CheckResult]) -> CheckResult:
+    """Run a check; add its result to ``gone`` if it lost the subject.
+
+    What comes after a check that did is not at fault.
+    """
+    try:
+        note = check.run(rig) or ""
+    except Failed as failed:
+        result = _failed(check, failed.expected, failed.actual)
+        if isinstance(failed.__cause__, SubjectGone):
+            gone.append(result)
+        return result
+    except StudentError as error:
+        return _blamed(check, error)
+    except SubjectGone as error:
+        if gone:
+            return _not_reached(check, gone[0])
+        gone.append(_blamed(check, error))
+        return gone[0]
+    except NotExaminable as reason:
+        return replace(_result_of(check, "not_examined"), actual=str(reason))
+    except Exception as error:  # noqa: BLE001 - whatever else goes wrong in here is our fault
+        if isinstance(error, UnicodeDecodeError) and _read_by_ros(error):
+            return _failed(check, *_no_text(error))
+        return replace(
+            _result_of(check, "grader_error"),
+            actual=f"The grader itself failed ({type(error).__name__}: {error}, in "
+            f"{_place(error)}). This is not your fault; after a hand-in a person looks at it.",
+        )
+    return replace(_result_of(check, "passed"), note=note)
+
+
+def _blamed(check: Check[RigT], error: StudentError | SubjectGone) -> CheckResult:
+    """Return the failure of a check that the student's own code or process has cut short."""
+    if isinstance(error, StudentError):
+        expected, actual = "Your code does what it is asked for without an error.", error.told
+    else:
+        expected = "Your program keeps running and answering while it is examined."
+        actual = str(error)
+    return _failed(check, expected, actual)
+
+
+def _failed(check: Check[RigT], expected: str, actual: str) -> CheckResult:
+    return replace(_result_of(check, "failed"), expected=expected, actual=actual)
+
+
+def _read_by_ros(error: BaseException) -> bool:
+    """Whether rclpy raised it: it makes text of what it has heard from others."""
+    place = _innermost(error)
+    return place is not None and place.tb_frame.f_globals.get("__name__", "").startswith("rclpy.")
+
+
+def _no_text(error: UnicodeDecodeError) -> tuple[str, str]:
+    """Return what is needed of a name on the ROS graph, and what one was that is no text."""
+    return (
+        "The names and types on the ROS graph are text.",
+        f"A name on the ROS graph is no text: {error.object[:LONGEST_NAME]!r}. Did something in "
+        "the notebook make a node, a topic or a type of that name?",
+    )
+
+
+def _innermost(error: BaseException) -> TracebackType | None:
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return trace
+
+
+def _place(error: BaseException) -> str:
+    trace = _innermost(error)
+    return f"{trace.tb_frame.f_code.co_name}, line {trace.tb_lineno}" if trace else "unknown"
+
+
+def unexamined(exam: Exam[RigT], part: str, reason: str, status: Status = "not_checked") -> Verdict:
+    """Return the verdict of a part that could not be sat.
+
+    ``status`` says whose fault it is: ``"not_checked"`` the subject's, ``"grader_error"`` ours.
+    """
+    table = exam.part(part)
+    results = (
+        replace(_result_of(exam.checks[name], status), actual=reason, max_points=table[name])
+        for name in table
+    )
+    return Verdict(exam.name, part, tuple(results))

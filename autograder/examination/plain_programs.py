@@ -1,0 +1,112 @@
+"""Plain programs of the subject's nodes, as the examiner sees them: from outside, and only so.
+
+What a student's process says of itself, or does when its harness asks it to, can be made up there.
+A further process runs the notebook's cells and then its nodes, as `python program.py` would
+(`autograder.examination.subject.plain_program`), and nobody asks it for anything.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any, TextIO
+
+from autograder.processes.outside.asking import Outside
+from autograder.processes.outside.requests import RequestError
+from course.domains import MAX_DOMAIN
+from course.errors import CourseError, WaitTimeout
+from course.runtime.core_session import CoreSession
+
+DOMAINS = 100
+"""Domains that programs take turns in: what one that was killed leaves is on the graph for long."""
+
+Nodes = Sequence[tuple[str, Sequence[str]]]
+"""Classes, and what their constructors are given."""
+
+
+class ProgramError(CourseError):
+    """The engine did not start a program; the message says why."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A plain program. ``up`` is whether it has made its nodes; ``session`` is in its network."""
+
+    session: CoreSession
+    up: bool
+    domain_id: int
+    _ask: Callable[..., dict[str, Any]]
+    _outside: Outside
+
+    def interrupt(self) -> None:
+        """Have its nodes ended, or made anew if they are."""
+        self._ask(wants="interrupt")
+
+    def ended(self) -> bool:
+        """Whether its process has gone, with all that it started."""
+        try:
+            return not self._outside.ask("threads")
+        except RequestError:
+            return True
+
+    def wait(self, condition: Callable[[], Any], seconds: float) -> bool:
+        """Wait until ``condition`` holds, for so long; return whether it does."""
+        with suppress(WaitTimeout):
+            self.session.until(condition, timeout=seconds, what="an observation")
+            return True
+        return False
+
+
+class Programs:
+    """Asks the engine for programs over the examiner's own streams."""
+
+    def __init__(self, replies: TextIO, requests: TextIO, outside: Outside) -> None:
+        """Ask on ``requests``, hear on ``replies``; ``outside`` sees the program while it runs."""
+        self._replies, self._requests, self._outside = replies, requests, outside
+        self._count = 0
+
+    def _ask(self, **request: Any) -> dict[str, Any]:
+        self._requests.write(json.dumps(request) + "\n")
+        self._requests.flush()
+        reply: dict[str, Any] = json.loads(self._replies.readline())
+        if "error" in reply:
+            raise ProgramError(f"There is no plain program: {reply['error']}.")
+        return reply
+
+    @contextmanager
+    def program(
+        self,
+        nodes: Nodes,
+        *,
+        threads: int = 1,
+        sim_time: bool = False,
+        apart: bool = False,
+        twice: bool = False,
+        shut_down: bool = False,
+    ) -> Iterator[Program]:
+        """Run nodes of the notebook's classes for the length of the block.
+
+        Where they are ``apart``, each has an executor of its own, with so many threads, and what
+        leaves a callback ends its node alone. ``twice``: at the end of the first life each node is
+        destroyed twice. ``shut_down``: at a first interrupt their ``shutdown()`` is called, and
+        they spin on until the next. Whatever looks at the subject's processes meanwhile looks at
+        the program's.
+
+        Raises:
+            ProgramError: the engine did not start it; that is never the student's fault.
+        """
+        self._count += 1
+        domain = MAX_DOMAIN - 1 - self._count % DOMAINS
+        try:
+            reply = self._ask(
+                wants="program", nodes=[[name, [*given]] for name, given in nodes],
+                threads=threads, sim_time=sim_time, apart=apart, twice=twice, shut_down=shut_down,
+                domain=domain,
+            )  # fmt: skip
+            with CoreSession(domain_id=domain) as session:
+                session.explains = False
+                yield Program(session, bool(reply["up"]), domain, self._ask, self._outside)
+        finally:
+            self._ask(wants="end")

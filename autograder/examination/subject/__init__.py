@@ -1,0 +1,1 @@
+"""The process that a submission runs in: its cells, its nodes, and what it says of itself."""

@@ -1,0 +1,96 @@
+"""How a verdict looks to a student: the same content as text and as HTML, everything escaped."""
+
+from __future__ import annotations
+
+from html import escape
+
+from autograder.examination.verdict import CheckResult, Verdict
+
+MARKS = {"passed": "✔", "failed": "✘", "not_checked": "-", "not_examined": "?", "grader_error": "!"}
+WORDS = {
+    "passed": "passed",
+    "failed": "not yet",
+    "not_checked": "not checked",
+    "not_examined": "not examined here",
+    "grader_error": "the grader failed",
+}
+NEEDED = "needed for others, earns nothing by itself"
+"""What stands in place of the points of a check that has none: why it was made all the same."""
+
+COLOURS = {
+    "passed": "#1a7f37",
+    "failed": "#b35900",
+    "not_checked": "#6e7781",
+    "not_examined": "#8250df",
+    "grader_error": "#8250df",
+}
+
+
+class Report:
+    """A verdict with as many hints as were asked for."""
+
+    def __init__(self, verdict: Verdict, *, hints: int = 1) -> None:
+        """Show ``verdict``; ``hints`` is how many of each failed check's hints to give."""
+        self._verdict = verdict
+        self._hints = hints
+
+    def __repr__(self) -> str:
+        """Return the report as plain text."""
+        verdict = self._verdict
+        lines = [f"{verdict.exam}: {_points(verdict.score)} of {_points(verdict.max_score)} points"]
+        lines += [f"  note: {note}" for note in verdict.notes]
+        for check in verdict.checks:
+            lines.append(f"{MARKS[check.status]} {check.title} ({_outcome(check)})")
+            lines += [f"    {label}: {text}" for label, text in self._details(check)]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        verdict = self._verdict
+        head = (
+            f"<p><strong>{escape(verdict.exam)}: {_points(verdict.score)} of "
+            f"{_points(verdict.max_score)} points</strong></p>"
+        )
+        notes = "".join(f"<p>{escape(note)}</p>" for note in verdict.notes)
+        items = "".join(self._item(check) for check in verdict.checks)
+        return f'{head}{notes}<ul style="list-style:none;padding-left:0">{items}</ul>'
+
+    def _item(self, check: CheckResult) -> str:
+        details = "".join(
+            f'<div style="margin-left:1.6em"><em>{escape(label)}:</em> '
+            f'<span style="white-space:pre-wrap">{escape(text)}</span></div>'
+            for label, text in self._details(check)
+        )
+        return (
+            f'<li style="margin:.4em 0"><span style="color:{COLOURS[check.status]}" '
+            f'aria-hidden="true">{MARKS[check.status]}</span> '
+            f"<strong>{escape(check.title)}</strong> "
+            f"({_outcome(check)}){details}</li>"
+        )
+
+    def _details(self, check: CheckResult) -> list[tuple[str, str]]:
+        if check.passed:
+            return [("note", check.note)] if check.note else []
+        details = [
+            ("needed", check.expected),
+            ("observed", check.actual),
+            ("why it matters", check.rationale),
+        ]
+        if check.status == "failed":
+            shown = check.hints[: self._hints]
+            details += [(f"hint {n}", hint) for n, hint in enumerate(shown, start=1)]
+            if len(shown) < len(check.hints):
+                part = "" if self._verdict.part == "visible" else f', part="{self._verdict.part}"'
+                more = f'check("{self._verdict.exam}"{part}, hint={len(shown) + 1})'
+                details.append(("more help", more))
+            details.append(("read", check.read))
+        return [(label, text) for label, text in details if text]
+
+
+def _outcome(check: CheckResult) -> str:
+    if not check.max_points:
+        return f"{WORDS[check.status]}; {NEEDED}"
+    return f"{WORDS[check.status]}, {_points(check.points)}/{_points(check.max_points)}"
+
+
+def _points(value: float) -> str:
+    return f"{value:g}"

@@ -1,0 +1,1 @@
+"""Pages of feedback: a student's, and the index of what there is."""

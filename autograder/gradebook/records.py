@@ -1,0 +1,95 @@
+"""The verdicts behind a grade, kept beside the gradebook, which holds only points.
+
+One small JSON file for each student and notebook is written when the scores are entered, by
+whichever door they come in: ``autograder grade``, ``nbgrader autograde`` or the formgrader.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from autograder.examination.verdict import Verdict
+from autograder.files import write_whole
+from course.errors import CourseError
+
+VERSION = 1
+FOLDER = "verdicts"
+MAX_BYTES = 4 * 1024 * 1024
+"""Largest record that is read; one of a notebook of this course has 10 kB."""
+
+
+class RecordError(CourseError):
+    """A record that is damaged, or of another version."""
+
+
+class Outcome(Protocol):
+    """What of a run is recorded; see `autograder.running.runner.Outcome`."""
+
+    verdicts: dict[str, Verdict]
+    notes: list[str]
+    seconds: float
+    unreadable: bool
+
+
+@dataclass(frozen=True)
+class Record:
+    """What came of running one notebook of one student.
+
+    ``verdicts`` is {grade id: verdict}, ``notes`` are the remarks about the run, ``seconds`` is
+    its wall time, and ``unreadable`` says that there was nothing to run at all.
+    """
+
+    verdicts: Mapping[str, Verdict]
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0
+    unreadable: bool = False
+
+
+def path(work: Path, assignment: str, student: str, notebook: str) -> Path:
+    """Return where a record lies in the engine's work folder."""
+    return work / FOLDER / assignment / student / f"{notebook}.json"
+
+
+def keep(work: Path, assignment: str, student: str, notebook: str, outcome: Outcome) -> None:
+    """Write the record of an outcome in place of an earlier one; raises OSError if it cannot."""
+    data = {
+        "version": VERSION,
+        "verdicts": {name: v.as_data() for name, v in outcome.verdicts.items()},
+        "notes": list(outcome.notes),
+        "seconds": outcome.seconds,
+        "unreadable": outcome.unreadable,
+    }
+    write_whole(path(work, assignment, student, notebook), json.dumps(data, ensure_ascii=False))
+
+
+def load(work: Path, assignment: str, student: str, notebook: str) -> Record | None:
+    """Return a record, or None if there is none.
+
+    Raises:
+        RecordError: there is one, and it cannot be read.
+    """
+    file = path(work, assignment, student, notebook)
+    try:
+        if not file.is_file():
+            return None
+        if file.stat().st_size > MAX_BYTES:
+            raise ValueError("too large")
+        data = json.loads(file.read_text(encoding="utf-8"))
+        if data["version"] != VERSION:
+            raise ValueError(f"version {data['version']}")
+        seconds = float(data["seconds"])
+        if not math.isfinite(seconds) or seconds < 0:
+            raise ValueError(f"{seconds} s")
+        verdicts = {str(name): Verdict.from_data(v) for name, v in data["verdicts"].items()}
+        notes = tuple(str(note) for note in data["notes"])
+        return Record(verdicts, notes, seconds, data["unreadable"] is True)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, CourseError, OSError):
+        raise RecordError(
+            f"The record of {student}'s check results for {notebook} is damaged, so it is left "
+            f"out: run `autograder grade {assignment}` again to have it written anew."
+        ) from None

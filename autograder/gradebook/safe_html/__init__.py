@@ -1,0 +1,1 @@
+"""What of a submission may be shown in a page, and at what cost."""

@@ -1,0 +1,1 @@
+"""A class is graded: its submissions taken in, run, entered."""

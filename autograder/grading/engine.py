@@ -1,0 +1,205 @@
+"""Grade a whole assignment: run submissions side by side, enter scores one by one.
+
+Running is parallel, because a subject mostly waits; the gradebook has one writer, this process. It
+may be killed at any moment: outcomes and grades are kept one by one, each as a whole or not at all,
+and the next run takes up what is missing.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Collection, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from autograder import files, sandbox
+from autograder.assignments.intake import roster
+from autograder.assignments.intake.roster import Roster
+from autograder.gradebook import bridge as bridge
+from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.gradebook.safe_html import page_texts
+from autograder.grading.graded import Graded
+from autograder.grading.grading_run import ClassRun
+from autograder.grading.progress import Progress
+from autograder.grading.submission_intake import Desk
+from autograder.running.fresh_run import Anew
+from autograder.running.interruption import Interruption
+from autograder.running.jobs import Job, Result
+from autograder.running.outcome_store import OutcomeStore
+from autograder.running.workers import LocalWorkers, Workers
+from course.errors import CourseError
+
+__all__ = ["AssignmentError", "BusyError", "Graded", "grade"]
+
+STAGED = f"{bridge.WORK_FOLDER}/staged"
+LOCK = f"{bridge.WORK_FOLDER}/engine.lock"
+
+
+EXCLUDED = (
+    "Left out, as nbgrader_config.py says (CourseDirectory.student_id_exclude): nothing was run."
+)
+
+
+class AssignmentError(CourseError):
+    """An assignment that does not exist or is not ready; the message names what there is."""
+
+
+class BusyError(CourseError):
+    """Another engine is grading in the same course."""
+
+
+QUIET = Progress()
+
+
+def grade(
+    root: Path,
+    assignment: str,
+    *,
+    students: Collection[str] = (),
+    jobs: int = 2,
+    fresh: bool = False,
+    trust: bool = False,
+    feedback: bool = True,
+    scheduler: str = "",
+    progress: Progress = QUIET,
+) -> list[Graded]:
+    """Grade every submission of an assignment into the gradebook of the course at ``root``.
+
+    What has not changed since it was graded is left as it is.
+
+    Args:
+        root: the nbgrader course root.
+        assignment: its name.
+        students: grade only these; all if there are none.
+        jobs: how many notebooks are run at a time.
+        fresh: run also what was run before and has not changed. Until such a run is through,
+            whichever comes after it goes on with it.
+        trust: run submissions outside of a sandbox, with the rights of this process.
+        feedback: write HTML feedback, too.
+        scheduler: address of a Dask scheduler whose workers run the notebooks, in place of this
+            machine.
+        progress: is told how it goes.
+
+    Raises:
+        AssignmentError: no such assignment, not released, or nothing submitted.
+        NotReadyError: its source or its release is missing or damaged.
+        BusyError: another engine is at work in this course.
+        ClusterError: the scheduler cannot be used.
+        GradebookError: the gradebook itself cannot be used.
+        GradebookUnusable: it cannot be used any more: a full disk, or a lock, say.
+        SandboxError: they are not trusted, and there is no working sandbox here.
+        StoreError: there is no room for what came out.
+        Stopped: a signal ended the run; what was graded is kept.
+    """
+    gradebook = CourseGradebook(root, staged=STAGED)
+    names = _notebooks(gradebook, assignment)
+    known = gradebook.roster()
+    students = sorted({known.student(name) for name in students})
+    found, wrong = _students(gradebook, assignment, known, students)
+    if not trust and not scheduler:
+        sandbox.warm_up()
+        sandbox.require()
+    page_texts.warm_up()
+    refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
+    refused += [Graded(s, {}, problem=EXCLUDED) for s in found if s in gradebook.excluded]
+    found = [s for s in found if s not in gradebook.excluded]
+    store = OutcomeStore(root / bridge.WORK_FOLDER / "outcomes", trust=trust, hidden=[root])
+    with ExitStack() as stack:
+        stack.enter_context(_alone(root))
+        stack.callback(progress.end)
+        files.sweep()
+        files.remove_partial(root / bridge.WORK_FOLDER)
+        workers = stack.enter_context(_workers(jobs, store, trust, scheduler, root, progress))
+        interruption = stack.enter_context(Interruption(workers.wake))
+        desk = Desk(gradebook, assignment, names, trust=trust)
+        whole = Anew(desk.work_folder, assignment)
+        anew = Anew(desk.work_folder, assignment, students) if students else whole
+        if anew.since:
+            progress.say("Going on with the run with --fresh that was ended before it was through.")
+        if fresh:
+            anew.begin()
+        run = ClassRun(
+            desk, store, workers, interruption, progress, feedback=feedback,
+            since=max(anew.since, whole.since),
+        )  # fmt: skip
+        graded = [*refused, *run.grade(found, refused)]
+        anew.end()
+    return sorted(graded, key=lambda item: item.student)
+
+
+def _workers(
+    count: int, store: OutcomeStore, trust: bool, scheduler: str, root: Path, progress: Progress
+) -> Workers:
+    def keep(job: Job, result: Result) -> None:
+        store.put(job.program, job.files, result.outcome, result.mode)
+
+    if not scheduler:
+        return LocalWorkers(count, keep, trust=trust, hidden=[root])
+    from autograder.running.cluster import Cluster
+
+    return Cluster(scheduler, keep, trust=trust, hidden=[root], say=progress.say)
+
+
+@contextmanager
+def _alone(root: Path) -> Iterator[None]:
+    """Hold the course for this engine; the kernel lets it go when the process ends, however."""
+    path = root / LOCK
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with FileLock(path, timeout=0):
+            yield
+    except Timeout:
+        raise BusyError(
+            f"Another `autograder grade` is at work in {root}: wait until it is done, or end it, "
+            "and run the same command again."
+        ) from None
+
+
+def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
+    """Return the notebooks of a released assignment, or say what is missing."""
+    known = gradebook.assignments()
+    released = gradebook.notebooks(assignment) if assignment in known else []
+    if not released:
+        sources = sorted(
+            path.name for path in (gradebook.root / "source").glob("*") if path.is_dir()
+        )
+        if assignment in sources:
+            raise AssignmentError(
+                f"The assignment '{assignment}' has not been released: run "
+                f"`autograder release {assignment}` first."
+            )
+        raise AssignmentError(
+            f"There is no assignment '{assignment}' in {gradebook.root}: there are "
+            f"{', '.join(sources) or 'none yet'}."
+        )
+    return released
+
+
+def _students(
+    gradebook: CourseGradebook, assignment: str, known: Roster, only: Collection[str]
+) -> tuple[list[str], dict[str, str]]:
+    """Return who has submitted, and what is wrong with the folders that cannot be graded.
+
+    ``only`` are the ids of the students that are meant; all if there are none.
+    """
+    students, wrong = roster.submissions(gradebook.root, assignment, known, gradebook.assignments())
+    there = {*students, *map(known.student, wrong)}
+    for student in only:
+        if student not in there:
+            close = difflib.get_close_matches(student, there, n=1)
+            meant = f" (is it '{close[0]}'?)" if close else ""
+            raise AssignmentError(
+                f"'{student}' has not submitted '{assignment}'{meant}: there is no folder "
+                f"{gradebook.root / 'submitted' / student / assignment}."
+            )
+    if not students and not wrong:
+        raise AssignmentError(
+            f"Nobody has submitted '{assignment}' yet: nbgrader expects the files in "
+            f"{gradebook.root / 'submitted'}/<student>/{assignment}/."
+        )
+    if not only:
+        return students, wrong
+    wrong = {name: problem for name, problem in wrong.items() if known.student(name) in only}
+    return [student for student in students if student in only], wrong

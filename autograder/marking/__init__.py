@@ -1,0 +1,1 @@
+"""Written answers, marked by a person."""

@@ -1,0 +1,83 @@
+"""The warden of one submission: answers its examiner, who is in a sandbox, from outside of it.
+
+Started as ``python -P -m autograder.processes.outside.warden --examiner FD`` in the submission's
+network. The engine tells over standard input whom it is about, in one line of JSON: the first
+processes of both sandboxes, ``{"subject": ..., "examiner": ...}``, the subject's own process,
+``"pid"``, and those that hold its sandbox, ``"ours"``, both by their numbers in it. ``FD`` is the
+channel to the examiner, whose every line is a request (`requests`). It ends with either.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import socket
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+from autograder.processes.channel import Channel, ChannelClosed
+from autograder.processes.descriptors import readable
+from autograder.processes.outside import requests
+from autograder.processes.outside.holding import HoldError
+from autograder.processes.outside.requests import CannotLoseError, RequestError, Scene
+from autograder.processes.process_folders import Sandboxed
+
+MAX_REQUEST = 64 * 1024
+"""Bytes of the longest request."""
+
+
+def serve(engine: int, examiner: Channel) -> None:
+    """Answer requests until engine or examiner has gone."""
+    scene: Scene | None = None
+    while True:
+        ready = readable([engine, examiner], None)
+        if engine in ready:
+            with open(engine, encoding="utf-8", closefd=False) as lines:
+                line = lines.readline()
+            if not line:
+                return
+            scene = _scene(json.loads(line))
+        elif examiner.fileno() in ready:
+            request = examiner.receive()
+            examiner.send(_reply(scene, request))
+
+
+def _scene(told: dict[str, Any]) -> Scene | None:
+    try:
+        subject, examiner = Sandboxed(told["subject"], told["ours"]), Sandboxed(told["examiner"])
+        return Scene(subject, told["pid"], examiner)
+    except OSError:
+        return None  # one of them has ended
+
+
+def _reply(scene: Scene | None, request: dict[str, Any]) -> dict[str, Any]:
+    what = request.pop("what", "")
+    if scene is None:
+        return {"error": "there is nobody to look at"}
+    try:
+        return {"answer": requests.answer(scene, what, request)}
+    except RequestError as error:
+        return {"error": str(error)}
+    except CannotLoseError as error:
+        return {"cannot": str(error)}
+    except HoldError as error:
+        return {"no_hold": str(error)}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the process; returns its exit code."""
+    parser = argparse.ArgumentParser(prog="autograder.processes.outside.warden")
+    parser.add_argument(
+        "--examiner", type=int, required=True, help="file descriptor to be asked on"
+    )
+    options = parser.parse_args(arguments)
+    try:
+        serve(0, Channel(socket.socket(fileno=options.examiner), MAX_REQUEST))
+    except ChannelClosed:
+        return 0
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

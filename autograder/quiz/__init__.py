@@ -1,0 +1,1 @@
+"""Quizzes in the gradebook: marked with the course's banks."""

@@ -1,0 +1,195 @@
+"""Quizzes in the gradebook: the saved answers of a submission, marked with the instructor's keys.
+
+A grade cell whose grade id is ``quiz-NAME`` stands for the quiz NAME, whose bank lies in the course
+(``authoring/banks``) or in the package. The scores in a student's
+attempts file are not looked at: its best attempt is marked again (see `quizzes.regrade`), so a
+file that was written by hand earns what its answers earn. How many attempts there are stands in
+the feedback; a file that looks machine-made is marked for a person, with the reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from nbformat import NotebookNode
+
+from autograder.assignments.intake import attempts
+from autograder.assignments.intake.file_names import same
+from autograder.assignments.quiz_cells import PREFIX, find_bank, in_cells, names
+from autograder.examination.verdict import CheckResult, Status, Verdict
+from autograder.running.runner import Outcome
+from quizzes import record, regrade, rendering, text
+from quizzes.bank import Bank
+from quizzes.marks import Mark
+
+PART = "answers"
+
+
+def with_quizzes(
+    outcome: Outcome,
+    notebook: NotebookNode,
+    folder: Path,
+    student: str,
+    root: Path,
+    roster: Collection[str] = (),
+) -> Outcome:
+    """Return an outcome that holds the marks of the notebook's quizzes, too.
+
+    Args:
+        outcome: what came of running the notebook.
+        notebook: the submitted notebook, its cells restored.
+        folder: the submission, with the attempts file in it.
+        student: whose submission it is.
+        root: the course root, with banks of its own.
+        roster: the students whom the gradebook knows.
+
+    Raises:
+        QuizMarksError: a bank is not sound.
+    """
+    asked = [name for name in in_cells(notebook) if name in names(root)]
+    marked = {
+        f"{PREFIX}{name}": verdict(find_bank(root, name), folder, student, root, roster)
+        for name in asked
+    }
+    return replace(outcome, verdicts={**outcome.verdicts, **marked}) if marked else outcome
+
+
+def unmarked(outcome: Outcome, notebook: NotebookNode, root: Path, reason: str) -> Outcome:
+    """Return the outcome of a notebook that is not graded, with its quizzes, for ``reason``.
+
+    Raises:
+        QuizMarksError: a bank is not sound.
+    """
+    asked = [name for name in in_cells(notebook) if name in names(root)]
+    marks = {
+        f"{PREFIX}{name}": _unmarked(find_bank(root, name), reason, status="grader_error")
+        for name in asked
+    }
+    return replace(outcome, verdicts={**outcome.verdicts, **marks})
+
+
+def questions(
+    notebook: NotebookNode, folder: Path, student: str, root: Path, roster: Collection[str] = ()
+) -> dict[str, tuple[str, str]]:
+    """Return {grade id: (what a person is asked, the command that answers)} of its quizzes.
+
+    Arguments as in `with_quizzes`.
+    """
+    asked: dict[str, tuple[str, str]] = {}
+    for name in in_cells(notebook):
+        if name in names(root):
+            with suppress(OSError):
+                found = attempts.find(folder, name, student, root, roster)
+                if found.question:
+                    asked[f"{PREFIX}{name}"] = (found.question, found.command)
+    return asked
+
+
+def verdict(
+    bank: Bank,
+    folder: Path,
+    student: str,
+    root: Path | None = None,
+    roster: Collection[str] = (),
+) -> Verdict:
+    """Mark the best attempt that lies in ``folder``; arguments as in `with_quizzes`.
+
+    The course ``root`` is that above ``submitted/STUDENT/ASSIGNMENT`` if it is left out.
+    """
+    name = record.filename(bank.quiz)
+    root = root or folder.parents[2]
+    try:
+        found = attempts.find(folder, bank.quiz, student, root, roster)
+    except OSError as error:
+        return _unmarked(bank, f"{name} cannot be read ({error.strerror or error}).")
+    if found.content is None:
+        reason = (
+            f"There is no {name} in the submission: it lies beside the notebook once you have "
+            "submitted the quiz, and has to be handed in with it."
+        )
+        if found.nothing:
+            reason = f"{name} was not handed in, as a person has said."
+        status: Status = "not_examined" if found.question else "not_checked"
+        return _unmarked(bank, found.question or reason, status=status)
+    content = found.content
+    try:
+        marked = regrade.mark_file(bank, content)
+    except Exception as error:  # noqa: BLE001 - one student's data must not end the class
+        reason = (
+            f"The attempts in {name} could not be marked ({type(error).__name__}: {error}): a "
+            "person has to look at them."
+        )
+        return _unmarked(bank, reason[:500], status="grader_error")
+    if marked.best is None and found.question:
+        return _unmarked(bank, found.question, tuple(_remarks(marked)), "not_examined")
+    if marked.best is None:
+        return _none_counts(bank, name, marked)
+    checks = tuple(_check(mark) for mark in marked.best.marks)
+    if marked.doubt:  # its points stand below; whether they count is for a person to say
+        title = "The attempts were made by a person"
+        doubt = CheckResult("attempts", title, "not_examined", 0.0, 0.0, actual=marked.doubt)
+        checks = (*checks, doubt)
+    if found.question:
+        title = "It is clear which attempts count, and whose they are"
+        unclear = CheckResult("file", title, "not_examined", 0.0, 0.0, actual=found.question)
+        checks = (*checks, unclear)
+    notes = (*([found.note] if found.note else []), *_notes(marked, student))
+    return Verdict(f"{PREFIX}{bank.quiz}", PART, checks, notes)
+
+
+def _check(mark: Mark) -> CheckResult:
+    wrong = [remark for remark in mark.remarks if not remark.right]
+    answer = rendering.plain(text.of_answer(mark.item, mark.answer))
+    return CheckResult(
+        mark.item.variant.id, rendering.plain(mark.item.concept.objective),
+        "passed" if mark.right else "failed", round(mark.credit, 2), 1.0,
+        rationale=" ".join(rendering.plain(r.feedback) for r in wrong if r.feedback),
+        actual=f"The answer was: {answer}",
+    )  # fmt: skip
+
+
+def _notes(marked: regrade.Marked, student: str) -> Iterator[str]:
+    assert marked.best is not None
+    paper = marked.best.paper
+    count = len(marked.results)
+    which = (
+        f"The best of {count} attempts counts:" if count > 1 else "The one attempt that counts is"
+    )
+    yield f"{which} number {paper.attempt}. {marked.best.headline}"
+    if not same(paper.student, student):
+        yield f"It was made under the login '{paper.student}'."
+    yield from _remarks(marked)
+
+
+def _remarks(marked: regrade.Marked) -> Iterator[str]:
+    yield from marked.problems[:5]
+    if marked.damaged:
+        yield f"{marked.damaged} lines of the file are no attempts and were left out."
+    if marked.other_edition:
+        yield f"{marked.other_edition} attempts were made with another edition of the quiz."
+
+
+def _none_counts(bank: Bank, name: str, marked: regrade.Marked) -> Verdict:
+    remarks = tuple(_remarks(marked))
+    if marked.other_edition:
+        reason = (
+            "The attempts were made with another edition of the quiz than the one that is "
+            "installed here, so a person has to mark them."
+        )
+        return _unmarked(bank, reason, remarks, "grader_error")
+    if marked.doubt:
+        return _unmarked(bank, marked.doubt, remarks, "not_examined")
+    return _unmarked(bank, f"{name} holds no attempt that counts.", remarks)
+
+
+def _unmarked(
+    bank: Bank, reason: str, notes: tuple[str, ...] = (), status: Status = "not_checked"
+) -> Verdict:
+    checks = tuple(
+        CheckResult(c.id, rendering.plain(c.objective), status, 0.0, 1.0, actual=reason)
+        for c in bank.concepts
+    )
+    return Verdict(f"{PREFIX}{bank.quiz}", PART, checks, notes)

@@ -1,0 +1,156 @@
+"""What a verdict depends on beside the submission: digests of the code that comes to it.
+
+An exam's verdict depends on its module, on the instruments that it imports, and on whatever runs a
+subject and an examiner. So a digest covers the modules that these import, directly or not, and a
+change of one exam lets the outcomes of the others stand. What is imported for annotations alone
+changes nothing, and of the names that a package imports on demand only those count that are used.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Iterator
+from functools import cache
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from autograder.examination import points
+
+PACKAGES = ("autograder", "course", "quizzes")
+HARNESS = (
+    "autograder.running.runner",
+    "autograder.examination.subject.process",
+    "autograder.running.examiner",
+)
+"""Where the processes of a run begin; what they import is behind every verdict."""
+
+GRADING = ("autograder.grading.submission_intake",)
+"""Where outcomes become points and feedback."""
+
+RUN_DATA = (".xml",)
+"""Files beside the code that decide how a run goes: the settings of DDS."""
+
+GRADING_DATA = (".yaml",)
+"""The same for points: the banks of the quizzes."""
+
+
+@cache
+def of_exams(names: tuple[str, ...], root: Path | None = None) -> str:
+    """Return a digest of everything that decides the verdicts of these exams.
+
+    Args:
+        names: sorted names of exams; none for a program that sits no exam.
+        root: a folder with copies of the packages; the installed ones if left out.
+    """
+    table = points.table()
+    worth = json.dumps({name: table[name].parts for name in names if name in table}, sort_keys=True)
+    return _Code(root).digest(_of_run(names), RUN_DATA, worth)
+
+
+@cache
+def of_grading(names: tuple[str, ...], root: Path | None = None) -> str:
+    """Return a digest of what decides these exams' verdicts and turns them into grades."""
+    return f"{of_exams(names, root)} {_Code(root).digest(GRADING, GRADING_DATA)}"
+
+
+def modules_of_exams(names: Iterable[str]) -> set[str]:
+    """Return the modules that decide the verdicts of these exams."""
+    return _Code(None).closure(_of_run(names))
+
+
+def _of_run(names: Iterable[str]) -> list[str]:
+    return [*HARNESS, *(f"autograder.exercises.{name}.exam" for name in names)]
+
+
+class _Code:
+    """The source of some packages, and what of them imports what."""
+
+    def __init__(self, root: Path | None) -> None:
+        self._files: dict[str, Traversable] = {}
+        self._data: list[Traversable] = []
+        for name in PACKAGES:
+            self._walk(name, root / name if root else resources.files(name))
+
+    def digest(self, modules: Iterable[str], data: tuple[str, ...], more: str = "") -> str:
+        """Return a digest of these modules, of all that they import, of data, and of ``more``."""
+        state = hashlib.sha256(more.encode())
+        for name in sorted(self.closure(modules)):
+            state.update(name.encode() + b"\0" + self._files[name].read_bytes())
+        for file in (file for file in self._data if file.name.endswith(data)):
+            state.update(file.name.encode() + b"\0" + file.read_bytes())
+        return state.hexdigest()
+
+    def closure(self, modules: Iterable[str]) -> set[str]:
+        """Return these modules and all that they import, directly or not."""
+        found: set[str] = set()
+        waiting = list(modules)
+        while waiting:
+            name = waiting.pop()
+            if name in found:
+                continue
+            if name in self._files:
+                found.add(name)
+                waiting += _imports(name, self._files[name].read_bytes())
+                continue
+            package = name.rpartition(".")[0]
+            if package in self._files:
+                waiting += _on_demand(package, self._files[package].read_bytes()).get(name, ())
+        return found
+
+    def _walk(self, package: str, folder: Traversable) -> None:
+        for entry in sorted(folder.iterdir(), key=lambda entry: entry.name):
+            if entry.is_dir():
+                self._walk(f"{package}.{entry.name}", entry)
+            elif entry.name == "__init__.py":
+                self._files[package] = entry
+            elif entry.name.endswith(".py"):
+                self._files[f"{package}.{entry.name[:-3]}"] = entry
+            elif entry.name.endswith((*RUN_DATA, *GRADING_DATA)):
+                self._data.append(entry)
+
+
+_FROM = re.compile(r"^[ \t]*from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|.*)", re.MULTILINE)
+_IMPORT = re.compile(r"^[ \t]*import[ \t]+(.*)", re.MULTILINE)
+_NAME = re.compile(r"[\w.]+")
+_BLOCK = r".*\n(?:[ \t].*\n|\n)*"
+_FOR_TYPES = re.compile(rf"^if TYPE_CHECKING:{_BLOCK}", re.MULTILINE)
+_GETATTR = re.compile(rf"^def __getattr__\({_BLOCK}", re.MULTILINE)
+
+
+@cache
+def _imports(name: str, source: bytes) -> frozenset[str]:
+    """Return what a module may import, its own packages included; too many names do no harm.
+
+    Read from its lines: a syntax tree would keep each `autograder grade` from starting for longer.
+    """
+    text = _GETATTR.sub("", _FOR_TYPES.sub("", source.decode()))
+    found = {name}
+    for package, names in _FROM.findall(text):
+        found |= {package, *(f"{package}.{imported}" for imported in _NAME.findall(names))}
+    for names in _IMPORT.findall(text):
+        found |= set(_NAME.findall(names))
+    return frozenset(found | {parent for module in found for parent in _parents(module)})
+
+
+@cache
+def _on_demand(package: str, source: bytes) -> dict[str, tuple[str, ...]]:
+    """Return {name: what is imported for it} of the names that a package imports when asked."""
+    text = source.decode()
+    if not _GETATTR.search(text):
+        return {}
+    declared = _FROM.findall("".join(_FOR_TYPES.findall(text)))
+    return {
+        f"{package}.{name}": (module, f"{module}.{name}")
+        for module, names in declared
+        for name in _NAME.findall(names)
+        if name != "as"
+    }
+
+
+def _parents(name: str) -> Iterator[str]:
+    while "." in name:
+        name = name.rpartition(".")[0]
+        yield name

@@ -1,0 +1,116 @@
+"""The examiner process: sits exams on a subject that it can only see over DDS.
+
+Started as ``python -P -m autograder.running.examiner --control FD --domain N``. It reads requests
+``{"exam": ..., "parts": [[NAME, KEY], ...], "pid": ..., "seed": ..., "last": ...}`` from standard
+input, one JSON object a line, and writes for each part ``{"verdict": ..., "hangs": ...}`` to
+standard output; ``hangs`` says why the subject cannot be expected to go on, if so. ``KEY`` is the
+answer key of the part's hidden cell, ``pid`` the subject's process, ``seed`` what the exam's
+numbers are drawn from, ``last`` that nothing of the notebook runs after it.
+File descriptor ``FD`` is the control channel to the subject's harness. In a sandbox it also has
+``--outside FD``, its channel to a warden (`autograder.processes.outside`), and is alone with the
+subject on their network.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import socket
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any, TextIO
+
+from autograder import exercises
+from autograder.examination import points
+from autograder.examination.check_context import MAX_REPLY, Bench, Subject
+from autograder.examination.exam import Part
+from autograder.examination.plain_programs import Programs
+from autograder.examination.subject import hang_report
+from autograder.examination.verdict import Verdict
+from autograder.processes.channel import Channel
+from autograder.processes.outside.asking import Afar, Here, Outside
+from course.runtime.core_session import CoreSession
+
+
+def sit(
+    request: dict[str, Any],
+    session: CoreSession,
+    subject: Subject,
+    outside: Outside,
+    programs: Programs | None = None,
+) -> Iterator[Verdict]:
+    """Run parts of an exam, yield a verdict a part, and let the subject go on.
+
+    In a sandbox in which nothing goes on, nodes on either side are not taken down one by one, which
+    takes as long as some checks: they end with the sandbox.
+    """
+    ends = bool(request["last"]) and outside.own_network
+    subject.delay = outside.delay
+    try:
+        bench = Bench(session, subject, outside, int(request["seed"]), programs, ends)
+        exam = exercises.load(request["exam"])
+        for verdict in exam.sit([Part(name, key) for name, key in request["parts"]], bench):
+            yield replace(verdict, seed=bench.draws.seed)
+    finally:
+        if not ends:
+            subject.release()
+
+
+def serve(
+    requests: TextIO,
+    answers: TextIO,
+    session: CoreSession,
+    subject: Subject,
+    outside: Outside | None = None,
+) -> None:
+    """Answer requests until standard input ends; without ``outside``, look at the subject here."""
+    while line := requests.readline():
+        request = json.loads(line)
+        outside = outside or Here(int(request["pid"]))
+        # In a student's own notebook there is only the kernel's process.
+        programs = Programs(requests, answers, outside) if outside.own_network else None
+        for verdict in sit(request, session, subject, outside, programs):
+            answer = {"verdict": verdict.as_data(), "hangs": subject.hangs}
+            answers.write(json.dumps(answer) + "\n")
+            answers.flush()
+
+
+def preload() -> None:
+    """Import every exam: `autograder.sandbox.prefork` calls it before it forks examiners."""
+    from autograder.processes.outside import warden  # noqa: F401 - forked from the same process
+    from autograder.sandbox.prefork import modules
+
+    modules.import_all()
+    for name in exercises.names():
+        exercises.load(name)
+    points.table()  # read once, and not in each fork
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the process; returns its exit code."""
+    parser = argparse.ArgumentParser(prog="autograder.running.examiner")
+    parser.add_argument("--control", type=int, required=True, help="file descriptor of the channel")
+    parser.add_argument("--domain", type=int, required=True, help="the subject's domain id")
+    parser.add_argument("--outside", type=int, help="file descriptor of the channel to a warden")
+    options = parser.parse_args(arguments)
+    # Verdicts go out over a private copy of standard output: whatever a library prints must not
+    # end up among them.
+    verdicts = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    hang_report.tell_when_asked(sys.stderr.fileno())
+    subject = Subject(Channel(socket.socket(fileno=options.control), MAX_REPLY))
+    outside = None
+    if options.outside is not None:
+        outside = Afar(socket.socket(fileno=options.outside))
+    with CoreSession(domain_id=options.domain) as session:
+        session.explains = False  # it asks whether something comes, and says itself what it means
+        serve(sys.stdin, verdicts, session, subject, outside)
+        if outside is not None:
+            os._exit(0)  # in its sandbox nobody is left who would have to hear that it goes
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,110 @@
+"""What has been entered into the gradebook, so that it is not entered again without need.
+
+A record says from what a student's grades were made and how they then stood in the gradebook. It
+is removed before a student is entered and written afterwards, so what a kill interrupted has none.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from autograder.assignments.intake.folder_digest import of_folder
+from autograder.files import write_whole
+from autograder.running import digests
+from autograder.running.fresh_run import is_since
+
+VERSION = 2
+FOLDER = "entered"
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How a student stands in the gradebook: digests of what was found and of what people set."""
+
+    automatic: str
+    manual: str
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A record of one student's grades.
+
+    Attributes:
+        made_of: digest of all that its grades depend on, a blank, and that of the submission.
+        standing: how they stood in the gradebook afterwards.
+        points: automatic points, of ``max_points``.
+        seconds: wall time that the submission's notebooks ran.
+        problem: what a person should know about the submission.
+        feedback: whether HTML feedback was written, too.
+    """
+
+    made_of: str
+    standing: Standing
+    points: float
+    max_points: float
+    seconds: float
+    problem: str
+    feedback: bool
+
+    def is_of(self, made_of: str) -> bool:
+        """Whether the submission is the same, whatever became of the assignment meanwhile."""
+        return self.made_of.split()[-1] == made_of.split()[-1]
+
+
+class Ledger:
+    """The records of one assignment."""
+
+    def __init__(self, work: Path, assignment: str) -> None:
+        """Keep them in the engine's folder ``work``."""
+        # A folder of its own whatever the name; a student's folder name may be as long as a
+        # file name can be, so a record goes by its digest.
+        self._folder = work / FOLDER / assignment
+
+    def get(self, student: str, since: int = 0) -> Entry | None:
+        """Return a student's record, or None if there is no sound one from after ``since``."""
+        path = self._path(student)
+        try:
+            if not is_since(path, since):
+                return None
+            data = json.loads(path.read_text(encoding="utf-8"))
+            if data.pop("version") != VERSION or data.pop("student") != student:
+                return None
+            return Entry(**{**data, "standing": Standing(**data["standing"])})
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+            return None
+
+    def put(self, student: str, entry: Entry) -> None:
+        """Keep a student's record; raises OSError if it cannot be written."""
+        data = {"version": VERSION, "student": student, **asdict(entry)}
+        write_whole(self._path(student), json.dumps(data))
+
+    def remove(self, student: str) -> None:
+        """Forget a student's record."""
+        self._path(student).unlink(missing_ok=True)
+
+    def _path(self, student: str) -> Path:
+        name = hashlib.sha256(student.encode(errors="surrogateescape")).hexdigest()[:32]
+        return self._folder / f"{name}.json"
+
+
+def of_course(
+    root: Path, folders: Iterable[Path], mode: str, exams: tuple[str, ...], late_rule: str
+) -> str:
+    """Return a digest of what all students' grades depend on.
+
+    Args:
+        root: the course root, whose configuration, with what it imports from there, and quizzes
+            count.
+        folders: the assignment's source and release.
+        mode: how submissions are run (see `autograder.sandbox.Abilities`).
+        exams: sorted names of the assignment's exams.
+        late_rule: digest of what is taken off for lateness (see `penalties.rule_digest`).
+    """
+    state = hashlib.sha256(f"{mode} {digests.of_grading(exams)} {late_rule}".encode())
+    for path in (*sorted(root.glob("*.py")), root / "authoring" / "banks", *folders):
+        state.update(of_folder(path).encode())
+    return state.hexdigest()

@@ -1,0 +1,172 @@
+"""The student's door: ``check("qos")`` in a notebook cell."""
+
+from __future__ import annotations
+
+import inspect
+import os
+import signal
+import socket
+import threading
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from autograder import exercises
+from autograder.examination.subject.server import Harness
+from autograder.examination.subject.student_errors import SUBJECT_ENV
+from autograder.examination.verdict import Verdict
+from autograder.examination.verdict_text import Report
+from autograder.processes.channel import Channel
+from autograder.running.start import ExaminerProcess
+from course.domains import lease_domain
+from course.errors import CourseError
+from course.journal.store import JournalError, journal_here
+from course.runtime.core_session import CoreSession
+
+STUCK = 3.0
+"""Seconds after a verdict in which the student's node must have been stopped."""
+
+
+def check(
+    exam: str, part: str = "visible", *, hint: int = 1, key: Mapping[str, Any] | None = None
+) -> float:
+    """Examine this notebook's nodes by what they do, show a report, and return the points.
+
+    An examiner process joins a DDS domain of its own with this kernel, asks for nodes of the
+    classes that the notebook defines, and watches them. A check that cannot be made in a kernel (a
+    lossy network takes a namespace) is shown as not examined, and its points are in the number that
+    is returned: a notebook that is right must not look wrong. Grades do not come from here.
+
+    Args:
+        exam: the name of the exam, such as ``"qos"``.
+        part: which of its parts; ``"visible"`` is the one for students.
+        hint: how many of a failed check's hints to show, from a nudge to nearly the answer.
+        key: the answer key of a part that has one; it stands in a hidden cell of the source.
+
+    Raises:
+        ExamError: no such exam or part; the message names the ones there are.
+    """
+    namespace = _caller_globals()
+    exercises.load(exam).part(part)
+    if SUBJECT_ENV in os.environ:
+        return 0.0  # the real examiner is at work outside this process
+    verdict = examine(exam, part, namespace, key)
+    _show(Report(_noted(verdict), hints=hint))
+    return float(verdict.score + verdict.unexamined)
+
+
+def examine(
+    exam: str, part: str, namespace: Mapping[str, Any], key: Mapping[str, Any] | None = None
+) -> Verdict:
+    """Sit one part of an exam on the classes of ``namespace``, in sessions made for it.
+
+    Call it from the main thread: what hangs in the student's code is interrupted there.
+
+    Raises:
+        ExaminerError: the examiner failed.
+    """
+    lease = lease_domain()
+
+    def open_session(threads: int, sim_time: bool) -> CoreSession:
+        return CoreSession(domain_id=lease.domain_id, threads=threads, sim_time=sim_time)
+
+    try:
+        ours, theirs = socket.socketpair()
+        with ours, ExaminerProcess(theirs, lease.domain_id) as examiner:
+            channel = Channel(ours)
+            examiner.request(exam, [(part, key or {})], pid=os.getpid())
+            sitting = _Sitting(examiner)
+            try:
+                sitting.serve(Harness(open_session, namespace), channel)
+            finally:
+                channel.close()
+            return sitting.verdict()
+    finally:
+        lease.release()
+
+
+class _Sitting:
+    """Serves the examiner in the main thread while another thread waits for the verdict.
+
+    So a constructor that never returns can be interrupted when the examiner has given up on it,
+    what constructors print lands in the cell, and a learner's own interrupt works as always.
+    """
+
+    def __init__(self, examiner: ExaminerProcess) -> None:
+        self._examiner = examiner
+        self._verdict: Verdict | None = None
+        self._error: CourseError | None = None
+        self._served = threading.Event()
+        self._lock = threading.Lock()
+        self._waiter = threading.Thread(target=self._wait, daemon=True)
+
+    def serve(self, harness: Harness, channel: Channel) -> None:
+        self._waiter.start()
+        try:
+            harness.serve(channel)
+            with self._lock:
+                self._served.set()
+        except KeyboardInterrupt:
+            if self._verdict is None and self._error is None:
+                raise
+
+    def verdict(self) -> Verdict:
+        self._waiter.join()
+        if self._verdict is None:
+            assert self._error is not None
+            raise self._error
+        return self._verdict
+
+    def _wait(self) -> None:
+        try:
+            self._verdict = self._examiner.verdict()
+        except CourseError as error:
+            self._error = error
+        if not self._served.wait(STUCK):
+            with self._lock:
+                if not self._served.is_set():
+                    self._interrupt()
+
+    def _interrupt(self) -> None:
+        """Interrupt the main thread, which is still busy with the student's code."""
+        main = threading.main_thread().ident
+        assert main is not None
+        signal.pthread_kill(main, signal.SIGINT)
+
+
+def _noted(verdict: Verdict) -> Verdict:
+    """Note a student's visible checks in the journal of the working copy, if this is in one."""
+    journal = journal_here()
+    if journal is None or verdict.part != "visible":
+        return verdict
+    passed = [check.title for check in verdict.checks if check.passed]
+    left = [c.title for c in verdict.checks if not c.passed and c.status != "not_examined"]
+    try:
+        journal.checked(verdict.exam, verdict.score, verdict.max_score, passed, left)
+    except JournalError as error:
+        return replace(verdict, notes=(*verdict.notes, str(error)))
+    return verdict
+
+
+def _caller_globals() -> Mapping[str, Any]:
+    """Return the globals of whoever called `check`: in a notebook, its namespace."""
+    frame = inspect.currentframe()
+    assert frame is not None
+    assert frame.f_back is not None
+    assert frame.f_back.f_back is not None
+    return frame.f_back.f_back.f_globals
+
+
+def _show(report: Report) -> None:
+    try:
+        from IPython.core.getipython import get_ipython
+    except ImportError:
+        shell = None
+    else:
+        shell = get_ipython()
+    if shell is None:
+        print(report)  # noqa: T201 - outside a notebook, the terminal is where a report goes
+    else:
+        from IPython.display import display
+
+        display(report)  # type: ignore[no-untyped-call]

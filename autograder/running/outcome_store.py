@@ -1,0 +1,91 @@
+"""Outcomes kept on disk, so that what did not change is not run again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from autograder import sandbox
+from autograder.examination.program import Program
+from autograder.files import write_whole
+from autograder.running import jobs
+from autograder.running.fresh_run import is_since
+from autograder.running.jobs import Job
+from autograder.running.runner import Outcome
+from course.errors import CourseError
+
+
+class StoreError(CourseError):
+    """An outcome could not be kept (a full disk, say): the whole run has to stop."""
+
+
+class OutcomeStore:
+    """A folder of outcomes, one file a program, named by the program's digest."""
+
+    def __init__(self, folder: Path, *, trust: bool = False, hidden: Iterable[Path] = ()) -> None:
+        """Keep outcomes in ``folder``, which is made when the first one is written.
+
+        ``trust`` and ``hidden`` are those of `runner.run`.
+        """
+        self._folder = folder
+        self._trust, self._hidden = trust, tuple(hidden)
+
+    def outcome(self, program: Program, files: Mapping[str, bytes]) -> Outcome:
+        """Return a program's outcome: the one that is kept, or else a new one.
+
+        Raises:
+            SandboxError: a new one is needed, and there is no sandbox to run an untrusted program.
+            StoreError: the new one could not be kept.
+        """
+        kept = self.get(program, files)
+        if kept is not None:
+            return kept
+        result = jobs.run(Job(program, files, self._trust), self._hidden)
+        self.put(program, files, result.outcome)
+        return result.outcome
+
+    def get(self, program: Program, files: Mapping[str, bytes], mode: str = "") -> Outcome | None:
+        """Return the outcome of an equal program under equal exams, if there is a sound one.
+
+        ``mode`` is the one in which it was run; that of this machine if left out.
+        """
+        return self.named(self.key(program, files, mode))
+
+    def named(self, key: str, since: int = 0) -> Outcome | None:
+        """Return the outcome whose key is ``key``, if there is a sound one from after ``since``."""
+        path = self._path(key)
+        try:
+            if not is_since(path, since):
+                return None
+            return Outcome.from_json(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError, KeyError, TypeError, AttributeError, CourseError):
+            return None
+
+    def put(
+        self, program: Program, files: Mapping[str, bytes], outcome: Outcome, mode: str = ""
+    ) -> None:
+        """Keep an outcome; one that a grader error spoilt is not kept.
+
+        Raises:
+            StoreError: the folder cannot be written (a full disk, say).
+        """
+        if outcome.spoilt:
+            return
+        path = self._path(self.key(program, files, mode))
+        try:
+            write_whole(path, outcome.to_json())
+        except OSError as error:
+            raise StoreError(
+                f"The outcome of a submission could not be written to {path.parent} "
+                f"({error.strerror}): make room there and run the same command again; what was "
+                "graded so far is kept."
+            ) from error
+
+    def key(self, program: Program, files: Mapping[str, bytes], mode: str = "") -> str:
+        """Return the name under which a program's outcome is kept."""
+        # What a sandbox or its lossy network finds is not found without.
+        mode = mode or sandbox.abilities().mode(trust=self._trust)
+        return Job(program, files, self._trust).key(mode)
+
+    def _path(self, key: str) -> Path:
+        return self._folder / f"{key}.json"

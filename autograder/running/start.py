@@ -1,0 +1,259 @@
+"""Starting the examiner and talking to it, for both doors: a student's kernel and the engine."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from autograder.examination import points
+from autograder.examination.draws import fresh_seed
+from autograder.examination.subject import hang_report
+from autograder.examination.verdict import Verdict, VerdictError
+from autograder.processes import python_module
+from autograder.processes.channel import parse
+from autograder.processes.descriptors import readable
+from autograder.processes.fair_deadline import FairDeadline, of_process
+from course.errors import CourseError
+from course.runtime.waiting import Deadline
+
+if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
+    from autograder.sandbox.place import Process
+
+MAX_ANSWER = 1024 * 1024
+EXAM_TIMEOUT = 360.0
+"""Seconds one part of an exam may take in all: its own deadlines end it before.
+
+They are `check_context.ALL_REPLIES_TIMEOUT` for replies and `exam.SITTING_S` for all.
+"""
+
+MAX_HANGS = 1000
+"""Characters of the sentence that says why a subject cannot be expected to go on."""
+
+LAST_WORDS = 65536
+"""Bytes that are kept of what an examiner says on standard error."""
+
+Answering = Callable[[dict[str, Any]], dict[str, Any]]
+"""Answers a request of an examiner's, as JSON knows it."""
+
+Spawn = Callable[..., "Process"]
+
+
+class ExaminerError(CourseError):
+    """The examiner process failed; it is never the student's fault."""
+
+
+class ExaminerFloodedError(ExaminerError):
+    """The examiner ran out of memory under what it was sent: that is the subject's doing."""
+
+
+class ExaminerProcess:
+    """A running examiner, bound to one subject by a control channel.
+
+    ``hangs`` says in a sentence that the subject did not answer in time, if a verdict came with it.
+    """
+
+    def __init__(
+        self,
+        control: socket.socket,
+        domain_id: int,
+        *,
+        env: Mapping[str, str] | None = None,
+        spawn: Spawn = subprocess.Popen,
+    ) -> None:
+        """Start the process.
+
+        Args:
+            control: its end of the channel to the subject; closed here.
+            domain_id: the subject's domain.
+            env: its environment; this process's if left out.
+            spawn: starts it, as `subprocess.Popen` does.
+        """
+        command = [
+            *python_module.command("autograder.running.examiner"),
+            "--control", str(control.fileno()), "--domain", str(domain_id),
+        ]  # fmt: skip
+        try:
+            # What the examiner's libraries print on stderr must never reach a graded cell.
+            self._process = spawn(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                pass_fds=[control.fileno()],
+                start_new_session=True,
+                env=dict(os.environ if env is None else env),
+            )
+        finally:
+            control.close()
+        self._buffer = b""
+        self._asked: deque[tuple[str, str]] = deque()
+        self._said, self._mute = b"", False
+        self.hangs = ""
+
+    def request(
+        self,
+        exam: str,
+        parts: Sequence[tuple[str, Mapping[str, Any]]],
+        *,
+        pid: int,
+        seed: int | None = None,
+        last: bool = False,
+    ) -> None:
+        """Ask for parts of an exam; their verdicts come one by one with `verdict`.
+
+        Args:
+            exam: the exam's name.
+            parts: the name of each, and the answer key of its cell, if it has one.
+            pid: the subject's process, for an examiner that looks at it itself.
+            seed: what the exam's numbers are drawn from; one that nobody knows if left out.
+            last: nothing of the notebook runs after it, so in a sandbox nothing is taken down.
+        """
+        self._asked = deque((exam, part) for part, _ in parts)
+        self._send(
+            {
+                "exam": exam,
+                "parts": [[part, dict(key)] for part, key in parts],
+                "pid": pid,
+                "seed": fresh_seed() if seed is None else seed,
+                "last": last,
+            }
+        )
+
+    def verdict(
+        self, timeout: float = EXAM_TIMEOUT, answer_with: Answering | None = None
+    ) -> Verdict:
+        """Return the verdict of the next part that was asked for.
+
+        ``answer_with`` answers what the examiner asks for meanwhile (see `program_host`).
+
+        Raises:
+            ExaminerError: the examiner ended, took longer than ``timeout`` seconds, or wrote what
+                is no verdict.
+        """
+        assert self._process.stdout is not None
+        deadline = FairDeadline(timeout, of_process(self._process.pid))
+        while True:
+            line = self._line(deadline, timeout)
+            try:
+                answer = parse(line)
+                if answer_with is None or "wants" not in answer:
+                    return self._verdict_of(answer)
+            except (ValueError, KeyError, TypeError, VerdictError) as error:
+                raise ExaminerError(f"What the examiner wrote is no verdict: {error}") from None
+            self._send(answer_with(answer))
+
+    def _line(self, deadline: FairDeadline, timeout: float) -> bytes:
+        assert self._process.stdout is not None
+        stream = self._process.stdout.fileno()
+        while b"\n" not in self._buffer:
+            if stream not in self._wait(deadline.left):
+                if deadline.left:
+                    continue
+                raise ExaminerError(
+                    f"The examiner gave no verdict within {timeout:.0f} s{self._place()}."
+                )
+            chunk = os.read(stream, 65536)
+            if not chunk or len(self._buffer) > MAX_ANSWER:
+                raise self._ended("The examiner ended without a verdict")
+            self._buffer += chunk
+        line, self._buffer = self._buffer.split(b"\n", 1)
+        return line
+
+    def _verdict_of(self, answer: dict[str, Any]) -> Verdict:
+        self.hangs = str(answer["hangs"])[:MAX_HANGS]
+        verdict = Verdict.from_data(answer["verdict"])
+        asked = self._asked.popleft()
+        verdict.require_asked(*asked, points.of_part(*asked))
+        return verdict
+
+    def _send(self, message: dict[str, Any]) -> None:
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(message).encode() + b"\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            raise self._ended("The examiner ended at once") from None
+
+    def _wait(self, timeout: float) -> list[int]:
+        """Return which of its streams can be read, and take what is said on standard error.
+
+        A student's nodes can have its libraries warn for ever; it must not wait for a reader.
+        """
+        assert self._process.stdout is not None
+        assert self._process.stderr is not None
+        errors_too = [] if self._mute else [self._process.stderr]
+        ready = readable([self._process.stdout, *errors_too], timeout)
+        if (errors := self._process.stderr.fileno()) in ready:
+            said = os.read(errors, 65536)
+            self._mute = not said
+            self._said = (self._said + said)[-LAST_WORDS:]
+        return ready
+
+    def _place(self) -> str:
+        """Return where it is stuck, for whoever looks for the mistake; empty if it does not say."""
+        self._said = b""
+        with suppress(ProcessLookupError, PermissionError):
+            os.kill(self._process.pid, hang_report.ASK)
+        assert self._process.stdout is not None
+        deadline = Deadline(hang_report.PATIENCE)
+        frames: list[hang_report.Frame] = []
+        while not frames and not self._mute and deadline.left:
+            if self._process.stdout.fileno() in self._wait(deadline.left):
+                break  # it is not stuck any more, or has ended: it says no more
+            frames = hang_report.of_first_thread(
+                self._said.decode(errors="replace"), hang_report.EXAMINER
+            )
+        return f" ({hang_report.told(frames)})" if frames else ""
+
+    def _ended(self, when: str) -> ExaminerError:
+        self._kill()
+        assert self._process.stderr is not None
+        while self._process.stderr.fileno() in self._wait(0.0):
+            pass
+        if b"bad_alloc" in self._said or b"MemoryError" in self._said:
+            return ExaminerFloodedError(
+                f"{when}: it ran out of memory, as under a flood of messages. Do your nodes send "
+                "more than anybody can read?"
+            )
+        return ExaminerError(f"{when}: {self._last_words()}")
+
+    def _last_words(self) -> str:
+        lines = self._said.decode(errors="replace").strip().splitlines()
+        return lines[-1] if lines else f"exit code {self._process.returncode}"
+
+    def _kill(self) -> None:
+        if self._process.poll() is None:
+            # One that has only just been forked does not lead a group yet, nor has it any members.
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.kill()
+        self._process.wait()
+
+    def __enter__(self) -> ExaminerProcess:
+        """Return itself; leaving the block ends the process."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Let the process end by itself, or end it if it does not."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.close()
+            self._process.wait(timeout=5 if error is None else 0)
+        except (subprocess.TimeoutExpired, BrokenPipeError):
+            self._kill()
+        for stream in (self._process.stdout, self._process.stderr):
+            if stream is not None:
+                stream.close()
