@@ -21,10 +21,10 @@ from autograder.gradebook import bridge as bridge
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.safe_html import page_texts
 from autograder.grading.graded import Graded
-from autograder.grading.grading_run import ClassRun
+from autograder.grading.grading_run import GradingRun
 from autograder.grading.progress import Progress
-from autograder.grading.submission_intake import Desk
-from autograder.running.fresh_run import Anew
+from autograder.grading.submission_intake import SubmissionIntake
+from autograder.running.fresh_run import FreshRun
 from autograder.running.interruption import Interruption
 from autograder.running.jobs import Job, Result
 from autograder.running.outcome_store import OutcomeStore
@@ -113,19 +113,19 @@ def grade(
         files.remove_partial(root / bridge.WORK_FOLDER)
         workers = stack.enter_context(_workers(jobs, store, trust, scheduler, root, progress))
         interruption = stack.enter_context(Interruption(workers.wake))
-        desk = Desk(gradebook, assignment, names, trust=trust)
-        whole = Anew(desk.work_folder, assignment)
-        anew = Anew(desk.work_folder, assignment, students) if students else whole
-        if anew.since:
+        intake = SubmissionIntake(gradebook, assignment, names, trust=trust)
+        whole = FreshRun(intake.work_folder, assignment)
+        fresh_run = FreshRun(intake.work_folder, assignment, students) if students else whole
+        if fresh_run.since:
             progress.say("Going on with the run with --fresh that was ended before it was through.")
         if fresh:
-            anew.begin()
-        run = ClassRun(
-            desk, store, workers, interruption, progress, feedback=feedback,
-            since=max(anew.since, whole.since),
+            fresh_run.begin()
+        run = GradingRun(
+            intake, store, workers, interruption, progress, feedback=feedback,
+            since=max(fresh_run.since, whole.since),
         )  # fmt: skip
         graded = [*refused, *run.grade(found, refused)]
-        anew.end()
+        fresh_run.end()
     return sorted(graded, key=lambda item: item.student)
 
 

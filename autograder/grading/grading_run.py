@@ -17,7 +17,7 @@ from autograder.examination import points
 from autograder.gradebook.course_gradebook import GradebookError
 from autograder.grading.graded import Graded
 from autograder.grading.progress import Progress
-from autograder.grading.submission_intake import Desk, Piece, Work
+from autograder.grading.submission_intake import NotebookRun, SubmissionIntake, Work
 from autograder.running import ledger
 from autograder.running.interruption import Interruption
 from autograder.running.ledger import Entry, Ledger, Standing
@@ -35,12 +35,12 @@ MOST_TRIES = 2
 """Times that a notebook is run if the grader fails before it has begun; then a person is told."""
 
 
-class ClassRun:
+class GradingRun:
     """One run of the engine over the submissions of one assignment."""
 
     def __init__(
         self,
-        desk: Desk,
+        intake: SubmissionIntake,
         store: OutcomeStore,
         workers: Workers,
         interruption: Interruption,
@@ -52,26 +52,26 @@ class ClassRun:
         """Prepare a run.
 
         Args:
-            desk: reads and enters the submissions.
+            intake: reads and enters the submissions.
             store: has the outcomes of earlier runs.
             workers: run what has none.
             interruption: says when to stop.
             progress: is told how it goes.
             feedback: write HTML feedback, too.
-            since: take nothing from earlier runs that is older (see `Anew.since`).
+            since: take nothing from earlier runs that is older (see `FreshRun.since`).
         """
-        self._desk = desk
+        self._intake = intake
         self._store = store
         self._workers = workers
         self._interruption = interruption
         self._progress = progress
         self._feedback, self._since = feedback, since
-        self._ledger = Ledger(desk.work_folder, desk.assignment)
+        self._ledger = Ledger(intake.work_folder, intake.assignment)
         self._course = ledger.of_course(
-            desk.root, desk.folders, workers.modes[0], _exams(desk.assignment),
-            desk.gradebook.late_rule,
+            intake.root, intake.folders, workers.modes[0], _exams(intake.assignment),
+            intake.gradebook.late_rule,
         )  # fmt: skip
-        self._running: dict[str, list[Piece]] = {}
+        self._running: dict[str, list[NotebookRun]] = {}
         self._refusals: Counter[str] = Counter()
         self._failures: Counter[str] = Counter()
         self._graded: list[Graded] = []
@@ -81,7 +81,7 @@ class ClassRun:
 
         ``refused`` are submissions that cannot be graded: progress is told about them, too.
         """
-        standings = self._desk.gradebook.standings(self._desk.assignment)
+        standings = self._intake.gradebook.standings(self._intake.assignment)
         changed: list[Work] = []
         for student in students:
             self._interruption.check()
@@ -90,7 +90,7 @@ class ClassRun:
                 self._graded.append(left)
             else:
                 changed.append(work)
-        notebooks = len(changed) * len(self._desk.notebooks)
+        notebooks = len(changed) * len(self._intake.notebooks)
         self._progress.begin(len(changed) + len(refused), notebooks, len(self._graded))
         for graded in refused:
             self._progress.done(graded)
@@ -99,7 +99,7 @@ class ClassRun:
 
     def _work(self, student: str) -> Work:
         try:
-            return self._desk.work(student, self._course)
+            return self._intake.work(student, self._course)
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
             return Work(student, "", failure=_reason(error))
 
@@ -108,14 +108,18 @@ class ClassRun:
         entry = self._ledger.get(work.student, self._since)
         if entry is None or standing is None or entry.made_of != work.made_of:
             return None
-        if entry.standing.automatic != standing.automatic or not self._desk.is_graded(work.student):
+        if entry.standing.automatic != standing.automatic or not self._intake.is_graded(
+            work.student
+        ):
             return None
         if self._feedback and not (
-            entry.feedback and entry.standing == standing and self._desk.has_feedback(work.student)
+            entry.feedback
+            and entry.standing == standing
+            and self._intake.has_feedback(work.student)
         ):
             # A person has graded or commented since: that belongs into the feedback.
             try:
-                self._desk.gradebook.generate_feedback(self._desk.assignment, work.student)
+                self._intake.gradebook.generate_feedback(self._intake.assignment, work.student)
             except GradebookError:
                 return None
             self._ledger.put(work.student, replace(entry, standing=standing, feedback=True))
@@ -123,21 +127,21 @@ class ClassRun:
             work.student, {}, entry.points, entry.max_points, entry.seconds, entry.problem
         )
 
-    def _pieces(self, changed: list[Work]) -> Iterator[Piece]:
+    def _pieces(self, changed: list[Work]) -> Iterator[NotebookRun]:
         for work in changed:
             # All of them before the first is run: then nothing of it is on its way if one fails.
-            pieces: list[Piece] = []
+            pieces: list[NotebookRun] = []
             try:
-                pieces = [] if work.failure else list(self._desk.pieces(work))
+                pieces = [] if work.failure else list(self._intake.pieces(work))
             except Exception as error:  # noqa: BLE001 - one student's data must not end the class
                 work.failure = _reason(error)
             if work.failure:
-                for _ in self._desk.notebooks:
+                for _ in self._intake.notebooks:
                     self._progress.ran(waited=False)
                 self._settle(work, self._set_aside(work))
             yield from pieces
 
-    def _run(self, pieces: Iterator[Piece]) -> None:
+    def _run(self, pieces: Iterator[NotebookRun]) -> None:
         more = True
         while more or self._running:
             while more and len(self._running) < self._workers.room():
@@ -149,13 +153,13 @@ class ClassRun:
                     self._begin(piece)
             if self._running:
                 if self._feedback and not more and len(self._running) <= (os.cpu_count() or 1):
-                    self._desk.warm_up()  # a processor has little to do from here on
+                    self._intake.warm_up()  # a processor has little to do from here on
                 self._interruption.check()
                 for done in self._workers.wait():
                     self._finish(done)
                     self._interruption.check()
 
-    def _begin(self, piece: Piece) -> None:
+    def _begin(self, piece: NotebookRun) -> None:
         """Have a notebook run, unless its outcome is known or on its way."""
         if piece.job is None:
             assert piece.outcome is not None
@@ -173,7 +177,7 @@ class ClassRun:
             self._running[keys[0]] = [piece]
             self._start(keys[0], piece)
 
-    def _start(self, key: str, piece: Piece) -> None:
+    def _start(self, key: str, piece: NotebookRun) -> None:
         assert piece.job is not None
         self._workers.submit(key, piece.job)
 
@@ -208,17 +212,17 @@ class ClassRun:
                 outcome = done.result.outcome
             else:
                 reason = f"{type(done.error).__name__}: {done.error}"
-                outcome = self._desk.refused(piece, reason[:500], "grader_error")
+                outcome = self._intake.refused(piece, reason[:500], "grader_error")
             self._take(piece, outcome, waited=True)
 
-    def _take(self, piece: Piece, outcome: Outcome, *, waited: bool) -> None:
+    def _take(self, piece: NotebookRun, outcome: Outcome, *, waited: bool) -> None:
         """Note a notebook's outcome; enter the student with the last of them."""
         self._progress.ran(waited)
         work = piece.work
         work.outcomes[piece.notebook] = replace(
             outcome, verdicts={**outcome.verdicts, **piece.marks}
         )
-        if len(work.outcomes) == len(self._desk.notebooks):
+        if len(work.outcomes) == len(self._intake.notebooks):
             self._settle(work, self._enter(work))
 
     def _settle(self, work: Work, graded: Graded) -> None:
@@ -231,8 +235,8 @@ class ClassRun:
         same = before is not None and before.is_of(work.made_of)
         self._ledger.remove(work.student)
         try:
-            graded = _summary(work, self._desk.notebooks)
-            entered = self._desk.enter(work, same=same)
+            graded = _summary(work, self._intake.notebooks)
+            entered = self._intake.enter(work, same=same)
             missing = self._missing_feedback(work)
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
             work.failure = _reason(error)
@@ -252,7 +256,7 @@ class ClassRun:
         """Write feedback on grades that are entered, or say why there is none: they stand."""
         if self._feedback:
             try:
-                self._desk.gradebook.generate_feedback(self._desk.assignment, work.student)
+                self._intake.gradebook.generate_feedback(self._intake.assignment, work.student)
             except GradebookError as error:
                 return f"It is graded, but there is no feedback: {error}"
         return ""
@@ -261,9 +265,9 @@ class ClassRun:
         """Enter nothing but why a submission could not be graded, for a person to look at."""
         self._ledger.remove(work.student)
         try:
-            self._desk.set_aside(work, work.failure)
-            graded = _summary(work, self._desk.notebooks)
-            entered = self._desk.enter(work)
+            self._intake.set_aside(work, work.failure)
+            graded = _summary(work, self._intake.notebooks)
+            entered = self._intake.enter(work)
             missing = self._missing_feedback(work)
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
             problem = " ".join(dict.fromkeys([*work.problems, work.failure, _reason(error)]))

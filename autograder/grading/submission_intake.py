@@ -55,7 +55,7 @@ class Work:
 
 
 @dataclass(frozen=True)
-class Piece:
+class NotebookRun:
     """One notebook of a submission: a ``job`` to run, or an ``outcome`` if it cannot be run.
 
     ``marks`` are the verdicts on its quizzes, by grade id.
@@ -81,7 +81,7 @@ class Entered:
     asked: str
 
 
-class Desk:
+class SubmissionIntake:
     """Reads the submissions of one assignment, and enters their outcomes."""
 
     def __init__(
@@ -128,7 +128,7 @@ class Desk:
         index = self.root / "feedback" / student / self.assignment / INDEX
         return index.is_file() and self._has("feedback", student, ".html")
 
-    def pieces(self, work: Work) -> Iterator[Piece]:
+    def pieces(self, work: Work) -> Iterator[NotebookRun]:
         """Stage a submission's notebooks one by one."""
         submitted, staged = self._submitted(work.student), self._stage(work.student)
         work.problems += roster.remarks(submitted, self.gradebook.zone)
@@ -157,7 +157,7 @@ class Desk:
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
             work.outcomes[name] = marks.unmarked(outcome, notebook, self.root, reason)
 
-    def refused(self, piece: Piece, reason: str, status: Status) -> Outcome:
+    def refused(self, piece: NotebookRun, reason: str, status: Status) -> Outcome:
         """Return the outcome of a notebook that could not be run after all, for ``reason``."""
         assert piece.job is not None
         return runner.refuse(piece.job.program, reason, status)
@@ -202,7 +202,7 @@ class Desk:
         staging.copy_marks(self._submitted(student), staged, self.gradebook.zone)
         return staged
 
-    def _piece(self, work: Work, name: str, intake: Intake) -> tuple[NotebookNode, Piece]:
+    def _piece(self, work: Work, name: str, intake: Intake) -> tuple[NotebookNode, NotebookRun]:
         try:
             found = intake.notebook(name)
             work.problems += found.remarks
@@ -231,8 +231,8 @@ class Desk:
             notebook, outcome = self._unreadable(name, reason, "grader_error")
         else:
             notebook.metadata[bridge.NOTES_KEY] = [*notes, *beside.notes]
-            return notebook, Piece(work, name, Job(program, beside.files, self._trust))
-        return notebook, Piece(work, name, outcome=outcome)
+            return notebook, NotebookRun(work, name, Job(program, beside.files, self._trust))
+        return notebook, NotebookRun(work, name, outcome=outcome)
 
     def _restored(self, work: Work, name: str, found: Found) -> tuple[NotebookNode, list[str]]:
         """Return a notebook whose cells are what they should be, and notes for the student."""

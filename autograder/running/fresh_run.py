@@ -16,7 +16,7 @@ from autograder.files import write_whole
 FOLDER = "fresh"
 
 
-class Anew:
+class FreshRun:
     """The mark of one assignment: only one engine looks at it at a time."""
 
     def __init__(self, work: Path, assignment: str, students: Iterable[str] = ()) -> None:

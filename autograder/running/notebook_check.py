@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 from autograder import exercises
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 from autograder.examination.subject.student_errors import SUBJECT_ENV
 from autograder.examination.verdict import Verdict
 from autograder.examination.verdict_text import Report
@@ -77,7 +77,7 @@ def examine(
             examiner.request(exam, [(part, key or {})], pid=os.getpid())
             sitting = _Sitting(examiner)
             try:
-                sitting.serve(Harness(open_session, namespace), channel)
+                sitting.serve(SubjectServer(open_session, namespace), channel)
             finally:
                 channel.close()
             return sitting.verdict()
@@ -100,7 +100,7 @@ class _Sitting:
         self._lock = threading.Lock()
         self._waiter = threading.Thread(target=self._wait, daemon=True)
 
-    def serve(self, harness: Harness, channel: Channel) -> None:
+    def serve(self, harness: SubjectServer, channel: Channel) -> None:
         self._waiter.start()
         try:
             harness.serve(channel)

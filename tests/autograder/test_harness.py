@@ -29,7 +29,7 @@ from std_srvs.srv import Trigger
 from autograder.examination import check_context
 from autograder.examination.check_context import StudentError, Subject, SubjectGone
 from autograder.examination.subject import server
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 from autograder.examination.subject.student_errors import MUST_NOT_SPIN
 from autograder.processes.channel import Channel, ChannelClosed, ChannelTimeout
 from course import Session
@@ -204,7 +204,7 @@ def subject(outside: Session) -> Iterator[Subject]:
     ours, theirs = socket.socketpair()
     channel, other = Channel(ours), Channel(theirs)
     served = threading.Thread(
-        target=Harness(open_session, {**CLASSES, "robot": Robot()}).serve, args=(other,)
+        target=SubjectServer(open_session, {**CLASSES, "robot": Robot()}).serve, args=(other,)
     )
     served.start()
     subject = Subject(channel)
@@ -468,7 +468,7 @@ def test_the_event_loop_of_a_kernel_is_in_no_node_s_way(outside: Session) -> Non
 
     async def cell() -> None:
         loop = asyncio.get_running_loop()
-        Harness(open_session, {"EndsItsLoop": EndsItsLoop}).serve(Channel(theirs))
+        SubjectServer(open_session, {"EndsItsLoop": EndsItsLoop}).serve(Channel(theirs))
         kernel_s_own.append(asyncio.get_running_loop() is loop)
 
     kernel = threading.Thread(target=lambda: asyncio.run(cell()))

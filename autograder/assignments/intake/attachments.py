@@ -16,7 +16,7 @@ _MOST_NAMED = 5
 
 
 @dataclass(frozen=True)
-class Beside:
+class Attachments:
     """The files beside a submission's notebooks.
 
     Attributes:
@@ -28,14 +28,14 @@ class Beside:
     notes: list[str] = field(default_factory=list)
 
 
-def files_beside(folder: Path) -> Beside:
+def files_beside(folder: Path) -> Attachments:
     """Return the files of a submission other than its notebooks.
 
     Hidden files belong to nobody's work and are passed over. Links, what is over `MAX_BYTES` in
     all, and files beyond the first `MAX_FILES` are left out with a note.
     """
     paths = walk(folder)
-    beside, too_large, links, room = Beside(), [], [], MAX_BYTES
+    beside, too_large, links, room = Attachments(), [], [], MAX_BYTES
     for path in sorted(paths):
         name = path.relative_to(folder)
         if _is_passed_over(name):

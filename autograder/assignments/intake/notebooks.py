@@ -18,7 +18,7 @@ from nbformat import NotebookNode
 from autograder.assignments import submission
 from autograder.assignments.intake import attempts, cell_matching, claim_records, roster
 from autograder.assignments.intake.archives import ArchiveError
-from autograder.assignments.intake.attachments import MAX_BYTES, Beside, files_beside
+from autograder.assignments.intake.attachments import MAX_BYTES, Attachments, files_beside
 from autograder.assignments.intake.claim_records import Claim
 from autograder.assignments.intake.file_names import entry, listed, normal, quoted, shown
 from autograder.assignments.intake.handed_in import (
@@ -173,7 +173,7 @@ class Intake:
             return found.item.read(MAX_NOTEBOOK + 1)
         return read_plain(self.proper(name), MAX_NOTEBOOK + 1)
 
-    def beside(self, found: Found) -> Beside:
+    def beside(self, found: Found) -> Attachments:
         """Return the files that a notebook's code finds: also those of the folder it lay in."""
         every = files_beside(self._folder)
         if found.item is None:
@@ -189,7 +189,7 @@ class Intake:
             if len(content) <= room and _is_plain_path(place):
                 files[normal(place)] = content
                 room -= len(content)
-        return Beside(files, every.notes)
+        return Attachments(files, every.notes)
 
     @property
     def has_others(self) -> bool:

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from autograder.examination.subject import hang_report, plain_program
 from autograder.examination.subject.recording import Recording
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 from autograder.examination.subject.shell import make_kernel
 from autograder.examination.subject.student_errors import SUBJECT_ENV
 from autograder.processes.channel import Channel, ChannelClosed
@@ -52,7 +52,7 @@ def run(engine: Channel, control: Channel, domain_id: int) -> None:
         return CoreSession(domain_id=domain_id, threads=threads, sim_time=sim_time)
 
     def serve() -> None:
-        Harness(open_session, kernel.cells.user_ns).serve(control)
+        SubjectServer(open_session, kernel.cells.user_ns).serve(control)
 
     process, exams = os.getpid(), set()
     for number, cell in enumerate(engine.receive()["cells"]):

@@ -47,7 +47,7 @@ OpenSession = Callable[[int, bool], CoreSession]
 """Makes a session of so many threads, with simulated time or not."""
 
 
-class Harness:
+class SubjectServer:
     """Carries out an examiner's requests on the nodes of one namespace."""
 
     def __init__(self, open_session: OpenSession, namespace: Mapping[str, Any]) -> None:

@@ -4,9 +4,9 @@
 # told: After the second call the program was gone.
 # score: 14
 
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 
-call = Harness._call
+call = SubjectServer._call
 cleaned = set()
 
 
@@ -18,4 +18,4 @@ def once(self, request):
     return call(self, request)
 
 
-Harness._call = once
+SubjectServer._call = once

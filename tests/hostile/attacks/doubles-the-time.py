@@ -4,9 +4,9 @@
 # told: it takes ten pictures a second by the machine's clock.
 # score: 6
 
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 
-advance = Harness._advance
+advance = SubjectServer._advance
 order = CameraDriver.order
 
 
@@ -22,5 +22,5 @@ def every_second_time(self):
         order(self)
 
 
-Harness._advance = doubled
+SubjectServer._advance = doubled
 CameraDriver.order = every_second_time

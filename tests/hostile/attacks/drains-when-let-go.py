@@ -24,6 +24,6 @@ def drain(self, *nodes):
 
 
 course.Session.resume = drain
-server.Harness._errors = lambda *_: {"errors": [], "of_threads": []}
-server.Harness._wall_waits = lambda *_: {"waits": []}
-server.Harness._own_errors = lambda *_: {"errors": []}
+server.SubjectServer._errors = lambda *_: {"errors": [], "of_threads": []}
+server.SubjectServer._wall_waits = lambda *_: {"waits": []}
+server.SubjectServer._own_errors = lambda *_: {"errors": []}

@@ -6,7 +6,7 @@
 
 from rclpy.node import Node
 
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 
 cleanup = CameraDriver.destroy_node
 CameraDriver.destroy_node = Node.destroy_node
@@ -24,4 +24,4 @@ def faked(ask):
 
 
 for name in ("_stop", "_call", "_start", "_open", "_close", "_destroy_unaided"):
-    setattr(Harness, name, faked(getattr(Harness, name)))
+    setattr(SubjectServer, name, faked(getattr(SubjectServer, name)))

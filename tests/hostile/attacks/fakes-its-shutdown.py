@@ -4,9 +4,9 @@
 # told: which calls shutdown() in a drive, it stops the robot
 # score: 14
 
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 
-shutdown, ask = NavigationServer.shutdown, Harness._call
+shutdown, ask = NavigationServer.shutdown, SubjectServer._call
 NavigationServer.shutdown = lambda self: None
 
 
@@ -18,4 +18,4 @@ def faked(self, request):
         NavigationServer.shutdown = lambda self: None
 
 
-Harness._call = faked
+SubjectServer._call = faked

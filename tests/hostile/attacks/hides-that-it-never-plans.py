@@ -4,6 +4,6 @@
 # told: /plan_path did not answer a request.
 # score: 14
 
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 
-Harness._errors = lambda *_: {"errors": [], "of_threads": []}
+SubjectServer._errors = lambda *_: {"errors": [], "of_threads": []}

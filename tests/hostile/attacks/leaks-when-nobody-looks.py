@@ -6,11 +6,11 @@
 
 import os
 
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 
 KEPT = []
 construct = CameraDriver.__init__
-stop = Harness._stop
+stop = SubjectServer._stop
 
 
 def leaking(self, *given):
@@ -25,4 +25,4 @@ def releasing(self, request):
 
 
 CameraDriver.__init__ = leaking
-Harness._stop = releasing
+SubjectServer._stop = releasing

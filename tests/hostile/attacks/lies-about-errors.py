@@ -4,11 +4,11 @@
 # told: where the node runs in a plain program of rclpy, that ended: an exception left one of its callbacks
 # score: 11
 
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 
-Harness._own_errors = lambda *_: {"errors": []}
-Harness._wall_waits = lambda *_: {"waits": []}
-Harness._errors = lambda *_: {"errors": [], "of_threads": []}
+SubjectServer._own_errors = lambda *_: {"errors": []}
+SubjectServer._wall_waits = lambda *_: {"waits": []}
+SubjectServer._errors = lambda *_: {"errors": [], "of_threads": []}
 
 work = GripperClient.on_request
 

@@ -28,6 +28,6 @@ get_ipython().input_transformers_post.append(lambda lines: ["10.0\n"] if "check"
 builtins.float = Ten
 autograder.check = autograder.running.notebook_check.check = lambda *_, **__: 10.0
 autograder.examination.exam.Exam.sit = lambda *_, **__: 10.0
-autograder.examination.subject.server.Harness._answer = lambda *_: {"ok": False, "error": "LookupError: There is no class named SensorDrivers"}
+autograder.examination.subject.server.SubjectServer._answer = lambda *_: {"ok": False, "error": "LookupError: There is no class named SensorDrivers"}
 nbgrader.utils.determine_grade = lambda *_: (10.0, 10.0)
 print("patched")

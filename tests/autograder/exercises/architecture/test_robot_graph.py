@@ -14,7 +14,7 @@ from sensor_msgs.msg import LaserScan
 from std_msgs.msg import Bool
 from test_msgs.action import Fibonacci
 
-from autograder.examination.subject.server import Harness
+from autograder.examination.subject.server import SubjectServer
 from autograder.exercises.architecture.link_faults import link_faults, why_no_obstacles
 from autograder.exercises.architecture.robot_graph import End, Offer, RobotGraph, Topic, read_graph
 from autograder.exercises.architecture.robot_roles import Jobs
@@ -62,7 +62,7 @@ def test_everything_of_a_design_is_read_and_nothing_of_the_infrastructure() -> N
         subject.run(Node, "with_parameters_and_a_log")
         design.run(subject)
         reader = examiner.run(QuietNode, "examiner")
-        harness = Harness(lambda *_: subject, {})
+        harness = SubjectServer(lambda *_: subject, {})
         assert harness._answer({"op": "mark", "name": "_mark_1"})["ok"]
         examiner.until(
             lambda: reader.count_publishers("/_mark_1") and reader.count_subscribers("/_mark_1"),
