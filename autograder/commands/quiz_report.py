@@ -13,6 +13,7 @@ from autograder.assignments.intake import attempts
 from autograder.assignments.intake.file_names import normal
 from autograder.commands.quiz_command import QuizCommandError, as_course_errors
 from autograder.gradebook import bridge as bridge
+from autograder.gradebook.course_gradebook import CourseGradebook
 from quizzes import record, sharing
 
 if TYPE_CHECKING:
@@ -100,6 +101,7 @@ def of_assignment(root: Path, assignment: str) -> list[QuizReport]:
     Raises:
         QuizMarksError: a bank is not sound.
         QuizCommandError: the reports cannot be written.
+        GradebookError: the gradebook cannot be read.
     """
     reports = []
     for name in quiz_cells.names(root):
@@ -127,10 +129,11 @@ class _Taken:
 
 def _taken(root: Path, assignment: str, quiz: str) -> _Taken:
     taken = _Taken()
+    class_ = CourseGradebook(root).roster().known
     for folder in sorted((root / "submitted").glob(f"*/{assignment}")):
         learner = normal(folder.parent.name)
         try:
-            found = attempts.find(folder, quiz, learner, root)
+            found = attempts.find(folder, quiz, learner, root, class_)
         except OSError as error:
             name = record.filename(quiz)
             taken.unread.append(f"{name} of {learner} cannot be read ({error.strerror or error}).")

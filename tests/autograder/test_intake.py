@@ -284,7 +284,7 @@ def test_what_lies_beside_the_folder_is_asked_about(folder: Path) -> None:
     taken = of_student(folder.parents[2], "ch05", "ana", notebooks)
 
     assert taken.notebook(OTHER).item is None
-    with pytest.raises(UnclearError, match=r"beside its folder there is 'ch05 \(1\)'"):
+    with pytest.raises(UnclearError, match=r"next to the submission's folder lies 'ch05 \(1\)'"):
         taken.notebook(NAME)
 
 

@@ -67,6 +67,18 @@ def test_what_lies_in_no_assignments_folder_is_asked_about(submitted: Path, plac
     }
 
 
+def test_a_notebook_in_no_students_folder_is_asked_about(submitted: Path) -> None:
+    (submitted / "qos-design.ipynb").write_text("{}")
+    (submitted / "archive-of-moodle.zip").write_text("x")
+    good, wrong = found(submitted)
+    assert good == ["alice"]
+    assert wrong == {
+        "qos-design.ipynb": "submitted/qos-design.ipynb is in no student's folder: move it to "
+        "submitted/STUDENT/ch05 if somebody handed it in, or out of submitted if not; then grade "
+        "again."
+    }
+
+
 def test_who_has_handed_in_other_assignments_alone_is_not_asked_about(submitted: Path) -> None:
     for place in ("ch04/exercise.ipynb", "ch06/exercise.ipynb", ".DS_Store", "timestamp.txt"):
         (submitted / "bob" / place).parent.mkdir(parents=True, exist_ok=True)

@@ -274,10 +274,10 @@ class Intake:
         )
 
     def _beside_the_folder(self, name: str, missing: str, around: list[str]) -> UnclearError:
-        verb, them = ("is", "it") if len(around) == 1 else ("are", "them")
+        verb, them = ("lies", "it") if len(around) == 1 else ("lie", "them")
         return UnclearError(
-            f"{missing}, but beside its folder there {verb} {listed(around)}: a person has "
-            "to say what counts.",
+            f"{missing}, but next to the submission's folder {verb} {listed(around)}: a "
+            "person has to say what counts.",
             f"Move {them} into that folder if that is this assignment's work, and to another place "
             f"if not, or say with `autograder claim {self._whose} {quoted(name)} --nothing` that "
             "it was not handed in; then grade again.",

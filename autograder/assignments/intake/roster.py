@@ -57,7 +57,7 @@ def submissions(
     ``assignments`` are those that the gradebook knows.
     """
     good: dict[str, str] = {}
-    wrong: dict[str, str] = {}
+    wrong = _nobodys(root / "submitted", assignment)
     for folder in _folders(root / "submitted"):
         problem = _misplaced(folder, assignment, assignments)
         if not problem and (folder / assignment).is_dir():
@@ -145,6 +145,17 @@ def _folders(submitted: Path) -> Iterator[Path]:
         yield from sorted(
             path for path in submitted.iterdir() if path.is_dir() and not is_junk(path.name)
         )
+
+
+def _nobodys(submitted: Path, assignment: str) -> dict[str, str]:
+    """Return what is wrong with notebooks that lie in no student's folder, by their names."""
+    return {
+        path.name: f"submitted/{shown(path.name)} is in no student's folder: move it to "
+        f"submitted/STUDENT/{assignment} if somebody handed it in, or out of submitted if not; "
+        "then grade again."
+        for path in (sorted(submitted.glob("*.ipynb")) if submitted.is_dir() else [])
+        if path.is_file()
+    }
 
 
 def _misplaced(folder: Path, assignment: str, assignments: Collection[str] = ()) -> str:
