@@ -12,6 +12,7 @@ from sqlalchemy.exc import SQLAlchemyError
 from autograder.assignments import questions
 from autograder.assignments.intake import roster
 from autograder.assignments.intake.file_names import normal
+from autograder.assignments.intake.notebooks import GRADED_AS
 from autograder.assignments.intake.roster import Roster
 from autograder.assignments.questions import Question
 from autograder.class_report import InsightError
@@ -180,7 +181,8 @@ def _left_out(
 
     def is_missing(student: str, notebook: str, record: Record) -> bool:
         results = [check for verdict in record.verdicts.values() for check in verdict.checks]
-        if record.unreadable or any(check.status != "not_checked" for check in results):
+        taken = any(GRADED_AS in note for note in record.notes)
+        if record.unreadable or taken or any(c.status != "not_checked" for c in results):
             return False
         return not (roster.folder(root, student) / assignment / f"{notebook}.ipynb").exists()
 

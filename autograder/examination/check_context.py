@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -32,6 +33,8 @@ MOST_TOLD = 200
 
 MAX_ERROR, MAX_TRACE, MAX_NAME = 2000, 4000, 500
 """Characters of an error, of where it came from, and of a node's or a label's name."""
+NODE_NAME = re.compile(r"(?=.{2,200}$)(/[A-Za-z_][A-Za-z0-9_]*)+", re.ASCII)
+"""What a node can be called (ROS 2 design, "Topic and Service name mapping"), if not longer."""
 
 PATIENCE = 3.0
 """Seconds of wall time that a callback of a subject's may hold up a step of simulated time."""
@@ -112,7 +115,7 @@ class Subject:
             SubjectGone: the process ended or hangs.
         """
         reply = self._ask("start", name, args=args)
-        return self._read(lambda: _text(reply["node"], MAX_NAME))
+        return self._node(reply)
 
     def start_all(self, name: str) -> dict[str, str]:
         """Make every node that an object of the notebook declares; return {label: node name}.
@@ -135,7 +138,18 @@ class Subject:
     def _start_declared(self, name: str, label: str) -> str:
         doing = f"bring up the nodes of `{name}`, and {label[:60]} did not come up"
         reply = self._ask("start_declared", name, label=label, doing=doing)
-        return self._read(lambda: _text(reply["node"], MAX_NAME))
+        return self._node(reply)
+
+    def _node(self, reply: dict[str, Any]) -> str:
+        """Return the name of the node in a reply, of which names of its services are made.
+
+        Raises:
+            StudentError: it is none that a node can have: a class may override how it is asked.
+        """
+        name = self._read(lambda: _text(reply["node"], MAX_NAME))
+        if not NODE_NAME.fullmatch(name):
+            raise StudentError(f"A node cannot be called {name[:60]!r}.", missing=True)
+        return name
 
     def mark(self, name: str) -> None:
         """Make a node called ``name`` with one publisher and one subscription on topic ``name``.

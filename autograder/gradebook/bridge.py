@@ -43,6 +43,7 @@ ASKED_KEY = "ros2_course_asked"
 person is asked: {grade id: why}."""
 
 FOUND_KEY = "ros2_course_found"
+BESIDE_KEY = "ros2_course_beside"
 UNCLEAR_KEY = "ros2_course_unclear"
 """Resources that the exporter leaves for the first step: which file it is, or what is not clear."""
 
@@ -78,6 +79,8 @@ class SubmissionExporter(NotebookExporter):
                 found = intake.notebook(name)
                 notebook = found.notebook
                 resources[FOUND_KEY] = found
+                if found.item is not None:
+                    resources[BESIDE_KEY] = intake.beside(found)
             else:  # nbgrader reads a second time what it has written itself
                 notebook = submission.read(Path(filename))
         except SubmissionError as error:
@@ -175,7 +178,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         if unreadable:
             outcome = runner.refuse(program, unreadable)
         else:
-            beside = files_beside(folder)
+            beside = resources.pop(BESIDE_KEY, None) or files_beside(folder)
             store = OutcomeStore(
                 root / WORK_FOLDER / "outcomes", trust=self.trust_submissions, hidden=[root]
             )

@@ -15,7 +15,7 @@ from nbgrader.api import Gradebook, MissingEntry
 from nbgrader.plugins import CsvExportPlugin
 
 from autograder.assignments.intake import open_questions, roster
-from autograder.assignments.intake.file_names import listed
+from autograder.assignments.intake.file_names import listed, normal
 from autograder.assignments.intake.roster import Roster
 from autograder.gradebook.bridge import WORK_FOLDER
 
@@ -53,7 +53,7 @@ class _Settled:
 
     @property
     def students(self) -> list[Any]:
-        return [s for s in self._gradebook.students if s.id not in self._left_out]
+        return [s for s in self._gradebook.students if normal(s.id) not in self._left_out]
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._gradebook, name)
@@ -78,4 +78,4 @@ def _open(gradebook: Gradebook, root: Path, assignment: str) -> set[str]:
             found.add(student)
     names = [each.name for each in gradebook.assignments]
     _, misplaced = roster.submissions(root, assignment, Roster(), names)
-    return found | misplaced.keys()
+    return set(map(normal, found | misplaced.keys()))

@@ -104,7 +104,8 @@ def verdict(
     try:
         found = attempts.find(folder, bank.quiz, student, root, roster)
     except OSError as error:
-        return _unmarked(bank, f"{name} cannot be read ({error.strerror or error}).")
+        reason = f"{name} cannot be read ({error.strerror or error}): a person has to look at it."
+        return _unmarked(bank, reason, status="not_examined")
     if found.content is None:
         reason = (
             f"There is no {name} in the submission: it lies beside the notebook once you have "
@@ -182,6 +183,9 @@ def _none_counts(bank: Bank, name: str, marked: regrade.Marked) -> Verdict:
         return _unmarked(bank, reason, remarks, "grader_error")
     if marked.doubt:
         return _unmarked(bank, marked.doubt, remarks, "not_examined")
+    if marked.damaged:
+        reason = f"{name} holds nothing that can be read as an attempt: a person has to look at it."
+        return _unmarked(bank, reason, remarks, "not_examined")
     return _unmarked(bank, f"{name} holds no attempt that counts.", remarks)
 
 

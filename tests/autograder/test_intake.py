@@ -314,6 +314,33 @@ def test_a_damaged_one_or_a_stub_in_its_place_is_asked_about_if_there_is_another
     assert "qos-design (1).ipynb" in str(asked(folder))
 
 
+@pytest.mark.parametrize("content", ["{", text(released())])
+@pytest.mark.parametrize(
+    "place", ["my solution.ipynb", "rest.tar.gz", "qos-design.py", "hand-in.zip/inner.zip"]
+)
+def test_a_damaged_one_or_a_stub_is_asked_about_where_the_work_may_lie_beside_it(
+    folder: Path, place: str, content: str
+) -> None:
+    put(folder, f"{NAME}.ipynb", content)
+    colab = text(new_notebook(cells=[new_code_cell(WORK)]))
+    put_unclaimed(folder, place, colab if place.endswith(".ipynb") else "x")
+    assert f"'{place}'" in str(asked(folder))
+
+
+def test_a_stub_beside_a_picture_and_a_module_is_a_stub(folder: Path) -> None:
+    put(folder, f"{NAME}.ipynb", text(released()))
+    put(folder, "robot.png", "x")
+    put(folder, "lab.py", "x = 1")
+    assert not work(found(folder).notebook)
+
+
+def test_a_notebook_saved_under_the_name_of_another_is_asked_about(folder: Path) -> None:
+    put(folder, f"{OTHER}.ipynb", text())
+    unclear = asked(folder)
+    assert f"{OTHER}.ipynb holds its cells" in str(unclear)
+    assert f"qos-design {OTHER}.ipynb`" in unclear.suggestion
+
+
 @pytest.mark.parametrize("written", ["composed", "decomposed"])
 def test_decomposed_names_are_the_same_names(folder: Path, written: str) -> None:
     import unicodedata

@@ -116,6 +116,17 @@ def test_an_empty_or_damaged_file_in_its_place_is_asked_about_if_there_is_anothe
     assert "but there is 'quiz-ch05.attempts (1).jsonl'" in asked(found)
 
 
+@pytest.mark.parametrize("content", ["{\n", "rubbish", '{\n  "quiz": "ch05"\n}\n'])
+def test_a_damaged_file_alone_in_its_place_waits_for_a_person(folder: Path, content: str) -> None:
+    (folder / FILE).write_text(content)
+    assert "holds nothing that can be read as an attempt" in asked(verdict(folder))
+
+
+def test_a_file_that_cannot_be_read_waits_for_a_person(folder: Path) -> None:
+    (folder / FILE).mkdir()
+    assert "cannot be read" in asked(verdict(folder))
+
+
 @pytest.mark.parametrize("kind", ["link", "folder"])
 def test_something_else_in_its_place_is_asked_about_if_there_is_another(
     folder: Path, kind: str

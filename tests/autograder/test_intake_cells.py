@@ -354,3 +354,46 @@ def test_a_notebook_is_known_by_half_of_what_was_given() -> None:
     assert cell_matching.likeness(new_notebook(cells=[new_code_cell(WORK)]), released()) == 0.0
     half = without(worked_on(), "task", "given", "visible")
     assert cell_matching.likeness(stripped(half), released()) == 0.5
+
+
+def test_an_import_added_inside_a_given_cell_is_run_as_well() -> None:
+    notebook = worked_on(given="import course\nimport math\n\nsession = course.session()")
+    _, known, whole = mended(notebook)
+    assert "import math" in code(whole)
+    assert code(whole).index("session = course.session()") < code(whole).index("import math")
+    assert any("run as it was given, and then as you have it" in note for note in known.notes)
+    assert not known.doubts
+
+
+@pytest.mark.parametrize("kept", ["stub", "nothing"])
+def test_work_below_the_check_that_examines_it_is_asked_about(kept: str) -> None:
+    notebook = worked_on(solution=STUB)
+    if kept == "nothing":
+        notebook = without(notebook, "solution")
+    notebook.cells.insert(at(notebook, "hidden"), new_code_cell(WORK))
+    _, known, _ = mended(notebook)
+    assert set(known.doubts) >= {"visible", "hidden"}
+    assert "cells are run from the top" in known.doubts["visible"]
+
+
+def test_trials_below_a_check_are_nothing_to_ask_about() -> None:
+    notebook = worked_on()
+    notebook.cells.insert(at(notebook, "hidden"), new_code_cell("depth = 7\nprint(design())"))
+    assert not mended(notebook)[1].doubts
+
+
+@pytest.mark.parametrize("text", ["# Nobody loses.", '"""Nobody loses."""'])
+def test_an_answer_typed_as_a_comment_or_a_string_is_one(text: str) -> None:
+    notebook = worked_on(answer_loss=BLANK)
+    notebook.cells.insert(at(notebook, "answer-loss") + 1, new_code_cell(text))
+    assert mended(notebook)[0]["answer-loss"] == text
+
+
+def test_an_answer_that_was_split_with_its_metadata_is_whole() -> None:
+    notebook = worked_on()
+    second = copy.deepcopy(notebook.cells[at(notebook, "answer-loss")])
+    second.id, second.source = "second", "And if somebody does, it is told."
+    notebook.cells.insert(at(notebook, "answer-loss") + 1, second)
+    texts, known, _ = mended(notebook)
+    assert texts["answer-loss"] == "Nobody loses.\n\nAnd if somebody does, it is told."
+    assert any("stood in 2 cells; all of them count" in note for note in known.notes)

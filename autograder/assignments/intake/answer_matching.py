@@ -15,6 +15,7 @@ class Answers(Cells):
 
     def take_answers(self) -> None:
         """Take written answers by the given cells that they stand between, and their order."""
+        self._join_copies()
         for given, cells in self._segments():
             expected = self._answers_after(given)
             texts = [cell for cell in cells if is_text(cell) and not self.is_known(cell)]
@@ -30,6 +31,33 @@ class Answers(Cells):
             else:
                 self.doubt(open_, _unclear(len(texts)))
         self._doubt_the_rest()
+
+    def _join_copies(self) -> None:
+        """Make one cell of those with the same grade id that were all written in: a split one."""
+        for name in self.answers:
+            written = [
+                cell for cell in self.cells
+                if grade_id(cell) == name and not self._is_empty(name, cell)
+            ]  # fmt: skip
+            if len(written) > 1:
+                self._join(written)
+                self.said.notes.append(
+                    f"Your answer to '{self.called(name)}' stood in {len(written)} cells; all of "
+                    "them count."
+                )
+
+    def _join(self, texts: list[NotebookNode]) -> None:
+        """Put cells' texts and pictures into the first of them, and remove the others."""
+        first, *others = texts
+        first.source = "\n\n".join(dict.fromkeys(cell.source for cell in texts))
+        for cell in others:
+            if cell.get("attachments"):
+                first.attachments = {**first.get("attachments", {}), **cell.attachments}
+        self._remove(others)
+
+    def _remove(self, cells: list[NotebookNode]) -> None:
+        gone = set(map(id, cells))
+        self.submitted.cells = [cell for cell in self.cells if id(cell) not in gone]
 
     def _segments(self) -> Iterator[tuple[str, list[NotebookNode]]]:
         """Yield what stands behind each given cell, up to the next one."""
@@ -71,15 +99,10 @@ class Answers(Cells):
 
     def _answer(self, name: str, texts: list[NotebookNode]) -> None:
         """Make cells with text the answer ``name``, as one cell in their place."""
-        first, *others = texts
-        first.source = "\n\n".join(cell.source for cell in texts)
-        for cell in others:
-            if cell.get("attachments"):
-                first.attachments = {**first.get("attachments", {}), **cell.attachments}
-        empty = self._cell(name)
-        gone = {id(cell) for cell in (empty, *others) if cell is not None}
-        self.submitted.cells = [cell for cell in self.cells if id(cell) not in gone]
-        self.take(name, first, said=empty is None)
+        self._join(texts)
+        if (empty := self._cell(name)) is not None:
+            self._remove([empty])
+        self.take(name, texts[0], said=empty is None)
         if empty is not None:
             self.moved.append(name)
 

@@ -17,7 +17,13 @@ from nbformat import NotebookNode
 from rapidfuzz import fuzz
 
 from autograder.assignments.intake.answer_matching import Answers
-from autograder.assignments.intake.known_cells import Recognised, defined, is_code, plain
+from autograder.assignments.intake.known_cells import (
+    Recognised,
+    defined,
+    is_code,
+    parses,
+    plain,
+)
 from autograder.assignments.submission import grade_id, is_locked, metadata
 
 ALIKE = 90.0
@@ -59,6 +65,8 @@ class _Recognition(Answers):
         self._take_given()
         self._take_work()
         self.take_answers()
+        self._keep_additions()
+        self._doubt_work_behind_its_exam()
         if len(self.taken) > len(self.reference) / 2:
             self.said.notes.append(LOST)
         elif self.taken:
@@ -143,10 +151,7 @@ class _Recognition(Answers):
 
     def _take_work(self) -> None:
         """Take code by what it defines; ask where code is left that a missing cell may be."""
-        given = {
-            name for cell in self.reference.values() if is_locked(cell)
-            for name in defined(cell.source)
-        }  # fmt: skip
+        given = self._defined_as_given()
         for name in self.missing():
             if name not in self.work:
                 continue
@@ -170,6 +175,53 @@ class _Recognition(Answers):
                     "may belong there: a person has to look at it.",
                 )
 
+    def _keep_additions(self) -> None:
+        """Run given cells also as the student has them, if there are lines of theirs in it.
+
+        Their text is put back, as every given one. An import in the middle would be lost with it.
+        """
+        for number, cell in reversed([*enumerate(self.cells)]):
+            own = self.reference.get(grade_id(cell))
+            if own is None or cell.cell_type != "code" or metadata(own).get("grade"):
+                continue
+            if self.added(cell).strip() and parses(cell.source):
+                self.cells.insert(number + 1, self._piece(cell, cell.source, ""))
+                self.said.notes.append(
+                    f"You have added to the given cell '{self.called(grade_id(cell))}': it is run "
+                    "as it was given, and then as you have it."
+                )
+
+    def _doubt_work_behind_its_exam(self) -> None:
+        """Ask where what a check examines is only defined below it: cells run from the top."""
+        order = list(self.reference)
+        given = self._defined_as_given()
+        for name in self.work:
+            wanted = defined(self.reference[name].source) - given
+            exams = [exam for exam in self._examined() if order.index(exam) > order.index(name)]
+            places = [n for n, cell in enumerate(self.cells) if grade_id(cell) in exams]
+            if not wanted or not places:
+                continue
+            before, behind = self.cells[: min(places)], self.cells[min(places) :]
+            done = {
+                word for cell in before if is_code(cell) and not self._is_stub(cell)
+                for word in defined(cell.source)
+            }  # fmt: skip
+            late = {
+                word for cell in behind
+                if is_code(cell) and grade_id(cell) in ("", name) and not self._is_stub(cell)
+                for word in defined(cell.source)
+            }  # fmt: skip
+            if not wanted & done and wanted & late:
+                self.doubt(
+                    self._examined(),
+                    f"'{sorted(wanted & late)[0]}' is defined below the check that examines it, "
+                    "and cells are run from the top: a person has to look at it.",
+                )
+
+    def _is_stub(self, cell: NotebookNode) -> bool:
+        own = self.reference.get(grade_id(cell))
+        return own is not None and plain(own.source) == plain(cell.source)
+
     def _in_place(self, name: str) -> list[NotebookNode]:
         """Return the unknown cells between what precedes and what follows a missing cell."""
         order = list(self.reference)
@@ -180,6 +232,13 @@ class _Recognition(Answers):
         end = min((n for n, earlier in known if not earlier and n > start), default=len(self.cells))
         unknown = {id(cell) for cell in self.unknown()}
         return [cell for cell in self.cells[start + 1 : end] if id(cell) in unknown]
+
+    def _defined_as_given(self) -> set[str]:
+        """Return what the given cells define as they were handed out."""
+        return {
+            name for cell in self.reference.values() if is_locked(cell)
+            for name in defined(cell.source)
+        }  # fmt: skip
 
     def _defined_in_given(self) -> set[str]:
         """Return what is defined in given cells that were changed: their own text is put back."""

@@ -128,10 +128,10 @@ def is_code(cell: NotebookNode) -> bool:
 
 
 def is_text(cell: NotebookNode) -> bool:
-    """Whether a cell may hold an answer: text, or code that is none."""
+    """Whether a cell may hold an answer: text, or code that is none or says nothing but text."""
     if not cell.source.strip():
         return False
-    return bool(cell.cell_type != "code" or not parses(cell.source))
+    return bool(cell.cell_type != "code" or not parses(cell.source) or _only_says(cell.source))
 
 
 def parses(source: str) -> bool:
@@ -147,6 +147,22 @@ def parses(source: str) -> bool:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return False
     return True
+
+
+def _only_says(source: str) -> bool:
+    """Whether sound code is comments and strings alone."""
+    if len(source) > LONGEST_ANSWER:
+        return False
+    try:
+        body = ast.parse(source).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError):  # magics
+        return False
+    return all(
+        isinstance(line, ast.Expr)
+        and isinstance(line.value, ast.Constant)
+        and isinstance(line.value.value, str)
+        for line in body
+    )
 
 
 def defined(source: str) -> set[str]:

@@ -9,6 +9,7 @@ Claimed are the assignment's notebooks, a quiz's attempts, and what was handed o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path, PurePosixPath
@@ -33,6 +34,12 @@ from quizzes.record import read_plain
 
 ALIKE = 0.5
 """Part of a notebook's given cells that a file must have to be taken for it."""
+
+GRADED_AS = "graded as"
+"""Stands in what a student is told of a notebook that lay somewhere else."""
+
+ARCHIVES = (".zip", ".tar", ".gz", ".tgz", ".bz2", ".xz", ".7z", ".rar")
+"""Ends of names of what may hold a notebook, and is not looked into, or only in part."""
 
 MAX_READ = 20
 """Files of other names that are read as notebooks; further ones are left to a person."""
@@ -217,7 +224,7 @@ class Intake:
         notebook = _parsed(item)
         if item.place == f"{name}.ipynb":
             return Found(notebook, claimed=True)
-        said = f"'{shown(item.place)}' was graded as {name}.ipynb, as a person has said."
+        said = f"'{shown(item.place)}' was {GRADED_AS} {name}.ipynb, as a person has said."
         return Found(notebook, item, (said,), claimed=True)
 
     def _proper(self, name: str, path: Path) -> Found:
@@ -229,9 +236,15 @@ class Intake:
             if others:
                 raise self._unclear(name, f"{error} But there is {_places(others)}, too:", others) \
                     from None  # fmt: skip
+            if like := self._like_work(name):
+                raise self._unclear(name, f"{error} But there is {like}, too:") from None
             raise
         others = [c for c in others if c.texts != _Candidate(c.item, notebook).texts]
         if not others:
+            untouched = cell_matching.is_untouched(notebook, self._released[name])
+            if untouched and (like := self._like_work(name)):
+                said = f"{name}.ipynb is as it was handed out, but there is {like}, too:"
+                raise self._unclear(name, said)
             return Found(notebook)
         if cell_matching.is_untouched(notebook, self._released[name]):
             said = f"{name}.ipynb is as it was handed out, but there is {_places(others)}, too:"
@@ -248,12 +261,15 @@ class Intake:
             assert notebook is not None
             said = (
                 f"There was no {name}.ipynb, but '{shown(item.place)}' holds its cells, so it was "
-                "graded as that."
+                f"{GRADED_AS} that."
             )
             return Found(notebook, item, (said,), (said,))
         missing = f"There is no {name}.ipynb in the submission"
         if found:
             raise self._unclear(name, f"{missing}, but there are {_places(found)}:", found)
+        if (other := self._misnamed(name)) is not None:
+            said = f"{missing}, but {shown(other.item.place)} holds its cells:"
+            raise self._unclear(name, said, [other])
         if strange := self._strange():
             names = listed(item.place for item in strange)
             verb = "is" if len(strange) == 1 else "are"
@@ -336,6 +352,30 @@ class Intake:
         ]  # fmt: skip
         of_quizzes = {item.place for item, _ in attempts.with_attempts(unclaimed)}
         return [item for item in unclaimed if item.place not in of_quizzes]
+
+    def _like_work(self, name: str) -> str:
+        """Return what may hold the work on a notebook that is a stub or damaged, as a phrase.
+
+        A picture or a module beside it says nothing: that belongs to other notebooks, too.
+        """
+        return listed(
+            item.place for item in self._strange()
+            if _may_be_notebook(item.name) or item.name.lower().endswith(ARCHIVES)
+            or normal(item.name).lower().startswith(f"{name}.")
+        )  # fmt: skip
+
+    def _misnamed(self, name: str) -> _Candidate | None:
+        """Return the notebook that lies in the place of another one, and holds this one's cells."""
+        for other in self._released:
+            item = self.handed_in.at(f"{other}.ipynb") if other != name else None
+            if item is not None:
+                with suppress(SubmissionError):
+                    notebook = _parsed(item)
+                    if self._match(notebook) == name and not self._is_stub(
+                        name, found := _Candidate(item, notebook, name)
+                    ):
+                        return found
+        return None
 
     def _why(self, strange: list[Item]) -> str:
         reasons = [self.handed_in.closed.get(item.place, "") for item in strange]

@@ -52,8 +52,7 @@ def read(text: str, zone: str = "") -> datetime:
         UnclearTimeError: it could be several, or is not whole.
         ValueError: it is no time at all.
     """
-    text = _COMMENT.sub("", " ".join(text.split()))
-    clear = _year_first(text)
+    clear = _year_first(_without_comment(" ".join(text.split())))
     moment, where = _split_zone(clear, zone)
     if moment.tzinfo is None:
         moment = moment.replace(tzinfo=where)
@@ -61,6 +60,18 @@ def read(text: str, zone: str = "") -> datetime:
         return moment.astimezone(UTC)
     except (OverflowError, ValueError):
         raise ValueError("it holds no date") from None
+
+
+def _without_comment(text: str) -> str:
+    """Return a text without the name in brackets that follows a zone; without one it is the zone.
+
+    JavaScript writes ``GMT+0100 (Central European Standard Time)``, people ``20:15 (CEST)``.
+    """
+    bare = _COMMENT.sub("", text)
+    words = re.findall(r"[A-Za-z]{1,5}", bare)
+    if _offset(bare) is not None or _NAMED.search(bare) or any(map(_is_zone, words)):
+        return bare
+    return text.replace("(", " ").replace(")", " ")
 
 
 def _year_first(text: str) -> str:
