@@ -7,7 +7,7 @@ that is interrupted does it by itself, and what becomes of the robot is seen fro
 from __future__ import annotations
 
 from autograder.examination.check_context import Bench
-from autograder.examination.exam import Failed
+from autograder.examination.exam import Failed, NotExaminable
 from autograder.exercises.safety import drive_goal
 from autograder.exercises.safety.navigation import Dispatcher, Drives
 from autograder.exercises.safety.plain_program_survival import (
@@ -32,6 +32,11 @@ def require_shutdown(bench: Bench, still: Stillness) -> None:
     drives: list[Drives] = []
     nodes = [(Dispatcher.SERVER, ())]
     with bench.programs.program(nodes, threads=THREADS, sim_time=True, shut_down=True) as program:
+        if not program.up:  # though it was made when the harness asked for it
+            raise NotExaminable(
+                f"{Dispatcher.SERVER} could not be made in a program of its own. After a hand-in a "
+                "person looks at it."
+            )
 
         def on_the_way(dispatcher: Dispatcher, run: Run) -> Act:
             drive = dispatcher.send(drive_goal.LONGEST)

@@ -77,8 +77,8 @@ def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
     ends: Mapping[tuple[str, str], bool] = bench.memory[key]
     if trial and (name, trial) not in ends:
         raise NotExaminable(
-            "Something ends a plain program of your nodes, and it was not found out what. "
-            "After a hand-in a person looks at it."
+            "Something ends a plain program of your nodes, or keeps one of them from being made "
+            "there, and it was not found out what. After a hand-in a person looks at it."
         )
     return bool(trial) and ends[name, trial]
 
@@ -90,12 +90,15 @@ def _ending_acts(programs: Programs, still: Stillness) -> dict[tuple[str, str], 
     """
     ends = {(part.name, act): False for part in PARTS for act in part.acts}
     first = _play(programs, still, PARTS)
-    if not first and first is not None:
+    if first is not None and not first.ended:
         return ends
-    once = {*(first or {}).items()}
+    once = {*first.ended.items()} if first else set[tuple[str, str]]()
+    there = {part.name for part in PARTS} if first else set[str]()
     left, raising, deadline = [*PARTS], set[str](), Deadline(MOST_S)
     while left and deadline.left:
-        ended = _play(programs, still, left, apart=True) or {}
+        played = _play(programs, still, left, apart=True)
+        ended = played.ended if played else {}
+        there |= played.there if played else set()
         for name, act in ended.items():
             # rclpy's own executor has races, too; but hardly in a class that is known to raise.
             if (name, act) in once or name in raising:
@@ -104,11 +107,13 @@ def _ending_acts(programs: Programs, still: Stillness) -> dict[tuple[str, str], 
             once.add((name, act))
         left = [_from(part, ended[part.name], ends) for part in left if part.name in ended]
         left = [part for part in left if part.acts]
-    if first and not raising and not left and _play(programs, still, PARTS):
-        left = [*PARTS]
-    for part in left:
+    if first and not raising and not left:
+        again = _play(programs, still, PARTS)
+        left = [*PARTS] if again and again.ended else []
+    # Of a class whose node was made when the harness asked, and in no program, nothing is known.
+    for part in (*left, *(part for part in PARTS if part.name not in there)):
         for act in part.acts:
-            del ends[part.name, act]
+            ends.pop((part.name, act), None)
     return ends
 
 
@@ -119,14 +124,24 @@ def _from(part: Part, act: str, ends: Mapping[tuple[str, str], bool]) -> Part:
     return part._replace(acts={name: part.acts[name] for name in names[first:]})
 
 
+class Played(NamedTuple):
+    """What became of a program's nodes.
+
+    Where they were apart, ``ended`` are the classes whose node ended, each with the act that was
+    under way. Else there are none, or if the program ended all: it may have been any of them.
+    ``there`` are the classes whose node was seen.
+    """
+
+    ended: dict[str, str]
+    there: frozenset[str]
+
+
 def _play(
     programs: Programs, still: Stillness, parts: Sequence[Part], *, apart: bool = False
-) -> dict[str, str] | None:
-    """Act on the nodes of a program, each class by itself at the same time; return what ended.
+) -> Played | None:
+    """Act on the nodes of a program, each class by itself at the same time.
 
-    Where the nodes are ``apart``, these are the classes whose node ended, each with the act that
-    was under way. Else nothing, or if the program ended all classes: it may have been any of them.
-    None if a node cannot be made; of nodes that are apart, it is left out.
+    None if a node cannot be made; of nodes that are ``apart``, it is left out.
     """
     nodes = [(part.name, ()) for part in parts]
     with programs.program(nodes, threads=THREADS, sim_time=True, apart=apart) as program:
@@ -134,14 +149,15 @@ def _play(
             return None
         stage = Stage(program, still, parts)
         stage.play()
-        return stage.ended if apart else stage.under_way if program.ended() else {}
+        ended = stage.ended if apart else stage.under_way if program.ended() else {}
+        return Played(ended, frozenset(stage.there))
 
 
 class Stage:
     """Nodes in a program, their counterparts, and the clock of both.
 
-    ``under_way`` is of each class the act that was begun last, ``ended`` the same of those whose
-    node has ended.
+    ``there`` are the classes whose node was seen. ``under_way`` is of each class the act that was
+    begun last, ``ended`` the same of those whose node has ended.
     """
 
     def __init__(self, program: Program, still: Stillness, parts: Sequence[Part]) -> None:
@@ -160,7 +176,7 @@ class Stage:
             player.attend()
         # They may be known here before they know of anybody: a request would then be lost.
         Patience(still, idle=MEET_IDLE_S).wait(program.session, lambda: False)
-        self._there = {name for name, player in self.players.items() if not player.missing()}
+        self.there = {name for name, player in self.players.items() if not player.missing()}
         self.under_way = {part.name: next(iter(part.acts)) for part in parts}
         self.ended = dict[str, str]()
         self._due: dict[str, tuple[float, Act]] = {
@@ -202,7 +218,7 @@ class Stage:
         self._note_ended()
 
     def _note_ended(self) -> None:
-        for name in self._there - {*self.ended}:
+        for name in self.there - {*self.ended}:
             if self.players[name].missing():
                 self.ended[name] = self.under_way[name]
                 self._due.pop(name, None)
