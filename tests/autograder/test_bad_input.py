@@ -18,7 +18,7 @@ import pytest
 from nbgrader.api import Gradebook
 
 from autograder.assignments import submission
-from autograder.assignments.intake import roster
+from autograder.assignments.intake import folder_digest, roster
 from autograder.class_report.platforms import grades_csv
 from autograder.gradebook import course_gradebook
 from autograder.gradebook import database as words
@@ -32,7 +32,6 @@ from autograder.gradebook.database import (
 from autograder.grading import engine
 from autograder.grading.engine import AssignmentError, Graded
 from autograder.grading.progress import Progress
-from autograder.running import ledger
 from tests.killing import fresh_copy
 from tests.machine import needs_own_mounts, needs_sandbox
 
@@ -305,7 +304,8 @@ def test_whatever_goes_wrong_with_one_submission_stops_nobody(
 ) -> None:
     for student in ("looked-at", "staged", "entered"):
         shutil.copytree(course.root / "submitted" / "right", course.root / "submitted" / student)
-    of_folder, remarks, autograde = ledger.of_folder, roster.remarks, CourseGradebook.autograde
+    of_folder, remarks = folder_digest.of_folder, roster.remarks
+    autograde = CourseGradebook.autograde
     refused: list[str] = []
 
     def fails_to_look(folder: Path) -> str:
@@ -324,7 +324,7 @@ def test_whatever_goes_wrong_with_one_submission_stops_nobody(
             raise GradebookError("nbgrader cannot.")
         autograde(self, assignment, student)
 
-    monkeypatch.setattr(ledger, "of_folder", fails_to_look)
+    monkeypatch.setattr(folder_digest, "of_folder", fails_to_look)
     monkeypatch.setattr(roster, "remarks", fails_to_stage)
     monkeypatch.setattr(CourseGradebook, "autograde", fails_to_enter)
     graded = grade(course)

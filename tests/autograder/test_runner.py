@@ -165,7 +165,7 @@ registry.destroy_node = queue.SimpleQueue().get  # waits, and is no line of thei
     outcome = runner.run((*program(source), Cell("x = 1"), hidden), cell_timeout=5)
     assert not outcome.spoilt
     (reason,) = {check.actual for check in outcome.verdicts["qos-hidden"].checks}
-    assert "still being taken down 5 s after an examination (in residents.py:" in reason
+    assert "still being taken down 5 s after an examination (in registry.py:" in reason
 
 
 def test_only_what_failed_before_the_program_began_is_tried_again() -> None:
@@ -362,7 +362,7 @@ def test_an_examiner_without_a_verdict_says_where_it_is_stuck() -> None:
                 examiner.verdict(timeout=0.1)
     finally:
         lease.release()
-    place = r"\(wire\.py:\d+ _fill < wire\.py:\d+ receive < .*\)"
+    place = r"\(channel\.py:\d+ _fill < channel\.py:\d+ receive < .*\)"
     assert re.fullmatch(rf"The examiner gave no verdict within 0 s {place}\.", str(raised.value))
 
 

@@ -5,7 +5,7 @@ import ctypes
 import os
 
 ctypes.CDLL(None).prctl(15, b"\xff) R (\xff", 0, 0, 0)
-for _ in range(4):
+for _ in range(3):
     if os.fork() == 0:
         hoard = bytearray(b"x") * (700 * 2**20)
         while True:
