@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ from autograder.assignments.intake import attempts
 from autograder.assignments.intake.file_names import normal
 from autograder.commands.quiz_command import QuizCommandError, as_course_errors
 from autograder.gradebook import bridge as bridge
-from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.gradebook.course_gradebook import CourseGradebook, GradebookError
 from quizzes import record, sharing
 
 if TYPE_CHECKING:
@@ -101,7 +102,6 @@ def of_assignment(root: Path, assignment: str) -> list[QuizReport]:
     Raises:
         QuizMarksError: a bank is not sound.
         QuizCommandError: the reports cannot be written.
-        GradebookError: the gradebook cannot be read.
     """
     reports = []
     for name in quiz_cells.names(root):
@@ -127,9 +127,16 @@ class _Taken:
     asked: list[str] = field(default_factory=list)
 
 
+def _class(root: Path) -> frozenset[str]:
+    """Return whom the gradebook knows, if there is one."""
+    with suppress(GradebookError):
+        return CourseGradebook(root).roster().known
+    return frozenset()
+
+
 def _taken(root: Path, assignment: str, quiz: str) -> _Taken:
     taken = _Taken()
-    class_ = CourseGradebook(root).roster().known
+    class_ = _class(root)
     for folder in sorted((root / "submitted").glob(f"*/{assignment}")):
         learner = normal(folder.parent.name)
         try:
