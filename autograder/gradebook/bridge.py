@@ -43,7 +43,7 @@ ASKED_KEY = "ros2_course_asked"
 person is asked: {grade id: why}."""
 
 FOUND_KEY = "ros2_course_found"
-BESIDE_KEY = "ros2_course_beside"
+ATTACHMENTS_KEY = "ros2_course_attachments"
 UNCLEAR_KEY = "ros2_course_unclear"
 """Resources that the exporter leaves for the first step: which file it is, or what is not clear."""
 
@@ -80,7 +80,7 @@ class SubmissionExporter(NotebookExporter):
                 notebook = found.notebook
                 resources[FOUND_KEY] = found
                 if found.item is not None:
-                    resources[BESIDE_KEY] = intake.beside(found)
+                    resources[ATTACHMENTS_KEY] = intake.beside(found)
             else:  # nbgrader reads a second time what it has written itself
                 notebook = submission.read(Path(filename))
         except SubmissionError as error:
@@ -178,11 +178,13 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         if unreadable:
             outcome = runner.refuse(program, unreadable)
         else:
-            beside = resources.pop(BESIDE_KEY, None) or files_beside(folder)
+            attachments = resources.pop(ATTACHMENTS_KEY, None) or files_beside(folder)
             store = OutcomeStore(
                 root / WORK_FOLDER / "outcomes", trust=self.trust_submissions, hidden=[root]
             )
-            outcome = runner.with_notes(store.outcome(program, beside.files), beside.notes)
+            outcome = runner.with_notes(
+                store.outcome(program, attachments.files), attachments.notes
+            )
         class_ = nbgrader_commands.students(coursedir)
         return marks.with_quizzes(outcome, nb, folder, student, root, class_)
 

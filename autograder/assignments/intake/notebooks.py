@@ -356,7 +356,7 @@ class Intake:
     def _like_work(self, name: str) -> str:
         """Return what may hold the work on a notebook that is a stub or damaged, as a phrase.
 
-        A picture or a module beside it says nothing: that belongs to other notebooks, too.
+        A picture or a module in the same folder does not count: other notebooks use those, too.
         """
         return listed(
             item.place for item in self._strange()

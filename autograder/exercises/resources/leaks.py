@@ -15,8 +15,6 @@ from autograder.exercises.resources.camera_duties import DRIVER, require_picture
 from autograder.exercises.resources.camera_requests import require_snapshot
 from autograder.exercises.resources.process_usage import Usage
 from autograder.exercises.resources.rig import ENDED, CameraRig
-from autograder.observe.patience import Patience
-from autograder.observe.stillness import Stillness
 
 START_MEMORY = 1024  # KiB a failed start or a round: one of ten costs more than one of fifty
 WORDS = {"threads": "threads", "files": "open files"}
@@ -144,7 +142,7 @@ def require_start_raises_unasked(rig: CameraRig) -> None:
         return
     device = rig.device("unplugged")
     with rig.programs.program([(DRIVER, [device])]) as program:
-        if not Patience(Stillness(rig.outside)).wait(program.session, program.ended):
+        if not rig.patience().wait(program.session, program.ended):
             raise Failed(
                 expected=f"{DRIVER}({device!r}) raises in a program of its own as well, which so "
                 "ends.",
