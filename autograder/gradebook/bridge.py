@@ -157,10 +157,10 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
                 cell.source = cells.without_hidden(cell.source)
                 cell.outputs = _graded(verdict)
         resources["ros2_course_outcome"] = outcome
-        # Of what could not be read, nobody knows whether the written answers are empty.
-        flags = graded_cells(nb) if outcome.unreadable else []
-        flags += [name for name, verdict in outcome.verdicts.items() if verdict.needs_human]
-        resources["ros2_course_flags"] = [*dict.fromkeys([*flags, *asked])]
+        if outcome.unreadable:  # nobody knows what it is worth, nor whether answers are empty
+            asked = {**dict.fromkeys(graded_cells(nb), " ".join(outcome.notes)), **asked}
+        flags = [name for name, verdict in outcome.verdicts.items() if verdict.needs_human]
+        resources["ros2_course_flags"] = [*dict.fromkeys([*asked, *flags])]
         resources[ASKED_KEY] = asked
         return nb, resources
 

@@ -24,7 +24,6 @@ from autograder.assignments.intake.file_names import meant
 from autograder.assignments.questions import Question
 from autograder.assignments.submission import SubmissionError
 from autograder.class_report.platforms.exports import as_csv, guarded, is_formula
-from autograder.gradebook import records
 from autograder.gradebook.bridge import WORK_FOLDER
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.database import of_cells
@@ -166,10 +165,7 @@ def collect(gradebook: CourseGradebook, assignment: str, question: Question) -> 
         unclear = asked.get(student, {}).get(question.notebook)
         asked_about = unclear is not None and question.grade_id in unclear.cells
         # If either, what stands in the graded copy is ours, in place of what was handed in.
-        if text is None or (
-            row["needs_manual_grade"]
-            and (asked_about or _is_unreadable(gradebook, assignment, question, student))
-        ):
+        if text is None or (row["needs_manual_grade"] and asked_about):
             unread.append(student)
         elif row["manual_score"] is None and not row["needs_manual_grade"]:
             empty.append(student)  # nbgrader has seen that nothing was written
@@ -282,18 +278,6 @@ def _text(
         return None
     cells = (c for c in notebook.cells if submission.grade_id(c) == question.grade_id)
     return next((str(cell.source) for cell in cells), None)
-
-
-def _is_unreadable(
-    gradebook: CourseGradebook, assignment: str, question: Question, student: str
-) -> bool:
-    """Whether nothing of the notebook that was handed in could be read."""
-    work = gradebook.root / WORK_FOLDER
-    try:
-        record = records.load(work, assignment, student, question.notebook)
-    except records.RecordError:
-        return False
-    return record is not None and record.unreadable
 
 
 def _state(text: str, row: Mapping[str, Any]) -> str:

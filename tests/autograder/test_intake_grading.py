@@ -121,6 +121,7 @@ def test_a_score_is_never_zero_because_of_a_name_or_lost_metadata(
     lost.cells.append(nbformat.v4.new_code_cell("profile = my_profile()"))
     put(course, "lost", f"{NOTEBOOK}.ipynb", lost)
     (course.folder("document") / "report.pdf").write_bytes(b"%PDF")
+    course.submit("damaged", '{"cells": [')
     with zipfile.ZipFile(course.folder("zipped") / "hand-in.zip", "w") as archive:
         archive.writestr("ch05/my work.ipynb", nbformat.writes(right()))
 
@@ -139,6 +140,8 @@ def test_a_score_is_never_zero_because_of_a_name_or_lost_metadata(
         assert f"autograder claim {ASSIGNMENT} {student} {NOTEBOOK}" in problems[student]
         assert problems[student].isprintable()
     assert "'b\\n[/red].ipynb'" in problems["two"]
+    assert "damaged" in found["damaged"].asked[NOTEBOOK], "it cannot be read"
+    asked.add("damaged")
     written = scores(course)
     assert {student for student, score in written.items() if not score} == asked
     assert exported(course) == (set(found) - asked,) * 2

@@ -125,8 +125,10 @@ class Sensor:
         delivered = self.message(tag)
         if self.type is not String:
             delivered.header = message.header
-        # As text only if need be: a range that is not a number does not equal itself.
-        return bool(message == delivered) or repr(message) == repr(delivered)
+        if message == delivered:
+            return True
+        # A range that is not a number does not equal itself.
+        return self.type is LaserScan and repr(message) == repr(delivered)
 
 
 def _vectors(imu: Imu) -> tuple[Any, Any, Any]:
