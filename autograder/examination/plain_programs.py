@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, TextIO
+from typing import Any, NamedTuple, TextIO
 
 from autograder.processes.outside.asking import Outside
 from autograder.processes.outside.requests import RequestError
@@ -24,6 +24,16 @@ DOMAINS = 100
 
 Nodes = Sequence[tuple[str, Sequence[str]]]
 """Classes, and what their constructors are given."""
+
+
+class Life(NamedTuple):
+    """What a program is from one interrupt to the next but one.
+
+    Beside its ``nodes`` others are ``tried``: the program goes on with what their making raises.
+    """
+
+    nodes: Nodes
+    tried: Nodes = ()
 
 
 class ProgramError(CourseError):
@@ -80,6 +90,7 @@ class Programs:
         self,
         nodes: Nodes,
         *,
+        then: Sequence[Life] = (),
         threads: int = 1,
         sim_time: bool = False,
         apart: bool = False,
@@ -88,11 +99,12 @@ class Programs:
     ) -> Iterator[Program]:
         """Run nodes of the notebook's classes for the length of the block.
 
-        Where they are ``apart``, each has an executor of its own, with so many threads, and what
-        leaves a callback ends its node alone. ``twice``: at the end of the first life each node is
-        destroyed twice. ``shut_down``: at a first interrupt their ``shutdown()`` is called, and
-        they spin on until the next. Whatever looks at the subject's processes meanwhile looks at
-        the program's.
+        Interrupted twice, a program makes them anew, or what its life is ``then``, life by life;
+        the last one is repeated. Where they are ``apart``, each has an executor of its own, with
+        so many threads, and what leaves a callback ends its node alone. ``twice``: at the end of
+        the first life of its kind each node is destroyed twice. ``shut_down``: at a first
+        interrupt their ``shutdown()`` is called, and they spin on until the next. Whatever looks
+        at the subject's processes meanwhile looks at the program's.
 
         Raises:
             ProgramError: the engine did not start it; that is never the student's fault.
@@ -101,7 +113,9 @@ class Programs:
         domain = MAX_DOMAIN - 1 - self._count % DOMAINS
         try:
             reply = self._ask(
-                wants="program", nodes=[[name, [*given]] for name, given in nodes],
+                wants="program", nodes=_told(nodes), then=[
+                    {"nodes": _told(life.nodes), "tried": _told(life.tried)} for life in then
+                ],
                 threads=threads, sim_time=sim_time, apart=apart, twice=twice, shut_down=shut_down,
                 domain=domain,
             )  # fmt: skip
@@ -110,3 +124,7 @@ class Programs:
                 yield Program(session, bool(reply["up"]), domain, self._ask, self._outside)
         finally:
             self._ask(wants="end")
+
+
+def _told(nodes: Nodes) -> list[list[Any]]:
+    return [[name, [*given]] for name, given in nodes]

@@ -21,7 +21,7 @@ from course.domains import MAX_DOMAIN
 
 UP_TIMEOUT_S = 30.0
 """Seconds until a program must have started, and until its cells have made its nodes."""
-MOST_NODES, MOST_ARGUMENTS, MAX_ARGUMENT, MOST_THREADS = 8, 4, 200, 8
+MOST_NODES, MOST_ARGUMENTS, MAX_ARGUMENT, MOST_THREADS, MOST_LIVES = 8, 4, 200, 8, 8
 
 _CLASS = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
 
@@ -41,10 +41,10 @@ class ProgramHost:
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return the answer to a request of the examiner's; an ``"error"`` says why there is none.
 
-        ``{"wants": "program", "nodes": [[class, arguments], ...], "threads", "sim_time", "apart",
-        "twice", "shut_down", "domain"}`` starts one; ``{"wants": "interrupt"}`` sends SIGINT,
-        ``{"wants": "end"}`` ends it. From its start to its end whoever looks at the subject's
-        processes sees the program's.
+        ``{"wants": "program", "nodes": [[class, arguments], ...], "then": [{"nodes", "tried"},
+        ...], "threads", "sim_time", "apart", "twice", "shut_down", "domain"}`` starts one;
+        ``{"wants": "interrupt"}`` sends SIGINT, ``{"wants": "end"}`` ends it. From its start to its
+        end whoever looks at the subject's processes sees the program's.
         """
         match request.get("wants"):
             case "program":
@@ -108,14 +108,24 @@ class ProgramHost:
 
 def _wanted(request: dict[str, Any]) -> tuple[dict[str, Any], int]:
     """Return what a program is to be, and its domain; raises what `answer` takes for no program."""
-    nodes = []
-    for name, arguments in request["nodes"][:MOST_NODES]:
-        texts = [argument for argument in arguments[:MOST_ARGUMENTS] if isinstance(argument, str)]
-        if not _CLASS.fullmatch(name) or any(len(text) > MAX_ARGUMENT for text in texts):
-            raise ValueError(name)
-        nodes.append([name, texts])
+    nodes = _nodes(request["nodes"])
+    then = [
+        {"nodes": _nodes(life["nodes"]), "tried": _nodes(life["tried"])}
+        for life in request["then"][:MOST_LIVES]
+    ]
     threads, domain = int(request["threads"]), int(request["domain"])
     if not 1 <= threads <= MOST_THREADS or not 0 <= domain <= MAX_DOMAIN:
         raise ValueError(threads)
     how = {name: bool(request[name]) for name in ("sim_time", "apart", "twice", "shut_down")}
-    return {"nodes": nodes, "threads": threads, **how}, domain
+    return {"nodes": nodes, "then": then, "threads": threads, **how}, domain
+
+
+def _nodes(wanted: Any) -> list[Any]:
+    """Return classes and texts that their constructors are given; raises what `_wanted` does."""
+    nodes = []
+    for name, arguments in wanted[:MOST_NODES]:
+        texts = [argument for argument in arguments[:MOST_ARGUMENTS] if isinstance(argument, str)]
+        if not _CLASS.fullmatch(name) or any(len(text) > MAX_ARGUMENT for text in texts):
+            raise ValueError(name)
+        nodes.append([name, texts])
+    return nodes

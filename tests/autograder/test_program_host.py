@@ -42,9 +42,19 @@ class Raises(Works):
     def tick(self):
         raise RuntimeError("out of a callback")
 
+class Refuses(Node):
+    def __init__(self, name):
+        say("refuses")
+        raise RuntimeError("not made")
+
 nodes, threads = [[name, [name]] for name in sys.argv[1].split()], int(sys.argv[2])
 wanted = {"nodes": nodes, "threads": threads, "sim_time": False, "apart": len(nodes) > 1}
 wanted |= {how: how == sys.argv[4] for how in ("twice", "shut_down")}
+wanted["then"] = [{"nodes": nodes, "tried": []}]
+if sys.argv[4] == "then":
+    refused = [["Refuses", ["none"]], ["Missing", []]]
+    wanted["then"] = [{"nodes": [["Works", ["next"]]], "tried": refused}]
+    wanted["then"] += [{"nodes": [["Refuses", ["none"]]], "tried": []}]
 plain_program.run(globals(), wanted, int(sys.argv[3]), lambda: say("up"))
 """
 
@@ -83,6 +93,18 @@ def test_where_it_is_asked_for_the_nodes_of_the_first_life_are_destroyed_twice()
     live(1, "twice", [["destroyed", "destroyed"]], [["destroyed"]])
 
 
+def test_lives_may_differ_and_only_what_is_tried_may_fail() -> None:
+    with start("Works", 1, "then") as program:
+        try:
+            reads(program, "made", "up", "spins")
+            for lines in (["destroyed"], ["made", "refuses", "spins"], ["destroyed"], ["refuses"]):
+                os.kill(program.pid, signal.SIGINT)
+                reads(program, *lines)
+            assert program.wait(timeout=60) == 1
+        finally:
+            program.kill()
+
+
 @pytest.mark.parametrize("threads", [1, 4])
 def test_where_it_is_asked_for_the_nodes_are_shut_down_and_spin_on(threads: int) -> None:
     life = [["shut down"], ["destroyed"]]
@@ -115,12 +137,19 @@ def test_apart_a_callback_that_raises_ends_its_node_alone_and_one_not_made_is_le
         {"wants": "anything"},
         {"wants": "interrupt"},
         {"wants": "program"},
-        {"wants": "program", "nodes": [["os.system", []]], "threads": 1, "domain": 1},
-        {"wants": "program", "nodes": [["Node", ["x" * 1000]]], "threads": 1, "domain": 1},
-        {"wants": "program", "nodes": [[["Node"], []]], "threads": 1, "domain": 1},
-        {"wants": "program", "nodes": [["Node", []]], "threads": 1000, "domain": 1},
-        {"wants": "program", "nodes": [["Node", []]], "threads": 1, "domain": 10**6},
-        {"wants": "program", "nodes": {"Node": []}, "threads": 1, "domain": 1},
+        {"wants": "program", "nodes": [["os.system", []]], "threads": 1, "then": [], "domain": 1},
+        {
+            "wants": "program",
+            "nodes": [["Node", ["x" * 1000]]],
+            "threads": 1,
+            "then": [],
+            "domain": 1,
+        },
+        {"wants": "program", "nodes": [[["Node"], []]], "threads": 1, "then": [], "domain": 1},
+        {"wants": "program", "nodes": [["Node", []]], "threads": 1000, "then": [], "domain": 1},
+        {"wants": "program", "nodes": [["Node", []]], "threads": 1, "then": [], "domain": 10**6},
+        {"wants": "program", "nodes": {"Node": []}, "threads": 1, "then": [], "domain": 1},
+        {"wants": "program", "nodes": [], "threads": 1, "then": ["Node"], "domain": 1},
     ],
 )
 def test_what_is_no_request_is_refused_and_starts_nothing(request_: dict[str, Any]) -> None:

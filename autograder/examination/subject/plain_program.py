@@ -4,15 +4,18 @@ What an exam learns of it, it sees from outside. A callback that raises ends the
 node has its own executor, it ends that node. SIGINT destroys the nodes, as Ctrl-C does. The program
 then keeps running, with whatever they did not release; the next SIGINT creates new nodes, so that
 one life can be compared with the next. Programs destroy a node twice now and then, in a handler and
-at their end, say: one can be had that does so at the end of its first life.
+at their end, say: one can be had that does so at the end of its first life. Lives may differ, and
+nodes may be tried in one, as a supervisor does: it goes on with what they raise.
 """
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
+from itertools import chain, repeat
 from threading import Thread
 from typing import Any
 
@@ -32,11 +35,12 @@ def run(
 
     Args:
         namespace: the notebook's globals.
-        wanted: ``"nodes"``, a list of [class, arguments], ``"threads"``, ``"sim_time"``,
-            ``"twice"``, whether each node of the first life is destroyed twice, ``"apart"``,
-            whether each node has an executor of its own, with so many threads, and
-            ``"shut_down"``, whether at a first SIGINT their ``shutdown()`` is called, and they
-            spin on until the next.
+        wanted: ``"nodes"``, a list of [class, arguments] for the first life, ``"then"``, the same
+            for each life after, with ``"tried"`` nodes, whose making may raise; the last of these
+            is repeated. ``"threads"``, ``"sim_time"``, ``"twice"``, whether each node of the first
+            life of its kind is destroyed twice, ``"apart"``, whether each node has an executor of
+            its own, with so many threads, and ``"shut_down"``, whether at a first SIGINT their
+            ``shutdown()`` is called, and they spin on until the next.
         domain_id: of the examiner who looks on.
         up: called once, when the first nodes are there.
     """
@@ -48,11 +52,39 @@ def run(
             # A node that is ended still sends its last words.
             signal_handler_options=SignalHandlerOptions.NO,
         )
-    times = 2 if wanted["twice"] else 1
-    while True:
-        _live(namespace, wanted, interrupts, up, times)
+    raised: list[BaseException] = []
+    before: list[Any] = []
+    for life in _lives(wanted):
+        times = 2 if wanted["twice"] and life["nodes"] not in before else 1
+        before.append(life["nodes"])
+        of_life = {**wanted, "nodes": life["nodes"], "times": times}
+        _live(namespace, of_life, interrupts, partial(_try, namespace, life["tried"], raised, up))
         interrupts.wait()
-        up, times = _nothing, 1
+        up = _nothing
+
+
+def _lives(wanted: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    first = {"nodes": wanted["nodes"], "tried": []}
+    lives = [first, *wanted["then"]]
+    return chain(lives, repeat(lives[-1]))
+
+
+def _try(
+    namespace: Mapping[str, Any],
+    tried: Sequence[Any],
+    raised: list[BaseException],
+    up: Callable[[], None],
+) -> None:
+    """Make nodes that may raise, beside those that are there; then say that all are.
+
+    What they raise is kept, as a notebook keeps it: what its frames refer to does not go by chance.
+    """
+    for name, arguments in tried:
+        try:
+            namespace[name](*arguments)
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - of the student's code
+            raised.append(error)
+    up()
 
 
 def _live(
@@ -60,10 +92,9 @@ def _live(
     wanted: Mapping[str, Any],
     interrupts: _Interrupts,
     up: Callable[[], None],
-    times: int,
 ) -> None:
-    """Run the nodes until SIGINT, then destroy them so many ``times``."""
-    threads = int(wanted["threads"])
+    """Run the nodes until SIGINT, then destroy them so many ``"times"``."""
+    threads, times = int(wanted["threads"]), int(wanted["times"])
     if wanted["apart"]:
         nodes = []
         for name, arguments in wanted["nodes"]:

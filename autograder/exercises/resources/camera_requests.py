@@ -73,8 +73,13 @@ def require_one_picture_each(rig: CameraRig, device: str, when: str) -> None:
         )
 
 
-def require_snapshots_under_way(rig: CameraRig, device: str) -> Callable[[], int]:
+def require_snapshots_under_way(
+    rig: CameraRig, device: str, *, answered: bool = True
+) -> Callable[[], int]:
     """Ask for some snapshots; fail unless one is answered. A callback waits for the next one then.
+
+    A design that takes several pictures at a time has then answered nearly all. So without
+    ``answered`` it is enough that the camera is asked: a callback waits for the first one.
 
     Return a function that says how many of them have not succeeded by the time of its call.
 
@@ -87,15 +92,15 @@ def require_snapshots_under_way(rig: CameraRig, device: str) -> Callable[[], int
     replies = [snapshot.call_async(Trigger.Request()) for _ in range(BURST)]
 
     def next_one_waits() -> bool:
-        """Whether a first answer is here, and a callback waits for a further picture."""
-        done = [reply.done() for reply in replies]
-        return all(done) or (any(done) and sum(rig.cameras(device)) >= asked + 2)
+        """Whether a first answer is here, if it has to be, and a callback waits for a picture."""
+        done, more = [reply.done() for reply in replies], sum(rig.cameras(device)) - asked
+        return all(done) or (any(done) and more >= 2) or (not answered and more >= 1)
 
     patience = rig.patience()
     while not rig.wait(next_one_waits, PERIOD) and patience.lasts():
         rig.node.zoom.publish(Int32(data=1))
         rig.nudge()
-    if not any(reply.done() for reply in replies):
+    if not any(reply.done() for reply in replies) and (answered or not next_one_waits()):
         raise Failed(
             expected=f"The service {SNAPSHOT} answers when the picture is there.",
             actual=f"No answer came{rig.raised()}.",

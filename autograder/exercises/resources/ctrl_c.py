@@ -2,35 +2,32 @@
 
 The harness asks a student's process to destroy a node, so that process knows when it is looked at.
 A program that is interrupted is not asked. Nor is it told what time it is: it has the machine's.
+
+A program takes its time to begin. So what else is to be seen of the notebook's nodes unasked comes
+in further lives of it, once it is known that the driver gives back what it takes: starts that fail,
+and a managed camera.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from statistics import median_low
-from typing import Any
 
 from autograder.examination.exam import Failed
-from autograder.examination.plain_programs import Program, Programs
+from autograder.examination.plain_programs import Life, Programs
 from autograder.exercises.resources.camera_duties import DRIVER
-from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT, ExaminerNode
+from autograder.exercises.resources.managed_life import MANAGED, ManagedLife, watch_managed
 from autograder.exercises.resources.process_usage import Usage
+from autograder.exercises.resources.program_observer import ProgramObserver
 from autograder.exercises.resources.rig import ENDED, PERIOD, CameraRig
-from autograder.observe.patience import SETTLE_S, Patience
-from autograder.observe.phrases import capitalized, phrase, pictures
-from autograder.observe.stillness import Stillness
-from autograder.processes.fair_deadline import FairDeadline
+from autograder.observe.patience import SETTLE_S
+from autograder.observe.phrases import phrase
 
 LIVES = 4
-COUNTED = 8
-"""Pictures whose rate is taken, in about as many tenths of a second."""
-SLOWEST, FASTEST = 0.6 / PERIOD, 1.6 / PERIOD
-"""Pictures a second that are taken for ten: a busy machine is no fault of a driver's."""
-TAKES = 3
-"""Of a rate, as pictures that have been held up come many at a time."""
+TRIED = 4
+"""Starts that fail, beside the last of these lives."""
 MEMORY = 1024  # KiB a life: nobody has Python collect what is garbage
 WHEN = "When the driver runs in a program of its own, which is ended by Ctrl-C,"
 
@@ -44,7 +41,9 @@ class Lives:
     ``usages`` what the program held after each, unless what came with them went
     later; ``others`` tells of processes that were left then.
     ``pace`` tells of pictures that do not come ten times a second, ``harmed`` of what a second
-    destroy_node() does, if that is not nothing.
+    destroy_node() does, if that is not nothing. ``of_starts`` tells of what starts left that failed
+    beside one more life. ``managed`` is what was seen of a managed camera, and ``start_raises``
+    whether the program ended where its driver could not start; None if it did not go so far.
     """
 
     worked: bool = True
@@ -55,11 +54,20 @@ class Lives:
     others: str = ""
     pace: str = ""
     harmed: str = ""
+    of_starts: str = ""
+    managed: ManagedLife | None = None
+    start_raises: bool | None = None
 
     @property
     def went_on(self) -> bool:
         """Whether each life but the last was followed by one."""
         return self.worked and not self.raised
+
+    @property
+    def clean(self) -> bool:
+        """Whether nothing was left of any of them."""
+        left = self.left_open or self.left_on_graph or self.of_starts
+        return self.went_on and not left and not (self.usages and _leaks(self.kept()))
 
     def kept(self) -> Usage:
         """Return what a life leaves behind: the median, as something else may come or go once."""
@@ -69,7 +77,7 @@ class Lives:
 
 def require_pace(rig: CameraRig) -> None:
     """Fail unless a driver takes ten pictures a second where nobody but the machine tells time."""
-    if (lives := _lives(rig)) is not None and lives.pace:
+    if (lives := seen_lives(rig)) is not None and lives.pace:
         raise Failed(
             expected="When the driver runs in a program of its own, it takes ten pictures a second "
             "by the machine's clock.",
@@ -79,19 +87,19 @@ def require_pace(rig: CameraRig) -> None:
 
 def require_no_harm_at_the_end(rig: CameraRig) -> None:
     """Fail unless a driver may be destroyed twice at Ctrl-C."""
-    if (lives := _lives(rig)) is not None and lives.harmed:
+    if (lives := seen_lives(rig)) is not None and lives.harmed:
         raise _failed("destroy_node() can be called a second time.", lives.harmed)
 
 
 def require_off_graph_at_the_end(rig: CameraRig) -> None:
     """Fail unless a driver's endpoints go at Ctrl-C."""
-    if (lives := _lives(rig)) is not None and lives.left_on_graph:
+    if (lives := seen_lives(rig)) is not None and lives.left_on_graph:
         raise _failed("nothing of it is on the graph.", "Its publisher or service still was.")
 
 
 def require_closed_at_the_end(rig: CameraRig) -> None:
     """Fail unless a driver closes its camera at Ctrl-C."""
-    if (lives := _lives(rig)) is None:
+    if (lives := seen_lives(rig)) is None:
         return
     if not lives.worked:
         raise _failed("it takes pictures.", "It took none.")
@@ -105,7 +113,7 @@ def require_closed_at_the_end(rig: CameraRig) -> None:
 
 def require_nothing_kept_at_the_end(rig: CameraRig) -> None:
     """Fail if each life of a driver leaves a thread, a file or memory in the program."""
-    lives = _lives(rig)
+    lives = seen_lives(rig)
     if lives is None or len(lives.usages) < LIVES:
         return
     if left := _leaks(lives.kept()):
@@ -122,7 +130,7 @@ def _leaks(kept: Usage) -> list[str]:
     return left
 
 
-def _lives(rig: CameraRig) -> Lives | None:
+def seen_lives(rig: CameraRig) -> Lives | None:
     """Return what was seen, once a notebook; None where there are no such programs."""
     if rig.programs is None:
         return None
@@ -149,90 +157,131 @@ def _watch_twice(rig: CameraRig, programs: Programs) -> Lives:
 
 
 def _watch(rig: CameraRig, programs: Programs, *, twice: bool) -> Lives:
-    device = rig.device()
-    with programs.program([(DRIVER, [device])], twice=twice) as program:
-        watcher = program.session.run(ExaminerNode)
-        assert isinstance(watcher, ExaminerNode)
-        return _watch_lives(rig, program, watcher, device)
+    device, stuck = rig.device(), rig.device("stuck")
+    driver = [(DRIVER, [device])]
+    then = [
+        *[Life(driver)] * (LIVES - 2),
+        Life(driver, tried=[(DRIVER, [stuck])] * TRIED),
+        Life([(MANAGED, [])]),
+        Life([(DRIVER, [rig.device("unplugged")])]),
+    ]
+    with programs.program(driver, then=then, twice=twice) as program:
+        seen = ProgramObserver(rig, program)
+        lives = _watch_lives(seen, device)
+        if len(lives.usages) == LIVES - 1:
+            lives = _watch_last_life(seen, lives, device, stuck)
+        return _watch_others(seen, lives) if lives.clean else lives
 
 
-def _watch_lives(rig: CameraRig, program: Program, watcher: ExaminerNode, device: str) -> Lives:
-    def on_graph() -> bool:
-        return bool(watcher.count_publishers(IMAGE) or watcher.count_services(SNAPSHOT))
-
-    still = Stillness(rig.outside)
-
-    def comes(condition: Callable[[], Any]) -> bool:
-        return Patience(still).wait(program.session, condition)
-
+def _watch_lives(seen: ProgramObserver, device: str) -> Lives:
+    """Watch all lives but the last, or as many as go on."""
     lives = Lives()
-    for life in range(LIVES):
-        # A picture is asked for by a timer or a thread, once the nodes spin.
-        if not program.up or not comes(lambda: any(rig.cameras(device)) or program.ended()):
-            return replace(lives, worked=False)
-        if program.ended():
-            return replace(lives, raised=True)
-        comes(on_graph)
-        if life == LIVES - 1:  # so what the first has left has a second more to go by itself
-            comes(lambda: watcher.of(device))
-            lives = replace(lives, pace=_pace(rig, program, watcher, device))
-        program.interrupt()
-        closed = comes(lambda: not rig.cameras(device))
-        off_graph = comes(lambda: not on_graph())
-        if program.ended():
-            return replace(lives, raised=True)
-        if not closed or not off_graph:
-            return replace(lives, left_open=not closed, left_on_graph=not off_graph)
-        usage = _usage(rig, program, lives.usages)
-        lives = replace(lives, usages=(*lives.usages, usage), others=rig.others())
-        if life == LIVES - 1 and _goes(rig, program, lives):
-            lives = replace(lives, usages=())
-        program.interrupt()
+    for life in range(LIVES - 1):
+        if life > 0:
+            seen.program.interrupt()
+        lives = _begin_life(seen, lives, device)
+        if not lives.went_on:
+            return lives
+        lives = _end_life(seen, lives, device)
+        if not lives.went_on or lives.left_open or lives.left_on_graph:
+            return lives
+        usage = _usage(seen, lives.usages)
+        lives = replace(lives, usages=(*lives.usages, usage), others=seen.rig.others())
     return lives
 
 
-def _pace(rig: CameraRig, program: Program, watcher: ExaminerNode, device: str) -> str:
-    """Return how many pictures come in what time, unless that is about ten a second."""
-
-    def came() -> int:
-        return len(watcher.of(device))
-
-    for _ in range(TAKES):
-        begun, before = time.monotonic(), came()
-        deadline = FairDeadline(COUNTED / SLOWEST, rig.outside.delay)
-        while (left := deadline.left) and came() < before + COUNTED:
-            program.wait(lambda most=before + COUNTED: came() >= most, left)  # type: ignore[misc]
-        number, seconds = came() - before, time.monotonic() - begun
-        if number >= COUNTED and number <= seconds * FASTEST:
-            return ""
-    return f"{capitalized(pictures(number))} came in {seconds:.1f} s."
+def _begin_life(seen: ProgramObserver, lives: Lives, device: str) -> Lives:
+    # A picture is asked for by a timer or a thread, once the nodes spin.
+    if not seen.program.up or not (seen.wait(lambda: any(seen.rig.cameras(device))) or seen.gone()):
+        return replace(lives, worked=False)
+    if seen.gone():
+        return replace(lives, raised=True)
+    seen.wait(seen.working)
+    return lives
 
 
-def _usage(rig: CameraRig, program: Program, before: Sequence[Usage]) -> Usage:
+def _end_life(seen: ProgramObserver, lives: Lives, device: str) -> Lives:
+    seen.program.interrupt()
+    closed = seen.wait(lambda: not seen.rig.cameras(device))
+    off_graph = seen.wait(lambda: not seen.working())
+    if seen.gone():
+        return replace(lives, raised=True)
+    return replace(lives, left_open=not closed, left_on_graph=not off_graph)
+
+
+def _watch_last_life(seen: ProgramObserver, lives: Lives, device: str, stuck: str) -> Lives:
+    """Watch the life that has failed starts beside it; what the first has left had time to go.
+
+    What the driver itself leaves is known by then, so what is more is left by them: nothing is said
+    of it where each of its own lives leaves something.
+    """
+    rig, before, nodes = seen.rig, seen.rig.process.usage(), len(seen.nodes())
+    seen.program.interrupt()
+    last = _begin_life(seen, lives, device)
+    if not last.went_on:
+        return last
+    seen.wait(lambda: seen.node.of(device))
+    lives = replace(lives, pace=seen.pace(device, 1 / PERIOD))
+    last = _end_life(seen, lives, device)
+    if last.raised:
+        return last
+    usage = _usage(seen, lives.usages)
+    lives = replace(lives, usages=(*lives.usages, usage), others=rig.others())
+    if _goes(seen, lives):
+        lives = replace(lives, usages=())
+    if not lives.clean:
+        return lives
+    left = ["a camera open"] if last.left_open or rig.cameras(stuck) else []
+    left += ["an endpoint on the graph"] if last.left_on_graph else []
+    if not left and not seen.wait(lambda: len(seen.nodes()) <= nodes):
+        left = ["a node on the graph"]
+
+    def kept() -> list[str]:
+        threads, files, memory = rig.process.usage().grown(before)
+        # Half of them: threads come and go. The life itself may keep as much memory as a start.
+        return _leaks(Usage(threads // (TRIED // 2), files // (TRIED // 2), memory // (TRIED + 1)))
+
+    if not left and not rig.ends(lambda: not kept(), seen.session):
+        left = kept()
+    return replace(lives, of_starts=f"They left {phrase(left)}.{rig.others()}" if left else "")
+
+
+def _watch_others(seen: ProgramObserver, lives: Lives) -> Lives:
+    """Watch a managed camera in the program of drivers that gave everything back."""
+    seen.program.interrupt()
+    managed = watch_managed(seen)
+    if not managed.clean:
+        return replace(lives, managed=managed)
+    seen.program.interrupt()
+    return replace(lives, managed=managed, start_raises=seen.wait(seen.gone))
+
+
+def _usage(seen: ProgramObserver, before: Sequence[Usage]) -> Usage:
     """Return what the program holds, once no more goes that the task gives a second to go.
 
     Where a life has left something once, each may: that is waited for at the end of them.
     """
+    rig = seen.rig
     if len(before) == 1 or (before and not _leaks(before[-1].grown(before[-2]))):
         last = before[-1]
-        rig.ends(lambda: not _leaks(rig.process.usage().grown(last)), program.session)
+        rig.ends(lambda: not _leaks(rig.process.usage().grown(last)), seen.session)
     return rig.process.usage()
 
 
-def _goes(rig: CameraRig, program: Program, lives: Lives) -> bool:
+def _goes(seen: ProgramObserver, lives: Lives) -> bool:
     """Whether what each of these lives has left behind goes by itself, if late.
 
     A thread that looks every few seconds whether it is to end is too slow, and no leak. One that
     does not sleep for a time does not wake up by itself.
     """
-    first = lives.usages[0]
+    rig, first = seen.rig, lives.usages[0]
     if not _leaks(lives.kept()) or not (wakes := rig.process.wakes()):
         return False
 
     def a_life() -> Usage:
         return Usage(*(more // (LIVES - 1) for more in rig.process.usage().grown(first)))
 
-    return program.wait(lambda: not _leaks(a_life()), min(SETTLE_S, max(wakes) + ENDED))
+    return seen.wait(lambda: not _leaks(a_life()), min(SETTLE_S, max(wakes) + ENDED))
 
 
 def _failed(expected: str, actual: str) -> Failed:

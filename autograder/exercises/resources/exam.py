@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from functools import wraps
 
-from autograder.examination.exam import Exam, Failed
+from autograder.examination.exam import Exam, Failed, NotExaminable
 from autograder.exercises.resources.camera_duties import (
     DRIVER,
     require_callbacks_ended,
@@ -52,9 +52,12 @@ from autograder.exercises.resources.leaks import (
     refuse_zooms,
     require_flat_refusals,
     require_flat_snapshots,
-    require_start_raises_unasked,
 )
 from autograder.exercises.resources.managed import Managed
+from autograder.exercises.resources.managed_ctrl_c import (
+    require_managed_ended,
+    require_managed_pace,
+)
 from autograder.exercises.resources.managed_holdings import (
     require_no_helper_finalized,
     require_no_publisher_yet,
@@ -70,6 +73,7 @@ from autograder.exercises.resources.managed_inactive import (
     require_still_held,
     require_stopped,
 )
+from autograder.exercises.resources.managed_life import MANAGED
 from autograder.exercises.resources.managed_transitions import (
     require_configuration,
     require_flat_rounds,
@@ -77,13 +81,16 @@ from autograder.exercises.resources.managed_transitions import (
     require_refusals,
 )
 from autograder.exercises.resources.rig import PERIOD, CameraRig, camera_rig
+from autograder.exercises.resources.unasked_starts import (
+    require_nothing_left_unasked,
+    require_start_raises_unasked,
+)
 from autograder.observe.phrases import phrase
 
 EXAM: Exam[CameraRig] = Exam("resources", camera_rig)
 
-MANAGED = "ManagedCamera"
 FAILING_STARTS = 6
-TAKES = 3  # of an experiment in which the examiner may come too late
+TAKES = 4  # of an experiment in which the examiner may come too late
 FASTEST = 30.0  # Hz, the highest rate that is allowed
 
 READ_NODES = "Chapter 5, “Nodes: lifecycle management” and “Nodes: resource management”"
@@ -287,6 +294,7 @@ def failed_start(rig: CameraRig) -> None:
         require_gone(rig, device, "After failed starts, one that worked, and its end,", node)
         failing_starts_memory(rig, kind, FAILING_STARTS, before)
     require_start_raises_unasked(rig)
+    require_nothing_left_unasked(rig)
 
 
 @EXAM.check(
@@ -318,6 +326,7 @@ def managed_runs(rig: CameraRig) -> None:
         require_own_clock(rig, device)
         require_rate(rig, device, 10)
         node.go("deactivate", "cleanup")
+    require_managed_pace(rig, name)
 
 
 @EXAM.check(
@@ -507,6 +516,7 @@ def managed_shutdown(rig: CameraRig) -> None:
                     rig.program.stop(MANAGED, bare=True)  # finalized is a state, too
                 require_off_graph(rig, name, "After destroy_node()")
                 rig.program.destroy_again(MANAGED)
+    require_managed_ended(rig, name)
 
 
 @EXAM.check(
@@ -570,9 +580,15 @@ def cleanup_when_busy(rig: CameraRig) -> None:
         pass
     rig.rest()  # a thread may have one step left to its end
     usual = rig.process.threads()
-    for _ in range(TAKES):
-        if _destroyed_during_a_snapshot(rig, usual):
+    for take in range(TAKES):
+        if _destroyed_during_a_snapshot(rig, usual, answered=take == 0):
             break
+    else:
+        raise NotExaminable(
+            "destroy_node() was not seen while one of its callbacks waited for the camera: each "
+            f"time, of {TAKES}, snapshots succeeded after it had been asked for. After a hand-in a "
+            "person looks at it."
+        )
     device = rig.device("slow")
     with rig.life(DRIVER, device):
         require_picture(rig, device)
@@ -580,8 +596,10 @@ def cleanup_when_busy(rig: CameraRig) -> None:
         require_closed(rig, device, "After destroy_node() with a slow camera")
 
 
-def _destroyed_during_a_snapshot(rig: CameraRig, usual: int) -> bool:
+def _destroyed_during_a_snapshot(rig: CameraRig, usual: int, *, answered: bool) -> bool:
     """Have a driver destroyed while a callback waits for its picture; return whether one did.
+
+    ``answered``: not before another snapshot has been.
 
     The examiner is held up now and then, and the call may then find all snapshots answered, or fall
     between two of them. So one that succeeded meanwhile leaves it open, and so does a request that
@@ -593,7 +611,7 @@ def _destroyed_during_a_snapshot(rig: CameraRig, usual: int) -> bool:
         requests = rig.requests
         require_snapshot(rig, device, "While the driver runs", slow=True)
         once = rig.requests == requests + 1
-        left = require_snapshots_under_way(rig, device)
+        left = require_snapshots_under_way(rig, device, answered=answered)
         when, threads = "After destroy_node() during a snapshot", rig.process.thread_ids()
         before = left()
         rig.program.destroy(DRIVER)

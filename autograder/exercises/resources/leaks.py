@@ -131,20 +131,3 @@ def attempt(rig: CameraRig, device: str) -> None:
         "picture to give.",
         actual="It made a node as if all were well.",
     )
-
-
-def require_start_raises_unasked(rig: CameraRig) -> None:
-    """Fail unless a plain program ends where its driver cannot start; nothing if there is none.
-
-    That a constructor has raised is otherwise said by the student's process alone.
-    """
-    if rig.programs is None:
-        return
-    device = rig.device("unplugged")
-    with rig.programs.program([(DRIVER, [device])]) as program:
-        if not rig.patience().wait(program.session, program.ended):
-            raise Failed(
-                expected=f"{DRIVER}({device!r}) raises in a program of its own as well, which so "
-                "ends.",
-                actual="The program went on as if all were well.",
-            )

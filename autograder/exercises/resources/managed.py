@@ -13,7 +13,7 @@ from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 from rcl_interfaces.srv import GetParameters, SetParameters
 
 from autograder.examination.exam import Failed
-from autograder.exercises.resources.rig import RESEND, CameraRig
+from autograder.exercises.resources.observer import RESEND, Observer
 from autograder.observe.phrases import phrase
 
 TRANSITIONS = {
@@ -33,7 +33,7 @@ SHUTDOWNS = {
 class Managed:
     """One lifecycle node of the subject, by its fully qualified name."""
 
-    def __init__(self, rig: CameraRig, node: str) -> None:
+    def __init__(self, rig: Observer, node: str) -> None:
         """Drive ``node``; its services are looked for when they are needed."""
         self._rig = rig
         self._node = node

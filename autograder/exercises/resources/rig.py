@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import secrets
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any
 
 from rclpy.duration import Duration
@@ -20,23 +20,17 @@ from autograder.examination.check_context import PATIENCE, Bench, StudentError
 from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_graph import CameraGraph
 from autograder.exercises.resources.camera_program import Program
-from autograder.exercises.resources.examiner_node import ExaminerNode, Picture
+from autograder.exercises.resources.examiner_node import Picture
+from autograder.exercises.resources.observer import Observer
 from autograder.exercises.resources.process_usage import Process
-from autograder.observe.patience import IDLE_S, SETTLE_S, Patience, Waits
+from autograder.observe.patience import SETTLE_S, Waits
 from autograder.observe.phrases import phrase
-from autograder.observe.stillness import Stillness
-from course.errors import WaitTimeout
-from course.runtime.waiting import Deadline
 
 GHOSTS = 1.0
 """Seconds that endpoints of an earlier life are given to go off the graph."""
 ENDED, SOON = 1.5, 0.5
 """Seconds in which all sleep that something may take to end: the task says 1. And to be woken up by
 another thread."""
-RESEND = 1.0
-"""Seconds after which a request that has no response is made again."""
-NUDGE = 0.05
-"""Seconds after which a callback that does not answer may be one that awaits something."""
 PERIOD = 0.1
 """Seconds of simulated time between two pictures, and of wall time between two probes."""
 OVER = 1.01
@@ -46,30 +40,23 @@ STEP = OVER * PERIOD
 """Seconds of simulated time after which the next picture is due."""
 
 
-class CameraRig:
+class CameraRig(Observer):
     """The examiner's view of one subject during the resources exam."""
 
     def __init__(self, bench: Bench) -> None:
         """Bring up the examiner's endpoints on the subject's domain."""
+        super().__init__(bench.session, bench.outside)
         self.subject = bench.subject
-        self.session = bench.session
         self.programs = bench.programs
         self.outside = bench.outside
         self.process = Process(bench.outside)
-        self._still = Stillness(bench.outside)
-        node = bench.session.run(ExaminerNode)
-        assert isinstance(node, ExaminerNode)
-        self.node = node
-        self.graph = CameraGraph(node)
+        self.graph = CameraGraph(self.node)
         self.program = Program(bench.subject, self.graph)
         self.memory = bench.memory
         self.draws = bench.draws
         self._clean = False
         self._provoked = False
         self._leaves_ghosts = False
-        self._clients: dict[str, Any] = {}
-        self.requests = 0  # that were made of services so far
-        self.waited = 0.0  # s of wall time that the last wait took which had no time-out
 
     # The subject.
 
@@ -153,54 +140,7 @@ class CameraRig:
         self.node.zoom.publish(Int32(data=factor))
         self.node.zoom.wait_for_all_acked(Duration(seconds=SETTLE_S))
 
-    def ask(self, service: Any, name: str, request: Any, *, nudging: bool = False) -> Any:
-        """Call a service; return its response, or None if none came in time.
-
-        A response that goes out before its way back is known is lost: it is asked for again, so
-        this is for requests that may be made twice. ``nudging``: a callback may await something.
-        """
-        client = self.client(service, name)
-        self.wait(client.service_is_ready)
-        patience = self.patience()
-        replies: list[Any] = []
-        while patience.lasts():
-            replies.append(client.call_async(request))
-            self.requests += 1
-            again = Deadline(RESEND)
-            while again.left and patience.lasts():
-                self.wait(lambda: any(reply.done() for reply in replies), NUDGE)
-                for reply in replies:
-                    if reply.done():
-                        return reply.result()
-                if nudging:
-                    self.nudge()
-        return None
-
-    def client(self, service: Any, name: str) -> Any:
-        """Return the client of a service, one for all lives of its server."""
-        if name not in self._clients:
-            self._clients[name] = self.node.create_client(service, name)
-        return self._clients[name]
-
     # What is seen.
-
-    def wait(
-        self, condition: Callable[[], Any], timeout: float | None = None, idle: float = IDLE_S
-    ) -> bool:
-        """Wait until ``condition`` holds, for ``timeout`` s; return whether it did by then.
-
-        Without ``timeout`` as long as it may come: until all have slept for ``idle`` s, see
-        `Patience`. `end_of_wait` says afterwards when that was.
-        """
-        if timeout is None:
-            patience = self.patience(idle)
-            holds = patience.wait(self.session, condition)
-            self.waited = patience.spent
-            return holds
-        with suppress(WaitTimeout):
-            self.session.until(condition, timeout=timeout, what="an observation")
-            return True
-        return False
 
     def ends(
         self,
@@ -224,17 +164,6 @@ class CameraRig:
         if min(self.process.wakes(among), default=ENDED) >= ENDED and not self.process.others():
             return False
         return self.patience(ENDED).wait(session, over)
-
-    @property
-    def end_of_wait(self) -> str:
-        """When the last wait without a time-out was over, as a phrase."""
-        if self.waited < SETTLE_S:
-            return "when nothing was at work any more"
-        return f"{SETTLE_S:.0f} s later"
-
-    def patience(self, idle: float = IDLE_S, seconds: float = SETTLE_S) -> Patience:
-        """Begin to wait for as long as something may take: see `Patience`."""
-        return Patience(self._still, seconds, idle)
 
     def rest(self) -> bool:
         """Return True when all that was sent has been dealt with, False if a thread never rests."""

@@ -1,0 +1,111 @@
+"""A managed camera in a plain program: its pace by the machine's clock, and its end by SIGINT.
+
+What it does there is seen once, after the driver's lives. Whatever is not right then is looked at
+again in a program of its own, in which nothing can come of the driver.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+from autograder.examination.exam import Failed, NotExaminable
+from autograder.examination.plain_programs import Programs
+from autograder.exercises.resources.ctrl_c import seen_lives
+from autograder.exercises.resources.managed_life import MANAGED, ManagedLife, watch_managed
+from autograder.exercises.resources.process_usage import Usage
+from autograder.exercises.resources.program_observer import ProgramObserver
+from autograder.exercises.resources.rig import CameraRig
+from autograder.observe.phrases import phrase
+
+LIVES = 3
+ALONE = "When the managed camera runs in a program of its own,"
+ENDED = f"{ALONE} which is ended by Ctrl-C while it is active,"
+
+
+def require_managed_pace(rig: CameraRig, node: str) -> None:
+    """Fail unless a managed camera, ``node``, keeps its rate by the machine's clock."""
+    life = _in_shared_program(rig)
+    if life is None or not life.worked:
+        life = _alone(rig, node)
+    if life is None:
+        return
+    _require_active(life)
+    if life.pace:
+        raise Failed(
+            expected=f"{ALONE} it sends as many pictures a second by the machine's clock as its "
+            f"rate says, which was {life.rate} Hz.",
+            actual=life.pace,
+        )
+
+
+def require_managed_ended(rig: CameraRig, node: str) -> None:
+    """Fail unless an active managed camera, ``node``, gives everything back at Ctrl-C."""
+    life = _in_shared_program(rig)
+    if life is None or not life.clean:
+        life = _alone(rig, node)
+    if life is None:
+        return
+    _require_active(life)
+    if life.raised:
+        raise Failed(
+            expected=f"{ENDED} its destroy_node() returns, and may be called a second time.",
+            actual="The program was gone: an exception left it, or an exit.",
+        )
+    if life.left:
+        raise Failed(
+            expected=f"{ENDED} its destroy_node() leaves nothing behind.",
+            actual=f"It left {phrase([*life.left])} behind.{rig.others()}",
+        )
+
+
+def _require_active(life: ManagedLife) -> None:
+    if life.failed is not None:
+        raise Failed(
+            expected=f"{ALONE} it goes through its states as well: {life.failed.expected}",
+            actual=life.failed.actual,
+        )
+    if not life.made and life.raised:
+        raise Failed(
+            expected=f"{ALONE} it can be made as well.",
+            actual="The program was gone: an exception left it, or an exit.",
+        )
+    if not life.made:
+        raise NotExaminable(
+            f"It was not found out which node of a plain program is {MANAGED}. After a hand-in a "
+            "person looks at it."
+        )
+
+
+def _in_shared_program(rig: CameraRig) -> ManagedLife | None:
+    """Return what was seen after the driver's lives; None if these did not go so far."""
+    lives = seen_lives(rig)
+    return lives.managed if lives is not None else None
+
+
+def _alone(rig: CameraRig, node: str) -> ManagedLife | None:
+    """Return what was seen in a program of its own, once a notebook; None if there is none."""
+    if rig.programs is None:
+        return None
+    if ManagedLife.__name__ not in rig.memory:
+        rig.memory[ManagedLife.__name__] = _watch_alone(rig, rig.programs, node)
+    found = rig.memory[ManagedLife.__name__]
+    assert isinstance(found, ManagedLife)
+    return found
+
+
+def _watch_alone(rig: CameraRig, programs: Programs, node: str) -> ManagedLife:
+    """Watch some lives; what the program has more after each of them is left by it."""
+    with programs.program([(MANAGED, [])], twice=True) as program:
+        seen, usages = ProgramObserver(rig, program), list[Usage]()
+        for _ in range(LIVES):
+            life = watch_managed(seen, node)
+            if not life.went_on or life.left or life.pace:
+                return life
+            usages.append(rig.process.usage())
+            program.interrupt()
+    grown = [after.grown(before) for before, after in pairwise(usages)]
+    threads, files, _ = map(min, zip(*grown, strict=True))
+    left = ["a thread"] if threads > 0 else []
+    left += ["an open file"] if files > 0 else []
+    return replace(life, left=tuple(left))

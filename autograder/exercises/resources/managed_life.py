@@ -1,0 +1,95 @@
+"""One life of a managed camera in a plain program: driven over its services, ended by SIGINT."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from autograder.examination.exam import Failed
+from autograder.exercises.resources.examiner_node import IMAGE
+from autograder.exercises.resources.managed import Managed
+from autograder.exercises.resources.program_observer import ProgramObserver
+from autograder.exercises.resources.rig import ENDED
+
+MANAGED = "ManagedCamera"
+RATE = 20
+"""Pictures a second: so a rate is taken in half the time that the default of 10 takes."""
+
+
+@dataclass(frozen=True)
+class ManagedLife:
+    """What was seen of a managed camera's life in a plain program.
+
+    ``made`` is whether it was found, ``failed`` what kept it from being active, ``pace`` tells of
+    pictures that do not come at their rate. ``raised`` is whether its end was that of the program,
+    ``left`` what it had not given back then. ``new_threads`` and ``new_files`` are how many there
+    are since it was made, some of which the middleware may keep.
+    """
+
+    made: bool = True
+    failed: Failed | None = None
+    rate: int = RATE
+    pace: str = ""
+    raised: bool = False
+    left: tuple[str, ...] = ()
+    new_threads: int = 0
+    new_files: int = 0
+
+    @property
+    def worked(self) -> bool:
+        """Whether it was active and sent its pictures."""
+        return self.made and self.failed is None and not self.pace
+
+    @property
+    def went_on(self) -> bool:
+        """Whether the program was there after it."""
+        return self.made and self.failed is None and not self.raised
+
+    @property
+    def clean(self) -> bool:
+        """Whether it is certain that nothing of it was left."""
+        return self.went_on and not (self.left or self.new_threads > 0 or self.new_files > 0)
+
+
+def watch_managed(seen: ProgramObserver, node: str = "") -> ManagedLife:
+    """Have a managed camera, which is being made, send pictures, and interrupt its program then.
+
+    ``node`` is its full name where that is known; else, or if it is not there, the one lifecycle
+    node is taken for it.
+    """
+    rig = seen.rig
+    seen.wait(lambda: node in seen.lifecycle_nodes() or (not node and seen.lifecycle_nodes()))
+    there = seen.lifecycle_nodes()
+    if node not in there and len(there) != 1:
+        return ManagedLife(made=False, raised=seen.gone())
+    device = rig.device()
+    rate = rig.draws.whole("a rate by the machine's clock", RATE, 15, 25)
+    managed = Managed(seen, node if node in there else there[0])
+    threads, before = rig.process.thread_ids(), rig.process.usage()
+    try:
+        managed.require(device=device, rate=float(rate))
+        managed.go("configure", "activate")
+    except Failed as failed:
+        return ManagedLife(failed=failed, raised=seen.gone())
+    came = seen.wait(lambda: seen.node.of(device), idle=ENDED)
+    pace = seen.pace(device, rate) if came else "None came."
+    seen.program.interrupt()
+    left = []
+    if not seen.wait(lambda: not rig.cameras(device)):
+        left.append("its open camera")
+    if not seen.wait(lambda: not seen.node.count_publishers(IMAGE)):
+        left.append(f"its publisher on {IMAGE}")
+    if not seen.wait(lambda: not seen.nodes()):
+        left += [f"the node {name}" for name in sorted({*seen.nodes().values()})]
+    if seen.gone():
+        return ManagedLife(rate=rate, pace=pace, raised=True)
+
+    def new_threads() -> int:
+        return len(rig.process.thread_ids() - threads)
+
+    def new_files() -> int:
+        return rig.process.usage().grown(before).files
+
+    rig.ends(lambda: new_threads() <= 0 and new_files() <= 0, seen.session)
+    return ManagedLife(
+        rate=rate, pace=pace, left=tuple(left), new_threads=new_threads(), new_files=new_files()
+    )

@@ -1,0 +1,80 @@
+"""Looks at nodes in a plain program, where nobody but the machine tells what time it is."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from autograder.examination.plain_programs import Program
+from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT
+from autograder.exercises.resources.observer import Observer
+from autograder.exercises.resources.rig import CameraRig
+from autograder.observe.participants import node_of, of_others
+from autograder.observe.patience import IDLE_S
+from autograder.observe.phrases import capitalized, pictures
+from autograder.processes.fair_deadline import FairDeadline
+
+COUNTED = 8
+"""Pictures whose rate is taken."""
+SLOWEST, FASTEST = 0.6, 1.6
+"""Times a rate that are taken for it: a busy machine is no fault of a node's."""
+TAKES = 3
+"""Of a rate, as pictures that have been held up come many at a time."""
+CHANGE_STATE = "/change_state"
+"""What is added to the name of a lifecycle node for that of a service which each has."""
+
+
+class ProgramObserver(Observer):
+    """Someone in the network of a plain program; what the program's processes hold, a rig sees."""
+
+    def __init__(self, rig: CameraRig, program: Program) -> None:
+        """Bring up endpoints in the network of ``program``."""
+        super().__init__(program.session, rig.outside)
+        self.rig = rig
+        self.program = program
+
+    def gone(self) -> bool:
+        """Whether the program has ended."""
+        return self.program.ended()
+
+    def wait(
+        self, condition: Callable[[], Any], timeout: float | None = None, idle: float = IDLE_S
+    ) -> bool:
+        """Wait as `Observer.wait` does, as long as the program is there."""
+        super().wait(lambda: condition() or self.gone(), timeout, idle)
+        return bool(condition())
+
+    def working(self) -> bool:
+        """Whether a publisher of pictures or a service for them is on the graph."""
+        return bool(self.node.count_publishers(IMAGE) or self.node.count_services(SNAPSHOT))
+
+    def nodes(self) -> dict[bytes, str]:
+        """Return the program's nodes on the graph, by what each of them publishes on."""
+        ends = of_others(self.node.get_publishers_info_by_topic("/parameter_events"))
+        return {bytes(end.endpoint_gid): node_of(end) for end in ends}
+
+    def lifecycle_nodes(self) -> list[str]:
+        """Return the full names of the lifecycle nodes on the graph.
+
+        Of one that was destroyed rclpy 7.1 leaves the services there until Python collects it.
+        """
+        services = {name for name, _ in self.node.get_service_names_and_types()}
+        nodes = sorted({*self.nodes().values()})
+        return [name for name in nodes if f"{name}{CHANGE_STATE}" in services]
+
+    def pace(self, device: str, rate: float) -> str:
+        """Return how many pictures of ``device`` come in what time, unless at about this rate."""
+
+        def came() -> int:
+            return len(self.node.of(device))
+
+        for _ in range(TAKES):
+            begun, before = time.monotonic(), came()
+            deadline = FairDeadline(COUNTED / (SLOWEST * rate), self.rig.outside.delay)
+            while (left := deadline.left) and came() < before + COUNTED and not self.gone():
+                self.wait(lambda most=before + COUNTED: came() >= most, left)  # type: ignore[misc]
+            number, seconds = came() - before, time.monotonic() - begun
+            if number >= COUNTED and number <= seconds * FASTEST * rate:
+                return ""
+        return f"{capitalized(pictures(number))} came in {seconds:.1f} s."
