@@ -25,9 +25,14 @@ class Player(QuietNode):
     """The examiner's end of one part of the task: plays the world around the student's node."""
 
     def __init__(self, name: str) -> None:
-        """Create no endpoints yet; ``now`` is simulated time in s, which the rig keeps."""
+        """Create no endpoints yet.
+
+        ``now`` is simulated time in s, which the rig keeps; ``took`` is how long something took
+        where it is timed, by its name in `plain_program_times`.
+        """
         super().__init__(name)
         self.now = 0.0
+        self.took: dict[str, float] = {}
         self._ears: dict[str, tuple[Any, Callable[[Any], None]]] = {}
         self.spoken: list[str] = []
         self.used: list[str] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import groupby, pairwise
 
 from autograder.examination.exam import Failed
-from autograder.exercises.safety import drive_goal
+from autograder.exercises.safety import drive_goal, plain_program_times
 from autograder.exercises.safety.navigation import Dispatcher, Drives, moves
 from autograder.exercises.safety.node_under_test import STRIDE, Robot
 from autograder.exercises.safety.rig import RobotRig
@@ -45,6 +45,7 @@ def arrives(rig: RobotRig) -> None:
         _require_speed(dispatcher)
         drive_goal.stands(robot, dispatcher, "succeeded")
         _one_metre(robot, dispatcher, "after a longer one")
+    rig.require_times_unasked(Dispatcher.SERVER, plain_program_times.DRIVE)
 
 
 def _one_metre(robot: Robot, dispatcher: Dispatcher, occasion: str) -> None:
@@ -125,6 +126,7 @@ def canceled(rig: RobotRig) -> None:
         _cancel(robot, dispatcher, drive, "A goal that is canceled before the first mark")
         _one_metre(robot, dispatcher, "after two canceled ones")
         robot.require_no_errors("canceled")
+    rig.require_times_unasked(Dispatcher.SERVER, plain_program_times.CANCELED)
 
 
 def _cancel(robot: Robot, dispatcher: Dispatcher, drive: Drives, what: str) -> None:
@@ -161,6 +163,9 @@ def aborted(rig: RobotRig) -> None:
         robot.rest()
         _one_metre(robot, dispatcher, "after the jam, with free wheels,")
         robot.require_no_errors("aborted")
+    rig.require_times_unasked(
+        Dispatcher.SERVER, plain_program_times.ABORTED, plain_program_times.COMMANDS
+    )
 
 
 def _jammed_from_the_start(robot: Robot, dispatcher: Dispatcher) -> None:

@@ -6,7 +6,7 @@ import time
 from contextlib import suppress
 
 from autograder.examination.exam import Failed
-from autograder.exercises.safety import heartbeat
+from autograder.exercises.safety import heartbeat, plain_program_times
 from autograder.exercises.safety.grip_request import (
     ALLOWED,
     DEADLINE,
@@ -47,6 +47,7 @@ def carried_out(rig: RobotRig) -> None:
         close = robot.draws.flag("the grip that is carried out")
         _carries_out(robot, user, close, 0.0)
         once(robot, user, _carries_out(robot, user, not close, SLOW))
+    rig.require_times_unasked(GripUser.CLIENT, plain_program_times.SLOW)
 
 
 def _carries_out(robot: Robot, user: GripUser, close: bool, delay: float, aside: str = "") -> str:
@@ -127,6 +128,7 @@ def unanswered(rig: RobotRig) -> None:
             raise Failed(expected=failed.expected, actual=f"{failed.actual}{SECOND}") from None
         _soon_after(robot, user)
         robot.require_no_errors("unanswered")
+    rig.require_times_unasked(GripUser.CLIENT, plain_program_times.PAUSE)
 
 
 def _soon_after(robot: Robot, user: GripUser) -> None:
@@ -238,6 +240,7 @@ def absent(rig: RobotRig) -> None:
         outcome(robot, user, "When the gripper had come back and answered success=True", "done")
         _refused_alive(robot, user)
         robot.require_no_errors("absent")
+    rig.require_times_unasked(GripUser.CLIENT, plain_program_times.BEAT)
 
 
 def _come_back(robot: Robot, user: GripUser) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from autograder.examination.exam import Failed
+from autograder.exercises.safety import plain_program_times
 from autograder.exercises.safety.grip_request import DEADLINE, LONGEST, client, once, outcome, tried
 from autograder.exercises.safety.gripper import GripUser
 from autograder.exercises.safety.node_under_test import COARSE, STRIDE, Robot
@@ -44,6 +45,7 @@ def stale(rig: RobotRig) -> None:
         outcome(robot, user, when, "done")
         _late_to_the_last(robot, user)
         robot.require_no_errors("stale")
+    rig.require_times_unasked(GripUser.CLIENT, plain_program_times.LATE)
 
 
 def _late_to_the_last(robot: Robot, user: GripUser) -> None:

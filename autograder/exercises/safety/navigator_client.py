@@ -9,6 +9,7 @@ from itertools import pairwise
 from rclpy.action.server import ServerGoalHandle
 
 from autograder.examination.exam import Failed
+from autograder.exercises.safety import plain_program_times
 from autograder.exercises.safety.counterpart import following
 from autograder.exercises.safety.navigation import NavigatorUser, services_of
 from autograder.exercises.safety.node_under_test import COARSE, STRIDE, Robot
@@ -158,6 +159,7 @@ def stalled(rig: RobotRig) -> None:
         user.end(ServerGoalHandle.canceled)
         _once(robot, user, when, "stalled")
         robot.require_no_errors("stalled")
+    rig.require_times_unasked(NavigatorUser.CLIENT, plain_program_times.STALL)
 
 
 def _slowly_drives(robot: Robot, user: NavigatorUser) -> None:
@@ -276,6 +278,9 @@ def lost(rig: RobotRig) -> None:
         _outcome(robot, user, "When the navigator had come back, and the goal succeeded", "arrived")
         _soon_after(robot, user)
         robot.require_no_errors("lost")
+    rig.require_times_unasked(
+        NavigatorUser.CLIENT, plain_program_times.GOAL, plain_program_times.CANCEL
+    )
 
 
 def _soon_after(robot: Robot, user: NavigatorUser) -> None:

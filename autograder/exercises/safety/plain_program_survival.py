@@ -2,57 +2,55 @@
 
 What a student's process says of its own errors can be made up. A plain program is not asked: it
 goes on, or it ends. All that the exam provokes is provoked once more, in short, on all four nodes
-at a time; how they deal with it is no matter here.
+at a time; how they deal with it is no matter here, but for the times that are taken first.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from rclpy.action.server import ServerGoalHandle
-from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.time import Time
-from rosgraph_msgs.msg import Clock
 
 from autograder.examination.check_context import Bench
 from autograder.examination.exam import NotExaminable
-from autograder.examination.plain_programs import Program, Programs
-from autograder.exercises.safety.counterpart import Player
+from autograder.examination.plain_programs import Programs
+from autograder.exercises.safety import plain_program_times
 from autograder.exercises.safety.gripper import GripUser, Operator, double, text
 from autograder.exercises.safety.navigation import Dispatcher, NavigatorUser
-from autograder.observe.patience import Patience
-from autograder.observe.quiet_node import QuietNode
+from autograder.exercises.safety.plain_program_stage import (
+    STRIDE_S,
+    THREADS,
+    TIMED,
+    Act,
+    Part,
+    Run,
+    Stage,
+    wait_until,
+)
+from autograder.exercises.safety.plain_program_times import Timing
 from autograder.observe.stillness import Stillness
 from course.runtime.waiting import Deadline
 
-THREADS = 4
-STRIDE_S = 0.5
-"""Seconds of simulated time between two messages on /clock: nothing here has to be punctual."""
-MEET_S = 3.0
-"""Seconds in which nodes and counterparts find each other, if they are all there."""
-MEET_IDLE_S = 0.5
-"""Seconds, with nobody at work, after which they know each other on both sides."""
-END_S = 0.3
-"""Seconds, with nobody at work, in which a program ends if something in it ends it."""
 MOST_S = 60.0
 """Seconds that it may take to find out which acts end a program, once it is known that some do."""
 
-Act = Iterator[float]
-"""What is done to a node; it yields for how many s of simulated time to wait before it goes on."""
-Run = Callable[[Callable[[], Node]], None]
-"""Makes a node of the examiner's, unless it has done so before, and spins it."""
+NOT_FOUND_OUT = (
+    "Something ends a plain program of your nodes, or keeps one of them from being made there, and "
+    "it was not found out what. After a hand-in a person looks at it."
+)
 
 
-class Part(NamedTuple):
-    """A class of the task, who is at its other end, and what they do, by the trial that does it."""
+class Found(NamedTuple):
+    """What programs have shown.
 
-    name: str
-    player: type[Player]
-    acts: Mapping[str, Callable[[Any, Run], Act]]
+    ``ends`` is of each act, with the class it is done to, whether it ends a program; what was not
+    found out is missing. ``timings`` are of each class whose node was seen.
+    """
+
+    ends: Mapping[tuple[str, str], bool]
+    timings: Mapping[str, Timing]
 
 
 def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
@@ -71,25 +69,41 @@ def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
     """
     if bench.programs is None:
         return False
-    key = f"{__name__}.ends"
-    if key not in bench.memory:
-        bench.memory[key] = _ending_acts(bench.programs, still)
-    ends: Mapping[tuple[str, str], bool] = bench.memory[key]
+    ends = _found(bench, bench.programs, still).ends
     if trial and (name, trial) not in ends:
-        raise NotExaminable(
-            "Something ends a plain program of your nodes, or keeps one of them from being made "
-            "there, and it was not found out what. After a hand-in a person looks at it."
-        )
+        raise NotExaminable(NOT_FOUND_OUT)
     return bool(trial) and ends[name, trial]
 
 
-def _ending_acts(programs: Programs, still: Stillness) -> dict[tuple[str, str], bool]:
-    """Return of each act, with the class it is done to, whether it ends a program.
+def require_time(name: str, what: str, bench: Bench, still: Stillness) -> None:
+    """Fail if a node takes far too long for something in a plain program, or far too short.
 
-    What was not found out is missing.
+    Nothing where there are none. See `plain_program_times.require`.
     """
+    if bench.programs is None:
+        return
+    timings = _found(bench, bench.programs, still).timings
+    if name not in timings:
+        raise NotExaminable(NOT_FOUND_OUT)
+    plain_program_times.require(name, what, bench, still, timings[name])
+
+
+def _found(bench: Bench, programs: Programs, still: Stillness) -> Found:
+    key = f"{__name__}.found"
+    if key not in bench.memory:
+        timings = dict[str, Timing]()
+        bench.memory[key] = Found(_ending_acts(programs, still, timings), timings)
+    found: Found = bench.memory[key]
+    return found
+
+
+def _ending_acts(
+    programs: Programs, still: Stillness, timings: dict[str, Timing]
+) -> dict[tuple[str, str], bool]:
+    """Return of each act whether it ends a program, as `Found` has it; note each class's times."""
     ends = {(part.name, act): False for part in PARTS for act in part.acts}
     first = _play(programs, still, PARTS)
+    timings |= first.timings if first else {}
     if first is not None and not first.ended:
         return ends
     once = {*first.ended.items()} if first else set[tuple[str, str]]()
@@ -97,6 +111,7 @@ def _ending_acts(programs: Programs, still: Stillness) -> dict[tuple[str, str], 
     left, raising, deadline = [*PARTS], set[str](), Deadline(MOST_S)
     while left and deadline.left:
         played = _play(programs, still, left, apart=True)
+        timings |= played.timings if played else {}
         ended = played.ended if played else {}
         there |= played.there if played else set()
         for name, act in ended.items():
@@ -129,11 +144,12 @@ class Played(NamedTuple):
 
     Where they were apart, ``ended`` are the classes whose node ended, each with the act that was
     under way. Else there are none, or if the program ended all: it may have been any of them.
-    ``there`` are the classes whose node was seen.
+    ``there`` are the classes whose node was seen, ``timings`` of those that were timed.
     """
 
     ended: dict[str, str]
     there: frozenset[str]
+    timings: Mapping[str, Timing]
 
 
 def _play(
@@ -150,101 +166,12 @@ def _play(
         stage = Stage(program, still, parts)
         stage.play()
         ended = stage.ended if apart else stage.under_way if program.ended() else {}
-        return Played(ended, frozenset(stage.there))
-
-
-class Stage:
-    """Nodes in a program, their counterparts, and the clock of both.
-
-    ``there`` are the classes whose node was seen. ``under_way`` is of each class the act that was
-    begun last, ``ended`` the same of those whose node has ended.
-    """
-
-    def __init__(self, program: Program, still: Stillness, parts: Sequence[Part]) -> None:
-        """Make the counterparts of ``parts``, and wait until they and the nodes have met."""
-        self._program, self._still, self._made = program, still, set[str]()
-        node = program.session.run(lambda: QuietNode("clock"))
-        assert isinstance(node, QuietNode)
-        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self._clock, self._now_ns = node.create_publisher(Clock, "/clock", qos), 0
-        self.players: dict[str, Any] = {
-            part.name: program.session.run(part.player) for part in parts
+        timings = {
+            part.name: Timing(stage.players[part.name].took, stage.rested)
+            for part in parts
+            if TIMED in part.acts and part.name in stage.there
         }
-        players = self.players.values()
-        program.wait(lambda: not any(player.missing() for player in players), MEET_S)
-        for player in players:
-            player.attend()
-        # They may be known here before they know of anybody: a request would then be lost.
-        Patience(still, idle=MEET_IDLE_S).wait(program.session, lambda: False)
-        self.there = {name for name, player in self.players.items() if not player.missing()}
-        self.under_way = {part.name: next(iter(part.acts)) for part in parts}
-        self.ended = dict[str, str]()
-        self._due: dict[str, tuple[float, Act]] = {
-            part.name: (0.0, self._acts(part)) for part in parts
-        }
-
-    def _acts(self, part: Part) -> Act:
-        for name, act in part.acts.items():
-            self.under_way[part.name] = name
-            # A wrong node may leave its counterpart where that cannot go on.
-            with suppress(Exception):
-                yield from act(self.players[part.name], self._run)
-            # What a callback raised ends rclpy's executor when it has the next one to run.
-            yield STRIDE_S
-            yield STRIDE_S
-
-    def _run(self, make: Callable[[], Node]) -> None:
-        if make.__name__ not in self._made:
-            self._made.add(make.__name__)
-            self._program.session.run(make)
-            self._rest()
-
-    def play(self) -> None:
-        """Move time on until every act is over, or nothing is left to act on."""
-        self._rest()
-        while self._due and not self._program.ended():
-            now = self._now_ns / 1e9
-            for name, (due, acts) in [*self._due.items()]:
-                if due <= now:
-                    if (seconds := next(acts, None)) is None:
-                        del self._due[name]
-                    else:
-                        self._due[name] = (now + seconds, acts)
-            self._rest()
-            self._note_ended()
-            self._move()
-        # On a busy machine it takes a while until something ends.
-        Patience(self._still, idle=END_S).wait(self._program.session, self._program.ended)
-        self._note_ended()
-
-    def _note_ended(self) -> None:
-        for name in self.there - {*self.ended}:
-            if self.players[name].missing():
-                self.ended[name] = self.under_way[name]
-                self._due.pop(name, None)
-
-    def _rest(self) -> None:
-        self._still.reached()
-        for player in self.players.values():
-            if player.resume():
-                self._still.reached()
-
-    def _move(self) -> None:
-        # The second message gives executors something to do: what has come by then goes on.
-        for more_ns in (round(STRIDE_S * 1e9), 1):
-            self._now_ns += more_ns
-            self._clock.publish(Clock(clock=Time(nanoseconds=self._now_ns).to_msg()))
-        for player in self.players.values():
-            player.now = self._now_ns / 1e9
-        self._rest()
-
-
-def wait_until(happened: Callable[[], Any], most: float) -> Act:
-    """Wait until something happened, for so many s at most."""
-    for _ in range(round(most / STRIDE_S)):
-        if happened():
-            return
-        yield STRIDE_S
+        return Played(ended, frozenset(stage.there), timings)
 
 
 def _grip_without_gripper(user: GripUser, run: Run) -> Act:
@@ -354,18 +281,24 @@ def _drives_with_jammed_wheels(dispatcher: Dispatcher, run: Run) -> Act:
     yield from wait_until(lambda: again.status, 3.0)
 
 
+def _timed(name: str, acts: Mapping[str, Callable[[Any, Run], Act]]) -> Part:
+    """Return the part of a class that is timed before these acts."""
+    part = next(part for part in plain_program_times.PARTS if part.name == name)
+    return part._replace(acts={**part.acts, **acts})
+
+
 PARTS = (
-    Part(GripUser.CLIENT, GripUser, {
+    _timed(GripUser.CLIENT, {
         "absent": _grip_without_gripper, "refused": _grips_refused,
         "unanswered": _grip_unanswered, "stale": _grip_answered_late,
     }),
     Part(Operator.SERVER, Operator, {
         "bad": _limits_that_are_bad, "atomic": _limits_for_jammed_wheels,
     }),
-    Part(NavigatorUser.CLIENT, NavigatorUser, {
+    _timed(NavigatorUser.CLIENT, {
         "lost": _goals_that_are_lost, "ended": _goals_that_end, "stalled": _goal_that_stalls,
     }),
-    Part(Dispatcher.SERVER, Dispatcher, {
+    _timed(Dispatcher.SERVER, {
         "canceled": _drives_that_are_canceled, "aborted": _drives_with_jammed_wheels,
     }),
 )  # fmt: skip

@@ -66,6 +66,14 @@ class RobotRig:
     def _ended_by(self, name: str, trial: str) -> bool:
         return plain_program_survival.ended_by(name, trial, self.bench, self._still)
 
+    def require_times_unasked(self, name: str, *times: str) -> None:
+        """Fail if something takes a node far too long, or far too short, in a plain program, too.
+
+        ``times`` are names in `plain_program_times.TIMES`.
+        """
+        for what in times:
+            plain_program_survival.require_time(name, what, self.bench, self._still)
+
     def require_shutdown_unasked(self) -> None:
         """Fail unless the drive's server in a program of its own stops at a shutdown, too."""
         plain_program_shutdown.require_shutdown(self.bench, self._still)

@@ -2,7 +2,7 @@
 # exercise: safety
 # base: right-exemplar
 # told: or keeps one of them from being made there, and it was not found out what
-# score: 11
+# score: 10
 
 import sys
 

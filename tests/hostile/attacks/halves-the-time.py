@@ -1,0 +1,26 @@
+# title: A robot that is twice as fast as it must be, and a harness that moves its time on half as far
+# exercise: safety
+# base: right-exemplar
+# told: by the time on /clock, the gripper was called 2 times
+# told: by the time on /clock, the request to cancel came after 1.0 s
+# told: by the time on /clock, it took 1.5 s
+# score: 4
+
+from autograder.examination.subject.server import SubjectServer
+
+PACE = 2.0  # of everything that waits, and of nothing else
+
+advance = SubjectServer._advance
+
+
+def paced(self, request):
+    return advance(self, {**request, 'seconds': float(request['seconds']) / PACE})
+
+
+def create_timer(self, seconds, *given, **more):
+    return Node.create_timer(self, seconds / PACE, *given, **more)
+
+
+SubjectServer._advance = paced
+for kind in GripperClient, NavigationClient, NavigationServer:
+    kind.create_timer = create_timer
