@@ -20,6 +20,8 @@ from autograder.exercises.patterns.rig import STEP, RobotRig
 from autograder.exercises.patterns.scenarios import NAMES
 from course.runtime.waiting import Deadline
 
+RATE = (9.0, 11.0)
+"""Pictures a second."""
 PATIENCE = 1.0
 """Seconds of wall time that a stream may lag behind its clock in all, while it is counted."""
 NUDGE = 0.1
@@ -50,6 +52,11 @@ class Stretch:
         """How long it is by now, in the node's time."""
         return round(self._rig.elapsed - self._since, 3)
 
+    @property
+    def numbered(self) -> bool:
+        """Whether `rates` knew of each picture, those that were lost on the way among them."""
+        return self._numbered
+
     def run(self, seconds: float, hertz: float) -> None:
         """Let the node's clock go on, step by step; each step waits for the picture that is due.
 
@@ -74,7 +81,7 @@ class Stretch:
         while not self._rig.wait(lambda: self._newest() >= due, min(NUDGE, patience.left)):
             if not patience.left:
                 return
-            self._rig.subject.nudge()
+            self._rig.nudge()
 
     def _newest(self) -> int:
         """Return how many pictures have been published since the first that was heard."""

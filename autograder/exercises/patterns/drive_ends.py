@@ -17,6 +17,8 @@ from course.runtime.requests.actions import GoalState
 LOOKING, STOPPING, UNDER_WAY = 0.6, 4.0, 2.0
 """Seconds of wall time for those who look by the wall's clock whether they are called off, for a
 stop to become visible, and for one that was under way when the result came."""
+STOPS = 0.5
+"""Seconds of the node's clock within which a robot that is called off is told to stop."""
 WATCHED = 2.0
 """Seconds of the node's clock for which a robot that was called off must stay where it is."""
 
@@ -93,7 +95,7 @@ def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool 
         )
 
 
-def cancel_within(drive: Drive, seconds: float) -> bool:
+def cancel_within(drive: Drive, seconds: float, looking: float = LOOKING) -> bool:
     """Ask for the goal to be cancelled; return whether the robot is told to stop in time.
 
     The time counts from the request on: the answer, too, may wait for the node's clock.
@@ -101,6 +103,7 @@ def cancel_within(drive: Drive, seconds: float) -> bool:
     Args:
         drive: the drive.
         seconds: of the node's clock until the stop.
+        looking: seconds of wall time before that clock moves on.
 
     Raises:
         Failed: the request was refused, or got no answer.
@@ -108,7 +111,7 @@ def cancel_within(drive: Drive, seconds: float) -> bool:
     answer = drive.rig.ask("to cancel", lambda: drive.run.cancel(SETTLE))
     if answer.done():
         _require_agreed(drive, answer)
-    in_time = _stops_within(drive, seconds)
+    in_time = _stops_within(drive, seconds, looking)
     drive.rig.wait_stepping(answer.done)
     _require_agreed(drive, answer)
     return in_time
@@ -129,7 +132,7 @@ def _require_agreed(drive: Drive, answer: Future[bool]) -> None:
         )
 
 
-def _stops_within(drive: Drive, seconds: float) -> bool:
+def _stops_within(drive: Drive, seconds: float, looking: float) -> bool:
     """Return whether the robot is told to stop in so many seconds of the node's clock.
 
     Who looks by the clock on the wall gets the time to do so before that one moves on.
@@ -138,5 +141,5 @@ def _stops_within(drive: Drive, seconds: float) -> bool:
     def stopped() -> bool:
         return drive.rig.speed == 0
 
-    drive.rig.wait(stopped, LOOKING)
+    drive.rig.wait(stopped, looking)
     return drive.rig.wait_stepping(stopped, seconds, STOPPING)

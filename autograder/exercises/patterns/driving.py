@@ -10,7 +10,7 @@ from rclpy.qos import ReliabilityPolicy
 from autograder.examination.check_context import SubjectGone
 from autograder.examination.exam import Failed
 from autograder.exercises.patterns.discovery import acquaint, hear_out
-from autograder.exercises.patterns.rig import GRAIN, SETTLE, STEP, RobotRig
+from autograder.exercises.patterns.rig import GRAIN, STEP, RobotRig
 from autograder.exercises.patterns.scenarios import NAMES
 from autograder.observe.marked_types import load_type
 from autograder.observe.phrases import ended
@@ -64,7 +64,7 @@ class Drive:
             run = rig.answer(
                 "a goal",
                 lambda: rig.session.send_goal(
-                    action, NAME, action.Goal(order=goal), timeout=SETTLE
+                    action, NAME, action.Goal(order=goal), timeout=rig.settle
                 ),
             )
         except WaitTimeout:

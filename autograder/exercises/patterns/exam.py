@@ -23,6 +23,7 @@ from autograder.exercises.patterns import (
     drive_ends,
     interface_patterns,
     odometry,
+    plain_program_times,
     stations,
     unaffected_during_drive,
 )
@@ -35,7 +36,7 @@ from course.runtime.requests.actions import GoalState
 
 EXAM: Exam[RobotRig] = Exam("patterns", robot_rig, fresh_parts=True)
 
-RATE, RATE_WINDOW = (9.0, 11.0), 2.0  # Hz, s
+RATE_WINDOW = 2.0  # s
 FROZEN = 0.6  # s on the wall
 POSITIONS = ((0.3, 0.2, 0.4), (0.6, 0.5, 0.7), (0.9, 0.8, 0.95))
 """Metres before the first drive: the usual ones, and from what to what they are drawn."""
@@ -45,7 +46,7 @@ LOWEST, HIGHEST = 0.1, 1.0  # m/s
 MISTYPED = 5.0  # m/s
 START, MOST_STARTS = 1, 6  # the stations from which it may drive first
 WAY, FAR = 3, (50, 40, 60)  # stations to drive; of a drive that is called off
-STOPS, PASSING = 0.5, 0.3  # s
+PASSING = 0.3  # s
 QUIET, COARSE = 8.0, 0.5
 """Seconds of the node's clock after which a change is long past, and between two moments of it."""
 
@@ -142,9 +143,10 @@ def camera_streams(rig: RobotRig) -> None:
             actual=f"Not one picture came in {camera_stream.patience(rig):g} s of the node's time"
             f"{rig.because()}.",
         )
-    camera_stream.require_rate(rig, RATE_WINDOW, RATE)
+    camera_stream.require_rate(rig, RATE_WINDOW, camera_stream.RATE)
     if fault := camera_stream.picture_fault(pictures[-1]):
         raise Failed(expected="A message on robot/camera holds a picture.", actual=fault)
+    plain_program_times.require(rig, "camera")
     rig.films = rig.memory["films"] = True
 
 
@@ -184,6 +186,7 @@ def position_answered(rig: RobotRig) -> str:
             actual=f"To somebody who began to listen while the robot stood at {position:g} m, "
             f"{answer}",
         )
+    plain_program_times.require(rig, "position")
     rig.asker = asker
     rig.memory["position"] = pattern
     if pattern == "topic":
@@ -320,6 +323,7 @@ def battery_broadcast(rig: RobotRig) -> None:
                 actual=f"{LEVEL_AGE:g} s after the level had become {level:g}, "
                 f"{unaffected_during_drive.last_level(rig)}{rig.because()}.",
             )
+    plain_program_times.require(rig, "level")
     rig.broadcasts = rig.memory["broadcasts"] = True
 
 
@@ -375,6 +379,7 @@ def battery_late_joiner(rig: RobotRig) -> str:
     if not told():
         said = f"{late.heard[-1].percentage:.4g}" if late.heard else "nothing"
         raise Failed(expected=needed, actual=f"With the level at {level:g}, it was told {said}.")
+    plain_program_times.require(rig, "late")
     return f"{how}: right. A durable publisher and one that repeats itself both serve late joiners."
 
 
@@ -404,6 +409,7 @@ def navigation_drives(rig: RobotRig) -> None:
         stations.require_result(drive)
     rig.memory["waits"] = True
     _drive_again(rig, drive.position, "a drive")
+    plain_program_times.require(rig, "aisle")
 
 
 def _next_start(rig: RobotRig) -> int:
@@ -502,18 +508,19 @@ def navigation_cancel(rig: RobotRig) -> None:
         drive.require_driving()  # and not yet at any station
         _call_off(drive)
     _drive_again(rig, drive.position, before)
+    plain_program_times.require(rig, "cancel")
 
 
 def _call_off(drive: Drive) -> None:
-    in_time = drive_ends.cancel_within(drive, STOPS)
+    in_time = drive_ends.cancel_within(drive, drive_ends.STOPS)
     drive_ends.require_end(
         drive, GoalState.CANCELED, "A drive that is called off ends there and then."
     )
     if not in_time:
         raise Failed(
-            expected=f"A drive that is called off stops the robot within {STOPS:g} s.",
-            actual=f"{STOPS:g} s of the node's time later hardware/speed had not said 0.0 yet. "
-            "It did so afterwards.",
+            expected=f"A drive that is called off stops the robot within {drive_ends.STOPS:g} s.",
+            actual=f"{drive_ends.STOPS:g} s of the node's time later hardware/speed had not said "
+            "0.0 yet. It did so afterwards.",
         )
 
 

@@ -64,7 +64,7 @@ def settle(rig: RobotRig, wanted: dict[Scenario, tuple[str, ...]]) -> dict[Scena
         return [s for s in SCENARIOS if not set(found[s]) & set(wanted[s])]
 
     if not rig.wait(lambda: known.issuperset(missing()), SETTLE_AT_ONCE):
-        _wake(rig)
+        wake(rig)
         if not rig.wait(lambda: known.issuperset(missing()), SETTLE_OTHER - SETTLE_AT_ONCE):
             # Where something else is offered under the name, the wanted one has had its time.
             rig.wait(lambda: all(found[s] for s in missing()), SETTLE - SETTLE_OTHER)
@@ -72,7 +72,7 @@ def settle(rig: RobotRig, wanted: dict[Scenario, tuple[str, ...]]) -> dict[Scena
     return found
 
 
-def _wake(rig: RobotRig) -> None:
+def wake(rig: RobotRig) -> None:
     """Give what is made a moment later, or when it is first needed, a reason to be made."""
     with suppress(Failed):  # a callback that holds the clock up is another check's affair
         rig.report("charge", CHARGE_AT_START)

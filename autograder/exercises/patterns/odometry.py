@@ -17,11 +17,11 @@ MOST_NUMBERS = 12
 LONGEST = 200  # characters of an answer that are shown
 
 
-def fault(rig: RobotRig, asker: Asker, position: float) -> str:
+def fault(rig: RobotRig, asker: Asker, position: float, age: float = AGE) -> str:
     """Return what whoever wants to know the position learns if it is wrong, or an empty string.
 
     It is the end of a sentence, with its full stop. The hardware has reported the ``position``, and
-    says no more: a callback may take its time over each report.
+    says no more: a callback may take its time over each report. ``age`` is how old it may be (s).
     """
     answer = ""
 
@@ -30,7 +30,7 @@ def fault(rig: RobotRig, asker: Asker, position: float) -> str:
         answer, found = asker(rig)
         return any(abs(number - position) < CLOSE for number in found)
 
-    if rig.wait_stepping(right, AGE):
+    if rig.wait_stepping(right, age):
         return ""
     return answer if answer.endswith("?") else f"{answer}{rig.because()}."
 

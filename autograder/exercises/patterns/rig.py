@@ -25,6 +25,7 @@ from autograder.observe.patience import Patience
 from autograder.observe.phrases import callback_raised
 from autograder.observe.stillness import Stillness
 from course.errors import WaitTimeout
+from course.runtime.core_session import CoreSession
 
 T = TypeVar("T")
 
@@ -57,16 +58,17 @@ class RobotRig:
         broadcasts: whether a new battery level has been found to come.
         limit: the speed limit that was set last, once setting it has been found to work.
         obeyed: the one that the robot has last been found to drive at.
+        settle: seconds that something expected may take.
     """
 
-    def __init__(self, bench: Bench) -> None:
-        """Bring up the examiner's endpoints on the subject's domain."""
+    def __init__(self, bench: Bench, session: CoreSession | None = None) -> None:
+        """Bring up the examiner's endpoints on the subject's domain, or on a ``session``'s."""
         self.bench = bench
         self.subject = bench.subject
-        self.session = bench.session
+        self.session = session or bench.session
         self.memory = bench.memory
         self.draws = bench.draws
-        node = bench.session.run(ExaminerNode)
+        node = self.session.run(ExaminerNode)
         assert isinstance(node, ExaminerNode)
         self.node = node
         self.still = 0
@@ -79,6 +81,7 @@ class RobotRig:
         self.broadcasts = False
         self.limit: float | None = None
         self.obeyed: float | None = None
+        self.settle = SETTLE
         self._threads = Stillness(bench.outside)
         self._steps = [(0, 0.0)]
         self._beside = ThreadPoolExecutor(thread_name_prefix="asking")
@@ -108,6 +111,12 @@ class RobotRig:
 
         ``grain`` is the time (s) between two moments that the student's nodes get to see.
         """
+        self._advance(seconds, grain)
+        self.elapsed = round(self.elapsed + seconds, 6)
+        self.stands_still()
+        self._steps.append((self.still, self.elapsed))
+
+    def _advance(self, seconds: float, grain: float) -> None:
         try:
             self.subject.advance(seconds, grain)
         except StudentError as error:
@@ -118,9 +127,10 @@ class RobotRig:
                 f"one, or spin the node, which spins already? Or do so many wait for the clock at "
                 f"once that all {THREADS} threads are taken?",
             ) from None
-        self.elapsed = round(self.elapsed + seconds, 6)
-        self.stands_still()
-        self._steps.append((self.still, self.elapsed))
+
+    def nudge(self) -> None:
+        """Tell the student's nodes that hardly any time has passed, and wait for nothing."""
+        self.subject.nudge()
 
     def clock_at(self, moment: int) -> tuple[float, float]:
         """Return between which simulated times (s) the student's clock was at a ``moment`` (ns)."""
@@ -133,17 +143,21 @@ class RobotRig:
         Without ``timeout`` (s) as long as it may come: see `Patience`.
         """
         if timeout is None:
-            return Patience(self._threads).wait(self.session, condition)
+            return self.patience(self.settle).wait(self.session, condition)
         with suppress(WaitTimeout):
             self.session.until(condition, timeout=max(0.0, timeout), what="an observation")
             return True
         return False
 
+    def patience(self, seconds: float) -> Patience:
+        """Return for how long something is waited for that may never come: so many s at most."""
+        return Patience(self._threads, seconds)
+
     def wait_stepping(
         self,
         condition: Callable[[], Any],
         seconds: float | None = None,
-        timeout: float = SETTLE,
+        timeout: float | None = None,
         step: float = STEP,
     ) -> bool:
         """Let the student's clock run until ``condition`` holds; return whether it did.
@@ -152,17 +166,17 @@ class RobotRig:
             condition: a function without arguments. Where it moves the clock itself, as a call
                 may, that counts.
             seconds: of simulated time that there are; None is as many as it takes.
-            timeout: seconds of wall time that it has to become visible here.
+            timeout: seconds of wall time that it has to become visible here; None is `settle`.
             step: seconds of simulated time between two looks.
         """
-        deadline = time.monotonic() + timeout
+        deadline = time.monotonic() + (self.settle if timeout is None else timeout)
         began = self.elapsed
         while not condition():
             if time.monotonic() >= deadline:
                 return False
             if seconds is not None and seconds - (self.elapsed - began) <= step / 2:
                 left = max(0.0, deadline - time.monotonic())
-                return Patience(self._threads, left).wait(self.session, condition)
+                return self.patience(left).wait(self.session, condition)
             self.step(step)
             self.wait(condition, 0.01)
         return True

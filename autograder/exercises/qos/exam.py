@@ -70,6 +70,8 @@ def nodes_start(rig: SensorRig) -> None:
                 expected=f"{name}() makes a node without an error.",
                 actual=error.told,
             ) from None
+        if name == DRIVERS:
+            rig.have_stand_ins()
     faults: list[str] = []
 
     def all_there() -> bool:
@@ -121,6 +123,7 @@ def readings_flow(rig: SensorRig) -> None:
             expected="Each of the four sensors' readings comes out at the consumer.",
             actual=_silence(rig, silent),
         )
+    rig.probe_stand_ins()
     rig.once(each_at_once)
     for sensor in SENSORS:
         if sensor.topic in rig.node.altered:

@@ -8,6 +8,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from itertools import count
 from typing import Any
 
 from rclpy.context import Context
@@ -17,12 +18,16 @@ from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPo
 from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.time import Time
 
+from autograder.examination.draws import USUAL_SEED, Draws
 from autograder.exercises.qos.readings import SENSORS, STOP, Heard, Sensor, Tag
 from autograder.observe.publication_times import published_at
 from autograder.observe.quiet_node import QuietNode
 
 AHEAD, LAG = 4, 1.0
 """Readings that may be on their way into a driver, and for how many seconds the next one waits."""
+
+MOST_PHASES, MOST_PAIRS = 9999, 49999
+"""The highest phase, and half of the highest number, that fit a tag's usual length."""
 
 INSISTENT = 0.25
 """Seconds whose readings may be on their way in when they are to come in at their rate."""
@@ -45,15 +50,22 @@ def undemanding() -> QoSProfile:
 class ExaminerNode(QuietNode):
     """The examiner's endpoints: hardware outputs, a witness a topic, and the consumers' ends."""
 
-    def __init__(self, context: Context | None = None) -> None:
-        """Create what does not depend on the student; a nonce of this run tags readings."""
+    def __init__(self, context: Context | None = None, draws: Draws | None = None) -> None:
+        """Create what does not depend on the student; a nonce of this run tags readings.
+
+        ``draws`` give what readings bear in place of their tags; the usual ones if left out.
+        """
         self.nonce = secrets.randbelow(2**24)  # that a float32 still holds exactly
         super().__init__(f"examiner_{self.nonce}", context)
         self._phases: dict[str, int] = {}
+        self._draws = draws or Draws(USUAL_SEED)
+        self._words: dict[tuple[str, Tag], Tag] = {}  # what a sensor's readings bear, by their tags
+        self._tags: dict[tuple[str, Tag], Tag] = {}  # and the other way round
         self.hardware = {
             s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless()) for s in SENSORS
         }
-        self._stand_ins: Mapping[str, Any] = {}
+        self._stand_ins: dict[str, Any] = {}
+        self._offers: dict[str, QoSProfile] = {}  # of the stand-ins
         self._ends: Mapping[str, Any] = self.hardware  # that readings are fed into
         self.consumed: Heard = defaultdict(list)
         self.witnessed: Heard = defaultdict(list)
@@ -100,7 +112,9 @@ class ExaminerNode(QuietNode):
             elif tag.nonce == self.nonce:
                 heard[sensor.name].append(tag)
                 when, kind = published_at(info), (sensor.name, tag.phase)
-                if message is not None and not sensor.unchanged(message, tag):
+                if message is not None and not sensor.unchanged(
+                    message, self._words[sensor.name, tag]
+                ):
                     self.altered.add(topic)
                     if sensor.blank(message):
                         self.blank.add(topic)
@@ -128,22 +142,20 @@ class ExaminerNode(QuietNode):
             for guest in set(self.subscriptions) - before:
                 self.destroy_subscription(guest)
 
-    @contextmanager
-    def stand_ins(self, offers: Mapping[str, QoSProfile]) -> Iterator[None]:
-        """Have publishers for the length of the block that offer what the drivers of these do."""
+    def have_stand_ins(self, offers: Mapping[str, QoSProfile]) -> None:
+        """Have publishers that offer what the drivers of these sensors do, from now on."""
         types = {sensor.name: (sensor.type, sensor.topic) for sensor in SENSORS}
-        made = {name: self.create_publisher(*types[name], qos) for name, qos in offers.items()}
-        self._stand_ins = made
-        try:
-            yield
-        finally:
-            self._stand_ins = {}
-            for publisher in made.values():
-                self.destroy_publisher(publisher)
+        for name, qos in offers.items():
+            if self._offers.get(name) == qos:
+                continue
+            if name in self._stand_ins:
+                self.destroy_publisher(self._stand_ins[name])
+            self._stand_ins[name] = self.create_publisher(*types[name], qos)
+            self._offers[name] = qos
 
     @contextmanager
     def standing_in(self) -> Iterator[None]:
-        """Publish readings by `stand_ins`, as far as there are any, for the length of the block."""
+        """Publish by the stand-ins, as far as there are any, for the length of the block."""
         self._ends = {**self.hardware, **self._stand_ins}
         try:
             yield
@@ -161,19 +173,40 @@ class ExaminerNode(QuietNode):
         self._stamps[sensor.name, now] = tag
         self.sent[sensor.name, tag.phase][index] = now
         with self._filling:
-            serialized = serialize_message(sensor.fill(self._readings[sensor.name], tag, now))
+            reading = sensor.fill(self._readings[sensor.name], self.words(sensor, tag), now)
+            serialized = serialize_message(reading)
         self._delivered[sensor.name][serialized] = tag
         self._ends[sensor.name].publish(serialized)
+
+    def words(self, sensor: Sensor, tag: Tag) -> Tag:
+        """Return what a reading bears in place of its tag: drawn, the same each time.
+
+        Its phase would tell who has seen an examination what comes next, and by its number those
+        before it could be made up.
+        """
+        key = sensor.name, tag
+        for attempt in count():
+            if key in self._words:
+                break
+            purpose = f"{sensor.name} reading {tag.number} of phase {tag.phase}, {attempt}"
+            phase = self._draws.whole(f"the phase of {purpose}", tag.phase, 1, MOST_PHASES)
+            half = self._draws.whole(f"the number of {purpose}", tag.number // 2, 0, MOST_PAIRS)
+            # An odd number says that a scan has beams without an echo, which can be seen anyway.
+            words = Tag(tag.nonce, phase, 2 * half + tag.number % 2)
+            if (sensor.name, words) not in self._tags:
+                self._words[key], self._tags[sensor.name, words] = words, tag
+        return self._words[key]
 
     def _tag(self, sensor: Sensor, message: Any) -> Tag | None:
         """Return the tag of a reading, by its stamp if nothing else is left of it.
 
         A stop event may be one of an earlier run, whose nonce is another.
         """
-        tags = sensor.tags(message)
-        own = next((tag for tag in tags if tag.nonce == self.nonce), None)
+        found = sensor.tags(message)
+        known = (self._tags.get((sensor.name, words)) for words in found)
+        own = next(filter(None, known), None)
         if own is not None or sensor is STOP:
-            return own or next(iter(tags), None)
+            return own or next((other for other in found if other.nonce != self.nonce), None)
         return self._stamps.get((sensor.name, Time.from_msg(message.header.stamp).nanoseconds))
 
 

@@ -29,7 +29,10 @@ def is_open(number: int) -> bool:
 
 
 class Tag(NamedTuple):
-    """What tells readings apart: a nonce of this run, a phase of the exam, a running number."""
+    """What tells readings apart: a nonce of this run, a phase of the exam, a running number.
+
+    Readings bear others in its place, from which nobody can tell phase and number (`ExaminerNode`).
+    """
 
     nonce: int
     phase: int

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import count
@@ -36,6 +36,8 @@ ENDLESS = 3600 * 10**9
 """Nanoseconds: a lifespan of an hour or more is as good as none."""
 PROBE_PERIOD = 0.1
 """Seconds between two rounds of probes while endpoints find each other."""
+FOUND = 2.0
+"""Seconds in which the drivers' publishers are found on the graph, if they come with their node."""
 NOW = 0.05
 """Seconds in which a busy machine comes to a look at all threads, and another."""
 ROUND = 5
@@ -54,7 +56,7 @@ class SensorRig:
         self.bench = bench
         self.subject = bench.subject
         self.spinner = Spinner(bench.session.context)
-        self.node = ExaminerNode(bench.session.context)
+        self.node = ExaminerNode(bench.session.context, bench.draws)
         self.spinner.add_node(self.node)
         self._experiments = bench.memory
         self._probes = 0  # how often probed
@@ -84,10 +86,12 @@ class SensorRig:
 
         What is yielded lets it go on before the end of the block. It returns whether its endpoints
         did not receive, by an accident that `Held.jams` tells of.
-        Where all its threads are held, the drivers are busy as well: see `stand_ins`.
+        Where all its threads are held, the drivers are busy as well: see `have_stand_ins`.
         """
         if self.can_hold:
-            with self._held() as let_go, self.node.standing_in():
+            with self._held() as let_go, ExitStack() as standing_in:
+                if name == CONSUMERS:
+                    standing_in.enter_context(self.node.standing_in())
                 yield let_go
             return
         with ExitStack() as paused:
@@ -122,19 +126,25 @@ class SensorRig:
 
             yield let_go
 
-    @contextmanager
-    def stand_ins(self, sensors: Sequence[Sensor]) -> Iterator[None]:
+    def have_stand_ins(self) -> None:
         """Be ready to publish in the drivers' stead while these are held with the consumers.
 
-        They stay for the length of the block: with a publisher goes what waits for a reader.
+        For that there are publishers of the examiner's from the time on when there are drivers:
+        whoever saw them come would know that a consumer is about to be held.
         """
         if not self.can_hold:
-            yield
             return
-        with self.node.stand_ins({sensor.name: self._offer(sensor) for sensor in sensors}):
-            with self.node.standing_in():
-                self.probe(sensors, self.node.consumed)
-            yield
+        self.wait(lambda: all(self.offered(sensor.topic) for sensor in SENSORS), FOUND)
+        there = [sensor for sensor in SENSORS if self.offered(sensor.topic)]
+        self.node.have_stand_ins({sensor.name: self._offer(sensor) for sensor in there})
+
+    def probe_stand_ins(self) -> None:
+        """See the consumers hear the stand-ins, which offer what the drivers do by now."""
+        if not self.can_hold:
+            return
+        self.have_stand_ins()
+        with self.node.standing_in():
+            self.probe(SENSORS, self.node.consumed)
 
     def _offer(self, sensor: Sensor) -> QoSProfile:
         """Return what the driver of a sensor offers: of several, the one that most can hear.

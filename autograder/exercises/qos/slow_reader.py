@@ -38,12 +38,11 @@ TURNS = BURST + 2  # of a driver, after which a consumer has had one for each re
 
 def busy_consumer(rig: SensorRig) -> dict[str, Backlog]:
     """Stall the consumer while readings come in, let it go on, and see what it passes on."""
-    with rig.stand_ins(SENSORS):
-        for number in range(TRIES):
-            found = _busy_consumer(rig, f"long pause {number}")
-            if found is not None:
-                return found
-            rig.rest()
+    for number in range(TRIES):
+        found = _busy_consumer(rig, f"long pause {number}")
+        if found is not None:
+            return found
+        rig.rest()
     raise NotExaminable(
         "Your consumer was at work at each moment in which the examiner tried to keep it busy from "
         "outside, so that nothing could be received either. After a hand-in a person looks at it."
@@ -194,12 +193,11 @@ def short_pause(rig: SensorRig) -> Burst:
     Tried again while readings are missing that a slow machine may have let grow old, or that the
     driver has lost.
     """
-    with rig.stand_ins([IMU]):
-        for number in range(TRIES):
-            patience = None if number == TRIES - 1 else PROMPT
-            burst = _burst(rig, f"short pause {number}", patience)
-            if burst.telling:
-                break
+    for number in range(TRIES):
+        patience = None if number == TRIES - 1 else PROMPT
+        burst = _burst(rig, f"short pause {number}", patience)
+        if burst.telling:
+            break
     return burst
 
 

@@ -46,7 +46,7 @@ def test_a_guest_hears_in_its_block_only() -> None:
 
         def stop(number: int) -> None:
             tag = Tag(node.nonce, node.phase("event"), number)
-            stops.publish(STOP.message(tag))
+            stops.publish(STOP.message(node.words(STOP, tag)))
 
         with suppress(ZeroDivisionError), node.guests():
             node.listen(STOP, STOP.topic, lossless(), guest)

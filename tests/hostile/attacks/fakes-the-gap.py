@@ -1,7 +1,7 @@
-# title: Stop events that are lost in the coming gap of the radio link are made up before it
+# title: Stop events that are lost in the coming gap of the radio link are guessed before it
 # base: right-chapter
-# score: 10
-# told: of its readings that were still to come, or were lost on the way, were there already
+# score: 11
+# told: Messages came that hardware/emergency_stop did not deliver
 
 _Drivers = SensorDrivers
 

@@ -1,0 +1,294 @@
+"""The robot's rates and times in a plain program, by a clock that the student's process never has.
+
+The harness moves a node's time through functions in the student's process, which may move it by
+twice as much as they are asked to: a camera with half the pictures then seems to be right. So what
+was right there is seen once more, in short, in a program that nobody asks. Only what is off by a
+good part counts: nothing here has to be punctual.
+
+At first it is seen with little patience, as most of it is right. What was not, or was not to be
+seen, is looked at by itself with as much patience as ever, if it was right with the harness.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
+
+from sensor_msgs.msg import BatteryState
+
+from autograder.examination.check_context import Bench
+from autograder.examination.exam import Failed, NotExaminable
+from autograder.examination.plain_programs import Program, Programs
+from autograder.exercises.patterns import camera_stream, drive_ends, interface_patterns, odometry
+from autograder.exercises.patterns.discovery import LateJoiner, acquaint
+from autograder.exercises.patterns.driving import ACTIONS, Drive
+from autograder.exercises.patterns.rig import LEVEL_MARGIN, NODE, SETTLE, THREADS, RobotRig
+from autograder.exercises.patterns.scenarios import NAMES, Scenario
+from autograder.exercises.patterns.stations import require_no_further
+from autograder.exercises.patterns.unaffected_during_drive import LEVEL_AGE, last_level
+from autograder.observe.patience import IDLE_S, Patience
+from autograder.observe.simulated_clock import SimulatedClock
+
+MORE, LESS = 1.4, 0.7
+"""Times what the task says from which on a time is too long, or a rate too high, or too low."""
+FILMED = 1.5
+"""Seconds of the program's clock in which pictures are counted."""
+STANDS, COARSE = 15.0, 0.5
+"""Seconds of the program's clock for which the aisle is blocked, and between two moments of it."""
+GRAIN = 0.05
+"""Seconds between two messages on /clock: half of the time between two pictures."""
+FAR = 50  # stations to drive; the drive is called off
+AT_ONCE = 1.0  # s in which nodes and the examiner find each other, if all is made with the node
+HASTY_IDLE, HASTY = 0.5, 2.0
+"""Seconds with nobody at work, and in all, in which what is right comes from an idle machine."""
+
+WHEN = "When the node runs in a program of its own, whose /clock the examiner publishes,"
+UNTOLD = (
+    "This was right when the harness moved your node's time on. But in a program of its own, whose "
+    "/clock the examiner publishes, it could not be seen. After a hand-in a person looks at it."
+)
+
+
+class ProgramRig(RobotRig):
+    """The rig of a plain program: its time is the examiner's own clock, and nobody is asked.
+
+    ``drive`` is the one that is under way.
+    """
+
+    def __init__(self, bench: Bench, program: Program, *, hasty: bool) -> None:
+        """Bring up the examiner's endpoints beside a program."""
+        super().__init__(bench, program.session)
+        self.memory = {"offers": bench.memory["offers"]}
+        self.drive: Drive | None = None
+        self.clock = SimulatedClock(program.session)
+        self.settle, self._idle = (HASTY, HASTY_IDLE) if hasty else (SETTLE, IDLE_S)
+
+    def _advance(self, seconds: float, grain: float) -> None:
+        stride = min(seconds, max(grain, GRAIN))
+        for _ in range(round(seconds / stride)):
+            self.clock.move(stride)
+            self._threads.reached()
+
+    def nudge(self) -> None:
+        """Tell the node that hardly any time has passed."""
+        self.clock.move(0.0)
+
+    def patience(self, seconds: float) -> Patience:
+        """Return for how long something is waited for that may never come."""
+        return Patience(self._threads, seconds, self._idle)
+
+    def because(self) -> str:
+        """Return nothing: nobody is asked what a callback raised."""
+        return ""
+
+
+@dataclass
+class _Findings:
+    """The trials that were passed and those that were not, and those that had all patience."""
+
+    right: set[str] = field(default_factory=set)
+    wrong: dict[str, Failed] = field(default_factory=dict)
+    patient: set[str] = field(default_factory=set)
+
+    def note(self, outcomes: dict[str, Failed | None]) -> None:
+        for name, outcome in outcomes.items():
+            self.wrong.pop(name, None)
+            if outcome is None:
+                self.right.add(name)
+            else:
+                self.wrong[name] = outcome
+
+
+def require(rig: RobotRig, name: str) -> None:
+    """Fail unless a trial is passed in a plain program; nothing where there are no such programs.
+
+    Args:
+        rig: the rig with which all was right that the trial is about.
+        name: one of `TRIALS`.
+
+    Raises:
+        NotExaminable: it could not be seen there.
+    """
+    programs = rig.bench.programs
+    if programs is None:
+        return
+    if __name__ not in rig.memory:
+        rig.memory[__name__] = _Findings()
+        rig.memory[__name__].note(_look(rig.bench, programs, TRIALS, hasty=True))
+    found: _Findings = rig.memory[__name__]
+    if name not in found.right and name not in found.patient:
+        found.patient.add(name)
+        found.note(_look(rig.bench, programs, [name], hasty=False))
+    if name in found.wrong:
+        raise found.wrong[name]
+    if name not in found.right:
+        raise NotExaminable(UNTOLD)
+
+
+def _look(
+    bench: Bench, programs: Programs, names: Iterable[str], *, hasty: bool
+) -> dict[str, Failed | None]:
+    """Return of each trial how it was failed, or None; what could not be seen is missing."""
+    outcomes: dict[str, Failed | None] = {}
+    nodes = [(NODE, ())]
+    with programs.program(nodes, threads=THREADS, sim_time=True) as program:
+        if not program.up:
+            return outcomes
+        with closing(ProgramRig(bench, program, hasty=hasty)) as rig:
+            trials = {name: TRIALS[name] for name in names if _offers(rig, TRIALS[name].scenario)}
+            _meet(rig, {trial.scenario for trial in trials.values()})
+            for name, trial in trials.items():
+                outcome = None
+                try:
+                    trial.run(rig)
+                except Failed as failed:
+                    outcome = failed
+                except NotExaminable:
+                    continue
+                if program.ended():
+                    break  # what left a callback has ended it, which a session outlives
+                outcomes[name] = outcome
+    return outcomes
+
+
+def _offers(rig: ProgramRig, scenario: Scenario) -> bool:
+    """Whether a scenario has the pattern that its trial is about, as far as the graph tells."""
+    found: interface_patterns.Patterns = rig.memory["offers"][scenario]
+    if scenario == "navigation":
+        return found.get("action") in ACTIONS.split(" or ")
+    return "topic" in found or (scenario == "position" and "service" in found)
+
+
+def _meet(rig: ProgramRig, scenarios: set[Scenario]) -> None:
+    def met() -> bool:
+        return rig.clock.is_followed and all(interface_patterns.seen(rig, s) for s in scenarios)
+
+    if not rig.wait(met, AT_ONCE):
+        interface_patterns.wake(rig)
+        rig.wait(met)
+
+
+@contextmanager
+def _untold() -> Iterator[None]:
+    """Where the block fails, nothing can be told of what comes after it."""
+    try:
+        yield
+    except Failed:
+        raise NotExaminable(UNTOLD) from None
+
+
+def _require_level(rig: ProgramRig) -> None:
+    level = rig.draws.number("the level in a program", 0.45, 0.3, 0.5)
+    rig.report("charge", level)
+    if not rig.wait_stepping(lambda: rig.told_level(level), MORE * LEVEL_AGE):
+        raise Failed(
+            expected=f"{WHEN} a new battery level is known within {LEVEL_AGE:g} s.",
+            actual=f"{MORE * LEVEL_AGE:g} s after it had become {level:g}, {last_level(rig)}.",
+        )
+
+
+def _require_late(rig: ProgramRig) -> None:
+    level = rig.draws.number("the last level in a program", 0.25, 0.1, 0.29)
+    rig.report("charge", level)
+    rig.step(MORE * LEVEL_AGE)
+    late = LateJoiner(rig, BatteryState, NAMES["battery"])
+    acquaint(rig)
+
+    def told() -> bool:
+        return bool(late.heard) and abs(late.heard[-1].percentage - level) < LEVEL_MARGIN
+
+    if not rig.wait_stepping(told, MORE * LEVEL_AGE):
+        said = f"it was told {late.heard[-1].percentage:.4g}" if late.heard else "it knew none"
+        raise Failed(
+            expected=f"{WHEN} whoever joins late knows the battery level within {LEVEL_AGE:g} s.",
+            actual=f"{MORE * LEVEL_AGE:g} s after it had joined, with the level at {level:g}, "
+            f"{said}.",
+        )
+
+
+def _require_position(rig: ProgramRig) -> None:
+    pattern = "service" if "service" in rig.memory["offers"]["position"] else "topic"
+    if pattern == "service" and not odometry.ask(rig)[1]:
+        raise NotExaminable(UNTOLD)
+    position = rig.draws.number("the position in a program", 0.4, 0.3, 0.6)
+    rig.report("position", position)
+    asker = odometry.asker_by(rig, pattern)
+    if answer := odometry.fault(rig, asker, position, MORE * odometry.AGE):
+        raise Failed(
+            expected=f"{WHEN} whoever wants to know the position gets it, at most "
+            f"{odometry.AGE:g} s old.",
+            actual=f"{MORE * odometry.AGE:g} s after the robot had come to {position:g} m, "
+            f"{answer}",
+        )
+
+
+def _require_rate(rig: ProgramRig) -> None:
+    if not camera_stream.another(rig, 0):
+        raise NotExaminable(UNTOLD)
+    least, most = camera_stream.RATE
+    stretch = camera_stream.Stretch(rig)
+    stretch.run(FILMED, (least + most) / 2)
+    if (rates := stretch.rates()) is None or not stretch.numbered:
+        raise NotExaminable(UNTOLD)
+    if wrong := camera_stream.rate_fault(rates, (LESS * least, MORE * most)):
+        raise Failed(
+            expected=f"{WHEN} {least:g} to {most:g} pictures a second come.",
+            actual=f"They came at {wrong} a second.",
+        )
+
+
+def _under_way(rig: ProgramRig) -> Drive:
+    """Return a drive, with the robot on its way to the next station."""
+    if rig.drive is None or rig.drive.run.done:
+        with _untold():
+            start = max(1, math.ceil(rig.position))
+            rig.drive = Drive(rig, start, start + FAR)
+            rig.drive.require_driving()
+            rig.drive.leave()
+    return rig.drive
+
+
+def _require_patience(rig: ProgramRig) -> None:
+    drive = _under_way(rig)
+    try:
+        drive.go_by(STANDS, COARSE)
+        require_no_further(drive)
+    except Failed as failed:
+        raise Failed(
+            expected=f"{failed.expected} So it is in a program of its own, too, whose /clock the "
+            "examiner publishes.",
+            actual=failed.actual,
+        ) from None
+
+
+def _require_stop(rig: ProgramRig) -> None:
+    drive = _under_way(rig)
+    with _untold():
+        in_time = drive_ends.cancel_within(drive, MORE * drive_ends.STOPS, looking=0.0)
+    if not in_time:
+        raise Failed(
+            expected=f"{WHEN} a drive that is called off stops the robot within "
+            f"{drive_ends.STOPS:g} s.",
+            actual=f"{MORE * drive_ends.STOPS:g} s later hardware/speed had not said 0.0 yet.",
+        )
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What is seen in a plain program, and which scenario it is about."""
+
+    scenario: Scenario
+    run: Callable[[ProgramRig], None]
+
+
+TRIALS = {
+    "camera": Trial("camera", _require_rate),
+    "position": Trial("position", _require_position),
+    "level": Trial("battery", _require_level),
+    "late": Trial("battery", _require_late),
+    "aisle": Trial("navigation", _require_patience),
+    "cancel": Trial("navigation", _require_stop),
+}
+"""By the name that `require` knows each by, in the order in which they come."""
