@@ -81,6 +81,12 @@ def scratch(place):
     except OSError:
         return written
 
+def seen():
+    for folder, folders, names in os.walk("/"):
+        folders[:] = [n for n in folders if os.path.join(folder, n) not in LARGE]
+        if GRADES in names:
+            yield folder
+
 def local():
     with socket.socket(socket.AF_UNIX) as caller:
         caller.connect(f"\\0ros2-course-taken-{PORT}")
@@ -106,7 +112,7 @@ found = {
     "written": [tries(lambda: open(place, "ab")) for place in PLACES],
     "made": [tries(lambda: open(os.path.dirname(place) + "/mine", "wb")) for place in PLACES],
     "root": tries(lambda: os.listdir(ROOT)),
-    "seen": [folder for folder, _, names in os.walk("/") if GRADES in names],
+    "seen": [*seen()],
     "kept": sorted(os.environ),
     "networks": [name for _, name in socket.if_nameindex()],
     "calls": [
@@ -116,7 +122,7 @@ found = {
         tries(lambda: socket.socket(40, socket.SOCK_STREAM)),
     ],
     "processes": len([name for name in os.listdir("/proc") if name.isdecimal()]),
-    "parent": tries(lambda: os.listdir(f"/proc/{os.getppid() or 1}/root/proc/1/fd")),
+    "of the first": tries(lambda: os.listdir(f"/proc/1/root{ROOT}")),
     "user": os.getuid(),
     "limits": {name: resource.getrlimit(getattr(resource, name))[1] for name in LIMITS},
     "raised": tries(lambda: resource.setrlimit(resource.RLIMIT_DATA, (-1, -1))),
@@ -187,6 +193,7 @@ def test_a_taken_examiner_reaches_nothing_and_lies_about_its_own_submission(
         names = {
             "PORT": port, "PLACES": places, "ROOT": str(tmp_path), "GRADES": GRADES,
             "REQUESTS": REQUESTS, "SCRATCH": list(map(str, view.SCRATCH)),
+            "LARGE": ["/usr", "/proc", sys.prefix, sys.base_prefix],
             "LIMITS": ["RLIMIT_DATA", "RLIMIT_NPROC", "RLIMIT_NOFILE", "RLIMIT_AS", "RLIMIT_CPU"],
         }  # fmt: skip
         given = "\n".join(f"{name} = {value!r}" for name, value in names.items())
@@ -211,7 +218,7 @@ def test_a_taken_examiner_reaches_nothing_and_lies_about_its_own_submission(
     assert found["networks"] == ["lo"]
     assert {"OSError", "PermissionError", "ConnectionRefusedError"}.issuperset(found["calls"])
     assert found["processes"] < 10
-    assert found["parent"] in refused
+    assert found["of the first"] in refused
     assert found["user"] != 0
     of_examiner = Limits.of_examiner().of_processes()
     for name, most in found["limits"].items():

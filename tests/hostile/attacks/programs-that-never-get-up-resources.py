@@ -1,8 +1,8 @@
 # title: Plain programs of resources that sleep before they make their nodes
 # exercise: resources
 # base: right-no-thread
-# told: it was not run once more
-# score: any
+# told: It took none.
+# score: 8
 
 import sys
 import threading
