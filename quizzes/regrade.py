@@ -124,6 +124,8 @@ def again(bank: Bank, attempt: Attempt) -> Result | None:
     if (attempt.quiz, attempt.edition) != (bank.quiz, bank.edition):
         return None
     paper = model.draw(bank, attempt.student, attempt.attempt)
+    if not attempt.answers.keys() <= {item.concept.id for item in paper.items}:
+        return None
     given: dict[str, Answer] = {}
     for item in paper.items:
         saved = attempt.answers.get(item.concept.id)

@@ -1,24 +1,29 @@
 """Attempts that were handed in by several people: the one thing that a file says of its making.
 
 A quiz that is taken at home knows what was answered, not by whom. But no two people submit the same
-answers at the same moment under the same login, so whoever hands in the same attempts has one file.
+answers at the same moment under the same login, so whoever hands in the same attempts has one file,
+be one answer of the copy another.
 """
 
 from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from quizzes import record
+from quizzes.answers import Answer, number
 from quizzes.record import Attempt
 
 CANNOT_KNOW = (
     "A quiz knows what was answered, and under which login. It cannot know who answered, who "
-    "helped, or whether somebody has copied attempts and changed them: only hand-ins that hold the "
-    "very same attempts are named, and points are taken from nobody. Marks that must be someone's "
-    "own need an exam under supervision."
+    "helped, or whether somebody has copied attempts and changed their login, time or answers: "
+    "only hand-ins that hold the very same attempts, but for one answer, are named, and points are "
+    "taken from nobody. Marks that must be someone's own need an exam under supervision."
 )
+
+FEWEST, MOST = 3, 50
+"""Answers of an attempt of which one may be another in a copy: of fewer, too little is the same."""
 
 
 def same_attempts(quiz: str, contents: Mapping[str, bytes]) -> list[tuple[str, ...]]:
@@ -32,7 +37,8 @@ def same_attempts(quiz: str, contents: Mapping[str, bytes]) -> list[tuple[str, .
     for person, content in contents.items():
         for attempt in record.parse(content)[0]:
             if attempt.quiz == quiz:
-                having[_identity(attempt)].add(person)
+                for identity in _identities(attempt):
+                    having[identity].add(person)
     groups: list[set[str]] = []
     for people in having.values():
         if len(people) > 1:
@@ -42,7 +48,24 @@ def same_attempts(quiz: str, contents: Mapping[str, bytes]) -> list[tuple[str, .
     return sorted(tuple(sorted(group)) for group in groups)
 
 
-def _identity(attempt: Attempt) -> str:
-    """Return what two attempts have in common if one is a copy; scores are not looked at."""
-    answers = sorted((name, given.variant, given.answer) for name, given in attempt.answers.items())
-    return json.dumps([attempt.student, attempt.attempt, attempt.submitted, answers])
+def _identities(attempt: Attempt) -> Iterator[str]:
+    """Yield what two attempts have in common, one or the other, if one is a copy.
+
+    All answers, or all but one of them; scores are not looked at.
+    """
+    answers = sorted(
+        (name, given.variant, _read(given.answer)) for name, given in attempt.answers.items()
+    )
+    same = [answers]
+    if FEWEST <= len(answers) <= MOST:
+        same += [answers[:place] + answers[place + 1 :] for place in range(len(answers))]
+    for some in same:
+        yield json.dumps([attempt.student, attempt.attempt, attempt.submitted, some])
+
+
+def _read(answer: Answer) -> Answer:
+    """Return what an answer has in common with others that may be marked alike: its letters."""
+    try:
+        return number(answer)
+    except ValueError:
+        return "".join(sorted(filter(str.isalnum, str(answer).casefold())))

@@ -16,6 +16,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from autograder.examination import points as points_table
 from autograder.examination.check_context import Bench, StudentError, SubjectGone
+from autograder.examination.plain_programs import SlowProgramError
 from autograder.examination.verdict import CheckResult, Status, Verdict
 from autograder.processes.fair_deadline import FairDeadline
 from course.errors import CourseError
@@ -264,7 +265,7 @@ def _run(check: Check[RigT], rig: RigT, gone: list[CheckResult]) -> CheckResult:
             return _not_reached(check, gone[0])
         gone.append(_blamed(check, error))
         return gone[0]
-    except NotExaminable as reason:
+    except (NotExaminable, SlowProgramError) as reason:
         return replace(_result_of(check, "not_examined"), actual=str(reason))
     except Exception as error:  # noqa: BLE001 - whatever else goes wrong in here is our fault
         if isinstance(error, UnicodeDecodeError) and _read_by_ros(error):

@@ -40,6 +40,10 @@ class ProgramError(CourseError):
     """The engine did not start a program; the message says why."""
 
 
+class SlowProgramError(Exception):
+    """Programs have taken so long to make their nodes that no more are started; it says so."""
+
+
 @dataclass(frozen=True)
 class Program:
     """A plain program. ``up`` is whether it has made its nodes; ``session`` is in its network."""
@@ -83,6 +87,12 @@ class Programs:
         reply: dict[str, Any] = json.loads(self._replies.readline())
         if "error" in reply:
             raise ProgramError(f"There is no plain program: {reply['error']}.")
+        if "slow" in reply:
+            raise SlowProgramError(
+                "Your notebook was run several times as a program of its own, and its cells took "
+                "so long each time that it was not run once more. After a hand-in a person looks "
+                "at it."
+            )
         return reply
 
     @contextmanager
@@ -108,6 +118,7 @@ class Programs:
 
         Raises:
             ProgramError: the engine did not start it; that is never the student's fault.
+            SlowProgramError: those before took so long that it is not started any more.
         """
         self._count += 1
         domain = MAX_DOMAIN - 1 - self._count % DOMAINS

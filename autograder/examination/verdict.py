@@ -144,7 +144,7 @@ class Verdict:
             checks = tuple(_check(item) for item in data["checks"])
             notes = tuple(str(note) for note in data["notes"])
             return cls(str(data["exam"]), str(data["part"]), checks, notes, int(data["seed"]))
-        except (ValueError, KeyError, TypeError, RecursionError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
             raise VerdictError(
                 f"A verdict is damaged ({type(error).__name__}: {error}): grade it again."
             ) from error

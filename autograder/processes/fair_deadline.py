@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
 
@@ -32,9 +33,15 @@ class RunDelay(Protocol):
 class SeenDelay:
     """That of processes which can be looked at from here."""
 
-    def __init__(self, processes: Processes, pid: int) -> None:
-        """Look at the first thread of ``pid``, a number as the process itself has it."""
-        self._processes, self._main = processes, processes.of(pid)
+    def __init__(
+        self, processes: Processes, pid: int, spent: Callable[[], float] = lambda: 0.0
+    ) -> None:
+        """Look at the first thread of ``pid``, a number as the process itself has it.
+
+        ``spent`` tells of whoever counts what they all have computed, in s, with those that have
+        ended and that nobody has waited for: the kernel forgets these.
+        """
+        self._processes, self._main, self._spent = processes, processes.of(pid), spent
 
     def mark(self) -> float:
         """Return for how many s it was kept up to now, less what its others have computed."""
@@ -42,7 +49,8 @@ class SeenDelay:
             worked, kept = run_times(self._main)
         except (OSError, ValueError):  # it has ended, or the kernel does not count
             return 0.0
-        return kept - max(0.0, sum(map(_computed, self._processes.folders())) - worked)
+        computed = max(self._spent(), sum(map(_computed, self._processes.folders())))
+        return kept - max(0.0, computed - worked)
 
     def since(self, mark: float) -> float:
         """Return for how many s it was kept since `mark` was asked."""

@@ -10,6 +10,7 @@ import os
 import re
 import signal
 import socket
+import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from typing import Any, Self
@@ -21,6 +22,8 @@ from course.domains import MAX_DOMAIN
 
 UP_TIMEOUT_S = 30.0
 """Seconds until a program must have started, and until its cells have made its nodes."""
+ALL_UP_S = 60.0
+"""Seconds that the cells of all programs of an examination may take together: 5 as a rule."""
 MOST_NODES, MOST_ARGUMENTS, MAX_ARGUMENT, MOST_THREADS, MOST_LIVES = 8, 4, 200, 8, 8
 
 _CLASS = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,99}")
@@ -37,6 +40,7 @@ class ProgramHost:
         self._start, self._subject, self._sources = start, subject, sources
         self._held = ExitStack()
         self._program: RunningSubject | None = None
+        self._left = ALL_UP_S
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return the answer to a request of the examiner's; an ``"error"`` says why there is none.
@@ -44,7 +48,8 @@ class ProgramHost:
         ``{"wants": "program", "nodes": [[class, arguments], ...], "then": [{"nodes", "tried"},
         ...], "threads", "sim_time", "apart", "twice", "shut_down", "domain"}`` starts one;
         ``{"wants": "interrupt"}`` sends SIGINT, ``{"wants": "end"}`` ends it. From its start to its
-        end whoever looks at the subject's processes sees the program's.
+        end whoever looks at the subject's processes sees the program's. The
+        answer ``"slow"`` says that none is started any more.
         """
         match request.get("wants"):
             case "program":
@@ -62,8 +67,10 @@ class ProgramHost:
         self._end()
         try:
             wanted, domain = _wanted(request)
-        except (LookupError, TypeError, ValueError):
+        except (LookupError, OverflowError, TypeError, ValueError):
             return {"error": "this is no program"}
+        if self._left <= 0:
+            return {"slow": True}
         engine, theirs = socket.socketpair()
         channel = Channel(engine)
         self._held.callback(channel.close)
@@ -79,10 +86,20 @@ class ProgramHost:
         # From here on code of the student's is at work: what goes wrong is theirs.
         try:
             channel.send({"cells": [*self._sources], "program": wanted})
+            return {"up": self._comes_up(channel)}
+        except ChannelClosed:
+            return {"up": False}
+
+    def _comes_up(self, channel: Channel) -> bool:
+        """Wait until the program's nodes are made, and count the time; return whether they are."""
+        began = time.monotonic()
+        try:
             channel.receive(UP_TIMEOUT_S)
         except (ChannelClosed, ChannelTimeout):
-            return {"up": False}
-        return {"up": True}
+            return False
+        finally:
+            self._left -= time.monotonic() - began
+        return True
 
     def _start_program(self, engine: socket.socket, domain: int) -> RunningSubject:
         control, unused = socket.socketpair()  # a subject has one: nobody talks on this

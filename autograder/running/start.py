@@ -37,8 +37,11 @@ They are `check_context.ALL_REPLIES_TIMEOUT` for replies and `exam.SITTING_S` fo
 MAX_HANGS = 1000
 """Characters of the sentence that says why a subject cannot be expected to go on."""
 
-LAST_WORDS = 65536
-"""Bytes that are kept of what an examiner says on standard error."""
+MOST_REQUESTS = 500
+"""What an examiner may ask for before it gives a verdict: exams come to 20, programs included."""
+
+LAST_WORDS, LAST_LINE = 65536, 1000
+"""Bytes that are kept of what an examiner says on standard error, and characters that are told."""
 
 Answering = Callable[[dict[str, Any]], dict[str, Any]]
 """Answers a request of an examiner's, as JSON knows it."""
@@ -135,37 +138,45 @@ class ExaminerProcess:
         ``answer_with`` answers what the examiner asks for meanwhile (see `program_host`).
 
         Raises:
-            ExaminerError: the examiner ended, took longer than ``timeout`` seconds, or wrote what
-                is no verdict.
+            ExaminerError: the examiner ended, took longer than ``timeout`` seconds, asked for too
+                much, or wrote what is no verdict.
         """
-        assert self._process.stdout is not None
         deadline = FairDeadline(timeout, of_process(self._process.pid))
-        while True:
+        for _ in range(MOST_REQUESTS):
             line = self._line(deadline, timeout)
             try:
                 answer = parse(line)
+                if not isinstance(answer, dict):
+                    raise TypeError("it is no JSON object")
                 if answer_with is None or "wants" not in answer:
                     return self._verdict_of(answer)
-            except (ValueError, KeyError, TypeError, VerdictError) as error:
-                raise ExaminerError(f"What the examiner wrote is no verdict: {error}") from None
+            except (ValueError, LookupError, TypeError, RecursionError, VerdictError) as error:
+                said = str(error)[:LAST_LINE]
+                raise ExaminerError(f"What the examiner wrote is no verdict: {said}") from None
             self._send(answer_with(answer))
+            if not deadline.left:
+                raise self._late(timeout)
+        raise ExaminerError(f"The examiner asked {MOST_REQUESTS} times, and gave no verdict.")
 
     def _line(self, deadline: FairDeadline, timeout: float) -> bytes:
         assert self._process.stdout is not None
         stream = self._process.stdout.fileno()
         while b"\n" not in self._buffer:
+            if self._buffer and not deadline.left:
+                raise self._late(timeout)
             if stream not in self._wait(deadline.left):
                 if deadline.left:
                     continue
-                raise ExaminerError(
-                    f"The examiner gave no verdict within {timeout:.0f} s{self._place()}."
-                )
+                raise self._late(timeout)
             chunk = os.read(stream, 65536)
             if not chunk or len(self._buffer) > MAX_ANSWER:
                 raise self._ended("The examiner ended without a verdict")
             self._buffer += chunk
         line, self._buffer = self._buffer.split(b"\n", 1)
         return line
+
+    def _late(self, timeout: float) -> ExaminerError:
+        return ExaminerError(f"The examiner gave no verdict within {timeout:.0f} s{self._place()}.")
 
     def _verdict_of(self, answer: dict[str, Any]) -> Verdict:
         self.hangs = str(answer["hangs"])[:MAX_HANGS]
@@ -227,7 +238,7 @@ class ExaminerProcess:
 
     def _last_words(self) -> str:
         lines = self._said.decode(errors="replace").strip().splitlines()
-        return lines[-1] if lines else f"exit code {self._process.returncode}"
+        return lines[-1][:LAST_LINE] if lines else f"exit code {self._process.returncode}"
 
     def _kill(self) -> None:
         if self._process.poll() is None:

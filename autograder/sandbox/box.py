@@ -110,14 +110,16 @@ class Box:
         """Start the examiner in a sandbox of its own; return it, and the sandbox's process 1."""
         limits = Limits.of_examiner()
         arguments = warmth.arguments_of(command, warmth.EXAMINER) if self._warm else None
-        bound = ["prlimit", f"--data={limits.data}", "--"]
+        bounds = [f"--{name}={most}" for name, most in limits.of_processes().items()]
         with ExitStack() as stack:
             user, holder = _user(), _user()
             sandbox = _Sandbox(limits, environment.examiner(), None)
             if arguments is None:
                 streams = {name: options.get(name) for name in ("stdin", "stdout", "stderr")}
-                process, init = self._enclose([*bound, *command], user, user, sandbox, stack, fds,
-                                              **streams)  # fmt: skip
+                command = ["prlimit", *bounds, "--", *command]
+                process, init = self._enclose(
+                    command, user, user, sandbox, stack, fds, **streams
+                )  # fmt: skip
                 self._held.push(BoxedSubject(process, init, limits, stack.pop_all()))
                 return process, init
             process, init = self._enclose(
@@ -127,7 +129,7 @@ class Box:
             self._held.push(enclosed)
             enclosed.require_holder()
             as_user = user if network.is_root() else None
-            examiner = warmth.examiner(arguments, fds, enclosed.handle, as_user, limits.data)
+            examiner = warmth.examiner(arguments, fds, enclosed.handle, as_user, limits)
             self._held.callback(end, examiner)
             return examiner, init
 

@@ -123,7 +123,7 @@ class BoxedSubject:
         pid = number_inside(self.pid)
         # Nothing of the student's runs yet: the others hold the sandbox.
         ours = [number for number in Sandboxed(self._init).inside() if number != pid]
-        self.delay = SeenDelay(Sandboxed(self._init, ours), pid)
+        self.delay = SeenDelay(Sandboxed(self._init, ours), pid, self._watch.spent)
         self._numbers = pid, ours
         self.tell_warden()
 

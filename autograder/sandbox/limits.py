@@ -84,20 +84,28 @@ class Limits:
         """Read what `to_json` wrote."""
         return cls(**json.loads(text))
 
+    def of_processes(self) -> dict[str, int]:
+        """Return what the kernel holds each process to: {resource as in prlimit(1): most}.
+
+        No process may have more than this one anyway.
+        """
+        wanted = {
+            "data": self.data, "nproc": self.tasks, "cpu": self.cpu, "fsize": self.file,
+            "nofile": self.open_files, "core": 0, "as": self.addresses, "msgqueue": 0,
+            "sigpending": self.tasks,
+        }  # fmt: skip
+        bounds = {}
+        for name, bound in wanted.items():
+            _, hard = resource.getrlimit(_number(name))
+            bounds[name] = bound if hard == resource.RLIM_INFINITY else min(bound, hard)
+        return bounds
+
     def apply(self) -> None:
         """Limit this process and all that it starts, for good."""
-        bounds = {
-            resource.RLIMIT_DATA: self.data,
-            resource.RLIMIT_NPROC: self.tasks,
-            resource.RLIMIT_CPU: self.cpu,
-            resource.RLIMIT_FSIZE: self.file,
-            resource.RLIMIT_NOFILE: self.open_files,
-            resource.RLIMIT_CORE: 0,
-            resource.RLIMIT_AS: self.addresses,
-            resource.RLIMIT_MSGQUEUE: 0,
-            resource.RLIMIT_SIGPENDING: self.tasks,
-        }
-        for what, bound in bounds.items():
-            _, hard = resource.getrlimit(what)
-            most = bound if hard == resource.RLIM_INFINITY else min(bound, hard)
-            resource.setrlimit(what, (most, most))
+        for name, most in self.of_processes().items():
+            resource.setrlimit(_number(name), (most, most))
+
+
+def _number(name: str) -> int:
+    number: int = getattr(resource, f"RLIMIT_{name.upper()}")
+    return number

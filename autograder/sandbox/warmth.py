@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 
 from autograder.processes import python_module
 from autograder.sandbox import environment, network, seccomp, view
+from autograder.sandbox.limits import Limits
 from autograder.sandbox.prefork import ForkedProcess, Zygote, shared
 from autograder.sandbox.prefork.forked import pipe_in, pipe_out
 from autograder.sandbox.prefork.task import Task
@@ -79,7 +80,7 @@ def subject(
 
 
 def examiner(
-    arguments: Sequence[str], fds: Sequence[int], process: int, user: int | None, data: int
+    arguments: Sequence[str], fds: Sequence[int], process: int, user: int | None, limits: Limits
 ) -> ForkedProcess:
     """Fork an examiner into the namespaces of a process, with pipes to its standard streams.
 
@@ -88,11 +89,11 @@ def examiner(
         fds: descriptors that it gets, under the same numbers.
         process: a process in its sandbox, by a pidfd.
         user: the user id that it takes on, if root grades.
-        data: bytes of writable memory that it may reserve.
+        limits: what it may use.
     """
     task = Task(
-        EXAMINER, list(arguments), [0, 1, 2, *fds], process=True, user=user, data=data,
-        calls=seccomp.program().hex(), folder=str(view.HOME),
+        EXAMINER, list(arguments), [0, 1, 2, *fds], process=True, user=user,
+        limits=limits.to_json(), calls=seccomp.program().hex(), folder=str(view.HOME),
     )  # fmt: skip
     return _with_streams(task, [process], fds)
 

@@ -71,6 +71,10 @@ class Watch:
         self._over.set()
         self._thread.join()
 
+    def spent(self) -> float:
+        """Return the processor time, in s, of all that were there when it looked."""
+        return self._used
+
     def _run(self) -> None:
         while not self._over.wait(PERIOD) and not self._ended():
             try:

@@ -192,7 +192,7 @@ echo $? > "$3/code"
 rm "$1/ballast"
 autograder grade {assignment} --root "$1" 2>"$3/said-later"
 echo $? > "$3/code-later"
-cp "$1/gradebook.db" "$1/nbgrader_config.py" "$3"
+cp -r "$1/gradebook.db" "$1/nbgrader_config.py" "$1/.autograder" "$3"
 """
 
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from autograder.processes.channel import Channel
+from autograder.running import program_host
 from autograder.running.program_host import ProgramHost
 from autograder.sandbox import RunningSubject
 
@@ -149,6 +155,23 @@ def test_apart_a_callback_that_raises_ends_its_node_alone_and_one_not_made_is_le
         {"wants": "program", "nodes": [["Node", []]], "threads": 1000, "then": [], "domain": 1},
         {"wants": "program", "nodes": [["Node", []]], "threads": 1, "then": [], "domain": 10**6},
         {"wants": "program", "nodes": {"Node": []}, "threads": 1, "then": [], "domain": 1},
+        {"wants": "program", "nodes": [["Node", 1]], "threads": 1, "then": [], "domain": 1},
+        {
+            "wants": "program",
+            "nodes": [["Node", []]],
+            "threads": float("inf"),
+            "then": [],
+            "domain": 1,
+        },
+        {
+            "wants": "program",
+            "nodes": [["Node", []]],
+            "threads": 1,
+            "then": [],
+            "domain": float("nan"),
+        },
+        {"wants": "program", "nodes": [["Node", []]], "threads": 1, "then": [], "domain": None},
+        {"wants": ["program"]},
         {"wants": "program", "nodes": [], "threads": 1, "then": ["Node"], "domain": 1},
     ],
 )
@@ -159,3 +182,30 @@ def test_what_is_no_request_is_refused_and_starts_nothing(request_: dict[str, An
     subject: Any = None
     with ProgramHost(start_subject, subject, []) as host:
         assert "error" in host.answer(request_)
+
+
+def test_programs_that_take_long_to_come_up_are_not_started_without_end() -> None:
+    """Some time for all of them: that the next one is not started is then left to a person."""
+    started = []
+
+    @contextmanager
+    def program(command: Sequence[str], fds: Sequence[int]) -> Iterator[Any]:
+        started.append(command)
+        channel = Channel(socket.socket(fileno=os.dup(fds[0])))
+        channel.send({"ready": True})
+        yield SimpleNamespace(pid=0, ready=lambda: None)
+        channel.close()
+
+    request = {
+        "wants": "program", "nodes": [["Node", []]], "threads": 1, "domain": 1, "sim_time": False,
+        "apart": False, "twice": False, "shut_down": False,
+    }  # fmt: skip
+    subject: Any = SimpleNamespace(tell_warden=lambda: None)
+    start_program: Any = program
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(program_host, "UP_TIMEOUT_S", 0.3)
+        patched.setattr(program_host, "ALL_UP_S", 0.5)
+        with ProgramHost(start_program, subject, []) as host:
+            answers = [host.answer(request) for _ in range(4)]
+    assert answers == [{"up": False}] * 2 + [{"slow": True}] * 2
+    assert len(started) == 2

@@ -7,6 +7,7 @@ import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 import pytest
@@ -19,7 +20,7 @@ from autograder.class_report import needs
 from autograder.class_report.collect import ClassData
 from autograder.commands import quiz_report
 from autograder.gradebook.course_gradebook import Grade
-from quizzes import loader, marking, model, record, schema, sharing
+from quizzes import loader, marking, model, record, regrade, schema, sharing
 from quizzes.record import Attempt, Given
 
 BANK = loader.load_bank("ch05")
@@ -272,6 +273,47 @@ def test_who_hands_in_the_same_attempts_is_named_and_keeps_the_points(tmp_path: 
     assert need.students == ("ann", "cem", "dora")
     assert need.urgent
     assert "the quiz ch05 were handed in by several" in need.why
+
+
+def altered(line: dict[str, Any], how: str) -> list[dict[str, Any]]:
+    """Return the attempts of a copy, made to look like others."""
+    names = [*line["answers"]]
+    answers = {name: dict(given) for name, given in line["answers"].items()}
+    match how:
+        case "the other way round":
+            answers = {name: answers[name] for name in reversed(names)}
+        case "one answer":
+            answers[names[0]]["answer"] = "a" if answers[names[0]]["answer"] != "a" else "b"
+        case "spelling":
+            for given in answers.values():
+                if isinstance(given["answer"], str):
+                    given["answer"] = f" {', '.join(given['answer']).upper()}"
+        case "score":
+            line = {**line, "score": 1.0, "right": 1, "passed": True, "edition": "mine"}
+        case "among others":
+            return [{**line, "attempt": 2, "submitted": "2026-01-02T00:00:00+00:00"}, line]
+    return [{**line, "answers": answers}]
+
+
+@pytest.mark.parametrize(
+    "how", ["the other way round", "one answer", "spelling", "score", "among others"]
+)
+def test_a_copy_that_was_made_to_look_like_another_is_named(tmp_path: Path, how: str) -> None:
+    file = hand_in(tmp_path, "ann")
+    lines = altered(json.loads(file.read_bytes()), how)
+    copy = "".join(f"{json.dumps(line)}\n" for line in lines).encode()
+    assert copy != file.read_bytes()
+    contents = {"ann": file.read_bytes(), "ben": copy}
+    assert sharing.same_attempts("ch05", contents) == [("ann", "ben")]
+
+
+def test_what_was_added_to_an_attempt_or_given_another_login_earns_nothing(tmp_path: Path) -> None:
+    line = json.loads(hand_in(tmp_path, "ann").read_bytes())
+    extra = {**line["answers"], "more": {"variant": "more", "answer": "a"}}
+    for changes in ({"answers": extra}, {"student": "ben"}):
+        marked = regrade.mark_file(BANK, json.dumps({**line, **changes}).encode())
+        assert marked.best is None or marked.best.score < 1, changes
+        assert "answers questions that were not asked in it" in "".join(marked.problems)
 
 
 def test_equal_answers_at_another_time_are_nobodys_copy(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from autograder.corpus.trials import busy_loops
 from autograder.processes.fair_deadline import FairDeadline, SeenDelay, of_process, run_times
+from autograder.processes.process_folders import Single
 
 
 def kept() -> float:
@@ -44,6 +45,16 @@ def test_who_is_kept_from_running_by_its_own_processes_gets_no_more_time() -> No
         while kept() - before < 1.2:
             pass
         assert delay.since(mark) < 0.6
+
+
+def test_who_is_kept_from_running_by_processes_that_have_gone_gets_no_more_time() -> None:
+    with busy_loops(4 * (os.cpu_count() or 1)):
+        before = kept()
+        delay = SeenDelay(Single(os.getpid()), os.getpid(), lambda: kept() - before)
+        mark = delay.mark()
+        while kept() - before < 0.6:
+            pass
+        assert delay.since(mark) < 0.3
 
 
 def test_a_process_that_is_not_there_was_never_kept_waiting() -> None:

@@ -20,7 +20,7 @@ from rclpy.time import Time
 
 from autograder.examination.draws import USUAL_SEED, Draws
 from autograder.exercises.qos.readings import SENSORS, STOP, Heard, Sensor, Tag
-from autograder.observe.publication_times import published_at
+from autograder.observe.publication_times import published_at, received_at
 from autograder.observe.quiet_node import QuietNode
 
 AHEAD, LAG = 4, 1.0
@@ -28,6 +28,8 @@ AHEAD, LAG = 4, 1.0
 
 MOST_PHASES, MOST_PAIRS = 9999, 49999
 """The highest phase, and half of the highest number, that fit a tag's usual length."""
+CLAIMED_NS = 200_000_000
+"""By how much longer what a consumer hands on may be on its way than what it got, as it says."""
 
 INSISTENT = 0.25
 """Seconds whose readings may be on their way in when they are to come in at their rate."""
@@ -77,6 +79,7 @@ class ExaminerNode(QuietNode):
         self.sent: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)
         self.published: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)
         self.handed: dict[tuple[str, int], list[tuple[int, int]]] = defaultdict(list)
+        self._transits: dict[tuple[str, int], dict[int, int]] = defaultdict(dict)  # ns
         self._stamps: dict[tuple[str, int], Tag] = {}  # ns since 1970
         # As they went out, serialized. One that comes back like that is told by it, and need not be
         # taken apart: most are, and each is heard at least twice.
@@ -120,7 +123,11 @@ class ExaminerNode(QuietNode):
                         self.blank.add(topic)
                 if heard is self.witnessed:
                     self.published[kind].setdefault(tag.number, when)
+                    self._transits[kind].setdefault(tag.number, received_at(info) - when)
                 elif heard is self.consumed:
+                    # Both come in by the same way: whoever is late here is so with both.
+                    if (transit := self._transits[kind].get(tag.number)) is not None:
+                        when = max(when, received_at(info) - transit - CLAIMED_NS)
                     self.handed[kind].append((tag.number, when))
 
         note: Callable[..., None] = keep  # rclpy's stubs know nothing of the second argument

@@ -39,12 +39,14 @@ def require_snapshot(rig: CameraRig, device: str, when: str, *, slow: bool = Fal
         raise Failed(
             expected=f"{when} {SNAPSHOT} succeeds.", actual="It answered with success=False."
         )
+    if slow:  # its picture is still being exposed if the answer has not waited for it
+        rig.settle()
     if not rig.wait(lambda: len(rig.pictures(device)) > before):
         raise Failed(
             expected=f"{when} {SNAPSHOT} publishes a picture on {IMAGE} at once.",
             actual="It answered, but no picture came.",
         )
-    # By the time that DDS gives it, which is this machine's.
+    # By the time that DDS gives it, which is this machine's; what came after a rest, since then.
     if slow and not any(p.published <= answered for p in rig.pictures(device)[before:]):
         raise Failed(
             expected=f"{when} {SNAPSHOT} answers when its picture has been published.",

@@ -357,6 +357,7 @@ def silent_when_inactive(rig: CameraRig) -> None:
         require_picture(rig, device)
         node.go("deactivate")
         inactive = time.time_ns()
+        rig.settle()
         require_still(rig, device, "deactivate")
         require_still_held(rig, device)
         asked = max(rig.cameras(device), default=0)

@@ -46,6 +46,7 @@ class ExaminerNode(QuietNode):
         super().__init__(f"examiner_{secrets.token_hex(4)}")
         self._pictures: dict[tuple[int, str, int, int], Picture] = {}
         self._strange: set[int] = set()
+        self.settled = 0  # see `published_at`
         for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
             qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=reliability)
             self.create_subscription(Image, IMAGE, self._note, qos)
@@ -55,7 +56,7 @@ class ExaminerNode(QuietNode):
     def _note(self, message: Any, info: dict[str, int]) -> None:
         # By the writer's stamp it is known when the other reader gets it, too.
         stamp = info["source_timestamp"]
-        if (picture := _picture(message, published_at(info))) is None:
+        if (picture := _picture(message, published_at(info, self.settled))) is None:
             self._strange.add(stamp)
         else:
             self._pictures.setdefault((stamp, *picture[:3]), picture)

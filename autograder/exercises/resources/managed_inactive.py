@@ -41,7 +41,8 @@ def require_still(rig: CameraRig, device: str, transition: str) -> None:
 def require_silent_at_once(rig: CameraRig, node: Managed, device: str) -> None:
     """Fail if a picture that was being exposed at “deactivate” is published after it.
 
-    By the times that DDS gives: what was published before, and arrives after, is in order.
+    By the times that DDS gives: what was published before, and arrives after, is in order. But a
+    writer that lies about them is not believed once all has come to rest.
     """
     for _ in range(EXPOSURES):
         node.go("activate")
@@ -50,6 +51,7 @@ def require_silent_at_once(rig: CameraRig, node: Managed, device: str) -> None:
         under_way = Deadline(EXPOSURE)
         node.go("deactivate")
         in_time, inactive = under_way.left, time.time_ns()
+        rig.settle()
         let_arrive(rig, device)
         if any(picture.published > inactive for picture in rig.pictures(device)[-1:]):
             raise Failed(

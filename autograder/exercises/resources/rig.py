@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import secrets
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -168,6 +169,11 @@ class CameraRig(Observer):
     def rest(self) -> bool:
         """Return True when all that was sent has been dealt with, False if a thread never rests."""
         return self._still.reached()
+
+    def settle(self) -> None:
+        """Wait until all that was sent has been dealt with: what comes then was sent after that."""
+        if self.rest():
+            self.node.settled = time.time_ns()
 
     def others(self) -> str:
         """Return a sentence on the processes that the notebook has started, if there are any."""

@@ -194,7 +194,10 @@ def _number(given: Given, name: str) -> float:
     found = given.get(name)
     if isinstance(found, bool) or not isinstance(found, int | float):
         raise RequestError(f"{name} is no number")
-    return float(found)
+    try:
+        return float(found)
+    except OverflowError:
+        raise RequestError(f"{name} is too large") from None
 
 
 def _seconds(given: Given, name: str) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import fcntl
 import json
 import os
-import resource
 import signal
 import sys
 from collections.abc import Iterable, Mapping
@@ -13,6 +12,7 @@ from dataclasses import asdict, dataclass, field
 from importlib import import_module
 from pathlib import Path
 
+from autograder.sandbox.limits import Limits
 from autograder.sandbox.prefork import linux
 
 
@@ -30,7 +30,7 @@ class Task:
         calls: it gives up all capabilities, and this filter (hexadecimal) decides about its system
             calls.
         environment: its environment, if not the zygote's own.
-        data: bytes of writable memory that it may reserve, if that is limited.
+        limits: what it may use, as `Limits.to_json` writes it, if that is limited.
         folder: where it works, if not where the zygote does.
     """
 
@@ -42,7 +42,7 @@ class Task:
     user: int | None = None
     calls: str = ""
     environment: dict[str, str] | None = None
-    data: int | None = None
+    limits: str = ""
     folder: str | None = None
 
     def to_json(self) -> bytes:
@@ -85,8 +85,8 @@ class Task:
             os.environ.update(self.environment)
         if self.folder is not None:
             os.chdir(self.folder)
-        if self.data is not None:
-            resource.setrlimit(resource.RLIMIT_DATA, (self.data, self.data))
+        if self.limits:
+            Limits.from_json(self.limits).apply()
         if self.calls:
             linux.bound_capabilities()  # while it still has the right to
         if self.user is not None:

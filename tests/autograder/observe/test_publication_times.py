@@ -23,6 +23,21 @@ def test_a_stamp_is_believed_within_the_time_of_its_way(stamp: int, published: i
     assert published_at(info) == published
 
 
+@pytest.mark.parametrize(
+    ("stamp", "settled", "published"),
+    [
+        (RECEIVED - 2000, RECEIVED - 1000, RECEIVED - 1000),  # nothing was on its way then
+        (RECEIVED - 1000, RECEIVED - 2000, RECEIVED - 1000),
+        (RECEIVED - 2000, RECEIVED, RECEIVED - 2000),  # it was here when all had come to rest
+    ],
+)
+def test_what_comes_after_a_rest_was_published_after_it(
+    stamp: int, settled: int, published: int
+) -> None:
+    info = {"source_timestamp": stamp, "received_timestamp": RECEIVED}
+    assert published_at(info, settled) == published
+
+
 def test_a_message_of_two_subscriptions_counts_once_whatever_its_stamp_says() -> None:
     ears = Ears[str]()
     forged = RECEIVED * 100

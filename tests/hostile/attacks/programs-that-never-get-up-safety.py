@@ -1,0 +1,11 @@
+# title: Plain programs of safety that sleep before they make their nodes
+# exercise: safety
+# base: right-callbacks
+# told: it was not run once more
+# score: any
+
+import sys
+import threading
+
+if "--program" in sys.argv:
+    threading.Event().wait()
