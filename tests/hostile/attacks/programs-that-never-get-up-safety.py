@@ -2,7 +2,7 @@
 # exercise: safety
 # base: right-callbacks
 # told: it was not run once more
-# score: any
+# score: 3
 
 import sys
 import threading
