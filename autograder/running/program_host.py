@@ -42,9 +42,9 @@ class ProgramHost:
         """Return the answer to a request of the examiner's; an ``"error"`` says why there is none.
 
         ``{"wants": "program", "nodes": [[class, arguments], ...], "threads", "sim_time", "apart",
-        "twice", "shut_down", "domain"}`` starts one; ``{"wants": "interrupt"}`` sends SIGINT,
-        ``{"wants": "end"}`` ends it. From its start to its end whoever looks at the subject's
-        processes sees the program's.
+        "twice", "shut_down", "goes_on", "domain"}`` starts one; ``{"wants": "interrupt"}`` sends
+        SIGINT, ``{"wants": "end"}`` ends it. From its start to its end whoever looks at the
+        subject's processes sees the program's.
         """
         match request.get("wants"):
             case "program":
@@ -117,5 +117,6 @@ def _wanted(request: dict[str, Any]) -> tuple[dict[str, Any], int]:
     threads, domain = int(request["threads"]), int(request["domain"])
     if not 1 <= threads <= MOST_THREADS or not 0 <= domain <= MAX_DOMAIN:
         raise ValueError(threads)
-    how = {name: bool(request[name]) for name in ("sim_time", "apart", "twice", "shut_down")}
+    flags = ("sim_time", "apart", "twice", "shut_down", "goes_on")
+    how = {name: bool(request[name]) for name in flags}
     return {"nodes": nodes, "threads": threads, **how}, domain

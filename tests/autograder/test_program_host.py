@@ -44,7 +44,7 @@ class Raises(Works):
 
 nodes, threads = [[name, [name]] for name in sys.argv[1].split()], int(sys.argv[2])
 wanted = {"nodes": nodes, "threads": threads, "sim_time": False, "apart": len(nodes) > 1}
-wanted |= {how: how == sys.argv[4] for how in ("twice", "shut_down")}
+wanted |= {how: how == sys.argv[4] for how in ("twice", "shut_down", "goes_on")}
 plain_program.run(globals(), wanted, int(sys.argv[3]), lambda: say("up"))
 """
 
