@@ -106,6 +106,7 @@ class Programs:
         apart: bool = False,
         twice: bool = False,
         shut_down: bool = False,
+        goes_on: bool = False,
     ) -> Iterator[Program]:
         """Run nodes of the notebook's classes for the length of the block.
 
@@ -113,8 +114,9 @@ class Programs:
         the last one is repeated. Where they are ``apart``, each has an executor of its own, with
         so many threads, and what leaves a callback ends its node alone. ``twice``: at the end of
         the first life of its kind each node is destroyed twice. ``shut_down``: at a first
-        interrupt their ``shutdown()`` is called, and they spin on until the next. Whatever looks
-        at the subject's processes meanwhile looks at the program's.
+        interrupt their ``shutdown()`` is called, and they spin on until the next. It ``goes_on``
+        whatever leaves a callback, as a session does, unless they are apart. Whatever looks at the
+        subject's processes meanwhile looks at the program's.
 
         Raises:
             ProgramError: the engine did not start it; that is never the student's fault.
@@ -128,7 +130,7 @@ class Programs:
                     {"nodes": _told(life.nodes), "tried": _told(life.tried)} for life in then
                 ],
                 threads=threads, sim_time=sim_time, apart=apart, twice=twice, shut_down=shut_down,
-                domain=domain,
+                goes_on=goes_on, domain=domain,
             )  # fmt: skip
             with CoreSession(domain_id=domain) as session:
                 session.explains = False

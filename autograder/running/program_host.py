@@ -46,10 +46,10 @@ class ProgramHost:
         """Return the answer to a request of the examiner's; an ``"error"`` says why there is none.
 
         ``{"wants": "program", "nodes": [[class, arguments], ...], "then": [{"nodes", "tried"},
-        ...], "threads", "sim_time", "apart", "twice", "shut_down", "domain"}`` starts one;
-        ``{"wants": "interrupt"}`` sends SIGINT, ``{"wants": "end"}`` ends it. From its start to its
-        end whoever looks at the subject's processes sees the program's. The
-        answer ``"slow"`` says that none is started any more.
+        ...], "threads", "sim_time", "apart", "twice", "shut_down", "goes_on", "domain"}`` starts
+        one; ``{"wants": "interrupt"}`` sends SIGINT, ``{"wants": "end"}`` ends it. From its start
+        to its end whoever looks at the subject's processes sees the program's. The answer
+        ``"slow"`` says that none is started any more.
         """
         match request.get("wants"):
             case "program":
@@ -133,7 +133,8 @@ def _wanted(request: dict[str, Any]) -> tuple[dict[str, Any], int]:
     threads, domain = int(request["threads"]), int(request["domain"])
     if not 1 <= threads <= MOST_THREADS or not 0 <= domain <= MAX_DOMAIN:
         raise ValueError(threads)
-    how = {name: bool(request[name]) for name in ("sim_time", "apart", "twice", "shut_down")}
+    flags = ("sim_time", "apart", "twice", "shut_down", "goes_on")
+    how = {name: bool(request[name]) for name in flags}
     return {"nodes": nodes, "then": then, "threads": threads, **how}, domain
 
 

@@ -55,7 +55,7 @@ class Refuses(Node):
 
 nodes, threads = [[name, [name]] for name in sys.argv[1].split()], int(sys.argv[2])
 wanted = {"nodes": nodes, "threads": threads, "sim_time": False, "apart": len(nodes) > 1}
-wanted |= {how: how == sys.argv[4] for how in ("twice", "shut_down")}
+wanted |= {how: how == sys.argv[4] for how in ("twice", "shut_down", "goes_on")}
 wanted["then"] = [{"nodes": nodes, "tried": []}]
 if sys.argv[4] == "then":
     refused = [["Refuses", ["none"]], ["Missing", []]]

@@ -39,8 +39,9 @@ def run(
             for each life after, with ``"tried"`` nodes, whose making may raise; the last of these
             is repeated. ``"threads"``, ``"sim_time"``, ``"twice"``, whether each node of the first
             life of its kind is destroyed twice, ``"apart"``, whether each node has an executor of
-            its own, with so many threads, and ``"shut_down"``, whether at a first SIGINT their
-            ``shutdown()`` is called, and they spin on until the next.
+            its own, with so many threads, ``"shut_down"``, whether at a first SIGINT their
+            ``shutdown()`` is called, and they spin on until the next, and ``"goes_on"``, whether
+            what leaves a callback ends nothing.
         domain_id: of the examiner who looks on.
         up: called once, when the first nodes are there.
     """
@@ -113,7 +114,8 @@ def _live(
         nodes = [namespace[name](*arguments) for name, arguments in wanted["nodes"]]
         up()
         first = interrupts.next()
-        _spin(nodes, threads, first, times, interrupts.next if wanted["shut_down"] else None)
+        shut_down_until = interrupts.next if wanted["shut_down"] else None
+        _spin(nodes, threads, first, times, shut_down_until, goes_on=wanted["goes_on"])
 
 
 def _spin_alone(node: Any, threads: int, until: Future, times: int) -> None:
@@ -131,11 +133,18 @@ def _spin(
     until: Future,
     times: int,
     shut_down_until: Callable[[], Future] | None = None,
+    *,
+    goes_on: bool = False,
 ) -> None:
     executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
     for node in nodes:
         executor.add_node(node)
-    executor.spin_until_future_complete(until)
+    while not until.done():
+        try:
+            executor.spin_until_future_complete(until)
+        except Exception:
+            if not goes_on:
+                raise
     if shut_down_until is not None:
         for node in nodes:
             node.shutdown()
