@@ -21,13 +21,13 @@ class RobotInterface(RobotInterface):
         self.known, self.called = 0.0, 0
         super().__init__()
         self.create_timer(1.5, self.look_around)
-        self.create_timer(2.5, lambda: super(RobotInterface, self).charge_changed())
 
     def look_around(self):
         self.known = self.position
 
     def charge_changed(self):
-        pass
+        self.get_clock().sleep_for(Duration(seconds=3.0))
+        super().charge_changed()
 
     def publish_picture(self):
         self.called += 1
