@@ -198,7 +198,7 @@ def test_programs_that_take_long_to_come_up_are_not_started_without_end() -> Non
 
     request = {
         "wants": "program", "nodes": [["Node", []]], "threads": 1, "domain": 1, "sim_time": False,
-        "apart": False, "twice": False, "shut_down": False,
+        "apart": False, "twice": False, "shut_down": False, "goes_on": False, "then": [],
     }  # fmt: skip
     subject: Any = SimpleNamespace(tell_warden=lambda: None)
     start_program: Any = program

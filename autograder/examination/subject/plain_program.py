@@ -139,19 +139,22 @@ def _spin(
     executor = SingleThreadedExecutor() if threads == 1 else MultiThreadedExecutor(threads)
     for node in nodes:
         executor.add_node(node)
-    while not until.done():
-        try:
-            executor.spin_until_future_complete(until)
-        except Exception:
-            if not goes_on:
-                raise
-    if shut_down_until is not None:
-        for node in nodes:
-            node.shutdown()
-        executor.spin_until_future_complete(shut_down_until())
-    for node in [*nodes] * times:
-        node.destroy_node()
-    executor.shutdown(timeout_sec=0.0)
+    try:
+        while not until.done():
+            try:
+                executor.spin_until_future_complete(until)
+            except Exception:
+                if not goes_on:
+                    raise
+        if shut_down_until is not None:
+            for node in nodes:
+                node.shutdown()
+            executor.spin_until_future_complete(shut_down_until())
+        for node in [*nodes] * times:
+            node.destroy_node()
+    finally:
+        # Left by an exception it holds what was ready with it, and so the endpoints of its node.
+        executor.shutdown(timeout_sec=0.0)
 
 
 class _Interrupts:
