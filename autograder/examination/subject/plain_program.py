@@ -39,9 +39,9 @@ def run(
             for each life after, with ``"tried"`` nodes, whose making may raise; the last of these
             is repeated. ``"threads"``, ``"sim_time"``, ``"twice"``, whether each node of the first
             life of its kind is destroyed twice, ``"apart"``, whether each node has an executor of
-            its own, with so many threads, ``"shut_down"``, whether at a first SIGINT their
-            ``shutdown()`` is called, and they spin on until the next, and ``"goes_on"``, whether
-            what leaves a callback ends nothing.
+            its own, with so many threads, ``"shut_down"``, whether at a first SIGINT the
+            ``shutdown()`` of those that have one is called, and they spin on until the next, and
+            ``"goes_on"``, whether what leaves a callback ends nothing.
         domain_id: of the examiner who looks on.
         up: called once, when the first nodes are there.
     """
@@ -148,7 +148,8 @@ def _spin(
                     raise
         if shut_down_until is not None:
             for node in nodes:
-                node.shutdown()
+                if callable(shutdown := getattr(node, "shutdown", None)):
+                    shutdown()
             executor.spin_until_future_complete(shut_down_until())
         for node in [*nodes] * times:
             node.destroy_node()

@@ -1,13 +1,15 @@
 """The drive's server in a plain program of rclpy that calls its ``shutdown()``.
 
 A session calls it through the student's process, which so knows that it is looked at. A program
-that is interrupted does it by itself, and what becomes of the robot is seen from outside: in the
-first life of the node in a drive, in the second with nothing to do.
+that is interrupted does it by itself, and what becomes of the robot is seen from outside: in a
+drive, and with nothing to do. The latter is seen at the end of the program that shows whether
+anything ends it, if nothing has; else in a second life of the node that was shut down in a drive.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from autograder.examination.check_context import Bench
 from autograder.examination.exam import Failed, NotExaminable
@@ -33,81 +35,83 @@ AT_ONCE_S = 1.0  # of wall time in which all sleep, and nothing stops the wheels
 AFTERWARDS = 2  # m of a goal that comes after shutdown(), and s in which it would drive
 
 
-def require_shutdown(bench: Bench, still: Stillness) -> None:
-    """Fail unless the robot then stands, and the drive is aborted; nothing where there are none."""
-    if bench.programs is None:
-        return
-    nodes = [(Dispatcher.SERVER, ())]
-    with bench.programs.program(nodes, threads=THREADS, sim_time=True, shut_down=True) as program:
-        if not program.up:  # though it was made when the harness asked for it
-            raise NotExaminable(
-                f"{Dispatcher.SERVER} could not be made in a program of its own. After a hand-in a "
-                "person looks at it."
-            )
-        watched = _Watched(program, still)
-        acts = {ON_THE_WAY: watched.on_the_way, IDLE: watched.idle}
-        Stage(program, still, [Part(Dispatcher.SERVER, Dispatcher, acts)]).play()
-        watched.require_right(program.ended())
+class Shutdowns:
+    """What became of the robot at the shutdowns that were seen, and of the program."""
 
-
-class _Watched:
-    """What becomes of the robot, in the two lives of a node in a program."""
-
-    def __init__(self, program: Program, still: Stillness) -> None:
-        """Nothing has been seen yet."""
-        self._program, self._still = program, still
+    def __init__(self, still: Stillness) -> None:
+        """Nothing has been seen yet; ``still`` tells when all have come to rest."""
+        self._still = still
         self._when = ""  # the program was told to call it, if it was
         self._late: list[str] = []  # when the stop came late
-        self._wrong: Failed | None = None
-        self._known = False  # whether all was seen that there is to see
+        self._wrong: dict[str, Failed] = {}  # by when it was told to
+        self._seen = set[str]()
 
-    def require_right(self, ended: bool) -> None:
-        """Fail if something was wrong; ``ended`` is whether the program has."""
-        if self._wrong:
-            raise self._wrong
-        if ended and self._when:
-            raise Failed(
-                expected=f"{WHEN} {self._when}, it raises nothing.",
-                actual="The program was gone: an exception left shutdown() or a callback.",
+    def watch_idle(self, program: Program, stage: Stage) -> None:
+        """Have it called with nothing to do, in a program whose nodes have done what they had."""
+        stage.play_more(Dispatcher.SERVER, partial(self._idle, program))
+        self._note_end(program)
+
+    def watch_all(self, program: Program) -> None:
+        """Have it called in a drive, and then with nothing to do, unless that has been seen."""
+        acts = {
+            ON_THE_WAY: partial(self._on_the_way, program),
+            IDLE: partial(self._idle, program),
+        }
+        Stage(program, self._still, [Part(Dispatcher.SERVER, Dispatcher, acts)]).play()
+        self._note_end(program)
+
+    def _note_end(self, program: Program) -> None:
+        if self._when and program.ended():
+            self._note(
+                "it raises nothing.",
+                "The program was gone: an exception left shutdown() or a callback.",
             )
+        self._when = ""
+
+    def require_right(self) -> None:
+        """Fail if something was wrong."""
+        for when in (ON_THE_WAY, IDLE):
+            if when in self._wrong:
+                raise self._wrong[when]
         if len(self._late) > 1:
             raise Failed(
                 expected=f"{WHEN}, it stops the wheels at once.",
                 actual=f"{' and '.join(self._late).capitalize()}, the zero Twist on cmd_vel came "
                 f"more than {AT_ONCE_S:g} s later.",
             )
-        if self._late or not self._known:
+        if self._late or not self._seen >= {ON_THE_WAY, IDLE}:
             raise NotExaminable(
                 "It could not be seen in a program of its own that shutdown() stops the wheels at "
                 "once, in a drive and without one. After a hand-in a person looks at it."
             )
 
-    def on_the_way(self, dispatcher: Dispatcher, run: Run) -> Act:
-        """Have it called in a drive; then end the node, and have it made anew."""
+    def _on_the_way(self, program: Program, dispatcher: Dispatcher, run: Run) -> Act:
         drive = dispatcher.send(drive_goal.LONGEST)
         yield from wait_until(lambda: any(dispatcher.speeds), SETTLES)
         if not any(dispatcher.speeds):
-            self._known = True  # that it drives is another check's
+            self._seen |= {ON_THE_WAY, IDLE}  # that it drives is another check's
             return
-        self._shut_down(ON_THE_WAY, lambda: not dispatcher.speeds[-1])
+        self._shut_down(program, ON_THE_WAY, lambda: not dispatcher.speeds[-1])
         stopped = len(dispatcher.speeds)
         yield from wait_until(lambda: drive.status is not None, SETTLES)
         self._require_aborted(dispatcher, drive, stopped)
         yield from self._goal_afterwards(dispatcher)
+        self._seen.add(ON_THE_WAY)
+        if IDLE in self._seen:
+            return
         self._when = ""
-        self._program.interrupt()
-        self._comes(dispatcher.missing)
-        self._program.interrupt()
-        self._comes(lambda: not dispatcher.missing())
+        program.interrupt()  # it is ended, and then made anew
+        self._comes(program, dispatcher.missing)
+        program.interrupt()
+        self._comes(program, lambda: not dispatcher.missing())
         # It may be known here before it knows of anybody, see `Stage`.
-        Patience(self._still, idle=MEET_IDLE_S).wait(self._program.session, lambda: False)
+        Patience(self._still, idle=MEET_IDLE_S).wait(program.session, lambda: False)
 
-    def idle(self, dispatcher: Dispatcher, run: Run) -> Act:
-        """Have it called with nothing to do."""
-        if self._known or dispatcher.missing():
+    def _idle(self, program: Program, dispatcher: Dispatcher, run: Run) -> Act:
+        if IDLE in self._seen or dispatcher.missing():
             return
         dispatcher.speeds.clear()
-        self._shut_down(IDLE, lambda: dispatcher.speeds)
+        self._shut_down(program, IDLE, lambda: dispatcher.speeds)
         if dispatcher.speeds[-1:] != [False]:
             self._note(
                 "it stops the wheels: a zero Twist on cmd_vel.",
@@ -116,17 +120,19 @@ class _Watched:
                 else "Nothing came on cmd_vel.",
             )
         yield from self._goal_afterwards(dispatcher)
-        self._known = True
+        self._seen.add(IDLE)
 
-    def _comes(self, condition: Callable[[], object], idle: float | None = None) -> bool:
+    def _comes(
+        self, program: Program, condition: Callable[[], object], idle: float | None = None
+    ) -> bool:
         patience = Patience(self._still) if idle is None else Patience(self._still, idle=idle)
-        return patience.wait(self._program.session, lambda: condition() or self._program.ended())
+        return patience.wait(program.session, lambda: condition() or program.ended())
 
-    def _shut_down(self, when: str, stopped: Callable[[], object]) -> None:
+    def _shut_down(self, program: Program, when: str, stopped: Callable[[], object]) -> None:
         """Have it called, and wait until the wheels are told to stop."""
         self._when = when
-        self._program.interrupt()
-        if not self._comes(stopped, AT_ONCE_S) and self._comes(stopped):
+        program.interrupt()
+        if not self._comes(program, stopped, AT_ONCE_S) and self._comes(program, stopped):
             self._late.append(when)  # or a message was lost, and sent again
 
     def _require_aborted(self, dispatcher: Dispatcher, drive: Drives, stopped: int) -> None:
@@ -151,6 +157,24 @@ class _Watched:
             )
 
     def _note(self, expected: str, actual: str) -> None:
-        self._wrong = self._wrong or Failed(
-            expected=f"{WHEN} {self._when}, {expected}", actual=actual
-        )
+        wrong = Failed(expected=f"{WHEN} {self._when}, {expected}", actual=actual)
+        self._wrong.setdefault(self._when, wrong)
+
+
+def require_shutdown(bench: Bench, still: Stillness, shutdowns: Shutdowns | None) -> None:
+    """Fail unless the robot stands after a shutdown, whenever it comes, and a drive is aborted.
+
+    Nothing where there are no programs. ``shutdowns`` are what has been seen of them by now.
+    """
+    if bench.programs is None:
+        return
+    shutdowns = shutdowns or Shutdowns(still)
+    nodes = [(Dispatcher.SERVER, ())]
+    with bench.programs.program(nodes, threads=THREADS, sim_time=True, shut_down=True) as program:
+        if not program.up:  # though it was made when the harness asked for it
+            raise NotExaminable(
+                f"{Dispatcher.SERVER} could not be made in a program of its own. After a hand-in a "
+                "person looks at it."
+            )
+        shutdowns.watch_all(program)
+    shutdowns.require_right()

@@ -19,6 +19,7 @@ from autograder.examination.plain_programs import Programs
 from autograder.exercises.safety import plain_program_times
 from autograder.exercises.safety.gripper import GripUser, Operator, double, text
 from autograder.exercises.safety.navigation import Dispatcher, NavigatorUser
+from autograder.exercises.safety.plain_program_shutdown import Shutdowns
 from autograder.exercises.safety.plain_program_stage import (
     STRIDE_S,
     THREADS,
@@ -46,11 +47,13 @@ class Found(NamedTuple):
     """What programs have shown.
 
     ``ends`` is of each act, with the class it is done to, whether it ends a program; what was not
-    found out is missing. ``timings`` are of each class whose node was seen.
+    found out is missing. ``timings`` are of each class whose node was seen. ``shutdowns`` has the
+    one with nothing to do, if nothing else ends a program.
     """
 
     ends: Mapping[tuple[str, str], bool]
-    timings: Mapping[str, Timing]
+    timings: dict[str, Timing]
+    shutdowns: Shutdowns
 
 
 def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
@@ -88,22 +91,26 @@ def require_time(name: str, what: str, bench: Bench, still: Stillness) -> None:
     plain_program_times.require(name, what, bench, still, timings[name])
 
 
+def shutdowns_seen(bench: Bench) -> Shutdowns | None:
+    """Return what has been seen of shutdowns by now, if programs have been looked at."""
+    known = bench.memory.get(f"{__name__}.found")
+    return known.shutdowns if known is not None else None
+
+
 def _found(bench: Bench, programs: Programs, still: Stillness) -> Found:
     key = f"{__name__}.found"
     if key not in bench.memory:
-        timings = dict[str, Timing]()
-        bench.memory[key] = Found(_ending_acts(programs, still, timings), timings)
-    found: Found = bench.memory[key]
-    return found
+        found = Found({}, {}, Shutdowns(still))
+        bench.memory[key] = found._replace(ends=_ending_acts(programs, still, found))
+    known: Found = bench.memory[key]
+    return known
 
 
-def _ending_acts(
-    programs: Programs, still: Stillness, timings: dict[str, Timing]
-) -> dict[tuple[str, str], bool]:
-    """Return of each act whether it ends a program, as `Found` has it; note each class's times."""
+def _ending_acts(programs: Programs, still: Stillness, found: Found) -> dict[tuple[str, str], bool]:
+    """Return of each act whether it ends a program; note what else is seen in what is ``found``."""
     ends = {(part.name, act): False for part in PARTS for act in part.acts}
-    first = _play(programs, still, PARTS)
-    timings |= first.timings if first else {}
+    first = _play(programs, still, PARTS, shutdowns=found.shutdowns)
+    found.timings.update(first.timings if first else {})
     if first is not None and not first.ended:
         return ends
     once = {*first.ended.items()} if first else set[tuple[str, str]]()
@@ -111,7 +118,7 @@ def _ending_acts(
     left, raising, deadline = [*PARTS], set[str](), Deadline(MOST_S)
     while left and deadline.left:
         played = _play(programs, still, left, apart=True)
-        timings |= played.timings if played else {}
+        found.timings.update(played.timings if played else {})
         ended = played.ended if played else {}
         there |= played.there if played else set()
         for name, act in ended.items():
@@ -153,19 +160,29 @@ class Played(NamedTuple):
 
 
 def _play(
-    programs: Programs, still: Stillness, parts: Sequence[Part], *, apart: bool = False
+    programs: Programs,
+    still: Stillness,
+    parts: Sequence[Part],
+    *,
+    apart: bool = False,
+    shutdowns: Shutdowns | None = None,
 ) -> Played | None:
     """Act on the nodes of a program, each class by itself at the same time.
 
-    None if a node cannot be made; of nodes that are ``apart``, it is left out.
+    None if a node cannot be made; of nodes that are ``apart``, it is left out. ``shutdowns`` sees
+    one at the end, if nothing has ended the program.
     """
     nodes = [(part.name, ()) for part in parts]
-    with programs.program(nodes, threads=THREADS, sim_time=True, apart=apart) as program:
+    with programs.program(
+        nodes, threads=THREADS, sim_time=True, apart=apart, shut_down=shutdowns is not None
+    ) as program:
         if not program.up:
             return None
         stage = Stage(program, still, parts)
         stage.play()
         ended = stage.ended if apart else stage.under_way if program.ended() else {}
+        if shutdowns is not None and not ended:
+            shutdowns.watch_idle(program, stage)
         timings = {
             part.name: Timing(stage.players[part.name].took, stage.rested)
             for part in parts

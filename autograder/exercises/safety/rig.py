@@ -76,7 +76,8 @@ class RobotRig:
 
     def require_shutdown_unasked(self) -> None:
         """Fail unless the drive's server in a program of its own stops at a shutdown, too."""
-        plain_program_shutdown.require_shutdown(self.bench, self._still)
+        seen = plain_program_survival.shutdowns_seen(self.bench)
+        plain_program_shutdown.require_shutdown(self.bench, self._still, seen)
 
     def renew(self) -> None:
         """Have the next check begin with a fresh node, in the same session."""
