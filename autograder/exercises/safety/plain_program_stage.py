@@ -118,8 +118,11 @@ class Stage:
         """Move time on until every act is over, or nothing is left to act on."""
         self._play()
         # On a busy machine it takes a while until something ends.
-        Patience(self._still, idle=END_S).wait(self._program.session, self._program.ended)
+        Patience(self._still, idle=END_S).wait(self._program.session, self._all_ended)
         self._note_ended()
+
+    def _all_ended(self) -> bool:
+        return self._program.ended() or self.there <= {*self.ended}
 
     def play_more(self, name: str, act: Callable[[Any, Run], Act]) -> None:
         """Do one thing more to a class when all else is over."""
