@@ -74,11 +74,11 @@ def watch_managed(seen: ProgramObserver, node: str = "") -> ManagedLife:
     pace = seen.pace(device, rate) if came else "None came."
     seen.program.interrupt()
     left = []
-    if not seen.wait(lambda: not rig.cameras(device)):
+    if not seen.ends(lambda: not rig.cameras(device)):
         left.append("its open camera")
-    if not seen.wait(lambda: not seen.node.count_publishers(IMAGE)):
+    if not seen.ends(lambda: not seen.node.count_publishers(IMAGE)):
         left.append(f"its publisher on {IMAGE}")
-    if not seen.wait(lambda: not seen.nodes()):
+    if not seen.ends(lambda: not seen.nodes()):
         left += [f"the node {name}" for name in sorted({*seen.nodes().values()})]
     if seen.gone():
         return ManagedLife(rate=rate, pace=pace, raised=True)
@@ -89,7 +89,7 @@ def watch_managed(seen: ProgramObserver, node: str = "") -> ManagedLife:
     def new_files() -> int:
         return rig.process.usage().grown(before).files
 
-    rig.ends(lambda: new_threads() <= 0 and new_files() <= 0, seen.session)
+    seen.ends(lambda: new_threads() <= 0 and new_files() <= 0)
     return ManagedLife(
         rate=rate, pace=pace, left=tuple(left), new_threads=new_threads(), new_files=new_files()
     )

@@ -19,7 +19,7 @@ from autograder.exercises.resources.managed_holdings import (
 from autograder.exercises.resources.rig import CameraRig
 
 ROUNDS = 10
-REFUSALS = 8  # at least, of a kind
+REFUSALS = 4  # at least, of a kind
 
 
 def require_configuration(

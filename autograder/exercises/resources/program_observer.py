@@ -15,7 +15,7 @@ from autograder.observe.patience import IDLE_S
 from autograder.observe.phrases import capitalized, pictures
 from autograder.processes.fair_deadline import FairDeadline
 
-COUNTED = 8
+COUNTED = 6
 """Pictures whose rate is taken."""
 SLOWEST, FASTEST = 0.6, 1.6
 """Times a rate that are taken for it: a busy machine is no fault of a node's."""
@@ -44,6 +44,11 @@ class ProgramObserver(Observer):
         """Wait as `Observer.wait` does, as long as the program is there."""
         super().wait(lambda: condition() or self.gone(), timeout, idle)
         return bool(condition())
+
+    def ends(self, over: Callable[[], Any]) -> bool:
+        """Wait as `CameraRig.ends` does, as long as the program is there."""
+        self.rig.ends(lambda: over() or self.gone(), self.session)
+        return bool(over())
 
     def working(self) -> bool:
         """Whether a publisher of pictures or a service for them is on the graph."""
