@@ -356,7 +356,7 @@ def demo(
         Path, typer.Option("--dir", help="Where to work; an earlier demo there is replaced.")
     ] = Path("ros2-course-demo"),
     every: Annotated[
-        bool, typer.Option("--all", help="All five exercises, which takes some minutes.")
+        bool, typer.Option("--all", help="All exercises, which takes some minutes.")
     ] = False,
     jobs: Jobs = 2,
     as_json: AsJson = False,

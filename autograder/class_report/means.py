@@ -84,14 +84,14 @@ def _exercises(data: ClassData) -> Iterator[Mean]:
                 waiting += 1
             else:
                 earned.append(sum(marked))
-        title = questions.title_of_notebook(data.assignment, notebook)
+        title = questions.title_of_notebook(notebook)
         worth = sum(q.max_points for q in data.questions.get(notebook, {}).values())
         yield _mean(title, "", earned, worth, waiting)
 
 
 def _questions(data: ClassData) -> Iterator[Mean]:
     for notebook in _notebooks(data):
-        about = questions.title_of_notebook(data.assignment, notebook)
+        about = questions.title_of_notebook(notebook)
         for question in data.questions.get(notebook, {}).values():
             earned, waiting = [], 0
             for grade in data.grades:

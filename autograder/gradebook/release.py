@@ -136,11 +136,11 @@ def _secret_lines(source: NotebookNode) -> set[str]:
 
 def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
     """Return what belongs beside the notebooks of an assignment that can be released."""
-    from autograder.assignments import quiz_sheets
+    from autograder.assignments import listing, quiz_sheets
 
     folder = root / "source" / assignment
     known = sorted({p.parent.name for p in (root / "source").glob("*/*.ipynb")})
-    authored = {p.parent.name for p in (root / "authoring" / "assignments").glob("*/*.py")}
+    authored = listing.names(root)
     if assignment in authored and assignment not in known:
         raise ReleaseError(
             f"The assignment '{assignment}' has not been built: run `autograder build` first."
@@ -150,13 +150,13 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
             f"There is no assignment '{assignment}' in {root}: there are "
             f"{', '.join(sorted(authored | set(known))) or 'none yet'}."
         )
-    texts = root / "authoring" / "assignments" / assignment
     paths = sorted(folder.glob("*.ipynb"))
-    orphans = [path for path in paths if not (texts / f"{path.stem}.py").is_file()]
-    if assignment in authored and orphans:
+    texts = listing.of_course(root)[assignment].texts if assignment in authored else None
+    orphans = [path for path in paths if texts is not None and path.stem not in texts]
+    if orphans:
         raise ReleaseError(
-            f"{orphans[0]} has no source in {texts}: remove it if it is no part of the assignment "
-            "any more, or put its source back, then release again."
+            f"{orphans[0]} has no source in {root / listing.ASSIGNMENTS}: remove it if it is no "
+            "part of the assignment any more, or put its source back, then release again."
         )
     notebooks = [_read(path) for path in paths]
     beside = quiz_sheets.of_notebooks(root, notebooks)

@@ -458,7 +458,7 @@ def class_with(
     data = replace(class_of({}), questions=asked)
     texts = {name: {who: text(code) for who, code in found.items()}
              for name, found in programs.items()}  # fmt: skip
-    title = questions.title_of_notebook(ASSIGNMENT, NOTEBOOK)
+    title = questions.title_of_notebook(NOTEBOOK)
     where = likeness.called(title, asked[NOTEBOOK]["q"])
     return data, {**texts, where: {who: text(said) for who, said in answers.items()}}
 
@@ -597,7 +597,7 @@ def test_the_report_of_a_graded_class(graded: Path) -> None:
     [waiting] = [need for need in report.needs if not need.urgent]
     assert waiting.students == ("bob", "cy")
     assert waiting.why == "Written answers of Exercise 1: QoS profile design wait for their marks."
-    where = questions.title_of_notebook(ASSIGNMENT, NOTEBOOK)
+    where = questions.title_of_notebook(NOTEBOOK)
     alike = {(p.left, p.right): p.similarity for p in report.alike.pairs if p.where == where}
     assert alike[("-dan", "ann")] == alike[("bob", "cy")] == 1.0
     assert rows_of(canvas.read_text())[2:] == [
@@ -660,7 +660,7 @@ def test_answers_of_notebooks_that_came_without_metadata_are_compared(graded: Pa
         nbformat.write(notebook, handed_in)
     report = reports.make(graded, ASSIGNMENT)
     where = likeness.called(
-        questions.title_of_notebook(ASSIGNMENT, NOTEBOOK), report.data.questions[NOTEBOOK][cell]
+        questions.title_of_notebook(NOTEBOOK), report.data.questions[NOTEBOOK][cell]
     )
     pairs = [pair for pair in report.alike.pairs if pair.where == where]
     assert pairs == [similarity.Pair("ann", "cy", 1.0, where)]

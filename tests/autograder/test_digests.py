@@ -14,6 +14,7 @@ import pytest
 import autograder
 from autograder import exercises
 from autograder.running import digests
+from tests.modules import modules_of
 
 HOME = Path(autograder.__file__).parents[1]
 
@@ -116,7 +117,7 @@ def test_the_installed_code_has_the_digest_of_its_copy(copy: Path) -> None:
 
 @pytest.mark.parametrize("package", digests.PACKAGES)
 def test_no_import_is_overlooked(package: str) -> None:
-    for file in (HOME / package).rglob("*.py"):
+    for file in modules_of(HOME / package):
         source = file.read_bytes()
         found = digests._imports("a.module", source)
         for node in of_a_run(ast.parse(source)):
