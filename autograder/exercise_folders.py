@@ -12,7 +12,7 @@ One course root at a time has its exercises among them: `use` and `of_course` sa
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,6 +22,9 @@ TASK, EXAM, POINTS = "task.py", "exam.py", "points.toml"
 CORPUS = "corpus"
 FOLDER = "exercises"
 """The folder of a course root, and of an assignment that is handed out, with exercises."""
+
+COURSE_PACKAGE = "course_exercises"
+"""The Python package that stands for that folder of the course root in use."""
 
 PACKAGE = Path(__file__).resolve().parent
 EVERY = PACKAGE / "corpus" / "every"
@@ -39,18 +42,18 @@ class Exercises:
     """The exercises there are: those of the package, and those of one course root.
 
     Attributes:
-        course: the folder of the course root's own; None if there is none.
+        root: the course root, if it has some of its own.
         folders: {name: folder}, in the order of the names.
         own: the names of the course root's own.
     """
 
-    def __init__(self, course: Path | None) -> None:
+    def __init__(self, root: Path | None) -> None:
         """Look for them.
 
         Raises:
             ExerciseError: one of the course root has a name that it cannot have.
         """
-        packaged, found = _found(PACKAGE / FOLDER), _found(course) if course else {}
+        packaged, found = _found(PACKAGE / FOLDER), _found(root / FOLDER) if root else {}
         for name, folder in found.items():
             if not name.isidentifier():
                 raise ExerciseError(
@@ -62,14 +65,14 @@ class Exercises:
                     f"The exercise {folder} has the name of one that comes with the course: give "
                     "its folder another name."
                 )
-        self.course = course if found else None
+        self.root = root if found else None
         self.own = frozenset(found)
         self.folders: Mapping[str, Path] = dict(sorted({**packaged, **found}.items()))
         self._state = [(name, _changed_ns(folder)) for name, folder in sorted(found.items())]
 
     def is_like(self, other: Exercises) -> bool:
         """Whether these are the same folders, with the same files as they were read."""
-        return (self.course, self._state) == (other.course, other._state)
+        return (self.root, self._state) == (other.root, other._state)
 
 
 _current: Exercises | None = None
@@ -93,8 +96,7 @@ def use(root: Path | None) -> None:
         ExerciseError: one of them has a name that it cannot have.
     """
     global _current
-    folder = root.resolve() / FOLDER if root else None
-    found = Exercises(folder if folder and folder.is_dir() else None)
+    found = Exercises(root.resolve() if root else None)
     if not found.is_like(current()):
         _current = found
 
@@ -130,6 +132,19 @@ def exam_files(folder: Path) -> dict[str, bytes]:
     """
     paths = [p for p in sorted(folder.glob("*.py")) if p.name != TASK]
     return {path.name: path.read_bytes() for path in (*paths, folder / POINTS) if path.is_file()}
+
+
+def own_exam_files(names: Iterable[str]) -> dict[str, bytes]:
+    """Return {path in a course root: content} of what those of these exams need that are its own.
+
+    A folder with these files is a course root to whoever uses it.
+    """
+    exercises = current()
+    return {
+        f"{FOLDER}/{name}/{file}": content
+        for name in sorted(exercises.own.intersection(names))
+        for file, content in exam_files(exercises.folders[name]).items()
+    }
 
 
 def kept_from_students(package: Path = PACKAGE) -> Iterator[Path]:

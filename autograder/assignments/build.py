@@ -171,6 +171,8 @@ def _built(
             yield folder / f"{file_name}.ipynb", to_text(notebook).encode()
             for file, content in quiz_sheets.of_notebooks(root, [notebook]).items():
                 yield folder / file, content
+        for file, content in listing.exam_files(assignment).items():
+            yield folder / file, content
 
 
 def _name(root: Path, path: Path) -> str:

@@ -47,6 +47,15 @@ def of_course(root: Path) -> dict[str, Assignment]:
     return {name: _assignment(root, name) for name in sorted(_names(folder))}
 
 
+def exam_files(assignment: Assignment) -> dict[Path, bytes]:
+    """Return {path in the assignment's folder: content} of exams that only the course root has.
+
+    Students get them with the notebooks, so that a ``check("...")`` in these finds its exam.
+    """
+    files = exercise_folders.own_exam_files(assignment.exercises)
+    return {Path(name): content for name, content in files.items()}
+
+
 def names(root: Path) -> set[str]:
     """Return the names of the assignments that the course at ``root`` has texts for."""
     return _names(root / ASSIGNMENTS)

@@ -17,10 +17,7 @@ from typing import Any
 
 from autograder import exercise_folders
 from autograder.examination.exam import Exam, ExamError
-from autograder.exercise_folders import Exercises
-
-COURSE_PACKAGE = "course_exercises"
-"""The package that stands for the ``exercises/`` of the course root in use."""
+from autograder.exercise_folders import COURSE_PACKAGE, FOLDER, Exercises
 
 _importing = threading.Lock()
 _imported: Exercises | None = None
@@ -71,8 +68,9 @@ def _stand_for(exercises: Exercises) -> None:
         return
     for module in [m for m in sys.modules if f"{m}.".startswith(f"{COURSE_PACKAGE}.")]:
         del sys.modules[module]
+    assert exercises.root is not None
     spec = ModuleSpec(COURSE_PACKAGE, None, is_package=True)
-    spec.submodule_search_locations = [str(exercises.course)]
+    spec.submodule_search_locations = [str(exercises.root / FOLDER)]
     importlib.invalidate_caches()
     sys.modules[COURSE_PACKAGE] = importlib.util.module_from_spec(spec)
     _imported = exercises

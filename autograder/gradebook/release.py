@@ -12,6 +12,7 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
+from autograder import exercise_folders
 from autograder.assignments import cells
 from autograder.assignments.submission import grade_id, metadata
 from course.errors import CourseError
@@ -28,7 +29,8 @@ class ReleaseError(CourseError):
 def release(root: Path, assignment: str) -> Path:
     """Write the student version of ``assignment`` to ``release/``; return its folder.
 
-    The release holds the notebooks, the questions of closed quizzes, and nothing else. It is made
+    The release holds the notebooks, the questions of closed quizzes, the exams of the course's own
+    exercises, and nothing else. It is made
     beside the earlier one, with a copy of the gradebook, and takes its place before the gradebook
     itself is changed; if that fails after all, the earlier one stands again. So a release that
     fails leaves everything as it was.
@@ -41,13 +43,15 @@ def release(root: Path, assignment: str) -> Path:
         ReleaseError: no such assignment, files in it that students must not get, a leak, or
             nbgrader cannot make it.
         QuizMarksError, QuizSheetError: a quiz that it uses is not sound, or cannot be handed out.
+        ExerciseError: an exercise of the course is not sound.
         GradebookError: there is no course at ``root``.
         GradebookUnusable: its gradebook cannot be used.
     """
     from autograder.gradebook.course_gradebook import CourseGradebook, GradebookError
 
     source, released = root / "source" / assignment, root / "release" / assignment
-    beside = _check_source(root, assignment)
+    with exercise_folders.of_course(root):
+        beside = _check_source(root, assignment)
     with _place_beside(released) as place:
         try:
             # First with a copy of the gradebook: nbgrader changes it notebook by notebook.
@@ -151,19 +155,21 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
             f"{', '.join(sorted(authored | set(known))) or 'none yet'}."
         )
     paths = sorted(folder.glob("*.ipynb"))
-    texts = listing.of_course(root)[assignment].texts if assignment in authored else None
-    orphans = [path for path in paths if texts is not None and path.stem not in texts]
+    listed = listing.of_course(root)[assignment] if assignment in authored else None
+    orphans = [path for path in paths if listed is not None and path.stem not in listed.texts]
     if orphans:
         raise ReleaseError(
             f"{orphans[0]} has no source in {root / listing.ASSIGNMENTS}: remove it if it is no "
             "part of the assignment any more, or put its source back, then release again."
         )
     notebooks = [_read(path) for path in paths]
-    beside = quiz_sheets.of_notebooks(root, notebooks)
+    exams = listing.exam_files(listed) if listed is not None else {}
+    beside = quiz_sheets.of_notebooks(root, notebooks) | exams
     for name, content in beside.items():
         if not (folder / name).is_file() or (folder / name).read_bytes() != content:
+            of_what = "exercise" if name in exams else "quiz"
             raise ReleaseError(
-                f"{folder / name} is not in step with the quiz: run `autograder build` first."
+                f"{folder / name} is not in step with the {of_what}: run `autograder build` first."
             )
     # nbgrader would hand out whatever else lies there.
     for path in sorted(folder.rglob("*")):

@@ -10,7 +10,7 @@ import importlib.util
 import os
 import site
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import course
@@ -23,6 +23,8 @@ SCRATCH = (Path("/tmp"), HOME, Path("/dev/shm"))
 """Folders that can be written to, each a small file system in memory."""
 HANDED_IN = Path("/run/handed-in")
 """Where a submission's other files lie, read-only; the subject copies them to its home."""
+COURSE = Path("/run/course")
+"""Where an examiner finds the exams that only a course root has, read-only."""
 
 PACKAGES = ("autograder", "course", "quizzes")
 
@@ -32,12 +34,12 @@ _ETC = (
 )  # fmt: skip
 
 
-def arguments(limits: Limits, handed_in: Path | None, hidden: Iterable[Path]) -> Iterator[str]:
+def arguments(limits: Limits, given: Mapping[Path, Path], hidden: Iterable[Path]) -> Iterator[str]:
     """Yield bwrap's arguments for the files.
 
     Args:
         limits: has the size of the scratch folders.
-        handed_in: the folder with the submission's other files.
+        given: {where it is seen: the folder}, such as one with the submission's other files.
         hidden: folders that must not be seen even if they lie within something that is.
     """
     yield from _system()
@@ -49,9 +51,9 @@ def arguments(limits: Limits, handed_in: Path | None, hidden: Iterable[Path]) ->
     for folder in (*shown, *([cached] if cached.is_dir() else [])):
         yield from _way_to(folder)
         yield from ("--ro-bind", str(folder), str(folder))
-    if handed_in is not None:
-        yield from _way_to(HANDED_IN)
-        yield from ("--ro-bind", str(handed_in), str(HANDED_IN))
+    for place, folder in given.items():
+        yield from _way_to(place)
+        yield from ("--ro-bind", str(folder), str(place))
     for path in (*hidden, *_bundled()):
         if _is_within(path, [Path("/usr"), *shown]):
             yield from _masked(path)
