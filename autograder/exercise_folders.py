@@ -1,10 +1,11 @@
 """Where the exercises are: a folder each, in the package and in a course root's ``exercises/``.
 
-A folder is an exercise if it has any of these files, and its name is the exercise's:
+A folder is an exercise if it has one of the first three of these, and its name is the exercise's:
 
 - ``task.py``: the notebook as text, with solutions, hidden tests and answer keys;
 - ``exam.py``: the checks; other modules beside it are what only they need;
 - ``points.toml``: what each check and each written answer is worth;
+- ``objectives.toml``: what each of them shows about a learner;
 - ``corpus/``: submissions with known verdicts; ``design.md``: what the checks are for.
 
 One course root at a time has its exercises among them: `use` and `of_course` say which.
@@ -19,7 +20,7 @@ from pathlib import Path
 from course.errors import CourseError
 
 TASK, EXAM, POINTS = "task.py", "exam.py", "points.toml"
-CORPUS = "corpus"
+OBJECTIVES, CORPUS = "objectives.toml", "corpus"
 FOLDER = "exercises"
 """The folder of a course root, and of an assignment that is handed out, with exercises."""
 

@@ -11,8 +11,9 @@ from pathlib import Path
 import nbformat
 import pytest
 
+import course
 from autograder import exercise_folders, exercises
-from autograder.assignments import submission
+from autograder.assignments import listing, submission
 from autograder.assignments.build import build
 from autograder.corpus import command
 from autograder.corpus.command import untrusting
@@ -29,7 +30,7 @@ from autograder.running import digests, runner
 from autograder.running.cluster import Cluster, ClusterError
 from autograder.running.jobs import Job
 from course import lab
-from course.content import CONFIG, content_root
+from course.content import CONFIG, content_root, copy_authoring
 from course.errors import CourseError
 from tests.machine import needs_sandbox
 
@@ -201,6 +202,32 @@ def test_it_is_built_beside_those_of_the_package_and_only_its_exam_is_handed_out
     text = "\n".join(path.read_text() for path in released.rglob("*") if path.is_file())
     assert "create_timer" not in text
     assert set(map(str, lab._course_files(root))) >= {f"lab1/{name}" for name in SHIPPED}
+
+
+def test_a_second_chapter_changes_nothing_of_the_first(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy_authoring(content_root(), root)
+    (root / "authoring" / "assignments" / "lab1.toml").unlink()
+    (root / "authoring" / "assignments" / "ch06.toml").write_text('exercises = ["lamp"]\n')
+    (root / "authoring" / "chapters" / "ch06-light.py").write_text("# %% [markdown]\n# # Light\n")
+    built = {path.relative_to(root) for path in build(root)}
+    first = {path.relative_to(content_root()) for path in build(content_root(), check=True)}
+    added = {"chapters/ch06-light.ipynb", "source/ch06/lamp.ipynb",
+             *(f"source/ch06/{name}" for name in SHIPPED)}  # fmt: skip
+    assert set(map(str, built - first)) == added
+    for path in first:
+        assert (root / path).read_bytes() == (content_root() / path).read_bytes(), path
+    release(root, "ch05-quiz")
+    release(root, "ch06")
+    lab.make_copy(tmp_path / "mine", root)
+    monkeypatch.chdir(tmp_path / "mine")
+    progress = course.progress()
+    assert progress.notices == ()
+    assert len(progress.chapters) == 2
+    exams = [exercise.notebook.exam for exercise in progress.exercises]
+    listed = listing.of_course(content_root())["ch05"].exercises
+    assert (sorted(exams), exams[: len(listed)]) == (sorted([*listed, "lamp"]), list(listed))
 
 
 def test_what_is_handed_out_is_in_step_with_the_exercise(root: Path) -> None:

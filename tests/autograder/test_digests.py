@@ -88,7 +88,6 @@ def test_an_exam_is_its_own_business(covered: dict[str, set[str]], name: str) ->
         ("autograder.examination.subject.server", set(exercises.names())),
         ("autograder.sandbox.limits", set(exercises.names())),
         ("course.runtime.core_session", set(exercises.names())),
-        ("course.design.node", {"architecture", "patterns"}),
         ("autograder.cli", set()),
         ("autograder.gradebook.course_gradebook", set()),
     ],
@@ -98,6 +97,11 @@ def test_what_an_exam_imports_belongs_to_it(
 ) -> None:
     assert module in digests._Code(None)._files
     assert {exam for exam, modules in covered.items() if module in modules} == concerned
+
+
+def test_what_some_exams_need_of_the_course_belongs_to_these(covered: dict[str, set[str]]) -> None:
+    for exam, needs_design in {"architecture": True, "patterns": True, "qos": False}.items():
+        assert ("course.design.node" in covered[exam]) == needs_design, exam
 
 
 @pytest.mark.parametrize(
