@@ -151,14 +151,15 @@ def own_exam_files(names: Iterable[str]) -> dict[str, bytes]:
 def kept_from_students(package: Path = PACKAGE) -> Iterator[Path]:
     """Yield the files and folders of the package that no submission may see.
 
-    Of an exercise's folder these are all but what its exam needs. An installer may have compiled
-    the text of a notebook, too.
+    Of an exercise's folder these are all but what its exam needs, and what it is worth. An
+    installer may have compiled the text of a notebook, too.
     """
     for folder in _found(package / FOLDER).values():
         for entry in sorted(folder.iterdir()):
+            is_needed = entry.suffix == ".py" or entry.name in (POINTS, OBJECTIVES)
             if entry.name == "__pycache__":
                 yield from sorted(entry.glob("task.*"))
-            elif entry.name == TASK or (entry.suffix != ".py" and entry.name != POINTS):
+            elif entry.name == TASK or not is_needed:
                 yield entry
     yield from (package / path.relative_to(PACKAGE) for path in (EVERY, DEMO_CLASS))
 

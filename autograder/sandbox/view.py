@@ -120,7 +120,8 @@ def _bundled() -> Iterator[Path]:
     folders = [*map(Path, sys.path), Path(course.__path__[0]).parent]
     for folder in {variant for path in folders for variant in (path, path.resolve())}:
         yield folder / "course" / "data"
-        yield from exercise_folders.kept_from_students(folder / "autograder")
+        if (package := folder / "autograder").is_dir():
+            yield from exercise_folders.kept_from_students(package)
 
 
 def _is_within(folder: Path, others: Sequence[Path]) -> bool:
