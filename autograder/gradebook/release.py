@@ -59,7 +59,7 @@ def release(root: Path, assignment: str) -> Path:
             if found := leaks(source, place / assignment, beside):
                 raise ReleaseError(
                     f"'{assignment}' is not released, because in the release {found[0]}: correct "
-                    f"authoring/assignments/{assignment}, then build and release again."
+                    "the text that it is built from, then build and release again."
                     f"{_as_before(released)}"
                 )
             with _in_place(place / assignment, released, place):
@@ -193,7 +193,7 @@ def _way_out(reason: str, assignment: str) -> str:
             f"change, or release it as an assignment of another name; `nbgrader db assignment "
             f"remove {assignment} --force` would also do, but loses its marks and due date."
         )
-    return f"correct authoring/assignments/{assignment}, then build and release again."
+    return "correct the texts of the assignment, then build and release again."
 
 
 @contextmanager
