@@ -6,6 +6,7 @@ import io
 import json
 import os
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -207,6 +208,7 @@ def corpus(
         ),
     ] = 0,
     jobs: Jobs = IN_FLIGHT,
+    root: Root = None,
     as_json: AsJson = False,
     as_table: Annotated[
         bool, typer.Option("--table", help="Run nothing; print which mutant each check catches.")
@@ -214,7 +216,10 @@ def corpus(
 ) -> None:
     """Grade the graders: run every case of known verdict, and compare."""
     from autograder.corpus import command, tables
+    from course.content import ContentError
 
+    with suppress(ContentError):  # outside of a course root, there are those of the package
+        _root(root)
     if as_table:
         sys.stdout.write(tables.matrix(command.cases(exercise)))
         return
@@ -356,7 +361,7 @@ def demo(
         Path, typer.Option("--dir", help="Where to work; an earlier demo there is replaced.")
     ] = Path("ros2-course-demo"),
     every: Annotated[
-        bool, typer.Option("--all", help="All five exercises, which takes some minutes.")
+        bool, typer.Option("--all", help="All exercises, which takes some minutes.")
     ] = False,
     jobs: Jobs = 2,
     as_json: AsJson = False,
@@ -410,9 +415,12 @@ def _print_json(data: Any) -> None:
 
 
 def _root(root: Path | None) -> Path:
+    from autograder import exercise_folders
     from course.content import working_root
 
-    return working_root() if root is None else root.resolve()
+    found = working_root() if root is None else root.resolve()
+    exercise_folders.use(found)
+    return found
 
 
 def main() -> None:

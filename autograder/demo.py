@@ -10,8 +10,8 @@ from pathlib import Path
 
 import nbformat
 
-from autograder import corpus
-from autograder.assignments import submission
+from autograder import corpus, exercise_folders
+from autograder.assignments import listing, submission
 from autograder.assignments.build import build
 from autograder.class_report.platforms import grades_csv
 from autograder.corpus import Case
@@ -23,12 +23,10 @@ from autograder.gradebook.release import release
 from autograder.grading import engine
 from autograder.grading.engine import Graded
 from autograder.grading.progress import Collecting, Progress
-from course.content import corpus_root
+from course.content import content_root
 from course.errors import CourseError
 
 ASSIGNMENT = "ch05"
-CLASS = "class.toml"
-"""The bundled class, in the corpus: what each student hands in."""
 
 CUT_OFF = "(cut off)"
 
@@ -85,6 +83,7 @@ def run(
     Raises:
         CourseError: ``folder`` holds something that is not a demo.
     """
+    exercise_folders.use(content_root())
     cases = _cases()
     class_ = bundled_class(cases, every=every)
     handed_in = {exam for student in class_.values() for exam in student}
@@ -111,7 +110,7 @@ def run(
 
 def bundled_class(cases: Cases, *, every: bool) -> Class:
     """Return the bundled class: of all exercises, or of the first one."""
-    bundled = tomllib.loads((corpus_root() / CLASS).read_text(encoding="utf-8"))
+    bundled = tomllib.loads(exercise_folders.DEMO_CLASS.read_text(encoding="utf-8"))
     if every:
         return dict(bundled["all"])
     first = bundled["first"]
@@ -124,9 +123,8 @@ def bundled_class(cases: Cases, *, every: bool) -> Class:
 
 def _cases() -> Cases:
     return {
-        exam: {case.name: case for case in corpus.load(corpus_root(), exam)}
-        for exam, entry in points.table().items()
-        if entry.assignment == ASSIGNMENT
+        exam: {case.name: case for case in corpus.load(exam)}
+        for exam in listing.of_course(content_root())[ASSIGNMENT].exercises
     }
 
 
@@ -168,7 +166,7 @@ def _course_root(folder: Path, exams: list[str]) -> Path:
         raise CourseError(
             f"The demo cannot write to {folder} ({error.strerror}): name a folder with --dir."
         ) from error
-    return notebooks_of(folder, exams)
+    return notebooks_of(folder, exams, ASSIGNMENT)
 
 
 def _row(handed_in: dict[str, str], graded: Graded, grade: Grade, cases: Cases) -> Row:

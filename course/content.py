@@ -30,15 +30,6 @@ def content_root() -> Path:
     return _first("notebooks", _CLONE / "notebooks", _DATA / "notebooks")
 
 
-def corpus_root() -> Path:
-    """Return the folder of submissions with known verdicts, one folder an exam.
-
-    Raises:
-        ContentError: the installation is incomplete.
-    """
-    return _first("submissions", _CLONE / "tests" / "submissions", _DATA / "submissions")
-
-
 def working_root() -> Path:
     """Return the nbgrader course root to work in, where files may be written.
 
@@ -62,6 +53,8 @@ def working_root() -> Path:
 def copy_authoring(root: Path, folder: Path) -> Path:
     """Make ``folder`` an nbgrader course root with the text sources of ``root``; return it.
 
+    Exercises of the course root's own are among them.
+
     Raises:
         ContentError: ``root`` is incomplete or ``folder`` cannot be written.
     """
@@ -71,8 +64,9 @@ def copy_authoring(root: Path, folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         left_out = shutil.ignore_patterns("__pycache__", ".*")  # of an editor, or of Python
-        sources = root / "authoring"
-        shutil.copytree(sources, folder / "authoring", ignore=left_out, dirs_exist_ok=True)
+        for name in ("authoring", "exercises"):
+            if (root / name).is_dir():
+                shutil.copytree(root / name, folder / name, ignore=left_out, dirs_exist_ok=True)
         shutil.copyfile(root / CONFIG, folder / CONFIG)
     except OSError as error:
         raise ContentError(

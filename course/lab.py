@@ -111,6 +111,8 @@ def _course_files(root: Path) -> dict[Path, bytes]:
     chapters = sorted((root / "chapters").glob("*.ipynb"))
     files = {Path(path.name): path.read_bytes() for path in chapters}
     files |= {path: text.encode() for path, text in student_versions(root).items()}
+    exams = [p for p in sorted((root / "source").glob("*/exercises/*/*")) if p.is_file()]
+    files |= {path.relative_to(root / "source"): path.read_bytes() for path in exams}
     for sheet in sorted((root / "source").glob("*/quiz-*.questions.yaml")):
         pictures = sorted((sheet.parent / "assets").glob("*"))
         files |= {path.relative_to(root / "source"): path.read_bytes()

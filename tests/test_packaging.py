@@ -21,6 +21,7 @@ from packaging.utils import canonicalize_name
 from course import content
 from course.errors import CourseError
 from course.platform_check import UnsupportedPlatformError, problem, require_supported_platform
+from tests.modules import modules_of
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -81,7 +82,7 @@ def test_a_wheel_carries_what_the_commands_look_for(project: dict[str, Any]) -> 
     own = {n for n in notebooks - made_by_nbgrader if not n.startswith((".", "__"))} - {
         "grades.csv"
     }
-    assert {Path(path).name for path in included} == own | {"submissions"}
+    assert {Path(path).name for path in included} == own
     for target in included.values():
         assert target.startswith("course/data/")
 
@@ -90,7 +91,6 @@ def test_the_material_is_found_beside_the_packages_or_in_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert content.content_root() == ROOT / "notebooks"
-    assert content.corpus_root() == ROOT / "tests" / "submissions"
     monkeypatch.setattr(content, "_CLONE", tmp_path / "site-packages")
     monkeypatch.setattr(content, "_DATA", tmp_path / "data")
     with pytest.raises(CourseError, match="missing from this installation"):
@@ -116,10 +116,10 @@ def test_the_course_root_to_work_in_is_never_the_installed_package(
 def test_copying_the_sources_leaves_out_what_nobody_wrote(tmp_path: Path) -> None:
     mine = content.copy_authoring(content.content_root(), tmp_path / "mine")
     for rubbish in ("__pycache__", ".ipynb_checkpoints"):
-        (mine / "authoring" / "assignments" / "ch05" / rubbish).mkdir()
+        (mine / "authoring" / "assignments" / rubbish).mkdir()
     copy = content.copy_authoring(mine, tmp_path / "copy")
     names = {path.name for path in (copy / "authoring").rglob("*")}
-    assert "quiz.py" in names
+    assert "ch05.toml" in names
     assert not names & {"__pycache__", ".ipynb_checkpoints"}
 
 
@@ -273,7 +273,7 @@ def test_nothing_in_the_packages_reaches_the_wrong_way() -> None:
     }  # fmt: skip
     ours = {*allowed, "notebooks", "tests"}
     for package, may in allowed.items():
-        for path in (ROOT / package).rglob("*.py"):
+        for path in modules_of(ROOT / package):
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
                 names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
                 names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []

@@ -1,9 +1,8 @@
 """Build the notebooks from their text sources (jupytext py:percent), always byte for byte alike.
 
-``authoring/chapters/NAME.py`` becomes ``chapters/NAME.ipynb``, and
-``authoring/assignments/ASSIGNMENT/NAME.py`` becomes ``source/ASSIGNMENT/NAME.ipynb``, with the
-questions of its closed quizzes beside it. What is built is committed, so `build` with
-``check=True`` proves that it is in step.
+``authoring/chapters/NAME.py`` becomes ``chapters/NAME.ipynb``, and each text of an assignment (see
+`autograder.assignments.listing`) becomes ``source/ASSIGNMENT/NAME.ipynb``, with what belongs beside
+it. What is built is committed, so `build` with ``check=True`` proves that it is in step.
 """
 
 from __future__ import annotations
@@ -17,7 +16,8 @@ import jupytext
 import nbformat
 from nbformat import NotebookNode
 
-from autograder.assignments import cells
+from autograder import exercise_folders
+from autograder.assignments import cells, listing
 from autograder.assignments.cells import BuildError
 from autograder.assignments.submission import grade_id
 from course.files import replacing
@@ -57,16 +57,20 @@ def build(
         BuildError: a source is not sound, there is none, a file cannot be written, or
             (``check``) some are not in step, or have no source. A source that is not sound leaves
             all as it was.
+        ExerciseError: an exercise of the course is not sound.
         QuizMarksError, QuizSheetError: a quiz that it uses is not sound, or cannot be handed out.
     """
-    if points is None:
-        from autograder.assignments import quiz_cells
-        from autograder.examination import points as exams
+    with exercise_folders.of_course(root):
+        if points is None:
+            from autograder.assignments import quiz_cells
+            from autograder.examination import points as exams
 
-        points = exams.of_grade_cells() | quiz_cells.of_grade_cells(root)
-    built = dict(_built(root, points, with_solutions))
+            points = exams.of_grade_cells() | quiz_cells.of_grade_cells(root)
+        built = dict(_built(root, points, with_solutions))
     if not built:
-        raise BuildError(f"There is nothing to build: no {root / 'authoring'}/*/*.py.")
+        raise BuildError(
+            f"There is nothing to build: no chapters and assignments in {root / 'authoring'}."
+        )
     stale = [path for path, content in built.items() if _content(path) != content]
     if check:
         _require_in_step(root, stale, orphans(root, built))
@@ -156,18 +160,23 @@ def _built(
 ) -> Iterator[tuple[Path, bytes]]:
     from autograder.assignments import quiz_sheets
 
-    authoring = root / "authoring"
-    for path in sorted((authoring / "chapters").glob("*.py")):
-        name = str(path.relative_to(root))
+    for path in sorted((root / "authoring" / "chapters").glob("*.py")):
+        name = _name(root, path)
         notebook = build_chapter(_source(path), with_solutions=with_solutions, name=name)
         yield root / "chapters" / f"{path.stem}.ipynb", to_text(notebook).encode()
-    for path in sorted((authoring / "assignments").glob("*/*.py")):
-        name = str(path.relative_to(root))
-        notebook = build_assignment(_source(path), points, name=name)
-        folder = root / "source" / path.parent.name
-        yield folder / f"{path.stem}.ipynb", to_text(notebook).encode()
-        for file, content in quiz_sheets.of_notebooks(root, [notebook]).items():
+    for assignment in listing.of_course(root).values():
+        folder = root / "source" / assignment.name
+        for file_name, path in assignment.texts.items():
+            notebook = build_assignment(_source(path), points, name=_name(root, path))
+            yield folder / f"{file_name}.ipynb", to_text(notebook).encode()
+            for file, content in quiz_sheets.of_notebooks(root, [notebook]).items():
+                yield folder / file, content
+        for file, content in listing.exam_files(assignment).items():
             yield folder / file, content
+
+
+def _name(root: Path, path: Path) -> str:
+    return str(path.relative_to(root) if path.is_relative_to(root) else path)
 
 
 def _source(path: Path) -> str:

@@ -108,17 +108,17 @@ def known(coursedir: CourseDirectory, assignment: str) -> dict[str, dict[str, Qu
         return {}  # then cells are called by their grade ids: better than no word about them
 
 
-def called(asked: Asked, assignment: str, notebook: str, grade_id: str) -> str:
+def called(asked: Asked, notebook: str, grade_id: str) -> str:
     """Return what a graded cell is called where the reader does not see its exercise."""
     question = asked.get(notebook, {}).get(grade_id)
-    exercise = title_of_notebook(assignment, notebook)
+    exercise = title_of_notebook(notebook)
     return f"“{question.title if question else grade_id}” of {exercise}"
 
 
-def title_of_notebook(assignment: str, notebook: str) -> str:
+def title_of_notebook(notebook: str) -> str:
     """Return what an exercise is called: its title in the table of points, or its file's name."""
     for entry in points.table().values():
-        if (entry.assignment, entry.notebook) == (assignment, notebook):
+        if entry.notebook == notebook:
             return entry.title
     return notebook
 

@@ -37,7 +37,7 @@ def texts_of(data: ClassData, given: GivenText) -> tuple[dict[str, dict[str, Own
             unread.append(grade.student)
             continue
         for name, notebook in notebooks.items():
-            title = questions.title_of_notebook(data.assignment, name)
+            title = questions.title_of_notebook(name)
             texts[title][grade.student] = given.own({name: notebook}, {})
             for question, answer in _answers(notebook, data.questions.get(name, {})):
                 texts[called(title, question)][grade.student] = answer
@@ -53,7 +53,7 @@ def texts_of(data: ClassData, given: GivenText) -> tuple[dict[str, dict[str, Own
 def compare(data: ClassData, texts: Texts, given: GivenText, threshold: float) -> Likeness:
     """Return which students' programs and answers are alike; see `similarity`."""
     asked = {
-        called(questions.title_of_notebook(data.assignment, name), question): question
+        called(questions.title_of_notebook(name), question): question
         for name, found in data.questions.items()
         for question in found.values()
     }

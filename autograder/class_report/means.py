@@ -10,13 +10,15 @@ import tomllib
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
+from functools import lru_cache
+from pathlib import Path
 
+from autograder import exercise_folders
 from autograder.assignments import questions
 from autograder.assignments.quiz_cells import PREFIX
 from autograder.class_report.collect import ClassData
 from autograder.examination import points
+from autograder.exercise_folders import ExerciseError, Exercises
 
 
 @dataclass(frozen=True)
@@ -59,17 +61,36 @@ def of_class(data: ClassData) -> Means:
     return Means(tuple(_exercises(data)), tuple(_questions(data)), tuple(_objectives(data)))
 
 
-@cache
 def objectives() -> Mapping[tuple[str, str], str]:
-    """Return {(exam, check or grade id): objective} as ``objectives.toml`` has it, in its order."""
-    text = resources.files("autograder.class_report").joinpath("objectives.toml").read_text("utf-8")
+    """Return {(exam, check or grade id): objective}, exercise by exercise.
+
+    What a learner shows by a check or a written answer stands in the ``objectives.toml`` of the
+    exercise's folder. It may leave some out: they are of no objective.
+
+    Raises:
+        ExerciseError: such a file is not sound.
+    """
+    return _objectives_of(exercise_folders.current())
+
+
+@lru_cache(maxsize=2)
+def _objectives_of(exercises: Exercises) -> Mapping[tuple[str, str], str]:
     return {
-        (exam, name): str(entry["text"])
-        for entry in tomllib.loads(text)["objective"]
-        for exam, names in entry.items()
-        if exam != "text"
+        (exam, name): objective
+        for exam in points.table()
+        for objective, names in _listed(exercises.folders[exam] / exercise_folders.OBJECTIVES)
         for name in names
     }
+
+
+def _listed(file: Path) -> list[tuple[str, list[str]]]:
+    if not file.is_file():
+        return []
+    try:
+        listed = tomllib.loads(file.read_text(encoding="utf-8"))
+        return [(objective, list(names)) for objective, names in listed.items()]
+    except (OSError, ValueError, TypeError) as error:
+        raise ExerciseError(f"{file} lists no names of checks: {error}.") from None
 
 
 def _exercises(data: ClassData) -> Iterator[Mean]:
@@ -84,14 +105,14 @@ def _exercises(data: ClassData) -> Iterator[Mean]:
                 waiting += 1
             else:
                 earned.append(sum(marked))
-        title = questions.title_of_notebook(data.assignment, notebook)
+        title = questions.title_of_notebook(notebook)
         worth = sum(q.max_points for q in data.questions.get(notebook, {}).values())
         yield _mean(title, "", earned, worth, waiting)
 
 
 def _questions(data: ClassData) -> Iterator[Mean]:
     for notebook in _notebooks(data):
-        about = questions.title_of_notebook(data.assignment, notebook)
+        about = questions.title_of_notebook(notebook)
         for question in data.questions.get(notebook, {}).values():
             earned, waiting = [], 0
             for grade in data.grades:

@@ -76,11 +76,11 @@ def _reasons(data: ClassData, grade: Grade) -> Iterator[tuple[bool, str]]:
         for cell in waiting:
             if cell not in examined:
                 explained = True
-                exercise = questions.title_of_notebook(data.assignment, notebook)
+                exercise = questions.title_of_notebook(notebook)
                 yield False, f"Written answers of {exercise} wait for their marks."
             elif not reasons:
                 explained = True
-                called = questions.called(data.questions, data.assignment, notebook, cell)
+                called = questions.called(data.questions, notebook, cell)
                 yield True, f"{called} was flagged for a manual grade."
     if grade.needs_manual_grade and not explained:
         yield True, "nbgrader says that it needs a manual grade."

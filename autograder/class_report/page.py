@@ -114,7 +114,7 @@ def _absent(report: ClassReport) -> list[str]:
         parts.append(f"<p>Nothing, by {number}: {_names(report, absent)}</p>")
     for notebook in sorted({name for names in left_out.values() for name in names}):
         who = [student for student, names in sorted(left_out.items()) if notebook in names]
-        title = questions.title_of_notebook(report.data.assignment, notebook)
+        title = questions.title_of_notebook(notebook)
         number = counted(len(who), "more student")
         parts.append(f"<p>{escape(title)}, by {number}: {_names(report, who)}</p>")
     return parts if len(parts) > 1 else []

@@ -119,6 +119,9 @@ def _print_json(data: Any) -> None:
 
 
 def _root(root: Path | None) -> Path:
+    from autograder import exercise_folders
     from course.content import working_root
 
-    return working_root() if root is None else root.resolve()
+    found = working_root() if root is None else root.resolve()
+    exercise_folders.use(found)
+    return found

@@ -10,7 +10,6 @@ from autograder.corpus import files, trials
 from autograder.corpus.case import Case, CorpusError
 from autograder.corpus.trials import Trial
 from autograder.examination.draws import USUAL_SEED
-from course.content import corpus_root
 
 
 def cases(exam: str = "") -> dict[str, list[Case]]:
@@ -21,7 +20,7 @@ def cases(exam: str = "") -> dict[str, list[Case]]:
         CorpusError: a corpus is missing or not well formed.
     """
     chosen = [exercises.load(exam).name] if exam else exercises.names()
-    return {name: files.load(corpus_root(), name) for name in chosen}
+    return {name: files.load(name) for name in chosen}
 
 
 def run(

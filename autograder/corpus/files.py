@@ -1,6 +1,6 @@
 """Reading the corpus: files of whole solutions, and a table of splices.
 
-``<exam>/<name>.py`` is what a student wrote, under a header of comments:
+In an exercise's folder, ``corpus/<name>.py`` is what a student wrote, under a header of comments:
 
     # title: one line that says what is special about it
     # fails: the checks that must fail, by name; "nothing" for a correct design, "the first" for
@@ -13,12 +13,12 @@
 
 The text is that of the cell ``<exam>-solution``. A line ``# %% <grade id>`` begins that of another.
 
-``<exam>/mutants.toml`` has one table a mutant: ``title``, ``fails`` (a list), ``says`` (a table),
+``corpus/mutants.toml`` has one table a mutant: ``title``, ``fails`` (a list), ``says`` (a table),
 and ``splices``: a list of {cell, old, new}, applied to the exemplar's cells, so that mutants follow
 the exemplar. ``cell`` is ``<exam>-solution`` if it is left out. Without splices it is the exemplar.
 
-``every/<name>.py`` are cases for every exam: their text replaces the solution cell, and the other
-solution cells are emptied; with "in: the stub" the text replaces the stub's mark.
+``every/<name>.py`` beside this module are cases for every exam: their text replaces the solution
+cell, and the other solution cells are emptied; with "in: the stub" it replaces the stub's mark.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from autograder import exercise_folders
 from autograder.corpus.case import EVERYTHING, ROOTS, Case, CorpusError, Splice
 from autograder.running.runner import CELL_TIMEOUT
 
-EVERY = "every"
 MUTANTS = "mutants.toml"
 STUB, AS_STUB = "wrong-stub", "as the stub"
 
@@ -42,20 +42,26 @@ _LINE = re.compile(r"# (\w+): (.*)\n")
 _CELL = re.compile(r"^# %% ([\w-]+)\n", re.MULTILINE)
 
 
-def load(folder: Path, exam: str) -> list[Case]:
+def load(exam: str, folder: Path | None = None, every: Path = exercise_folders.EVERY) -> list[Case]:
     """Return the cases of an exam, sorted by name.
 
+    Args:
+        exam: an exercise that there is.
+        folder: the corpus, if it is not the one in the exercise's folder.
+        every: the cases that every exam gets.
+
     Raises:
-        CorpusError: the folder is missing, or a case is not well formed.
+        CorpusError: it is missing, or a case is not well formed.
     """
-    own, mutants = sorted((folder / exam).glob("*.py")), folder / exam / MUTANTS
+    folder = folder or exercise_folders.current().folders[exam] / exercise_folders.CORPUS
+    own, mutants = sorted(folder.glob("*.py")), folder / MUTANTS
     if not own and not mutants.exists():
         raise CorpusError(
-            f"There is no corpus for '{exam}' in {folder}: write cases into {folder / exam}, as "
+            f"There is no corpus for '{exam}': write cases into {folder}, as "
             "notebooks/authoring/README.md says."
         )
     cases = [_case(exam, file) for file in own]
-    cases += [_case(exam, file, every=True) for file in sorted((folder / EVERY).glob("*.py"))]
+    cases += [_case(exam, file, every=True) for file in sorted(every.glob("*.py"))]
     cases += _mutants(exam, mutants)
     names = [case.name for case in cases]
     for name in names:

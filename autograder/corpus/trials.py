@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -14,8 +15,8 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
-from autograder import exercises
-from autograder.assignments import submission
+from autograder import exercise_folders, exercises
+from autograder.assignments import listing, submission
 from autograder.assignments.build import build
 from autograder.corpus.case import Case
 from autograder.examination import points
@@ -24,6 +25,9 @@ from autograder.gradebook.release import release
 from autograder.running import runner
 from autograder.running.runner import Outcome
 from course.content import content_root, copy_authoring
+
+ASSIGNMENT = "corpus"
+"""The assignment that the notebook of an exam by itself is released as."""
 
 Notebooks = tuple[NotebookNode, NotebookNode]
 """The source and the released version of one notebook."""
@@ -50,27 +54,28 @@ def notebooks(exam: str) -> Notebooks:
     with tempfile.TemporaryDirectory(prefix="ros2-course-corpus-") as folder:
         root = one_notebook(Path(folder), exam)
         build(root)
-        release(root, entry.assignment)
+        release(root, ASSIGNMENT)
         source, released = (
-            submission.read(root / step / entry.assignment / f"{entry.notebook}.ipynb")
+            submission.read(root / step / ASSIGNMENT / f"{entry.notebook}.ipynb")
             for step in ("source", "release")
         )
     return source, released
 
 
-def one_notebook(folder: Path, exam: str) -> Path:
-    """Make ``folder`` a course root with the text source of one exam's notebook; return it."""
-    return notebooks_of(folder, [exam])
+def one_notebook(folder: Path, exam: str, assignment: str = ASSIGNMENT) -> Path:
+    """Make ``folder`` a course root with an assignment of one exam's notebook; return it."""
+    return notebooks_of(folder, [exam], assignment)
 
 
-def notebooks_of(folder: Path, exams_: Iterable[str]) -> Path:
-    """Make ``folder`` a course root with the text sources of these exams only; return it."""
-    entries = [points.table()[exam] for exam in exams_]
-    kept = {(entry.assignment, entry.notebook) for entry in entries}
+def notebooks_of(folder: Path, exams: Iterable[str], assignment: str = ASSIGNMENT) -> Path:
+    """Make ``folder`` a course root with one assignment, of these exams' notebooks; return it."""
+    chosen, known = list(exams), exercise_folders.current()
     root = copy_authoring(content_root(), folder)
-    for path in (root / "authoring" / "assignments").glob("*/*"):
-        if path.is_file() and (path.parent.name, path.stem) not in kept:
-            path.unlink()
+    shutil.rmtree(root / listing.ASSIGNMENTS)
+    listing.write(root, assignment, chosen)
+    for exam in known.own.intersection(chosen):
+        shutil.copytree(known.folders[exam], root / exercise_folders.FOLDER / exam,
+                        dirs_exist_ok=True)  # fmt: skip
     return root
 
 

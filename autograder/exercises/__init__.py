@@ -1,32 +1,76 @@
-"""The exercises, a folder each: its exam, and the instruments that only this exam needs.
+"""The exercises, a folder each: text, exam, points, corpus, and the instruments of this exam only.
 
-A folder of this package whose module ``exam`` has an ``EXAM`` is an exercise: adding it adds one.
+A folder of this package, or of a course root's ``exercises/``, is an exercise: adding it adds one
+(see `autograder.exercise_folders`). Modules of a course root's are imported as
+``course_exercises.NAME.MODULE``; nothing of a course root is on Python's path.
 """
 
 from __future__ import annotations
 
 import difflib
 import importlib
-import pkgutil
+import importlib.util
+import sys
+import threading
+from importlib.machinery import ModuleSpec
 from typing import Any
 
+from autograder import exercise_folders
 from autograder.examination.exam import Exam, ExamError
+from autograder.exercise_folders import COURSE_PACKAGE, FOLDER, Exercises
+
+_importing = threading.Lock()
+_imported: Exercises | None = None
 
 
 def names() -> list[str]:
     """Return the names of the exercises there are."""
-    return sorted(module.name for module in pkgutil.iter_modules(__path__) if module.ispkg)
+    return list(exercise_folders.current().folders)
 
 
 def load(name: str) -> Exam[Any]:
     """Return the exam of the exercise called ``name``.
 
     Raises:
-        ExamError: there is none; the message names the ones there are.
+        ExamError: there is none, and the message names the ones there are; or it has none.
+        ExerciseError: it has no ``exam.py``.
     """
+    exercises = exercise_folders.current()
+    require(name)
+    exercise_folders.file(name, exercise_folders.EXAM)
+    if name not in exercises.own:
+        exam: Exam[Any] = importlib.import_module(f"autograder.exercises.{name}.exam").EXAM
+        return exam
+    with _importing:
+        _stand_for(exercises)
+        return _own(importlib.import_module(f"{COURSE_PACKAGE}.{name}.exam"), name)
+
+
+def require(name: str) -> None:
+    """Raise ExamError if there is no exercise called ``name``; it names the ones there are."""
     if name not in names():
         close = difflib.get_close_matches(name, names(), n=1)
         guess = f" Did you mean '{close[0]}'?" if close else ""
         raise ExamError(f"There is no exam '{name}': there are {', '.join(names())}.{guess}")
-    exam: Exam[Any] = importlib.import_module(f"autograder.exercises.{name}.exam").EXAM
+
+
+def _own(module: Any, name: str) -> Exam[Any]:
+    exam = getattr(module, "EXAM", None)
+    if not isinstance(exam, Exam) or exam.name != name:
+        raise ExamError(f"{module.__file__} must make its exam with EXAM = Exam('{name}', ...).")
     return exam
+
+
+def _stand_for(exercises: Exercises) -> None:
+    """Have `COURSE_PACKAGE` be the folder of these, and forget modules of another one."""
+    global _imported
+    if _imported is exercises:
+        return
+    for module in [m for m in sys.modules if f"{m}.".startswith(f"{COURSE_PACKAGE}.")]:
+        del sys.modules[module]
+    assert exercises.root is not None
+    spec = ModuleSpec(COURSE_PACKAGE, None, is_package=True)
+    spec.submodule_search_locations = [str(exercises.root / FOLDER)]
+    importlib.invalidate_caches()
+    sys.modules[COURSE_PACKAGE] = importlib.util.module_from_spec(spec)
+    _imported = exercises

@@ -22,6 +22,7 @@ from nbgrader.preprocessors import NbGraderPreprocessor
 from nbgrader.utils import parse_utc
 from traitlets import Bool
 
+from autograder import exercise_folders
 from autograder.assignments import cells, submission
 from autograder.assignments.intake import cell_matching, nbgrader_commands, open_questions, roster
 from autograder.assignments.intake.attachments import files_beside
@@ -71,6 +72,7 @@ class SubmissionExporter(NotebookExporter):
         """Return the notebook at ``filename``; the released one, with why, if it is unreadable."""
         resources = resources or {}
         converter: Any = self.parent
+        exercise_folders.use(Path(converter.coursedir.root))
         coursedir, (assignment, student, name) = converter.coursedir, _names(resources)
         folder = nbgrader_commands.submitted(coursedir, assignment, student)
         try:
@@ -171,6 +173,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         from autograder.running.outcome_store import OutcomeStore
 
         coursedir = _coursedir(self)
+        exercise_folders.use(Path(coursedir.root))
         assignment, student, _ = _names(resources)
         folder = Path(coursedir.format_path(coursedir.submitted_directory, student, assignment))
         root = Path(coursedir.root)

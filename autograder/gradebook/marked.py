@@ -157,7 +157,7 @@ class Marks:
         book.db.commit()
         self._path(student).unlink(missing_ok=True)
         return remark({
-            questions.called(self._questions, self._assignment, *name): why
+            questions.called(self._questions, *name): why
             for name, why in asked.items()
         })  # fmt: skip
 

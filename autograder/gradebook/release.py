@@ -12,6 +12,7 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
+from autograder import exercise_folders
 from autograder.assignments import cells
 from autograder.assignments.submission import grade_id, metadata
 from course.errors import CourseError
@@ -28,7 +29,8 @@ class ReleaseError(CourseError):
 def release(root: Path, assignment: str) -> Path:
     """Write the student version of ``assignment`` to ``release/``; return its folder.
 
-    The release holds the notebooks, the questions of closed quizzes, and nothing else. It is made
+    The release holds the notebooks, the questions of closed quizzes, the exams of the course's own
+    exercises, and nothing else. It is made
     beside the earlier one, with a copy of the gradebook, and takes its place before the gradebook
     itself is changed; if that fails after all, the earlier one stands again. So a release that
     fails leaves everything as it was.
@@ -41,13 +43,15 @@ def release(root: Path, assignment: str) -> Path:
         ReleaseError: no such assignment, files in it that students must not get, a leak, or
             nbgrader cannot make it.
         QuizMarksError, QuizSheetError: a quiz that it uses is not sound, or cannot be handed out.
+        ExerciseError: an exercise of the course is not sound.
         GradebookError: there is no course at ``root``.
         GradebookUnusable: its gradebook cannot be used.
     """
     from autograder.gradebook.course_gradebook import CourseGradebook, GradebookError
 
     source, released = root / "source" / assignment, root / "release" / assignment
-    beside = _check_source(root, assignment)
+    with exercise_folders.of_course(root):
+        beside = _check_source(root, assignment)
     with _place_beside(released) as place:
         try:
             # First with a copy of the gradebook: nbgrader changes it notebook by notebook.
@@ -55,7 +59,7 @@ def release(root: Path, assignment: str) -> Path:
             if found := leaks(source, place / assignment, beside):
                 raise ReleaseError(
                     f"'{assignment}' is not released, because in the release {found[0]}: correct "
-                    f"authoring/assignments/{assignment}, then build and release again."
+                    "the text that it is built from, then build and release again."
                     f"{_as_before(released)}"
                 )
             with _in_place(place / assignment, released, place):
@@ -136,11 +140,11 @@ def _secret_lines(source: NotebookNode) -> set[str]:
 
 def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
     """Return what belongs beside the notebooks of an assignment that can be released."""
-    from autograder.assignments import quiz_sheets
+    from autograder.assignments import listing, quiz_sheets
 
     folder = root / "source" / assignment
     known = sorted({p.parent.name for p in (root / "source").glob("*/*.ipynb")})
-    authored = {p.parent.name for p in (root / "authoring" / "assignments").glob("*/*.py")}
+    authored = listing.names(root)
     if assignment in authored and assignment not in known:
         raise ReleaseError(
             f"The assignment '{assignment}' has not been built: run `autograder build` first."
@@ -150,20 +154,22 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
             f"There is no assignment '{assignment}' in {root}: there are "
             f"{', '.join(sorted(authored | set(known))) or 'none yet'}."
         )
-    texts = root / "authoring" / "assignments" / assignment
     paths = sorted(folder.glob("*.ipynb"))
-    orphans = [path for path in paths if not (texts / f"{path.stem}.py").is_file()]
-    if assignment in authored and orphans:
+    listed = listing.of_course(root)[assignment] if assignment in authored else None
+    orphans = [path for path in paths if listed is not None and path.stem not in listed.texts]
+    if orphans:
         raise ReleaseError(
-            f"{orphans[0]} has no source in {texts}: remove it if it is no part of the assignment "
-            "any more, or put its source back, then release again."
+            f"{orphans[0]} has no source in {root / listing.ASSIGNMENTS}: remove it if it is no "
+            "part of the assignment any more, or put its source back, then release again."
         )
     notebooks = [_read(path) for path in paths]
-    beside = quiz_sheets.of_notebooks(root, notebooks)
+    exams = listing.exam_files(listed) if listed is not None else {}
+    beside = quiz_sheets.of_notebooks(root, notebooks) | exams
     for name, content in beside.items():
         if not (folder / name).is_file() or (folder / name).read_bytes() != content:
+            of_what = "exercise" if name in exams else "quiz"
             raise ReleaseError(
-                f"{folder / name} is not in step with the quiz: run `autograder build` first."
+                f"{folder / name} is not in step with the {of_what}: run `autograder build` first."
             )
     # nbgrader would hand out whatever else lies there.
     for path in sorted(folder.rglob("*")):
@@ -187,7 +193,7 @@ def _way_out(reason: str, assignment: str) -> str:
             f"change, or release it as an assignment of another name; `nbgrader db assignment "
             f"remove {assignment} --force` would also do, but loses its marks and due date."
         )
-    return f"correct authoring/assignments/{assignment}, then build and release again."
+    return "correct the texts of the assignment, then build and release again."
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from autograder import files, sandbox
+from autograder import exercise_folders, files, sandbox
 from autograder.assignments.intake import roster
 from autograder.assignments.intake.roster import Roster
 from autograder.gradebook import bridge as bridge
@@ -87,12 +87,14 @@ def grade(
         NotReadyError: its source or its release is missing or damaged.
         BusyError: another engine is at work in this course.
         ClusterError: the scheduler cannot be used.
+        ExerciseError: an exercise of the course is not sound.
         GradebookError: the gradebook itself cannot be used.
         GradebookUnusable: it cannot be used any more: a full disk, or a lock, say.
         SandboxError: they are not trusted, and there is no working sandbox here.
         StoreError: there is no room for what came out.
         Stopped: a signal ended the run; what was graded is kept.
     """
+    exercise_folders.use(root)
     gradebook = CourseGradebook(root, staged=STAGED)
     names = _notebooks(gradebook, assignment)
     known = gradebook.roster()

@@ -13,7 +13,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from autograder.assignments.submission import SubmissionError
-from autograder.examination import points
 from autograder.gradebook.course_gradebook import GradebookError
 from autograder.grading.graded import Graded
 from autograder.grading.progress import Progress
@@ -68,7 +67,7 @@ class GradingRun:
         self._feedback, self._since = feedback, since
         self._ledger = Ledger(intake.work_folder, intake.assignment)
         self._course = ledger.of_course(
-            intake.root, intake.folders, workers.modes[0], _exams(intake.assignment),
+            intake.root, intake.folders, workers.modes[0], intake.exams,
             intake.gradebook.late_rule,
         )  # fmt: skip
         self._running: dict[str, list[NotebookRun]] = {}
@@ -305,8 +304,3 @@ def _reason(error: Exception) -> str:
         raise error
     what = f"{type(error).__name__}: {error}".splitlines()[0][:300]
     return f"This submission could not be graded ({what}): a person has to look at it."
-
-
-def _exams(assignment: str) -> tuple[str, ...]:
-    table = points.table()
-    return tuple(sorted(exam for exam, entry in table.items() if entry.assignment == assignment))

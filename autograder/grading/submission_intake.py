@@ -108,6 +108,12 @@ class SubmissionIntake:
             FeedbackExporter.warm_up(released)
 
     @property
+    def exams(self) -> tuple[str, ...]:
+        """The exams of the assignment's notebooks, sorted."""
+        programs = [submission.program(source) for source, _ in self._originals.values()]
+        return tuple(sorted({cell.exam for cells in programs for cell in cells if cell.exam}))
+
+    @property
     def folders(self) -> tuple[Path, Path]:
         """The assignment's source and release."""
         return self.root / "source" / self.assignment, self.root / "release" / self.assignment

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any, Self
 from urllib.parse import urlsplit
 
+from autograder import exercise_folders
 from autograder.running import jobs
 from autograder.running.jobs import Job, Result
 from autograder.running.resource_errors import passes
@@ -120,8 +121,13 @@ class Cluster:
         """Send a job.
 
         Raises:
-            ClusterError: the scheduler is gone.
+            ClusterError: the scheduler is gone, or the job has an exam that only this machine has.
         """
+        if own := exercise_folders.current().own.intersection(job.exams):
+            raise ClusterError(
+                f"The exercise '{min(own)}' is the course's own, and workers have only those of "
+                "ros2-course: grade without --scheduler."
+            )
         try:
             # Again if a worker is closed in the middle; Dask sees to those that die.
             future = self._client.submit(

@@ -4,6 +4,7 @@ An exam's verdict depends on its module, on the instruments that it imports, and
 subject and an examiner. So a digest covers the modules that these import, directly or not, and a
 change of one exam lets the outcomes of the others stand. What is imported for annotations alone
 changes nothing, and of the names that a package imports on demand only those count that are used.
+Of an exercise's folder its text, its corpus and its design note change no verdict.
 """
 
 from __future__ import annotations
@@ -12,12 +13,14 @@ import hashlib
 import json
 import re
 from collections.abc import Iterable, Iterator
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
+from autograder import exercise_folders
 from autograder.examination import points
+from autograder.exercise_folders import COURSE_PACKAGE, Exercises
 
 PACKAGES = ("autograder", "course", "quizzes")
 HARNESS = (
@@ -30,6 +33,8 @@ HARNESS = (
 GRADING = ("autograder.grading.submission_intake",)
 """Where outcomes become points and feedback."""
 
+_EXERCISES = "autograder.exercises."
+
 RUN_DATA = (".xml",)
 """Files beside the code that decide how a run goes: the settings of DDS."""
 
@@ -37,7 +42,6 @@ GRADING_DATA = (".yaml",)
 """The same for points: the banks of the quizzes."""
 
 
-@cache
 def of_exams(names: tuple[str, ...], root: Path | None = None) -> str:
     """Return a digest of everything that decides the verdicts of these exams.
 
@@ -45,34 +49,81 @@ def of_exams(names: tuple[str, ...], root: Path | None = None) -> str:
         names: sorted names of exams; none for a program that sits no exam.
         root: a folder with copies of the packages; the installed ones if left out.
     """
-    table = points.table()
-    worth = json.dumps({name: table[name].parts for name in names if name in table}, sort_keys=True)
-    return _Code(root).digest(_of_run(names), RUN_DATA, worth)
+    return _of_exams(names, root, exercise_folders.current())
+
+
+@lru_cache(maxsize=64)
+def _of_exams(names: tuple[str, ...], root: Path | None, exercises: Exercises) -> str:
+    worth = {name: points.read(file).parts for name, file in _tables(names, root, exercises)}
+    more = json.dumps(worth, sort_keys=True)
+    return _Code(root, exercises).digest(_of_run(names, exercises), RUN_DATA, more)
+
+
+def _tables(
+    names: Iterable[str], root: Path | None, exercises: Exercises
+) -> Iterator[tuple[str, Path]]:
+    """Yield (exam, its table of points) for those of these exams that have one."""
+    for name in names:
+        if name in exercises.folders:
+            folder = exercises.folders[name]
+            if root and name not in exercises.own:
+                folder = root / "autograder" / exercise_folders.FOLDER / name
+            if (folder / exercise_folders.POINTS).is_file():
+                yield name, folder / exercise_folders.POINTS
+
+
+def of_grading(names: tuple[str, ...], root: Path | None = None) -> str:
+    """Return a digest of what decides these exams' verdicts and turns them into grades."""
+    return f"{of_exams(names, root)} {_of_grading(root)}"
 
 
 @cache
-def of_grading(names: tuple[str, ...], root: Path | None = None) -> str:
-    """Return a digest of what decides these exams' verdicts and turns them into grades."""
-    return f"{of_exams(names, root)} {_Code(root).digest(GRADING, GRADING_DATA)}"
+def _of_grading(root: Path | None) -> str:
+    return _Code(root).digest(GRADING, GRADING_DATA)
+
+
+def forget() -> None:
+    """Read the code again for the next digest."""
+    _of_exams.cache_clear()
+    _of_grading.cache_clear()
 
 
 def modules_of_exams(names: Iterable[str]) -> set[str]:
     """Return the modules that decide the verdicts of these exams."""
-    return _Code(None).closure(_of_run(names))
+    exercises = exercise_folders.current()
+    return _Code(None, exercises).closure(_of_run(names, exercises))
 
 
-def _of_run(names: Iterable[str]) -> list[str]:
-    return [*HARNESS, *(f"autograder.exercises.{name}.exam" for name in names)]
+def _of_run(names: Iterable[str], exercises: Exercises) -> list[str]:
+    """Return where the code of a run begins: of a course root's exercise, with all its modules."""
+    begins = list(HARNESS)
+    for name in names:
+        if name in exercises.own:
+            begins += _own_modules(name, exercises)
+        else:
+            begins.append(f"autograder.exercises.{name}.exam")
+    return begins
+
+
+def _own_modules(name: str, exercises: Exercises) -> dict[str, Path]:
+    folder = exercises.folders[name]
+    return {
+        f"{COURSE_PACKAGE}.{name}.{file.removesuffix('.py')}": folder / file
+        for file in exercise_folders.exam_files(folder)
+        if file.endswith(".py")
+    }
 
 
 class _Code:
     """The source of some packages, and what of them imports what."""
 
-    def __init__(self, root: Path | None) -> None:
+    def __init__(self, root: Path | None, exercises: Exercises | None = None) -> None:
         self._files: dict[str, Traversable] = {}
         self._data: list[Traversable] = []
         for name in PACKAGES:
             self._walk(name, root / name if root else resources.files(name))
+        for name in exercises.own if exercises else ():
+            self._files.update(_own_modules(name, exercises))  # type: ignore[arg-type]
 
     def digest(self, modules: Iterable[str], data: tuple[str, ...], more: str = "") -> str:
         """Return a digest of these modules, of all that they import, of data, and of ``more``."""
@@ -103,6 +154,8 @@ class _Code:
     def _walk(self, package: str, folder: Traversable) -> None:
         for entry in sorted(folder.iterdir(), key=lambda entry: entry.name):
             if entry.is_dir():
+                if entry.name == exercise_folders.CORPUS and package.startswith(_EXERCISES):
+                    continue
                 self._walk(f"{package}.{entry.name}", entry)
             elif entry.name == "__init__.py":
                 self._files[package] = entry

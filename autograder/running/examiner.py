@@ -20,9 +20,10 @@ import socket
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, TextIO
 
-from autograder import exercises
+from autograder import exercise_folders, exercises
 from autograder.examination import points
 from autograder.examination.check_context import MAX_REPLY, Bench, Subject
 from autograder.examination.exam import Part
@@ -94,7 +95,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--control", type=int, required=True, help="file descriptor of the channel")
     parser.add_argument("--domain", type=int, required=True, help="the subject's domain id")
     parser.add_argument("--outside", type=int, help="file descriptor of the channel to a warden")
+    parser.add_argument("--course", type=Path, help="a course root with exams of its own")
     options = parser.parse_args(arguments)
+    if options.course is not None:
+        exercise_folders.use(options.course)
     # Verdicts go out over a private copy of standard output: whatever a library prints must not
     # end up among them.
     verdicts = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")

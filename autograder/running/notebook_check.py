@@ -9,9 +9,10 @@ import socket
 import threading
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
-from autograder import exercises
+from autograder import exercise_folders, exercises
 from autograder.examination.subject.server import SubjectServer
 from autograder.examination.subject.student_errors import SUBJECT_ENV
 from autograder.examination.verdict import Verdict
@@ -32,6 +33,8 @@ def check(
 ) -> float:
     """Examine this notebook's nodes by what they do, show a report, and return the points.
 
+    The exams of a course's own lie in the folder ``exercises`` beside the notebook.
+
     An examiner process joins a DDS domain of its own with this kernel, asks for nodes of the
     classes that the notebook defines, and watches them. A check that cannot be made in a kernel (a
     lossy network takes a namespace) is shown as not examined, and its points are in the number that
@@ -47,9 +50,11 @@ def check(
         ExamError: no such exam or part; the message names the ones there are.
     """
     namespace = _caller_globals()
-    exercises.load(exam).part(part)
     if SUBJECT_ENV in os.environ:
         return 0.0  # the real examiner is at work outside this process
+    if exam not in exercises.names():
+        exercise_folders.use(Path.cwd())
+    exercises.load(exam).part(part)
     verdict = examine(exam, part, namespace, key)
     _show(Report(_noted(verdict), hints=hint))
     return float(verdict.score + verdict.unexamined)
@@ -72,7 +77,8 @@ def examine(
 
     try:
         ours, theirs = socket.socketpair()
-        with ours, ExaminerProcess(theirs, lease.domain_id) as examiner:
+        course = exercise_folders.current().root
+        with ours, ExaminerProcess(theirs, lease.domain_id, course=course) as examiner:
             channel = Channel(ours)
             examiner.request(exam, [(part, key or {})], pid=os.getpid())
             sitting = _Sitting(examiner)

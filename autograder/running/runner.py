@@ -13,7 +13,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from autograder import sandbox
+from autograder import exercise_folders, sandbox
 from autograder.examination.draws import fresh_seed
 from autograder.examination.program import Program
 from autograder.examination.subject import hang_report, outputs, own_interfaces
@@ -118,7 +118,8 @@ def run(
     started = time.monotonic()
     outcome = Outcome(outputs=[[] for _ in program])
     with ExitStack() as stack:
-        place = stack.enter_context(sandbox.place(trust=trust, hidden=hidden))
+        exams = exercise_folders.own_exam_files(cell.exam for cell in program)
+        place = stack.enter_context(sandbox.place(trust=trust, hidden=hidden, exams=exams))
         # The lower number is the engine's: what writes to every descriptor in turn must find this
         # one, which is being read, before the examiner's, which is not until an exam begins.
         pairs = sorted((socket.socketpair() for _ in range(2)), key=lambda pair: pair[1].fileno())
@@ -126,7 +127,9 @@ def run(
         for end in (engine, subject_engine, control, subject_control):
             stack.enter_context(end)
         channel = Channel(engine)
-        examiner = stack.enter_context(ExaminerProcess(control, place.domain_id, spawn=place.spawn))
+        examiner = stack.enter_context(
+            ExaminerProcess(control, place.domain_id, spawn=place.spawn, course=place.course)
+        )
         subject = stack.enter_context(_start(place, subject_engine, subject_control, files))
 
         def start(command: Sequence[str], fds: Sequence[int]) -> RunningSubject:

@@ -10,6 +10,7 @@ import subprocess
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +71,7 @@ class ExaminerProcess:
         *,
         env: Mapping[str, str] | None = None,
         spawn: Spawn = subprocess.Popen,
+        course: Path | None = None,
     ) -> None:
         """Start the process.
 
@@ -78,10 +80,12 @@ class ExaminerProcess:
             domain_id: the subject's domain.
             env: its environment; this process's if left out.
             spawn: starts it, as `subprocess.Popen` does.
+            course: a course root, as it sees it, that has exams which the package has not.
         """
         command = [
             *python_module.command("autograder.running.examiner"),
             "--control", str(control.fileno()), "--domain", str(domain_id),
+            *(["--course", str(course)] if course else []),
         ]  # fmt: skip
         try:
             # What the examiner's libraries print on stderr must never reach a graded cell.

@@ -16,6 +16,7 @@ import subprocess
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
 from autograder.files import scratch_folder
@@ -48,17 +49,25 @@ class Box:
     domain_id = MAX_DOMAIN  # all are ours alone here; a program that names one names another
 
     def __init__(
-        self, limits: Limits | None = None, hidden: Iterable[Path] = (), *, warm: bool = False
+        self,
+        limits: Limits | None = None,
+        hidden: Iterable[Path] = (),
+        exams: Mapping[str, bytes] = MappingProxyType({}),
+        *,
+        warm: bool = False,
     ) -> None:
         """Prepare a sandbox.
 
         Args:
             limits: what the submission may use.
             hidden: folders that must not be seen even if they lie within this Python's folders.
+            exams: the files of exams that the examiner is given, by path in a course root.
             warm: examiner and subject are forked from processes that have imported everything.
         """
         self._limits = limits or Limits()
         self._hidden = tuple(hidden)
+        self._exams = exams
+        self.course = view.COURSE if exams else None
         self._warm = warm
         self._namespaces: dict[str, int] = {}
         self._held = ExitStack()
@@ -113,7 +122,8 @@ class Box:
         bounds = [f"--{name}={most}" for name, most in limits.of_processes().items()]
         with ExitStack() as stack:
             user, holder = _user(), _user()
-            sandbox = _Sandbox(limits, environment.examiner(), None)
+            exams = {view.COURSE: self._exams} if self._exams else {}
+            sandbox = _Sandbox(limits, environment.examiner(), exams)
             if arguments is None:
                 streams = {name: options.get(name) for name in ("stdin", "stdout", "stderr")}
                 command = ["prlimit", *bounds, "--", *command]
@@ -174,7 +184,7 @@ class Box:
             return subject
 
     def _subjects(self, files: Mapping[str, bytes]) -> _Sandbox:
-        return _Sandbox(self._limits, environment.submission(), files)
+        return _Sandbox(self._limits, environment.submission(), {view.HANDED_IN: files})
 
     def _enclose(
         self,
@@ -218,8 +228,8 @@ class Box:
         yield from ("--perms", "0755", "--dir", "/etc")
         for path, text in view.written(user).items():
             yield from ("--perms", "0644", "--ro-bind-data", given.file(text.encode()), path)
-        folder = None if sandbox.files is None else given.folder(sandbox.files)
-        yield from view.arguments(sandbox.limits, folder, self._hidden)
+        folders = {place: given.folder(files) for place, files in sandbox.files.items()}
+        yield from view.arguments(sandbox.limits, folders, self._hidden)
         for name, value in sandbox.variables.items():
             yield from ("--setenv", name, value)
         yield from ("--seccomp", given.file(seccomp.program()))
@@ -236,11 +246,11 @@ class Box:
 
 
 class _Sandbox(NamedTuple):
-    """What makes a sandbox the subject's or the examiner's; ``files`` are those handed in."""
+    """What makes a sandbox the subject's or the examiner's; ``files`` are given it, by folder."""
 
     limits: Limits
     variables: Mapping[str, str]
-    files: Mapping[str, bytes] | None
+    files: Mapping[Path, Mapping[str, bytes]]
 
 
 class _Given:

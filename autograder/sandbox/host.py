@@ -9,6 +9,7 @@ import subprocess
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Self
 
 from autograder.files import scratch_folder
@@ -21,10 +22,15 @@ from course.domains import lease_domain
 class Host:
     """This machine as it is: only the ROS domain is the submission's own."""
 
-    def __init__(self) -> None:
-        """Lease a domain."""
-        self._lease = lease_domain()
-        self.domain_id = self._lease.domain_id
+    def __init__(self, exams: Mapping[str, bytes] = MappingProxyType({})) -> None:
+        """Lease a domain; ``exams`` are files for the examiner, by path in a course root."""
+        self._held = ExitStack()
+        lease = lease_domain()
+        self._held.callback(lease.release)
+        self.domain_id = lease.domain_id
+        self.course = self._held.enter_context(scratch_folder()) if exams else None
+        if self.course is not None:
+            write_files(self.course, exams)
 
     def spawn(self, command: Sequence[str], **options: Any) -> Process:
         """Start the examiner."""
@@ -42,7 +48,7 @@ class Host:
 
     def __exit__(self, *_: object) -> None:
         """Give the domain back."""
-        self._lease.release()
+        self._held.close()
 
 
 class HostSubject:

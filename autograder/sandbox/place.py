@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Protocol, Self
 
@@ -95,6 +96,9 @@ class Place(Protocol):
 
     domain_id: int
     """The ROS domain of both."""
+
+    course: Path | None
+    """A course root, as the examiner sees it, that has the exams it was given."""
 
     def spawn(self, command: Sequence[str], **options: Any) -> Process:
         """Start the examiner; ``options`` are those of `subprocess.Popen`.

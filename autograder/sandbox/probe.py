@@ -8,12 +8,13 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 
 from autograder.sandbox import warmth
 from autograder.sandbox.box import Box
@@ -98,20 +99,26 @@ def warm_up() -> None:
     threading.Thread(target=begin).start()
 
 
-def place(*, trust: bool = False, hidden: Iterable[Path] = ()) -> Place:
+def place(
+    *,
+    trust: bool = False,
+    hidden: Iterable[Path] = (),
+    exams: Mapping[str, bytes] = MappingProxyType({}),
+) -> Place:
     """Return where one submission is to run.
 
     Args:
         trust: run it on this machine as it is, with the rights of whoever grades.
         hidden: folders that a sandboxed submission must never see (the course root).
+        exams: the files of exams that only a course root has, by path in it, for the examiner.
 
     Raises:
         SandboxError: it is not trusted, and there is no working sandbox here.
     """
     if trust:
-        return Host()
+        return Host(exams)
     require()
-    return Box(hidden=hidden, warm=abilities().warm)
+    return Box(hidden=hidden, exams=exams, warm=abilities().warm)
 
 
 def require() -> None:

@@ -1,7 +1,7 @@
 """The files that a submission sees: the system and this Python read-only, and a small scratch.
 
 Not among them: home folders, the course root with its gradebook, sources and other submissions,
-and the host's processes, which a /proc of its own hides.
+the exercises' solutions and corpora, and the host's processes, which a /proc of its own hides.
 """
 
 from __future__ import annotations
@@ -10,10 +10,11 @@ import importlib.util
 import os
 import site
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import course
+from autograder import exercise_folders
 from autograder.sandbox.limits import Limits
 from course.interfaces import cache
 
@@ -22,6 +23,8 @@ SCRATCH = (Path("/tmp"), HOME, Path("/dev/shm"))
 """Folders that can be written to, each a small file system in memory."""
 HANDED_IN = Path("/run/handed-in")
 """Where a submission's other files lie, read-only; the subject copies them to its home."""
+COURSE = Path("/run/course")
+"""Where an examiner finds the exams that only a course root has, read-only."""
 
 PACKAGES = ("autograder", "course", "quizzes")
 
@@ -31,12 +34,12 @@ _ETC = (
 )  # fmt: skip
 
 
-def arguments(limits: Limits, handed_in: Path | None, hidden: Iterable[Path]) -> Iterator[str]:
+def arguments(limits: Limits, given: Mapping[Path, Path], hidden: Iterable[Path]) -> Iterator[str]:
     """Yield bwrap's arguments for the files.
 
     Args:
         limits: has the size of the scratch folders.
-        handed_in: the folder with the submission's other files.
+        given: {where it is seen: the folder}, such as one with the submission's other files.
         hidden: folders that must not be seen even if they lie within something that is.
     """
     yield from _system()
@@ -48,16 +51,24 @@ def arguments(limits: Limits, handed_in: Path | None, hidden: Iterable[Path]) ->
     for folder in (*shown, *([cached] if cached.is_dir() else [])):
         yield from _way_to(folder)
         yield from ("--ro-bind", str(folder), str(folder))
-    if handed_in is not None:
-        yield from _way_to(HANDED_IN)
-        yield from ("--ro-bind", str(handed_in), str(HANDED_IN))
-    for folder in (*hidden, *_bundled()):
-        if folder.is_dir() and _is_within(folder, [Path("/usr"), *shown]):
-            yield from ("--tmpfs", str(folder), "--remount-ro", str(folder))
+    for place, folder in given.items():
+        yield from _way_to(place)
+        yield from ("--ro-bind", str(folder), str(place))
+    for path in (*hidden, *_bundled()):
+        if _is_within(path, [Path("/usr"), *shown]):
+            yield from _masked(path)
     # In /proc a process could have the machine spare it when memory runs out, or write to others.
     for mount in ("/proc", "/dev", "/"):
         yield from ("--remount-ro", mount)
     yield from ("--chdir", str(HOME))
+
+
+def _masked(path: Path) -> Iterator[str]:
+    """Yield what puts something empty in the place of a file or folder, if it is there."""
+    if path.is_dir():
+        yield from ("--tmpfs", str(path), "--remount-ro", str(path))
+    elif path.exists():
+        yield from ("--ro-bind", "/dev/null", str(path))
 
 
 def _way_to(folder: Path) -> Iterator[str]:
@@ -101,13 +112,16 @@ def _places(package: str) -> Sequence[str]:
     return (found and found.submodule_search_locations) or []
 
 
-def _bundled() -> list[Path]:
-    """Return where notebooks, solutions and corpus may lie among installed packages.
+def _bundled() -> Iterator[Path]:
+    """Yield where notebooks, solutions and corpora may lie among installed packages.
 
-    An editable installation has them beside the other packages, not beside its own modules.
+    An editable installation has its notebooks beside the other packages, not beside its modules.
     """
-    installed = [Path(entry, "course") for entry in sys.path]
-    return [package / "data" for package in {*installed, Path(course.__path__[0])}]
+    folders = [*map(Path, sys.path), Path(course.__path__[0]).parent]
+    for folder in {variant for path in folders for variant in (path, path.resolve())}:
+        yield folder / "course" / "data"
+        if (package := folder / "autograder").is_dir():
+            yield from exercise_folders.kept_from_students(package)
 
 
 def _is_within(folder: Path, others: Sequence[Path]) -> bool:

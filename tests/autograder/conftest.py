@@ -26,7 +26,6 @@ from tests.killing import Engine, fresh_copy
 from tests.left_out import leave_out
 from tests.machine import sandbox_problem
 
-SUBMISSIONS = Path(__file__).parents[1] / "submissions"
 ASSIGNMENT, NOTEBOOK = "ch05", "qos-design"
 
 
@@ -60,7 +59,7 @@ class Course:
 
 @pytest.fixture(scope="session")
 def released_course(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = one_notebook(tmp_path_factory.mktemp("course"), "qos")
+    root = one_notebook(tmp_path_factory.mktemp("course"), "qos", ASSIGNMENT)
     build(root)
     release(root, ASSIGNMENT)
     return root
@@ -75,7 +74,7 @@ def course(released_course: Path, tmp_path: Path) -> Course:
 
 @pytest.fixture(scope="session")
 def cases() -> dict[str, Case]:
-    return {case.name: case for case in corpus.load(SUBMISSIONS, "qos")}
+    return {case.name: case for case in corpus.load("qos")}
 
 
 @dataclass(frozen=True)

@@ -257,6 +257,39 @@ def test_the_committed_notebooks_are_in_step_with_their_sources() -> None:
     assert sorted(committed) == sorted(built)
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("exercises = ['qso']", r"ps2\.toml lists the exercise 'qso', .* Did you mean 'qos'\?"),
+        ("quizzes = ['midterm']", r"ps2\.toml lists the quiz 'midterm', .*: there is none"),
+        ("exercises = 'qos'", r"ps2\.toml: exercises must be a list of names"),
+        ("exercises = ['qos', 'qos']", "the notebook 'qos-design' would be there twice"),
+        ("title = 'Two'", r"ps2\.toml has a 'title', which an assignment has not"),
+        ("[broken", r"ps2\.toml is no TOML"),
+        ("", r"ps2\.toml lists nothing"),
+    ],
+)
+def test_a_list_of_an_assignment_that_is_not_sound_is_one_sentence(
+    root: Path, text: str, says: str
+) -> None:
+    (root / "authoring" / "assignments" / "ps2.toml").write_text(text)
+    with pytest.raises(CourseError, match=says) as raised:
+        build(root)
+    assert len(str(raised.value).splitlines()) == 1
+
+
+def test_an_assignment_has_what_its_list_says_in_that_order(root: Path) -> None:
+    assignments = root / "authoring" / "assignments"
+    (assignments / "ps1.toml").write_text("exercises = ['patterns', 'qos']\nquizzes = ['last']\n")
+    (root / "authoring" / "quizzes").mkdir()
+    (root / "authoring" / "quizzes" / "last.py").write_text(ASSIGNMENT.replace("0,", "3,"))
+    built = build(root, points={"test": 3.0, **points.of_grade_cells()})
+    assert [str(path.relative_to(root)) for path in built] == [
+        "chapters/one.ipynb", "source/ps1/patterns.ipynb", "source/ps1/qos-design.ipynb",
+        "source/ps1/last.ipynb", "source/ps1/two.ipynb",
+    ]  # fmt: skip
+
+
 def test_every_grade_cell_of_the_table_of_points_is_in_an_assignment() -> None:
     found = {}
     for path in content_root().glob("source/*/*.ipynb"):

@@ -18,7 +18,7 @@ import nbformat
 import numpy as np
 import pytest
 
-from autograder import exercises
+from autograder import exercise_folders, exercises
 from autograder.assignments import questions, submission
 from autograder.assignments.questions import Question
 from autograder.class_report import (
@@ -217,15 +217,10 @@ def test_every_check_and_every_written_answer_of_the_course_has_one_objective() 
         for name in [*itertools.chain(*entry.parts.values()), *entry.manual]
     }
     assert set(means.objectives()) == asked
-    raw = tomllib.loads(Path(means.__file__).with_name("objectives.toml").read_text("utf-8"))
-    named = [
-        (exam, name)
-        for entry in raw["objective"]
-        for exam, names in entry.items()
-        if exam != "text"
-        for name in names
-    ]
-    assert len(named) == len(set(named))
+    for exam in exercises.names():
+        lists = tomllib.loads(exercise_folders.file(exam, "objectives.toml").read_text("utf-8"))
+        named = [name for names in lists.values() for name in names]
+        assert len(named) == len(set(named)), exam
 
 
 def test_what_was_not_examined_is_no_failure() -> None:
@@ -458,7 +453,7 @@ def class_with(
     data = replace(class_of({}), questions=asked)
     texts = {name: {who: text(code) for who, code in found.items()}
              for name, found in programs.items()}  # fmt: skip
-    title = questions.title_of_notebook(ASSIGNMENT, NOTEBOOK)
+    title = questions.title_of_notebook(NOTEBOOK)
     where = likeness.called(title, asked[NOTEBOOK]["q"])
     return data, {**texts, where: {who: text(said) for who, said in answers.items()}}
 
@@ -597,7 +592,7 @@ def test_the_report_of_a_graded_class(graded: Path) -> None:
     [waiting] = [need for need in report.needs if not need.urgent]
     assert waiting.students == ("bob", "cy")
     assert waiting.why == "Written answers of Exercise 1: QoS profile design wait for their marks."
-    where = questions.title_of_notebook(ASSIGNMENT, NOTEBOOK)
+    where = questions.title_of_notebook(NOTEBOOK)
     alike = {(p.left, p.right): p.similarity for p in report.alike.pairs if p.where == where}
     assert alike[("-dan", "ann")] == alike[("bob", "cy")] == 1.0
     assert rows_of(canvas.read_text())[2:] == [
@@ -660,7 +655,7 @@ def test_answers_of_notebooks_that_came_without_metadata_are_compared(graded: Pa
         nbformat.write(notebook, handed_in)
     report = reports.make(graded, ASSIGNMENT)
     where = likeness.called(
-        questions.title_of_notebook(ASSIGNMENT, NOTEBOOK), report.data.questions[NOTEBOOK][cell]
+        questions.title_of_notebook(NOTEBOOK), report.data.questions[NOTEBOOK][cell]
     )
     pairs = [pair for pair in report.alike.pairs if pair.where == where]
     assert pairs == [similarity.Pair("ann", "cy", 1.0, where)]

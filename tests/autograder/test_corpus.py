@@ -21,9 +21,7 @@ from autograder.running import runner
 from autograder.sandbox import abilities
 from autograder.sandbox.probe import Abilities
 
-from .conftest import SUBMISSIONS
-
-CASES = {exam: corpus.load(SUBMISSIONS, exam) for exam in exercises.names()}
+CASES = {exam: corpus.load(exam) for exam in exercises.names()}
 EXAMS = pytest.mark.parametrize("exam", exercises.names())
 
 
@@ -127,7 +125,8 @@ def test_every_mistake_is_told_in_words_that_are_tested(exam: str) -> None:
 
 
 def test_the_table_of_checks_and_mutants_is_in_step() -> None:
-    assert (SUBMISSIONS / "README.md").read_text(encoding="utf-8") == tables.matrix(CASES)
+    table = Path(tables.__file__).with_name("README.md")
+    assert table.read_text(encoding="utf-8") == tables.matrix(CASES)
 
 
 def test_a_difference_is_reported() -> None:
@@ -207,18 +206,21 @@ def test_a_flip_between_repeats_is_found() -> None:
 def test_a_corpus_that_is_not_well_formed_is_named(
     tmp_path: Path, name: str, text: str, message: str
 ) -> None:
-    (tmp_path / "qos").mkdir()
-    (tmp_path / "qos" / "right.py").write_text("# title: t\n# fails: nothing\nx = 1\n")
-    (tmp_path / "qos" / name).write_text(text)
+    (tmp_path / "right.py").write_text("# title: t\n# fails: nothing\nx = 1\n")
+    (tmp_path / name).write_text(text)
     with pytest.raises(CorpusError, match=message):
-        corpus.load(tmp_path, "qos")
+        corpus.load("qos", tmp_path)
 
 
 def test_a_case_without_splices_is_the_exemplar(tmp_path: Path) -> None:
-    (tmp_path / "qos").mkdir()  # a table of mutants is a corpus, too: there is no other file
+    # A table of mutants is a corpus, too: there is no other file.
     table = "[right-exemplar]\ntitle = 'The exemplar'\nfails = []\nsplices = []\n"
-    (tmp_path / "qos" / "mutants.toml").write_text(table)
-    case = next(c for c in corpus.load(tmp_path, "qos") if c.name == "right-exemplar")
+    (tmp_path / "mutants.toml").write_text(table)
+    case = next(
+        c
+        for c in corpus.load("qos", tmp_path, every=tmp_path / "none")
+        if c.name == "right-exemplar"
+    )
     source, released = notebooks("qos")
     handed_in = case.submission(source, released)
     solution = next(c for c in handed_in.cells if submission.grade_id(c) == "qos-solution")
@@ -246,7 +248,7 @@ def test_busy_loops_end_with_the_block_and_with_a_process_that_is_killed() -> No
 
 def test_a_missing_corpus_is_named(tmp_path: Path) -> None:
     with pytest.raises(CorpusError, match="no corpus for 'other'"):
-        corpus.load(tmp_path, "other")
+        corpus.load("other", tmp_path)
 
 
 def test_a_case_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,6 +14,7 @@ import pytest
 import autograder
 from autograder import exercises
 from autograder.running import digests
+from tests.modules import modules_of
 
 HOME = Path(autograder.__file__).parents[1]
 
@@ -29,15 +30,15 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @contextmanager
-def longer(path: Path) -> Iterator[None]:
+def longer(path: Path, more: bytes = b"") -> Iterator[None]:
     content = path.read_bytes()
-    path.write_bytes(content + b"\n")
+    path.write_bytes(content + more + b"\n")
     yield
     path.write_bytes(content)
 
 
 def of_all(root: Path) -> dict[str, str]:
-    digests.of_exams.cache_clear()
+    digests.forget()
     return {name: digests.of_exams((name,), root) for name in exercises.names()}
 
 
@@ -45,10 +46,25 @@ def test_a_change_of_one_exam_runs_nothing_else_again(copy: Path) -> None:
     before = of_all(copy)
     with longer(copy / "autograder/exercises/qos/exam.py"):
         assert {name for name, digest in of_all(copy).items() if before[name] != digest} == {"qos"}
+    for part, more in {"rig.py": b"", "points.toml": b"[late]\nimu_burst = 1"}.items():
+        with longer(copy / "autograder/exercises/qos" / part, more):
+            changed = {name for name, digest in of_all(copy).items() if before[name] != digest}
+            assert changed == {"qos"}, part
     with longer(copy / "autograder/sandbox/fastdds.xml"):
         assert not before.items() & of_all(copy).items()
     with longer(copy / "quizzes/banks/ch05.yaml"):
         assert of_all(copy) == before
+
+
+def test_text_corpus_and_design_note_of_an_exercise_run_nothing_again(copy: Path) -> None:
+    before = of_all(copy)
+    corpus = copy / "autograder/exercises/qos/corpus"
+    (corpus / "robot.xml").touch()  # of the kind that counts where the code is
+    for file in ("task.py", "design.md", "corpus/mutants.toml", "corpus/right-batch.py",
+                 "corpus/robot.xml", "../../corpus/every/broken-empty.py"):  # fmt: skip
+        with longer(corpus.parent / file):
+            assert of_all(copy) == before, file
+    (corpus / "robot.xml").unlink()
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +88,6 @@ def test_an_exam_is_its_own_business(covered: dict[str, set[str]], name: str) ->
         ("autograder.examination.subject.server", set(exercises.names())),
         ("autograder.sandbox.limits", set(exercises.names())),
         ("course.runtime.core_session", set(exercises.names())),
-        ("course.design.node", {"architecture", "patterns"}),
         ("autograder.cli", set()),
         ("autograder.gradebook.course_gradebook", set()),
     ],
@@ -82,6 +97,11 @@ def test_what_an_exam_imports_belongs_to_it(
 ) -> None:
     assert module in digests._Code(None)._files
     assert {exam for exam, modules in covered.items() if module in modules} == concerned
+
+
+def test_what_some_exams_need_of_the_course_belongs_to_these(covered: dict[str, set[str]]) -> None:
+    for exam, needs_design in {"architecture": True, "patterns": True, "qos": False}.items():
+        assert ("course.design.node" in covered[exam]) == needs_design, exam
 
 
 @pytest.mark.parametrize(
@@ -105,18 +125,18 @@ def test_what_makes_points_of_verdicts_enters_again_but_runs_nothing(copy: Path)
     before = digests.of_grading(("qos",), copy)
     for file in ("quizzes/banks/ch05.yaml", "autograder/gradebook/bridge.py"):
         with longer(copy / file):
-            digests.of_grading.cache_clear()
+            digests.forget()
             assert digests.of_grading(("qos",), copy) != before
 
 
 def test_the_installed_code_has_the_digest_of_its_copy(copy: Path) -> None:
-    digests.of_exams.cache_clear()
+    digests.forget()
     assert digests.of_exams(("qos",)) == digests.of_exams(("qos",), copy)
 
 
 @pytest.mark.parametrize("package", digests.PACKAGES)
 def test_no_import_is_overlooked(package: str) -> None:
-    for file in (HOME / package).rglob("*.py"):
+    for file in modules_of(HOME / package):
         source = file.read_bytes()
         found = digests._imports("a.module", source)
         for node in of_a_run(ast.parse(source)):

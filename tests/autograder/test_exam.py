@@ -37,7 +37,7 @@ class Deadline:
 @pytest.fixture
 def exam(monkeypatch: pytest.MonkeyPatch) -> Exam[list[str]]:
     parts = {"visible": {"first": 1.0, "second": 2.0, "third": 4.0}, "hidden": {"last": 8.0}}
-    table = {"toy": points.Entry("Toy", "ch00", "toy", parts, manual={})}
+    table = {"toy": points.Entry("Toy", "toy", parts, manual={})}
     monkeypatch.setattr(points, "table", lambda: table)
     exam: Exam[list[str]] = Exam("toy", no_rig)
 

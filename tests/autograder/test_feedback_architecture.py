@@ -11,11 +11,10 @@ from autograder.examination.subject.own_interfaces import DEFINITIONS, NAVIGATE_
 from autograder.examination.verdict_text import Report
 from tests.machine import needs_isolation
 
-from .conftest import SUBMISSIONS
 from .goldens import golden
 
 EXAM = "architecture"
-CASES = {case.name: case for case in corpus.load(SUBMISSIONS, EXAM)}
+CASES = {case.name: case for case in corpus.load(EXAM)}
 
 
 @pytest.fixture(scope="module")

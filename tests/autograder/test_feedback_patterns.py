@@ -15,7 +15,6 @@ from autograder.examination.verdict_text import Report
 from autograder.running import runner
 from tests.machine import needs_isolation
 
-from .conftest import SUBMISSIONS
 from .goldens import golden
 
 
@@ -26,7 +25,7 @@ def _notebooks() -> trials.Notebooks:
 
 def report(name: str, part: str) -> str:
     """Return what the student of a corpus case reads about one part, with all hints."""
-    case = next(case for case in corpus.load(SUBMISSIONS, "patterns") if case.name == name)
+    case = next(case for case in corpus.load("patterns") if case.name == name)
     source, released = _notebooks()
     notebook, _ = submission.restore(case.submission(source, released), source, released)
     outcome = runner.run(submission.program(notebook), seed=USUAL_SEED)

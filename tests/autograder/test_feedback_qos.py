@@ -11,10 +11,9 @@ from autograder.corpus import trials
 from autograder.examination.verdict_text import Report
 from tests.machine import needs_sandbox
 
-from .conftest import SUBMISSIONS
 from .goldens import golden
 
-CASES = {case.name: case for case in corpus.load(SUBMISSIONS, "qos")}
+CASES = {case.name: case for case in corpus.load("qos")}
 MISTAKES = (
     "wrong-camera-reliable",
     "wrong-constructor-raises",

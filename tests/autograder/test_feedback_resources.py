@@ -17,7 +17,6 @@ from autograder.examination.verdict_text import Report
 from autograder.running import runner
 from tests.machine import needs_isolation
 
-from .conftest import SUBMISSIONS
 from .goldens import golden
 
 
@@ -28,7 +27,7 @@ def versions() -> Notebooks:
 
 @pytest.fixture(scope="module")
 def cases() -> dict[str, Case]:
-    return {case.name: case for case in corpus.load(SUBMISSIONS, "resources")}
+    return {case.name: case for case in corpus.load("resources")}
 
 
 @needs_isolation

@@ -9,10 +9,9 @@ from autograder.corpus import Case, trials
 from autograder.examination.verdict_text import Report
 from tests.machine import needs_isolation
 
-from .conftest import SUBMISSIONS
 from .goldens import golden
 
-CASES = {case.name: case for case in corpus.load(SUBMISSIONS, "safety")}
+CASES = {case.name: case for case in corpus.load("safety")}
 MISTAKES = ("wrong-gripper-constant-pauses", "wrong-speed-nan", "wrong-drive-shutdown-drives-on")
 
 

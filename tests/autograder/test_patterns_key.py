@@ -24,14 +24,12 @@ from autograder.running import runner
 from course.student_version import student_versions
 from tests.machine import needs_isolation
 
-from .conftest import SUBMISSIONS
-
 KEY_LINES = ('"position": ["service", "topic"]', '"navigation": ["action"]', "key=")
 
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root = one_notebook(tmp_path_factory.mktemp("course"), "patterns")
+    root = one_notebook(tmp_path_factory.mktemp("course"), "patterns", "ch05")
     build(root)
     release(root, "ch05")
     return root
@@ -129,7 +127,7 @@ def test_a_part_without_its_key_is_the_graders_fault() -> None:
 
 @needs_isolation
 def test_the_feedback_html_has_the_verdict_and_not_the_key(root: Path) -> None:
-    cases = {case.name: case for case in corpus.load(SUBMISSIONS, "patterns")}
+    cases = {case.name: case for case in corpus.load("patterns")}
     case = cases["wrong-choice-navigation"]
     folder = root / "submitted" / "wrong" / "ch05"
     folder.mkdir(parents=True)

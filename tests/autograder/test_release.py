@@ -18,6 +18,7 @@ import pytest
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 
+from autograder import exercise_folders
 from autograder.gradebook import course_gradebook
 from autograder.gradebook.database import GradebookLockedError
 from autograder.gradebook.release import ReleaseError, leaks, release
@@ -150,9 +151,11 @@ def rename_a_cell(root: Path) -> None:
 
 
 def add_a_notebook(root: Path) -> None:
-    for folder, suffix in (("source", "ipynb"), ("authoring/assignments", "py")):
-        old = root / folder / "ch05" / f"qos-design.{suffix}"
-        shutil.copy(old, old.with_name(f"a-new-one.{suffix}"))
+    old = root / "source" / "ch05" / "qos-design.ipynb"
+    shutil.copy(old, old.with_name("a-new-one.ipynb"))
+    texts = root / "authoring" / "assignments" / "ch05"
+    texts.mkdir()
+    shutil.copy(exercise_folders.file("qos", "task.py"), texts / "a-new-one.py")
 
 
 @pytest.mark.filterwarnings("ignore::sqlalchemy.exc.SAWarning")  # of nbgrader's own

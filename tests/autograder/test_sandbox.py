@@ -10,11 +10,13 @@ import shutil
 import signal
 import subprocess
 import sys
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from autograder import sandbox
+from autograder import exercise_folders, exercises, sandbox
 from autograder.corpus import Case
 from autograder.examination.program import Cell
 from autograder.gradebook.course_gradebook import CourseGradebook
@@ -127,6 +129,84 @@ tempfile.TemporaryFile().write(b"x" * 1000)
     outcome = runner.run((Cell(source),), {"helpers/profiles.py": b"DEPTH = 7"})
     assert outcome.outputs[0][0]["text"] == "7 /home/student /home/student\n"
     assert not outcome.notes
+
+
+def contents(paths: Iterable[Path]) -> list[str]:
+    """Return these files and all that is in these folders, those with something in them."""
+    files = (file for path in paths for file in ([path] if path.is_file() else path.rglob("*")))
+    return sorted(str(file) for file in files if file.is_file() and file.stat().st_size)
+
+
+READS = """
+import os, sys
+from pathlib import Path
+read = []
+for name in {names}:
+    try:
+        read += [name] if open(name, "rb").read(1) else []
+    except OSError:
+        pass
+marked = []
+for folder in {{*sys.path, *(os.path.realpath(entry) for entry in sys.path)}}:
+    for package in ("autograder", "course", "quizzes"):
+        for path in Path(folder, package).rglob("*"):
+            if path.is_file() and b"### BEGIN " + b"HIDDEN TESTS" in path.read_bytes():
+                marked.append(path)
+named = [m for m in sys.modules if m.startswith("autograder.exercises.") and m.endswith(".task")]
+print(len(read), read[:3], marked, named)
+"""
+
+
+@needs_sandbox
+@pytest.mark.parametrize("warm", [True, False])
+def test_a_submission_reads_no_solution_no_hidden_test_and_no_corpus(
+    monkeypatch: pytest.MonkeyPatch, warm: bool
+) -> None:
+    kept = contents(exercise_folders.kept_from_students())
+    for name in exercises.names():
+        own = [file for file in kept if f"/exercises/{name}/" in file]
+        assert any(file.endswith("/task.py") for file in own)
+        assert any(file.endswith("/design.md") for file in own)
+        assert any("/corpus/" in file for file in own)
+        assert not any(file.endswith("/exam.py") for file in own)
+    if not warm:
+        abilities = replace(sandbox.abilities(), warm=False)
+        monkeypatch.setattr(probe, "abilities", lambda: abilities)
+    outcome = runner.run((Cell(READS.format(names=kept)),))
+    assert outcome.outputs[0][0]["text"] == "0 [] [] []\n"
+
+
+def test_what_an_installer_has_compiled_is_kept_from_submissions_too(tmp_path: Path) -> None:
+    folder = tmp_path / "exercises" / "one"
+    for name in (
+        "__pycache__/task.cpython-311.pyc", "__pycache__/exam.cpython-311.pyc", "corpus/right.py",
+        "task.py", "exam.py", "rig.py", "points.toml", "notes",
+    ):  # fmt: skip
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).touch()
+    kept = exercise_folders.kept_from_students(tmp_path)
+    assert {str(path.relative_to(tmp_path)) for path in kept} == {
+        "exercises/one/__pycache__/task.cpython-311.pyc", "exercises/one/corpus",
+        "exercises/one/task.py", "exercises/one/notes", "corpus/every", "demo_class.toml",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("module", [warmth.SUBJECT, warmth.EXAMINER])
+def test_what_submissions_are_forked_from_has_never_opened_them(module: str) -> None:
+    program = f"""
+import sys
+opened = set()
+sys.addaudithook(lambda event, its: opened.add(str(its[0])) if event == "open" else None)
+import {module} as process
+process.preload()
+print(*opened, sep="\\n")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=True
+    )
+    opened = set(done.stdout.splitlines())
+    assert opened
+    assert not opened & set(contents(exercise_folders.kept_from_students()))
 
 
 @needs_sandbox

@@ -40,7 +40,6 @@ from autograder.examination import points
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.release import release
 
-SUBMISSIONS = Path(__file__).parents[1] / "submissions"
 MIB = 1024 * 1024
 NEED_LOSS = {"camera_moves_on", "stop_repaired"}
 """Checks that a kernel cannot make, as nobody can lose its packets: there they cost no points."""
@@ -155,6 +154,7 @@ class Assignment:
         return root
 
 
+ASSIGNMENT = "ch05"
 SIGNED = "\n# handed in by student "
 
 
@@ -163,16 +163,16 @@ def assignment(exercise: str) -> Iterator[Assignment]:
     """Build and release the assignment of one exercise in a folder of its own."""
     entry = points.table()[exercise]
     with tempfile.TemporaryDirectory(prefix="bench-grading-") as folder:
-        root = one_notebook(Path(folder) / "course", exercise)
+        root = one_notebook(Path(folder) / "course", exercise, ASSIGNMENT)
         build(root)
-        release(root, entry.assignment)
+        release(root, ASSIGNMENT)
         # A cell that ends its process ends stock nbgrader's batch: that is not what is compared.
         cases = [
             case
-            for case in corpus.load(SUBMISSIONS, exercise)
+            for case in corpus.load(exercise)
             if not case.name.startswith("broken") and not case.must_fail & NEED_LOSS
         ]
-        yield Assignment(root, entry.assignment, entry.notebook, cases)
+        yield Assignment(root, ASSIGNMENT, entry.notebook, cases)
 
 
 def grade(root: Path, command: list[str], number: int) -> Run:

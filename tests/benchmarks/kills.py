@@ -54,10 +54,10 @@ class Figures:
 
 def class_root(folder: Path) -> Path:
     """Return a course in which a small class has handed in one exercise."""
-    root = one_notebook(folder, "qos")
+    root = one_notebook(folder, "qos", ASSIGNMENT)
     build(root)
     release(root, ASSIGNMENT)
-    cases = {case.name: case for case in corpus.load(Path("tests/submissions"), "qos")}
+    cases = {case.name: case for case in corpus.load("qos")}
     source, released = (
         submission.read(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
         for step in ("source", "release")

@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Locator, expect
 from autograder import corpus
 from autograder.assignments import submission
 from autograder.examination import points
-from course.content import content_root, corpus_root
+from course.content import content_root
 from course.journal.progress import WELCOME
 
 from .lab import Lab
@@ -46,7 +46,7 @@ class Exercise:
 def exercise(course_lab: Lab) -> Exercise:
     path = course_lab.work / EXERCISE
     source = submission.read(content_root() / "source" / EXERCISE)
-    case = next(c for c in corpus.load(corpus_root(), "qos") if c.name == "right-chapter")
+    case = next(c for c in corpus.load("qos") if c.name == "right-chapter")
     right = case.submission(source, submission.read(path))
     (solution,) = (c.source for c in right.cells if submission.grade_id(c) == SOLUTION)
     return Exercise(path.read_text(encoding="utf-8"), solution)

@@ -18,7 +18,6 @@ from autograder.assignments.build import build
 from autograder.corpus.trials import one_notebook
 from autograder.examination import points
 from autograder.gradebook.release import release
-from course.content import corpus_root
 from tests.machine import needs_sandbox
 
 from .lab import Lab, until
@@ -36,14 +35,14 @@ EXPLANATIONS = list(points.table()["qos"].manual)
 @pytest.fixture
 def course_root(tmp_path: Path) -> Path:
     """A course with one exercise, released, and one submission that has not been graded."""
-    root = one_notebook(tmp_path / "course", "qos")
+    root = one_notebook(tmp_path / "course", "qos", ASSIGNMENT)
     build(root)
     release(root, ASSIGNMENT)
     source, released = (
         submission.read(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
         for step in ("source", "release")
     )
-    case = next(c for c in corpus.load(corpus_root(), "qos") if c.name == "wrong-lidar-deep")
+    case = next(c for c in corpus.load("qos") if c.name == "wrong-lidar-deep")
     folder = root / "submitted" / "ada" / ASSIGNMENT
     folder.mkdir(parents=True)
     nbformat.write(case.submission(source, released), folder / f"{NOTEBOOK}.ipynb")

@@ -24,7 +24,6 @@ from autograder.corpus.trials import one_notebook
 from autograder.examination import points
 from autograder.gradebook.release import release
 from autograder.grading import engine
-from course.content import corpus_root
 from tests.machine import needs_sandbox
 
 from .lab import Lab, until
@@ -74,14 +73,14 @@ display(HTML('<table><tr><td>kept</td></tr></table><math><mi>k</mi></math>'))
 @pytest.fixture(scope="module")
 def course_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A graded course with one submission, whose every part wants to run in a browser."""
-    root = one_notebook(tmp_path_factory.mktemp("hostile") / "course", "qos")
+    root = one_notebook(tmp_path_factory.mktemp("hostile") / "course", "qos", ASSIGNMENT)
     build(root)
     release(root, ASSIGNMENT)
     source, released = (
         submission.read(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
         for step in ("source", "release")
     )
-    case = next(c for c in corpus.load(corpus_root(), "qos") if c.name == "broken-empty")
+    case = next(c for c in corpus.load("qos") if c.name == "broken-empty")
     notebook = case.submission(source, released)
     cells = {submission.grade_id(cell): cell for cell in notebook.cells}
     for number, name in enumerate(EXPLANATIONS):

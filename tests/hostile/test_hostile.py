@@ -120,7 +120,7 @@ def class_(tmp_path_factory: pytest.TempPathFactory) -> Class:
 
 def class_in(folder: Path) -> Class:
     exercises = sorted({attack.exercise for attack in attacks()} | {"qos"})
-    root = notebooks_of(folder, exercises)
+    root = notebooks_of(folder, exercises, "ch05")
     build(root)
     release(root, "ch05")
     notebooks, cases = {}, {}
@@ -128,7 +128,7 @@ def class_in(folder: Path) -> Class:
         file = f"ch05/{points.table()[name].notebook}.ipynb"
         source, released = (submission.read(root / step / file) for step in ("source", "release"))
         notebooks[name] = source, released
-        cases.update({(name, c.name): c for c in corpus.load(HERE.parent / "submissions", name)})
+        cases.update({(name, c.name): c for c in corpus.load(name)})
     return Class(root, notebooks, cases)
 
 

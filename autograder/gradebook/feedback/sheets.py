@@ -163,7 +163,7 @@ def read(gradebook: Gradebook, coursedir: CourseDirectory, assignment: str, stud
     exercises = (
         Exercise(
             notebook,
-            questions.title_of_notebook(assignment, notebook),
+            questions.title_of_notebook(notebook),
             tuple(_ordered(found, asked.get(notebook, {}))),
             penalties[notebook],
         )

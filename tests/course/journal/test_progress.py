@@ -14,9 +14,10 @@ from markdown_it import MarkdownIt
 from typer.testing import CliRunner
 
 import course
+from autograder.assignments import listing
 from course import lab
 from course.cli import app
-from course.content import content_root
+from course.content import CONFIG, content_root
 from course.errors import CourseError
 from course.journal.progress import WELCOME
 from course.journal.store import FILE, MANIFEST, Journal
@@ -28,10 +29,25 @@ CHAPTER, EXERCISE = Path("ch05-building-blocks.ipynb"), Path("ch05/qos-design.ip
 QUIZ = Path("ch05-quiz")
 
 
+EXERCISES = list(listing.of_course(content_root())["ch05"].exercises)
+
+
 @pytest.fixture(scope="session")
-def handed_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def chapter_5(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a course that ends with chapter 5, as it is built."""
+    root = tmp_path_factory.mktemp("chapter-5")
+    (root / "chapters").mkdir()
+    for name in ("chapters/start-here.ipynb", f"chapters/{CHAPTER}", CONFIG):
+        shutil.copy(content_root() / name, root / name)
+    for name in ("source/ch05", "source/ch05-quiz"):
+        shutil.copytree(content_root() / name, root / name)
+    return root
+
+
+@pytest.fixture(scope="session")
+def handed_out(chapter_5: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("copy") / "mine"
-    lab.make_copy(folder, content_root())
+    lab.make_copy(folder, chapter_5)
     return folder
 
 
@@ -74,15 +90,13 @@ def test_a_new_copy_has_everything_left(folder: Path) -> None:
     progress = course.progress()
     (chapter,) = progress.chapters
     assert (chapter.done, chapter.total) == (0, len(ids(folder / CHAPTER)))
-    assert [exercise.notebook.exam for exercise in progress.exercises] == [
-        "qos", "architecture", "patterns", "resources", "safety",
-    ]  # fmt: skip
+    assert [exercise.notebook.exam for exercise in progress.exercises] == EXERCISES
     assert not any(exercise.done for exercise in progress.exercises)
     assert [quiz.notebook.quiz for quiz in progress.quizzes] == ["ch05"]
     assert progress.notices == ()
     text = repr(progress)
     assert "Next: ch05-building-blocks.ipynb: go on at “The beginning”." in text
-    assert "0 of 5 exercises ready to hand in, the quiz not passed yet." in text
+    assert f"0 of {len(EXERCISES)} exercises ready to hand in, the quiz not passed yet." in text
     assert "Visible checks: not checked yet" in text
 
 
@@ -109,7 +123,7 @@ def test_what_was_run_checked_written_and_passed_counts(folder: Path) -> None:
     progress = course.progress()
     assert [exercise.done for exercise in progress.exercises] == [True, *[False] * 4]
     assert (progress.quizzes[0].passed, len(progress.quizzes[0].attempts)) == (True, 1)
-    assert "1 of 5 exercises ready to hand in, the quiz passed." in repr(progress)
+    assert f"1 of {len(EXERCISES)} exercises ready to hand in, the quiz passed." in repr(progress)
     assert "Best attempt: 5 of 5" in repr(progress)
 
 
@@ -180,7 +194,7 @@ def test_a_damaged_record_of_the_copy_costs_nothing(folder: Path, record: str) -
     if record.startswith("{"):
         assert progress.exercises == ()
     else:
-        assert len(progress.exercises) == 5
+        assert len(progress.exercises) == len(EXERCISES)
         assert len(progress.chapters) == 1
     assert "ipynb" not in " ".join(progress.notices)
 
@@ -202,7 +216,9 @@ def test_the_command_says_the_same_in_a_terminal(
     monkeypatch.chdir(folder.parent)
     told = CliRunner().invoke(app, ["progress", str(folder)])
     assert told.exit_code == 0
-    assert "0 of 5 exercises ready to hand in, the quiz not passed yet." in told.output
+    assert (
+        f"0 of {len(EXERCISES)} exercises ready to hand in, the quiz not passed yet." in told.output
+    )
     folder.rename(folder.parent / lab.DEFAULT)
     assert CliRunner().invoke(app, ["progress"]).output == told.output
 
@@ -217,21 +233,25 @@ def outputs(folder: Path) -> list[dict[str, Any]]:
     return [output for cell in cells for output in cell.get("outputs", [])]
 
 
-def test_course_lab_brings_its_first_notebook_up_to_date_and_keeps_the_rest(folder: Path) -> None:
+def test_course_lab_brings_its_first_notebook_up_to_date_and_keeps_the_rest(
+    folder: Path, chapter_5: Path
+) -> None:
     nbformat.validate(nbformat.read(folder / WELCOME, as_version=4))
     (shown,) = outputs(folder)
-    assert "0 of 5 exercises" in "".join(shown["data"]["text/markdown"])
-    assert "0 of 5 exercises" in "".join(shown["data"]["text/plain"])
+    assert f"0 of {len(EXERCISES)} exercises" in "".join(shown["data"]["text/markdown"])
+    assert f"0 of {len(EXERCISES)} exercises" in "".join(shown["data"]["text/plain"])
     edit(folder / WELCOME, lambda cell: cell.update(source=["My notes. ", *cell["source"]]))
     take_quiz(folder / QUIZ)
-    lab.make_copy(folder, content_root())
+    lab.make_copy(folder, chapter_5)
     (shown,) = outputs(folder)
     assert "the quiz passed" in shown["data"]["text/plain"]
     assert (folder / WELCOME).read_text(encoding="utf-8").count("My notes. ") == 3
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b'{"cells": [{}]}', b"\xff\xfe"])
-def test_a_first_notebook_that_cannot_be_read_is_left_alone(folder: Path, content: bytes) -> None:
+def test_a_first_notebook_that_cannot_be_read_is_left_alone(
+    folder: Path, chapter_5: Path, content: bytes
+) -> None:
     (folder / WELCOME).write_bytes(content)
-    lab.make_copy(folder, content_root())
+    lab.make_copy(folder, chapter_5)
     assert (folder / WELCOME).read_bytes() == content

@@ -1,0 +1,129 @@
+"""What each assignment of a course is made of: a few lines of TOML list its exercises and quizzes.
+
+``authoring/assignments/NAME.toml`` says::
+
+    exercises = ["qos", "patterns"]
+    quizzes = ["quiz"]
+
+Exercises are those of the package and those of the course root's ``exercises/``; the text of a quiz
+is ``authoring/quizzes/NAME.py``. Notebooks that only one assignment has may also be texts in
+``authoring/assignments/NAME/``; a folder of them needs no TOML.
+"""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from autograder import exercise_folders
+from autograder.assignments.cells import BuildError
+from autograder.examination import points
+
+ASSIGNMENTS = Path("authoring") / "assignments"
+QUIZZES = Path("authoring") / "quizzes"
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """An assignment: {notebook's name: its text}, in order, and the names of its exercises."""
+
+    name: str
+    texts: Mapping[str, Path]
+    exercises: tuple[str, ...] = ()
+
+
+def of_course(root: Path) -> dict[str, Assignment]:
+    """Return {name: assignment} of the course at ``root``, whose exercises must be in use.
+
+    Raises:
+        BuildError: a list is not sound, or names what there is not.
+        ExerciseError: a table of points is not sound, or an exercise has no text.
+    """
+    folder = root / ASSIGNMENTS
+    return {name: _assignment(root, name) for name in sorted(_names(folder))}
+
+
+def exam_files(assignment: Assignment) -> dict[Path, bytes]:
+    """Return {path in the assignment's folder: content} of exams that only the course root has.
+
+    Students get them with the notebooks, so that a ``check("...")`` in these finds its exam.
+    """
+    files = exercise_folders.own_exam_files(assignment.exercises)
+    return {Path(name): content for name, content in files.items()}
+
+
+def names(root: Path) -> set[str]:
+    """Return the names of the assignments that the course at ``root`` has texts for."""
+    return _names(root / ASSIGNMENTS)
+
+
+def _names(folder: Path) -> set[str]:
+    lists = {path.stem for path in folder.glob("*.toml")}
+    return lists | {path.parent.name for path in folder.glob("*/*.py")}
+
+
+def write(root: Path, name: str, exercises: list[str]) -> None:
+    """Write the list of an assignment of these exercises into the course at ``root``."""
+    folder = root / ASSIGNMENTS
+    folder.mkdir(parents=True, exist_ok=True)
+    listed = ", ".join(f'"{exercise}"' for exercise in exercises)
+    (folder / f"{name}.toml").write_text(f"exercises = [{listed}]\n", encoding="utf-8")
+
+
+def _assignment(root: Path, name: str) -> Assignment:
+    file = root / ASSIGNMENTS / f"{name}.toml"
+    data = _read(file) if file.is_file() else {"exercises": [], "quizzes": []}
+    texts: dict[str, Path] = {}
+    for exercise in data["exercises"]:
+        _require(exercise, list(exercise_folders.current().folders), f"{file} lists the exercise")
+        text = exercise_folders.file(exercise, exercise_folders.TASK)
+        exercise_folders.file(exercise, exercise_folders.POINTS)
+        _add(texts, points.table()[exercise].notebook, text, file)
+    quizzes = {path.stem: path for path in sorted((root / QUIZZES).glob("*.py"))}
+    for quiz in data["quizzes"]:
+        _require(quiz, list(quizzes), f"{file} lists the quiz")
+        _add(texts, quiz, quizzes[quiz], file)
+    for path in sorted((root / ASSIGNMENTS / name).glob("*.py")):
+        _add(texts, path.stem, path, path)
+    if not texts:
+        raise BuildError(f"{file} lists nothing: exercises = ['…'] names what the assignment has.")
+    return Assignment(name, texts, tuple(data["exercises"]))
+
+
+def _read(file: Path) -> dict[str, list[str]]:
+    try:
+        data: dict[str, Any] = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BuildError(f"{file} is no TOML: {error}.") from error
+    listed = {"exercises": data.pop("exercises", []), "quizzes": data.pop("quizzes", [])}
+    for key, names in listed.items():
+        if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+            raise BuildError(f"{file}: {key} must be a list of names, as in {key} = ['…'].")
+    if data:
+        raise BuildError(
+            f"{file} has a '{next(iter(data))}', which an assignment has not: it has lists of "
+            "exercises and quizzes."
+        )
+    return listed
+
+
+def _require(name: str, known: list[str], who: str) -> None:
+    if name not in known:
+        close = difflib.get_close_matches(name, known, n=1)
+        guess = f" Did you mean '{close[0]}'?" if close else ""
+        raise BuildError(
+            f"{who} '{name}', which there is not: there is {', '.join(known) or 'none'}.{guess}"
+        )
+
+
+def _add(texts: dict[str, Path], notebook: str, text: Path, file: Path) -> None:
+    if notebook in texts:
+        raise BuildError(
+            f"{file}: the notebook '{notebook}' would be there twice, from {texts[notebook]} and "
+            f"from {text}: leave one of them out, or give it another name."
+        )
+    texts[notebook] = text

@@ -1,0 +1,181 @@
+"""Where the exercises are: a folder each, in the package and in a course root's ``exercises/``.
+
+A folder is an exercise if it has one of the first three of these, and its name is the exercise's:
+
+- ``task.py``: the notebook as text, with solutions, hidden tests and answer keys;
+- ``exam.py``: the checks; other modules beside it are what only they need;
+- ``points.toml``: what each check and each written answer is worth;
+- ``objectives.toml``: what each of them shows about a learner;
+- ``corpus/``: submissions with known verdicts; ``design.md``: what the checks are for.
+
+One course root at a time has its exercises among them: `use` and `of_course` say which.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from course.errors import CourseError
+
+TASK, EXAM, POINTS = "task.py", "exam.py", "points.toml"
+OBJECTIVES, CORPUS = "objectives.toml", "corpus"
+FOLDER = "exercises"
+"""The folder of a course root, and of an assignment that is handed out, with exercises."""
+
+COURSE_PACKAGE = "course_exercises"
+"""The Python package that stands for that folder of the course root in use."""
+
+PACKAGE = Path(__file__).resolve().parent
+EVERY = PACKAGE / "corpus" / "every"
+"""The cases that are in each exercise's corpus."""
+
+DEMO_CLASS = PACKAGE / "demo_class.toml"
+"""What the class of ``autograder demo`` hands in."""
+
+
+class ExerciseError(CourseError):
+    """An exercise's folder that cannot be used; the message says what to change."""
+
+
+class Exercises:
+    """The exercises there are: those of the package, and those of one course root.
+
+    Attributes:
+        root: the course root, if it has some of its own.
+        folders: {name: folder}, in the order of the names.
+        own: the names of the course root's own.
+    """
+
+    def __init__(self, root: Path | None) -> None:
+        """Look for them.
+
+        Raises:
+            ExerciseError: one of the course root has a name that it cannot have.
+        """
+        packaged, found = _found(PACKAGE / FOLDER), _found(root / FOLDER) if root else {}
+        for name, folder in found.items():
+            if not name.isidentifier():
+                raise ExerciseError(
+                    f"The exercise {folder} cannot be called '{name}': give its folder a name of "
+                    "letters, digits and underscores, as a Python module has."
+                )
+            if name in packaged:
+                raise ExerciseError(
+                    f"The exercise {folder} has the name of one that comes with the course: give "
+                    "its folder another name."
+                )
+        self.root = root if found else None
+        self.own = frozenset(found)
+        self.folders: Mapping[str, Path] = dict(sorted({**packaged, **found}.items()))
+        self._state = [(name, _changed_ns(folder)) for name, folder in sorted(found.items())]
+
+    def is_like(self, other: Exercises) -> bool:
+        """Whether these are the same folders, with the same files as they were read."""
+        return (self.root, self._state) == (other.root, other._state)
+
+
+_current: Exercises | None = None
+
+
+def current() -> Exercises:
+    """Return the exercises of the package and of the course root in use.
+
+    What is read of them may be kept for as long as this is the same object.
+    """
+    global _current
+    if _current is None:
+        _current = Exercises(None)
+    return _current
+
+
+def use(root: Path | None) -> None:
+    """Have the exercises of the course at ``root`` among them, in place of another course's.
+
+    Raises:
+        ExerciseError: one of them has a name that it cannot have.
+    """
+    global _current
+    found = Exercises(root.resolve() if root else None)
+    if not found.is_like(current()):
+        _current = found
+
+
+@contextmanager
+def of_course(root: Path) -> Iterator[None]:
+    """Have the exercises of the course at ``root`` among them for the block; raises as `use`."""
+    global _current
+    before = current()
+    use(root)
+    try:
+        yield
+    finally:
+        _current = before
+
+
+def file(name: str, part: str) -> Path:
+    """Return a file of an exercise that there is.
+
+    Raises:
+        ExerciseError: it does not have it.
+    """
+    path = current().folders[name] / part
+    if not path.is_file():
+        raise ExerciseError(f"The exercise '{name}' has no {part}: write {path}.")
+    return path
+
+
+def exam_files(folder: Path) -> dict[str, bytes]:
+    """Return {file name: content} of what an exercise's exam needs: modules and points.
+
+    It is what students may have: no text of the notebook, and no corpus.
+    """
+    paths = [p for p in sorted(folder.glob("*.py")) if p.name != TASK]
+    return {path.name: path.read_bytes() for path in (*paths, folder / POINTS) if path.is_file()}
+
+
+def own_exam_files(names: Iterable[str]) -> dict[str, bytes]:
+    """Return {path in a course root: content} of what those of these exams need that are its own.
+
+    A folder with these files is a course root to whoever uses it.
+    """
+    exercises = current()
+    return {
+        f"{FOLDER}/{name}/{file}": content
+        for name in sorted(exercises.own.intersection(names))
+        for file, content in exam_files(exercises.folders[name]).items()
+    }
+
+
+def kept_from_students(package: Path = PACKAGE) -> Iterator[Path]:
+    """Yield the files and folders of the package that no submission may see.
+
+    Of an exercise's folder these are all but what its exam needs, and what it is worth. An
+    installer may have compiled the text of a notebook, too.
+    """
+    for folder in _found(package / FOLDER).values():
+        for entry in sorted(folder.iterdir()):
+            is_needed = entry.suffix == ".py" or entry.name in (POINTS, OBJECTIVES)
+            if entry.name == "__pycache__":
+                yield from sorted(entry.glob("task.*"))
+            elif entry.name == TASK or not is_needed:
+                yield entry
+    yield from (package / path.relative_to(PACKAGE) for path in (EVERY, DEMO_CLASS))
+
+
+def _found(folder: Path) -> dict[str, Path]:
+    return {
+        entry.name: entry
+        for entry in (sorted(folder.iterdir()) if folder.is_dir() else ())
+        if entry.is_dir() and not entry.name.startswith((".", "_")) and _is_exercise(entry)
+    }
+
+
+def _is_exercise(folder: Path) -> bool:
+    return any((folder / part).is_file() for part in (EXAM, POINTS, TASK))
+
+
+def _changed_ns(folder: Path) -> list[tuple[str, int]]:
+    files = (path for path in sorted(folder.iterdir()) if path.is_file())
+    return [(path.name, path.stat().st_mtime_ns) for path in files]
