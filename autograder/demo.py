@@ -124,7 +124,7 @@ def bundled_class(cases: Cases, *, every: bool) -> Class:
 def _cases() -> Cases:
     return {
         exam: {case.name: case for case in corpus.load(exam)}
-        for exam in listing.of_course(content_root())[ASSIGNMENT].exercises
+        for exam in listing.one(content_root(), ASSIGNMENT).exercises
     }
 
 

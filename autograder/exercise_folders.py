@@ -31,6 +31,9 @@ PACKAGE = Path(__file__).resolve().parent
 EVERY = PACKAGE / "corpus" / "every"
 """The cases that are in each exercise's corpus."""
 
+TABLE = PACKAGE / "corpus" / "README.md"
+"""Which cases each check must catch, and which designs are right."""
+
 DEMO_CLASS = PACKAGE / "demo_class.toml"
 """What the class of ``autograder demo`` hands in."""
 
@@ -54,7 +57,14 @@ class Exercises:
         Raises:
             ExerciseError: one of the course root has a name that it cannot have.
         """
-        packaged, found = _found(PACKAGE / FOLDER), _found(root / FOLDER) if root else {}
+        packaged = _found(PACKAGE / FOLDER)
+        try:
+            found = _found(root / FOLDER) if root else {}
+            self._state = [(name, _changed_ns(folder)) for name, folder in sorted(found.items())]
+        except OSError as error:
+            raise ExerciseError(
+                f"{error.filename} cannot be read ({error.strerror}): mend its permissions."
+            ) from None
         for name, folder in found.items():
             if not name.isidentifier():
                 raise ExerciseError(
@@ -69,7 +79,6 @@ class Exercises:
         self.root = root if found else None
         self.own = frozenset(found)
         self.folders: Mapping[str, Path] = dict(sorted({**packaged, **found}.items()))
-        self._state = [(name, _changed_ns(folder)) for name, folder in sorted(found.items())]
 
     def is_like(self, other: Exercises) -> bool:
         """Whether these are the same folders, with the same files as they were read."""
@@ -88,6 +97,12 @@ def current() -> Exercises:
     if _current is None:
         _current = Exercises(None)
     return _current
+
+
+def packaged() -> frozenset[str]:
+    """Return the names of those that come with the course."""
+    exercises = current()
+    return frozenset(exercises.folders.keys() - exercises.own)
 
 
 def use(root: Path | None) -> None:
@@ -130,9 +145,23 @@ def exam_files(folder: Path) -> dict[str, bytes]:
     """Return {file name: content} of what an exercise's exam needs: modules and points.
 
     It is what students may have: no text of the notebook, and no corpus.
+
+    Raises:
+        ExerciseError: one of them cannot be read.
     """
-    paths = [p for p in sorted(folder.glob("*.py")) if p.name != TASK]
-    return {path.name: path.read_bytes() for path in (*paths, folder / POINTS) if path.is_file()}
+    paths = [path for path in (*sorted(folder.glob("*.py")), folder / POINTS) if _is_needed(path)]
+    try:
+        return {path.name: path.read_bytes() for path in paths if path.is_file()}
+    except OSError as error:
+        raise ExerciseError(
+            f"{error.filename} cannot be read ({error.strerror}): mend its permissions."
+        ) from None
+
+
+def _is_needed(path: Path) -> bool:
+    """Whether an exam needs a file: no copy that an editor has made, which no import names."""
+    is_module = path.suffix == ".py" and path.stem.isidentifier() and path.name != TASK
+    return is_module or path.name == POINTS
 
 
 def own_exam_files(names: Iterable[str]) -> dict[str, bytes]:
@@ -151,17 +180,18 @@ def own_exam_files(names: Iterable[str]) -> dict[str, bytes]:
 def kept_from_students(package: Path = PACKAGE) -> Iterator[Path]:
     """Yield the files and folders of the package that no submission may see.
 
-    Of an exercise's folder these are all but what its exam needs, and what it is worth. An
-    installer may have compiled the text of a notebook, too.
+    Of an exercise's folder these are all but what its exam needs, and what it is worth, also if it
+    has no exam yet. An installer may have compiled the text of a notebook, too.
     """
-    for folder in _found(package / FOLDER).values():
+    folders = (package / FOLDER).iterdir()
+    for folder in sorted(path for path in folders if path.is_dir() and path.name != "__pycache__"):
         for entry in sorted(folder.iterdir()):
-            is_needed = entry.suffix == ".py" or entry.name in (POINTS, OBJECTIVES)
             if entry.name == "__pycache__":
                 yield from sorted(entry.glob("task.*"))
-            elif entry.name == TASK or not is_needed:
+            elif not _is_needed(entry) and entry.name != OBJECTIVES:
                 yield entry
-    yield from (package / path.relative_to(PACKAGE) for path in (EVERY, DEMO_CLASS))
+    kept = (EVERY, TABLE, DEMO_CLASS)
+    yield from (package / path.relative_to(PACKAGE) for path in kept)
 
 
 def _found(folder: Path) -> dict[str, Path]:

@@ -79,18 +79,23 @@ def build(
     return list(built)
 
 
+PLACES = (
+    "chapters/*.ipynb", "source/*/*.ipynb", "release/*/*.ipynb", "source/*/exercises/*/*",
+    "release/*/exercises/*/*",
+)  # fmt: skip
+"""Where a course has what is built, and what was released of it."""
+
+
 def orphans(root: Path, built: Iterable[Path]) -> list[Path]:
-    """Return the notebooks of a course that are none of those ``built``: they lost their source.
+    """Return the notebooks and exams of a course that are none of those ``built``.
+
+    They lost their source.
 
     Of the releases, too: students would still get an exercise that is gone.
     """
     made = {path.relative_to(root) for path in built}
     made |= {Path("release", *path.parts[1:]) for path in made if path.parts[0] == "source"}
-    found = (
-        path
-        for pattern in ("chapters/*.ipynb", "source/*/*.ipynb", "release/*/*.ipynb")
-        for path in sorted(root.glob(pattern))
-    )
+    found = (path for pattern in PLACES for path in sorted(root.glob(pattern)) if path.is_file())
     return [path for path in found if path.relative_to(root) not in made]
 
 
@@ -103,8 +108,8 @@ def _require_in_step(root: Path, stale: list[Path], orphaned: list[Path]) -> Non
         )
     if orphaned:
         problems.append(
-            f"Without a source in {root / 'authoring'}: {_names(root, orphaned)}; remove what is "
-            "no part of the course any more, or put its source back."
+            f"Without a source in {root / 'authoring'} or an exercise: {_names(root, orphaned)}; "
+            "remove what is no part of the course any more, or put its source back."
         )
     if problems:
         raise BuildError(" ".join(problems))

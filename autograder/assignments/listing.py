@@ -43,8 +43,7 @@ def of_course(root: Path) -> dict[str, Assignment]:
         BuildError: a list is not sound, or names what there is not.
         ExerciseError: a table of points is not sound, or an exercise has no text.
     """
-    folder = root / ASSIGNMENTS
-    return {name: _assignment(root, name) for name in sorted(_names(folder))}
+    return {name: one(root, name) for name in sorted(names(root))}
 
 
 def exam_files(assignment: Assignment) -> dict[Path, bytes]:
@@ -74,7 +73,8 @@ def write(root: Path, name: str, exercises: list[str]) -> None:
     (folder / f"{name}.toml").write_text(f"exercises = [{listed}]\n", encoding="utf-8")
 
 
-def _assignment(root: Path, name: str) -> Assignment:
+def one(root: Path, name: str) -> Assignment:
+    """Return an assignment that the course has texts for; raises as `of_course`."""
     file = root / ASSIGNMENTS / f"{name}.toml"
     data = _read(file) if file.is_file() else {"exercises": [], "quizzes": []}
     texts: dict[str, Path] = {}

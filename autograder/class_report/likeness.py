@@ -30,6 +30,7 @@ def texts_of(data: ClassData, given: GivenText) -> tuple[dict[str, dict[str, Own
     names = sorted({name for grade in data.grades for name in grade.cells})
     texts: defaultdict[str, dict[str, OwnText]] = defaultdict(dict)
     unread = []
+    handed_out = files_beside(data.root / "release" / data.assignment).files
     for grade in data.grades:
         folder = roster.folder(data.root, grade.student) / data.assignment
         notebooks = {**_notebooks(folder, names), **_graded(data, grade.student)}
@@ -41,7 +42,9 @@ def texts_of(data: ClassData, given: GivenText) -> tuple[dict[str, dict[str, Own
             texts[title][grade.student] = given.own({name: notebook}, {})
             for question, answer in _answers(notebook, data.questions.get(name, {})):
                 texts[called(title, question)][grade.student] = answer
-        if (beside := given.own({}, files_beside(folder).files)).lines:
+        files = files_beside(folder).files
+        own = {name: content for name, content in files.items() if content != handed_out.get(name)}
+        if (beside := given.own({}, own)).lines:
             texts[BESIDE][grade.student] = beside
     if not unread:
         return dict(texts), []

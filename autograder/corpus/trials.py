@@ -50,7 +50,8 @@ class Trial:
 
 def notebooks(exam: str) -> Notebooks:
     """Build and release the notebook of one exam by itself; return both versions."""
-    entry = points.table()[exercises.load(exam).name]
+    exercise_folders.file(exercises.load(exam).name, exercise_folders.POINTS)
+    entry = points.table()[exam]
     with tempfile.TemporaryDirectory(prefix="ros2-course-corpus-") as folder:
         root = one_notebook(Path(folder), exam)
         build(root)

@@ -15,6 +15,7 @@ from nbformat import NotebookNode
 from autograder import exercise_folders
 from autograder.assignments import cells
 from autograder.assignments.submission import grade_id, metadata
+from autograder.files import NOT_COUNTED
 from course.errors import CourseError
 from course.files import PARTIAL
 
@@ -30,10 +31,9 @@ def release(root: Path, assignment: str) -> Path:
     """Write the student version of ``assignment`` to ``release/``; return its folder.
 
     The release holds the notebooks, the questions of closed quizzes, the exams of the course's own
-    exercises, and nothing else. It is made
-    beside the earlier one, with a copy of the gradebook, and takes its place before the gradebook
-    itself is changed; if that fails after all, the earlier one stands again. So a release that
-    fails leaves everything as it was.
+    exercises, and nothing else. It is made beside the earlier one, with a copy of the gradebook,
+    and takes its place before the gradebook itself is changed; if that fails after all, the earlier
+    one stands again. So a release that fails leaves everything as it was.
 
     Args:
         root: the nbgrader course root.
@@ -155,15 +155,22 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
             f"{', '.join(sorted(authored | set(known))) or 'none yet'}."
         )
     paths = sorted(folder.glob("*.ipynb"))
-    listed = listing.of_course(root)[assignment] if assignment in authored else None
+    listed = listing.one(root, assignment) if assignment in authored else None
     orphans = [path for path in paths if listed is not None and path.stem not in listed.texts]
     if orphans:
         raise ReleaseError(
-            f"{orphans[0]} has no source in {root / listing.ASSIGNMENTS}: remove it if it is no "
-            "part of the assignment any more, or put its source back, then release again."
+            f"{orphans[0]} is none of the notebooks of '{assignment}' in "
+            f"{root / listing.ASSIGNMENTS}: remove it, or list its exercise there, then build and "
+            "release again."
         )
     notebooks = [_read(path) for path in paths]
     exams = listing.exam_files(listed) if listed is not None else {}
+    for name, content in exams.items():
+        if cells.has_marker(content.decode(errors="replace")):
+            raise ReleaseError(
+                f"{name} marks a solution or hidden tests, and students would get it with the exam "
+                f"of its exercise: move it out of the folder {root / name.parent}."
+            )
     beside = quiz_sheets.of_notebooks(root, notebooks) | exams
     for name, content in beside.items():
         if not (folder / name).is_file() or (folder / name).read_bytes() != content:
@@ -173,7 +180,10 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
             )
     # nbgrader would hand out whatever else lies there.
     for path in sorted(folder.rglob("*")):
-        if path.is_file() and path.suffix != ".ipynb" and path.relative_to(folder) not in beside:
+        name = path.relative_to(folder)
+        if NOT_COUNTED.intersection(name.parts):
+            continue  # nor does nbgrader
+        if path.is_file() and path.suffix != ".ipynb" and name not in beside:
             raise ReleaseError(
                 f"{path} would be handed out to students: move it out of {folder}, which is for "
                 "notebooks only."

@@ -179,7 +179,7 @@ def _imports(name: str, source: bytes) -> frozenset[str]:
 
     Read from its lines: a syntax tree would keep each `autograder grade` from starting for longer.
     """
-    text = _GETATTR.sub("", _FOR_TYPES.sub("", source.decode()))
+    text = _GETATTR.sub("", _FOR_TYPES.sub("", source.decode(errors="replace")))
     found = {name}
     for package, names in _FROM.findall(text):
         found |= {package, *(f"{package}.{imported}" for imported in _NAME.findall(names))}
@@ -191,7 +191,7 @@ def _imports(name: str, source: bytes) -> frozenset[str]:
 @cache
 def _on_demand(package: str, source: bytes) -> dict[str, tuple[str, ...]]:
     """Return {name: what is imported for it} of the names that a package imports when asked."""
-    text = source.decode()
+    text = source.decode(errors="replace")
     if not _GETATTR.search(text):
         return {}
     declared = _FROM.findall("".join(_FOR_TYPES.findall(text)))

@@ -19,6 +19,7 @@ import os
 import socket
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
@@ -32,6 +33,7 @@ from autograder.examination.subject import hang_report
 from autograder.examination.verdict import Verdict
 from autograder.processes.channel import Channel
 from autograder.processes.outside.asking import Afar, Here, Outside
+from course.errors import CourseError
 from course.runtime.core_session import CoreSession
 
 
@@ -85,8 +87,10 @@ def preload() -> None:
 
     modules.import_all()
     for name in exercises.names():
-        exercises.load(name)
-    points.table()  # read once, and not in each fork
+        with suppress(CourseError):  # one that is being written keeps nobody from the others
+            exercises.load(name)
+    with suppress(CourseError):
+        points.table()  # read once, and not in each fork
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -52,8 +52,8 @@ def check(
     namespace = _caller_globals()
     if SUBJECT_ENV in os.environ:
         return 0.0  # the real examiner is at work outside this process
-    if exam not in exercises.names():
-        exercise_folders.use(Path.cwd())
+    if exam not in exercise_folders.packaged():
+        exercise_folders.use(Path.cwd())  # it may have changed, or be another folder's by now
     exercises.load(exam).part(part)
     verdict = examine(exam, part, namespace, key)
     _show(Report(_noted(verdict), hints=hint))

@@ -180,14 +180,15 @@ def test_what_an_installer_has_compiled_is_kept_from_submissions_too(tmp_path: P
     folder = tmp_path / "exercises" / "one"
     for name in (
         "__pycache__/task.cpython-311.pyc", "__pycache__/exam.cpython-311.pyc", "corpus/right.py",
-        "task.py", "exam.py", "rig.py", "points.toml", "notes",
+        "task.py", "task-Copy1.py", "exam.py", "rig.py", "points.toml", "notes", "../begun/task.py",
     ):  # fmt: skip
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).touch()
     kept = exercise_folders.kept_from_students(tmp_path)
     assert {str(path.relative_to(tmp_path)) for path in kept} == {
         "exercises/one/__pycache__/task.cpython-311.pyc", "exercises/one/corpus",
-        "exercises/one/task.py", "exercises/one/notes", "corpus/every", "demo_class.toml",
+        "exercises/one/task.py", "exercises/one/task-Copy1.py", "exercises/one/notes",
+        "exercises/begun/task.py", "corpus/every", "corpus/README.md", "demo_class.toml",
     }  # fmt: skip
 
 
