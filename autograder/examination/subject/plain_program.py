@@ -20,10 +20,13 @@ from threading import Thread
 from typing import Any
 
 import rclpy
-from rclpy.executors import MultiThreadedExecutor, SingleThreadedExecutor
+from rclpy.context import Context
+from rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.utilities import get_default_context
+
+from course.runtime.context.context import set_default_context
 
 SIMULATED = ["--ros-args", "-p", "use_sim_time:=true"]
 
@@ -46,13 +49,14 @@ def run(
         up: called once, when the first nodes are there.
     """
     interrupts = _Interrupts()
-    if not get_default_context().ok():  # else a cell has done so
-        rclpy.init(
-            args=SIMULATED if wanted["sim_time"] else [],
-            domain_id=domain_id,
-            # A node that is ended still sends its last words.
-            signal_handler_options=SignalHandlerOptions.NO,
-        )
+    if get_default_context().ok():  # a cell has opened it, for nodes of its own
+        set_default_context(Context())
+    rclpy.init(
+        args=SIMULATED if wanted["sim_time"] else [],
+        domain_id=domain_id,
+        # A node that is ended still sends its last words.
+        signal_handler_options=SignalHandlerOptions.NO,
+    )
     raised: list[BaseException] = []
     before: list[Any] = []
     for life in _lives(wanted):
@@ -140,12 +144,7 @@ def _spin(
     for node in nodes:
         executor.add_node(node)
     try:
-        while not until.done():
-            try:
-                executor.spin_until_future_complete(until)
-            except Exception:
-                if not goes_on:
-                    raise
+        _spin_until(executor, until, goes_on=goes_on)
         if shut_down_until is not None:
             for node in nodes:
                 if callable(shutdown := getattr(node, "shutdown", None)):
@@ -156,6 +155,17 @@ def _spin(
     finally:
         # Left by an exception it holds what was ready with it, and so the endpoints of its node.
         executor.shutdown(timeout_sec=0.0)
+
+
+def _spin_until(executor: Executor, until: Future, *, goes_on: bool) -> None:
+    while True:
+        try:
+            executor.spin_until_future_complete(until)
+        except Exception:
+            if not goes_on:
+                raise
+        else:
+            return
 
 
 class _Interrupts:

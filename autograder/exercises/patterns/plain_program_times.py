@@ -24,7 +24,14 @@ from autograder.examination.plain_programs import Program, Programs
 from autograder.exercises.patterns import camera_stream, drive_ends, interface_patterns, odometry
 from autograder.exercises.patterns.discovery import LateJoiner, acquaint
 from autograder.exercises.patterns.driving import ACTIONS, Drive
-from autograder.exercises.patterns.rig import LEVEL_MARGIN, NODE, SETTLE, THREADS, RobotRig
+from autograder.exercises.patterns.rig import (
+    LEVEL_MARGIN,
+    NODE,
+    SETTLE,
+    STEP,
+    THREADS,
+    RobotRig,
+)
 from autograder.exercises.patterns.scenarios import NAMES, Scenario
 from autograder.exercises.patterns.stations import require_no_further
 from autograder.exercises.patterns.unaffected_during_drive import LEVEL_AGE, last_level
@@ -68,6 +75,24 @@ class ProgramRig(RobotRig):
         for _ in range(round(seconds / stride)):
             self.clock.move(stride)
             self._threads.reached()
+
+    def wait_stepping(
+        self,
+        condition: Callable[[], object],
+        seconds: float | None = None,
+        timeout: float | None = None,
+        step: float = STEP,
+    ) -> bool:
+        """Let the clock run until ``condition`` holds, as `RobotRig.wait_stepping` does.
+
+        Raises:
+            NotExaminable: the wall time for that was over before the ``seconds`` were.
+        """
+        began = self.elapsed
+        holds = super().wait_stepping(condition, seconds, timeout, step)
+        if not holds and seconds is not None and seconds - (self.elapsed - began) > step / 2:
+            raise NotExaminable(UNTOLD)
+        return holds
 
     def nudge(self) -> None:
         """Tell the node that hardly any time has passed."""
@@ -196,7 +221,9 @@ def _require_late(rig: ProgramRig) -> None:
     level = rig.draws.number("the last level in a program", 0.25, 0.1, 0.29)
     rig.report("charge", level)
     if not LateJoiner(rig, BatteryState, NAMES["battery"]).durable:
-        rig.step(MORE * LEVEL_AGE)  # until what this change set off is over
+        rig.step(
+            MORE * LEVEL_AGE, interface_patterns.COARSE
+        )  # until what this change set off is over
     late = LateJoiner(rig, BatteryState, NAMES["battery"])
     acquaint(rig)
 
@@ -215,6 +242,7 @@ def _require_late(rig: ProgramRig) -> None:
 
 def _require_position(rig: ProgramRig) -> None:
     pattern = "service" if "service" in rig.memory["offers"]["position"] else "topic"
+    rig.report("position", rig.draws.number("the first position in a program", 0.1, 0.1, 0.2))
     if pattern == "service" and not odometry.ask(rig)[1]:
         raise NotExaminable(UNTOLD)
     position = rig.draws.number("the position in a program", 0.4, 0.3, 0.6)

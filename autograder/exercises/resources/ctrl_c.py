@@ -42,8 +42,9 @@ class Lives:
     later; ``others`` tells of processes that were left then.
     ``pace`` tells of pictures that do not come ten times a second, ``harmed`` of what a second
     destroy_node() does, if that is not nothing. ``of_starts`` tells of what starts left that failed
-    beside one more life. ``managed`` is what was seen of a managed camera, and ``start_raises``
-    whether the program ended where its driver could not start; None if it did not go so far.
+    beside one more life. ``own_nodes`` are those that the notebook's cells have made. ``managed``
+    is what was seen of a managed camera, and ``start_raises`` whether the program ended where its
+    driver could not start; None if it did not go so far.
     """
 
     worked: bool = True
@@ -55,6 +56,7 @@ class Lives:
     pace: str = ""
     harmed: str = ""
     of_starts: str = ""
+    own_nodes: tuple[str, ...] = ()
     managed: ManagedLife | None = None
     start_raises: bool | None = None
 
@@ -217,10 +219,9 @@ def _watch_last_life(seen: ProgramObserver, lives: Lives, device: str, stuck: st
     """
     rig, before, nodes = seen.rig, seen.rig.process.usage(), len(seen.nodes())
     seen.program.interrupt()
-    last = _begin_life(seen, lives, device)
-    if not last.went_on:
-        return last
-    seen.wait(lambda: seen.node.of(device))
+    # Its pictures come when the starts are over, each of which may take its second.
+    if not seen.wait(lambda: seen.node.of(device), SETTLE_S + TRIED * ENDED):
+        return replace(lives, raised=True) if seen.gone() else lives
     lives = replace(lives, pace=seen.pace(device, 1 / PERIOD))
     last = _end_life(seen, lives, device)
     if last.raised:
@@ -231,7 +232,8 @@ def _watch_last_life(seen: ProgramObserver, lives: Lives, device: str, stuck: st
         lives = replace(lives, usages=())
     if not lives.clean:
         return lives
-    left = ["a camera open"] if last.left_open or rig.cameras(stuck) else []
+    open_ = last.left_open or not rig.ends(lambda: not rig.cameras(stuck), seen.session)
+    left = ["a camera open"] if open_ else []
     left += ["an endpoint on the graph"] if last.left_on_graph else []
     if not left and not seen.wait(lambda: len(seen.nodes()) <= nodes):
         left = ["a node on the graph"]
@@ -248,8 +250,10 @@ def _watch_last_life(seen: ProgramObserver, lives: Lives, device: str, stuck: st
 
 def _watch_others(seen: ProgramObserver, lives: Lives) -> Lives:
     """Watch a managed camera in the program of drivers that gave everything back."""
+    others = tuple({*seen.nodes().values()})
+    lives = replace(lives, own_nodes=others)
     seen.program.interrupt()
-    managed = watch_managed(seen)
+    managed = watch_managed(seen, others=others)
     if not managed.clean:
         return replace(lives, managed=managed)
     seen.program.interrupt()

@@ -96,15 +96,22 @@ def _alone(rig: CameraRig, node: str) -> ManagedLife | None:
 
 def _watch_alone(rig: CameraRig, programs: Programs, node: str) -> ManagedLife:
     """Watch some lives; what the program has more after each of them is left by it."""
+    lives = seen_lives(rig)
+    others = lives.own_nodes if lives is not None else ()
     with programs.program([(MANAGED, [])], twice=True) as program:
         seen, usages = ProgramObserver(rig, program), list[Usage]()
         for _ in range(LIVES):
-            life = watch_managed(seen, node)
+            again = watch_managed(seen, node, others)
+            if usages and again.failed is not None:
+                break  # rclpy 7.1 leaves an ended node's services: one of them may have been asked
+            life = again
             if not life.went_on or life.left or life.pace:
                 return life
             usages.append(rig.process.usage())
             program.interrupt()
     grown = [after.grown(before) for before, after in pairwise(usages)]
+    if not grown:
+        return life
     threads, files, _ = map(min, zip(*grown, strict=True))
     left = ["a thread"] if threads > 0 else []
     left += ["an open file"] if files > 0 else []

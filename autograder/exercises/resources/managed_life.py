@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from autograder.examination.exam import Failed
@@ -50,11 +51,13 @@ class ManagedLife:
         return self.went_on and not (self.left or self.new_threads > 0 or self.new_files > 0)
 
 
-def watch_managed(seen: ProgramObserver, node: str = "") -> ManagedLife:
+def watch_managed(
+    seen: ProgramObserver, node: str = "", others: Collection[str] = ()
+) -> ManagedLife:
     """Have a managed camera, which is being made, send pictures, and interrupt its program then.
 
     ``node`` is its full name where that is known; else, or if it is not there, the one lifecycle
-    node is taken for it.
+    node is taken for it. ``others`` are nodes of the notebook's own, which stay.
     """
     rig = seen.rig
     seen.wait(lambda: node in seen.lifecycle_nodes() or (not node and seen.lifecycle_nodes()))
@@ -78,8 +81,12 @@ def watch_managed(seen: ProgramObserver, node: str = "") -> ManagedLife:
         left.append("its open camera")
     if not seen.ends(lambda: not seen.node.count_publishers(IMAGE)):
         left.append(f"its publisher on {IMAGE}")
-    if not seen.ends(lambda: not seen.nodes()):
-        left += [f"the node {name}" for name in sorted({*seen.nodes().values()})]
+
+    def nodes_left() -> list[str]:
+        return sorted({*seen.nodes().values()}.difference(others))
+
+    if not seen.ends(lambda: not nodes_left()):
+        left += [f"the node {name}" for name in nodes_left()]
     if seen.gone():
         return ManagedLife(rate=rate, pace=pace, raised=True)
 

@@ -111,9 +111,9 @@ class Timing(NamedTuple):
     sure: bool
 
     def far_off(self, what: str) -> bool:
-        """Whether a time is known to be out of its bounds, or not known."""
+        """Whether a time is out of its bounds, or not known."""
         took = self.took.get(what, math.nan)
-        return not (self.sure and TIMES[what].least <= took <= TIMES[what].most)
+        return not TIMES[what].least <= took <= TIMES[what].most
 
 
 def require(name: str, what: str, bench: Bench, still: Stillness, timing: Timing) -> None:
@@ -157,6 +157,8 @@ def _once_more(name: str, bench: Bench, still: Stillness, stride: float) -> Timi
             return Timing({}, False)
         stage = Stage(program, still, parts, stride)
         stage.play()
+        if name not in stage.there:
+            return Timing({}, False)
         return Timing(stage.players[name].took, stage.rested)
 
 
