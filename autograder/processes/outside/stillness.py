@@ -34,8 +34,7 @@ interpreter's lock, which it holds, also sleeps, but wakes up to ask for it ever
 _ASLEEP = (b"S", b"I", b"t", b"Z", b"X")
 """States of proc(5). Those of a thread that is held (see `holding`), and of one that has ended and
 is still there for its parent, are none in which it could go on."""
-_NAP, _LONGEST_NAP = 0.0005, 0.004  # s between two looks: they take processor time, too
-_PATIENCE = 1 / 8  # of the time that a rest has taken by now, until it is looked at again
+_NAP = 0.0005  # s between two looks
 _CLIP = 0.005  # s that one look may count for
 
 Task = tuple[str, int]
@@ -70,8 +69,8 @@ class Stillness:
         than ``timeout`` s. One that has computed through one rest after another, for ENDLESS s in
         all, does not count until it is found asleep.
         """
-        began = time.monotonic()
-        deadline, unrest = began + timeout, _Unrest()
+        deadline = time.monotonic() + timeout
+        unrest = _Unrest()
         asleep = {task: self._runs(task) for task in self._endless}
         before, looked = self._look(), time.monotonic()
         since = looked  # when a thread was last seen to have run
@@ -87,7 +86,7 @@ class Stillness:
                 self._blame(unrest.worked, restless / 2)
                 return False
             if now.awake is not None or self._endless:
-                self._nap.wait(min(max(_NAP, _PATIENCE * (moment - began)), _LONGEST_NAP))
+                self._nap.wait(_NAP)
             before, looked = now, moment
 
     def all_asleep(self) -> bool:
