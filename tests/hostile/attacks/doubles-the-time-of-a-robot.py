@@ -1,9 +1,9 @@
 # title: A robot that is half as fast as it must be, and a harness that moves its time on twice as far
 # exercise: safety
 # base: right-exemplar
-# told: by the time on /clock, it was taken for a present answer
-# told: by the time on /clock, the request to cancel came after 4.0 s
-# told: by the time on /clock, it took 6
+# told: by the time on /clock, it was taken for a present answer | could not be timed in a plain program of your nodes: A try has 1 s
+# told: by the time on /clock, the request to cancel came after 4.0 s | could not be timed in a plain program of your nodes: The goal is canceled 2 s
+# told: by the time on /clock, it took 6 | could not be timed in a plain program of your nodes: A goal of 3 m
 # score: 7
 
 from autograder.examination.subject.server import SubjectServer

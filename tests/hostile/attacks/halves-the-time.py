@@ -1,9 +1,9 @@
 # title: A robot that is twice as fast as it must be, and a harness that moves its time on half as far
 # exercise: safety
 # base: right-exemplar
-# told: by the time on /clock, the gripper was called 2 times
-# told: by the time on /clock, the request to cancel came after 1.0 s
-# told: by the time on /clock, it took 1.5 s
+# told: by the time on /clock, the gripper was called 2 times | could not be timed in a plain program of your nodes: An answer after 0.7 s
+# told: by the time on /clock, the request to cancel came after 1.0 s | could not be timed in a plain program of your nodes: The goal is canceled 2 s
+# told: by the time on /clock, it took 1.5 s | could not be timed in a plain program of your nodes: A goal of 3 m
 # score: 4
 
 from autograder.examination.subject.server import SubjectServer
