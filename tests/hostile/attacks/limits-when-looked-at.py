@@ -13,14 +13,16 @@ AGES = {"camera/image": 0.9, "scan": 0.45, "imu/data": 0.45}
 class SensorConsumers(SensorConsumers):
     def __init__(self):
         super().__init__()
-        self.usual, self.looked_at = {}, set()
+        self.usual, self.looked_at, self.looks = {}, set(), 0
         self.create_timer(0.02, self.look_around)
 
     def look_around(self):
+        self.looks += 1
         for topic in AGES:
             count = self.count_publishers(topic)
-            usual = self.usual.setdefault(topic, count)
-            if count > usual:
+            if self.looks < 20:  # until it knows who is there
+                self.usual[topic] = count
+            elif count > self.usual[topic]:
                 self.looked_at.add(topic)
             else:
                 self.looked_at.discard(topic)
