@@ -22,7 +22,7 @@ from course.domains import MAX_DOMAIN
 
 UP_TIMEOUT_S = 30.0
 """Seconds until a program must have started, and until its cells have made its nodes."""
-ALL_UP_S = 90.0
+ALL_UP_S = 60.0
 """Seconds that the cells of all programs of an examination may take together: 5 as a rule."""
 MOST_NODES, MOST_ARGUMENTS, MAX_ARGUMENT, MOST_THREADS, MOST_LIVES = 8, 4, 200, 8, 8
 
