@@ -2,7 +2,7 @@
 # exercise: resources
 # base: right-no-thread
 # told: It took none.
-# score: 8
+# score: 2
 
 import sys
 import threading

@@ -1,8 +1,8 @@
 # title: Plain programs of safety that sleep before they make their nodes
 # exercise: safety
 # base: right-callbacks
-# told: it was not run once more
-# score: 3
+# told: it was not found out what
+# score: 1
 
 import sys
 import threading
