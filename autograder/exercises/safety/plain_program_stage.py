@@ -11,14 +11,11 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.time import Time
-from rosgraph_msgs.msg import Clock
 
 from autograder.examination.plain_programs import Program
 from autograder.exercises.safety.counterpart import Player
 from autograder.observe.patience import Patience
-from autograder.observe.quiet_node import QuietNode
+from autograder.observe.simulated_clock import SimulatedClock
 from autograder.observe.stillness import Stillness
 
 THREADS = 4
@@ -71,10 +68,7 @@ class Stage:
         """
         self._program, self._still, self._made = program, still, set[str]()
         self._fine, self.rested = fine, True
-        node = program.session.run(lambda: QuietNode("clock"))
-        assert isinstance(node, QuietNode)
-        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self._clock, self._now_ns = node.create_publisher(Clock, "/clock", qos), 0
+        self._clock = SimulatedClock(program.session)
         self.players: dict[str, Any] = {
             part.name: program.session.run(part.player) for part in parts
         }
@@ -131,13 +125,13 @@ class Stage:
             with suppress(Exception):  # as in `_acts`
                 yield from act(self.players[name], self._run)
 
-        self._due[name] = (self._now_ns / 1e9, acts())
+        self._due[name] = (self._clock.now, acts())
         self._play()
 
     def _play(self) -> None:
         self._rest()
         while self._due and not self._program.ended():
-            now = self._now_ns / 1e9
+            now = self._clock.now
             for name, (due, acts) in [*self._due.items()]:
                 if due <= now:
                     if (seconds := next(acts, None)) is None:
@@ -169,13 +163,10 @@ class Stage:
         self.rested = self.rested and (rested or not self._times)
 
     def _move(self) -> None:
-        # The second message gives executors something to do: what has come by then goes on.
-        strides_ns = (round((self._fine if self._times else STRIDE_S) * 1e9), 1)
+        seconds = self._fine if self._times else STRIDE_S
         for player in self.players.values():  # before: what comes in on the way bears its end
-            player.now = (self._now_ns + sum(strides_ns)) / 1e9
-        for more_ns in strides_ns:
-            self._now_ns += more_ns
-            self._clock.publish(Clock(clock=Time(nanoseconds=self._now_ns).to_msg()))
+            player.now = self._clock.now + seconds
+        self._clock.move(seconds)
         self._rest()
 
 
