@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -29,6 +30,10 @@ from rclpy.utilities import get_default_context
 from course.runtime.context.context import set_default_context
 
 SIMULATED = ["--ros-args", "-p", "use_sim_time:=true"]
+SWITCH_S = 0.0002
+"""Seconds after which a thread of Python's must let another one run. With the usual 5 ms rclpy's
+MultiThreadedExecutor computes as long for each callback: it gives a task to its pool again and
+again until a thread of the pool has begun it (https://github.com/ros2/rclpy/issues/1452)."""
 
 
 def run(
@@ -49,6 +54,7 @@ def run(
         up: called once, when the first nodes are there.
     """
     interrupts = _Interrupts()
+    sys.setswitchinterval(SWITCH_S)
     if get_default_context().ok():  # a cell has opened it, for nodes of its own
         set_default_context(Context())
     rclpy.init(

@@ -108,11 +108,20 @@ def cancel_within(drive: Drive, seconds: float, looking: float = LOOKING) -> boo
     Raises:
         Failed: the request was refused, or got no answer.
     """
-    answer = drive.rig.ask("to cancel", lambda: drive.run.cancel(SETTLE))
+    rig = drive.rig
+
+    def stopped() -> bool:
+        return rig.speed == 0
+
+    answer, began = rig.ask("to cancel", lambda: drive.run.cancel(SETTLE)), rig.elapsed
     if answer.done():
         _require_agreed(drive, answer)
-    in_time = _stops_within(drive, seconds, looking)
-    drive.rig.wait_stepping(answer.done)
+    else:
+        rig.await_answer(answer, "to cancel", seconds)
+    # Who looks by the clock on the wall gets the time to do so before the node's moves on.
+    rig.wait(stopped, looking)
+    in_time = rig.wait_stepping(stopped, seconds - (rig.elapsed - began), STOPPING)
+    rig.await_answer(answer, "to cancel")
     _require_agreed(drive, answer)
     return in_time
 
@@ -130,16 +139,3 @@ def _require_agreed(drive: Drive, answer: Future[bool]) -> None:
             expected="A request to cancel a drive is accepted.",
             actual=f"It was refused, {drive.where}{drive.rig.because()}.",
         )
-
-
-def _stops_within(drive: Drive, seconds: float, looking: float) -> bool:
-    """Return whether the robot is told to stop in so many seconds of the node's clock.
-
-    Who looks by the clock on the wall gets the time to do so before that one moves on.
-    """
-
-    def stopped() -> bool:
-        return drive.rig.speed == 0
-
-    drive.rig.wait(stopped, looking)
-    return drive.rig.wait_stepping(stopped, seconds, STOPPING)

@@ -86,7 +86,7 @@ class RobotRig:
         self._steps = [(0, 0.0)]
         self._beside = ThreadPoolExecutor(thread_name_prefix="asking")
         self._clients: dict[str, Any] = {}
-        self._by_the_clock: set[str] = set()
+        self._by_the_clock: set[str] = self.memory.setdefault("answers by the clock", set())
         self._told: set[str] = set()
         self._deaf_to: set[str] = set()
 
@@ -220,9 +220,13 @@ class RobotRig:
     def answer(self, name: str, function: Callable[[], T]) -> T:
         """Return what a function that waits for an answer returns, or raise what it raises."""
         answer = self.ask(name, function)
-        if not answer.done() and self.wait_stepping(answer.done):
-            self._by_the_clock.add(name)
+        self.await_answer(answer, name)
         return answer.result()
+
+    def await_answer(self, answer: Future[T], name: str, seconds: float | None = None) -> None:
+        """Let the student's clock run until an answer is there, for so long (s) at most."""
+        if not answer.done() and self.wait_stepping(answer.done, seconds):
+            self._by_the_clock.add(name)
 
     def close(self) -> None:
         """Take the examiner's endpoints down."""

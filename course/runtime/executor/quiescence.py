@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -10,10 +11,12 @@ from collections.abc import Iterator, Sequence
 from course.runtime.executor.background import BackgroundExecutor
 
 _NAP = 0.0005  # s between looks at callbacks that run in other threads
-_ENDLESS = (2.5, 10)
+_ENDLESS = ((1.0, 100), (2.5, 10))
 """Seconds, and callbacks that have ended in them, after which more will follow for ever: somebody
 polls in many short callbacks, as a coroutine does that sleeps a little between two awaits."""
-_TURN = ((0.03, 8), (0.1, 2), (0.5, 1))
+_AGAIN = ((0.5, 10),)
+"""The same, where they have been found to do so before: whoever polls once will do so again."""
+_TURN = ((0.03, 8), (0.05, 2), (0.5, 1))
 """The same, where callbacks have been found to follow each other without end a moment ago: then
 each of them has had its turn, and so has everything else."""
 _MOMENT = 5.0  # s
@@ -79,7 +82,11 @@ class _Chain:
         self._executors = executors
         self._began = time.monotonic()
         self._ended_before = self._ended()
-        self._signs = _TURN if follow_each_other(executors) else (_ENDLESS,)
+        self._signs = _TURN if follow_each_other(executors) else self._first_signs()
+
+    def _first_signs(self) -> tuple[tuple[float, int], ...]:
+        before = any(executor.endless > -math.inf for executor in self._executors)
+        return _AGAIN if before else _ENDLESS
 
     def _ended(self) -> int:
         return sum(executor.finished for executor in self._executors)
