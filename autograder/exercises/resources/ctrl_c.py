@@ -266,9 +266,13 @@ def _usage(seen: ProgramObserver, before: Sequence[Usage]) -> Usage:
     Where a life has left something once, each may: that is waited for at the end of them.
     """
     rig = seen.rig
+
+    def gone() -> bool:
+        # Memory alone is not waited for: a thread that ends gives it back, or nobody.
+        return not _leaks(rig.process.usage().grown(before[-1])._replace(memory=0))
+
     if len(before) == 1 or (before and not _leaks(before[-1].grown(before[-2]))):
-        last = before[-1]
-        rig.ends(lambda: not _leaks(rig.process.usage().grown(last)), seen.session)
+        rig.ends(gone, seen.session)
     return rig.process.usage()
 
 

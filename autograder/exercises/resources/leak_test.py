@@ -15,7 +15,7 @@ from autograder.exercises.resources.rig import ENDED, PERIOD, STEP, CameraRig
 from autograder.observe.patience import SETTLE_S
 from course.runtime.waiting import Deadline
 
-WARM_UP, FEWEST, LIVES = 2, 6, 50
+WARM_UP, FEWEST, LIVES = 1, 6, 50
 """Lives: at first, and then at least (a camera may need a second to get warm), and at most."""
 TIME = 2.0
 """Seconds of wall time for all lives after the warm-up, if more than the fewest are to be made."""
