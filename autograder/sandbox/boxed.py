@@ -69,7 +69,8 @@ class Warden:
         end(self._process)
         for stream in (self._process.stdin, self._process.stdout, self._process.stderr):
             if stream is not None:
-                stream.close()
+                with suppress(BrokenPipeError):  # it was told something, and had gone
+                    stream.close()
 
 
 class BoxedSubject:

@@ -27,6 +27,7 @@ from autograder.running.outcome_store import OutcomeStore
 from autograder.running.start import ExaminerError, ExaminerProcess
 from autograder.sandbox import BoxError, SandboxError, network, probe, seccomp, usage, warmth
 from autograder.sandbox.box import Box
+from autograder.sandbox.boxed import Warden
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.usage import Process
 from autograder.sandbox.watch import Watch
@@ -462,3 +463,15 @@ def test_what_a_killed_tool_leaves_is_not_waited_for_either() -> None:
         os.close(info_end)  # so that it has said nothing
         with pytest.raises(BoxError, match="odd"):
             network.child(info, tool)
+
+
+def test_a_warden_that_is_gone_is_let_go_when_it_is_told_something() -> None:
+    with subprocess.Popen(
+        ["true"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        process.wait()
+        with Warden(process) as warden:
+            warden.tell(1, 1, [])
+        for stream in (process.stdin, process.stdout, process.stderr):
+            assert stream is not None
+            assert stream.closed
