@@ -266,6 +266,7 @@ def _usage(seen: ProgramObserver, before: Sequence[Usage]) -> Usage:
     Where a life has left something once, each may: that is waited for at the end of them.
     """
     rig = seen.rig
+    rig.rest()  # its node may be off the graph, and its last threads and files go just now
 
     def gone() -> bool:
         # Memory alone is not waited for: a thread that ends gives it back, or nobody.
