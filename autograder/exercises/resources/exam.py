@@ -326,7 +326,6 @@ def managed_runs(rig: CameraRig) -> None:
         require_own_clock(rig, device)
         require_rate(rig, device, 10)
         node.go("deactivate", "cleanup")
-    require_managed_pace(rig, name)
 
 
 @EXAM.check(
@@ -400,6 +399,7 @@ def managed_gives_back(rig: CameraRig) -> None:
             require_configuration(rig, node, rate, seconds=1 if rate == FASTEST else 6)
         require_flat_rounds(rig, node)
         require_no_thread_inactive(rig, node)
+    require_managed_pace(rig, name)
 
 
 @EXAM.check(

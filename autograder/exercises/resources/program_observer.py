@@ -19,7 +19,7 @@ COUNTED = 6
 """Pictures whose rate is taken."""
 SLOWEST, FASTEST = 0.6, 1.6
 """Times a rate that are taken for it: a busy machine is no fault of a node's."""
-TAKES = 3
+TAKES = 6
 """Of a rate, as pictures that have been held up come many at a time."""
 CHANGE_STATE = "/change_state"
 """What is added to the name of a lifecycle node for that of a service which each has."""
