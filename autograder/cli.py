@@ -216,7 +216,7 @@ def corpus(
 ) -> None:
     """Grade the graders: run every case of known verdict, and compare."""
     from autograder.corpus import command, tables
-    from course.content import ContentError
+    from course.workspace.content import ContentError
 
     with suppress(ContentError):  # outside of a course root, there are those of the package
         _root(root)
@@ -340,7 +340,7 @@ def feedback(
     the name of theirs.
     """
     from autograder.class_report.platforms import feedback_archive
-    from course.plain import counted
+    from course.messages.yaml_text import counted
 
     if platform not in ("moodle", "canvas"):
         raise typer.BadParameter("moodle or canvas", param_hint="--platform")
@@ -416,7 +416,7 @@ def _print_json(data: Any) -> None:
 
 def _root(root: Path | None) -> Path:
     from autograder import exercise_folders
-    from course.content import working_root
+    from course.workspace.content import working_root
 
     found = working_root() if root is None else root.resolve()
     exercise_folders.use(found)

@@ -23,8 +23,8 @@ from autograder.gradebook.release import release
 from autograder.grading import engine
 from autograder.grading.engine import Graded
 from autograder.grading.progress import Collecting, Progress
-from course.content import content_root
 from course.errors import CourseError
+from course.workspace.content import content_root
 
 ASSIGNMENT = "ch05"
 

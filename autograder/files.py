@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
 
-from course.files import PARTIAL, replacing
+from course.util.files import PARTIAL, replacing
 
 SCRATCH = "ros2-course-scratch-"
 PRIVATE = 0o600

@@ -6,7 +6,7 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
-from course import platform_check
+from course.util import platform_check
 
 # Message modules read this when they load: a wrong field type then fails where it is assigned.
 os.environ.setdefault("ROS_PYTHON_CHECK_FIELDS", "1")
@@ -18,20 +18,20 @@ if platform_check.problem() is None:
     interfaces.install()
 
 if TYPE_CHECKING:
-    from course.ambient import call as call
-    from course.ambient import close as close
-    from course.ambient import logs as logs
-    from course.ambient import next_message as next_message
-    from course.ambient import pause as pause
-    from course.ambient import record as record
-    from course.ambient import resume as resume
-    from course.ambient import run as run
-    from course.ambient import send_goal as send_goal
-    from course.ambient import session as session
-    from course.ambient import spin as spin
-    from course.ambient import stop as stop
-    from course.ambient import until as until
-    from course.ambient import wait_for_service as wait_for_service
+    from course.default_session import call as call
+    from course.default_session import close as close
+    from course.default_session import logs as logs
+    from course.default_session import next_message as next_message
+    from course.default_session import pause as pause
+    from course.default_session import record as record
+    from course.default_session import resume as resume
+    from course.default_session import run as run
+    from course.default_session import send_goal as send_goal
+    from course.default_session import session as session
+    from course.default_session import spin as spin
+    from course.default_session import stop as stop
+    from course.default_session import until as until
+    from course.default_session import wait_for_service as wait_for_service
     from course.design.declaration import Design as Design
     from course.design.endpoints import DesignError as DesignError
     from course.errors import CourseError as CourseError
@@ -53,20 +53,20 @@ if TYPE_CHECKING:
     from course.runtime.simulated_time import SimulatedTime as SimulatedTime
 
 _HOMES = {
-    "call": "course.ambient",
-    "close": "course.ambient",
-    "logs": "course.ambient",
-    "next_message": "course.ambient",
-    "pause": "course.ambient",
-    "record": "course.ambient",
-    "resume": "course.ambient",
-    "run": "course.ambient",
-    "send_goal": "course.ambient",
-    "session": "course.ambient",
-    "spin": "course.ambient",
-    "stop": "course.ambient",
-    "until": "course.ambient",
-    "wait_for_service": "course.ambient",
+    "call": "course.default_session",
+    "close": "course.default_session",
+    "logs": "course.default_session",
+    "next_message": "course.default_session",
+    "pause": "course.default_session",
+    "record": "course.default_session",
+    "resume": "course.default_session",
+    "run": "course.default_session",
+    "send_goal": "course.default_session",
+    "session": "course.default_session",
+    "spin": "course.default_session",
+    "stop": "course.default_session",
+    "until": "course.default_session",
+    "wait_for_service": "course.default_session",
     "Design": "course.design.declaration",
     "DesignError": "course.design.endpoints",
     "CourseError": "course.errors",

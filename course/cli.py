@@ -44,7 +44,7 @@ def lab(
 
     Your files are never overwritten: a newer version from the course is put beside yours.
     """
-    from course import lab as course_lab
+    from course.workspace import lab as course_lab
 
     rest = list(arguments or [])
     # JupyterLab's own options take values, so only the first word can be the folder.
@@ -68,8 +68,8 @@ def progress(
     ] = None,
 ) -> None:
     """Say what is done and what is left in your working copy."""
-    from course import lab as course_lab
     from course.journal.progress import progress as read
+    from course.workspace import lab as course_lab
 
     inside = course_lab.DEFAULT if course_lab.DEFAULT.is_dir() else None
     _print(repr(read(folder.expanduser() if folder else inside)))

@@ -12,7 +12,7 @@ import os
 import signal
 import sys
 
-from course.platform_check import (
+from course.util.platform_check import (
     WHEELS_ANEW,
     WHEELS_TORN,
     UnsupportedPlatformError,

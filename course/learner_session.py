@@ -9,11 +9,11 @@ from rclpy.action.graph import get_action_names_and_types
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-from course import arguments
 from course.errors import SessionError
+from course.messages.types import load_type
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.graph_queries import full_action, full_node, full_service
-from course.types import load_type
+from course.util import arguments
 
 if TYPE_CHECKING:
     from course.diagnosis import Diagnosis

@@ -10,7 +10,7 @@ from rclpy.exceptions import NotInitializedException
 
 from course.interfaces import magic
 from course.journal.notes import CellNotes
-from course.ros import magic as ros_magic
+from course.ros_magic import magic as ros_magic
 from course.runtime.callbacks.errors import CallbackError
 from course.runtime.context import closing
 from course.runtime.core_session import CoreSession

@@ -11,7 +11,7 @@ import pytest
 
 from autograder.sandbox import abilities
 from course.interfaces.toolchain import compiler_problem
-from course.qoslab import link
+from course.qos_lab import link
 from tests import people
 
 

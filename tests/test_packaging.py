@@ -18,9 +18,9 @@ import typer
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from course import content
 from course.errors import CourseError
-from course.platform_check import UnsupportedPlatformError, problem, require_supported_platform
+from course.util.platform_check import UnsupportedPlatformError, problem, require_supported_platform
+from course.workspace import content
 from tests.modules import modules_of
 
 ROOT = Path(__file__).parents[1]

@@ -20,7 +20,7 @@ from autograder import exercise_folders
 from autograder.assignments import cells, listing
 from autograder.assignments.cells import BuildError
 from autograder.assignments.submission import grade_id
-from course.files import replacing
+from course.util.files import replacing
 
 SOLUTIONS_TAG = "solutions"
 """Tag of the chapters' cells that only an instructor's build keeps."""

@@ -16,7 +16,7 @@ from autograder.class_report.class_report import ClassReport
 from autograder.class_report.figures import FEW, CheckFigures
 from autograder.class_report.means import Mean
 from autograder.class_report.similarity import MOST_PAIRS, Pair, side_by_side
-from course.plain import counted
+from course.messages.yaml_text import counted
 
 CHECK_COLUMNS = (
     "check", "points", "passed", "failed", "not checked", "not handed in", "grader error", "n",

@@ -24,7 +24,7 @@ from autograder.class_report.own_text import GivenText
 from autograder.class_report.platforms import exports
 from autograder.class_report.platforms.exports import Export
 from autograder.gradebook.course_gradebook import CourseGradebook
-from course.plain import counted
+from course.messages.yaml_text import counted
 
 PAGE, CANVAS, MOODLE = "class-report.html", "canvas.csv", "moodle.csv"
 

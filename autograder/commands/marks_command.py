@@ -92,7 +92,7 @@ def enter(
     """
     from autograder.gradebook.course_gradebook import CourseGradebook
     from autograder.marking import answers
-    from course.plain import counted
+    from course.messages.yaml_text import counted
 
     entered = answers.enter(CourseGradebook(_root(root)), file)
     if as_json:
@@ -120,7 +120,7 @@ def _print_json(data: Any) -> None:
 
 def _root(root: Path | None) -> Path:
     from autograder import exercise_folders
-    from course.content import working_root
+    from course.workspace.content import working_root
 
     found = working_root() if root is None else root.resolve()
     exercise_folders.use(found)

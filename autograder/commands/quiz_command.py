@@ -122,7 +122,7 @@ def schema(
 def _banks(root: Path | None) -> Path | None:
     """Return the folder of the course's own banks; None if there is no course here."""
     from autograder.assignments.quiz_cells import BANKS
-    from course.content import ContentError, working_root
+    from course.workspace.content import ContentError, working_root
 
     try:
         return (working_root() if root is None else root.resolve()) / BANKS

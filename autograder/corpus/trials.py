@@ -24,7 +24,7 @@ from autograder.examination.draws import USUAL_SEED
 from autograder.gradebook.release import release
 from autograder.running import runner
 from autograder.running.runner import Outcome
-from course.content import content_root, copy_authoring
+from course.workspace.content import content_root, copy_authoring
 
 ASSIGNMENT = "corpus"
 """The assignment that the notebook of an exam by itself is released as."""

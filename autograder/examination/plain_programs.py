@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, TextIO
 
 from autograder.processes.outside.asking import Outside
 from autograder.processes.outside.requests import RequestError
-from course.domains import MAX_DOMAIN
+from course.domains.leases import MAX_DOMAIN
 from course.errors import CourseError, WaitTimeout
 from course.runtime.core_session import CoreSession
 

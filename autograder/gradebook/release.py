@@ -17,7 +17,7 @@ from autograder.assignments import cells
 from autograder.assignments.submission import grade_id, metadata
 from autograder.files import NOT_COUNTED
 from course.errors import CourseError
-from course.files import PARTIAL
+from course.util.files import PARTIAL
 
 _OLD_S = 600.0
 """Seconds after which a folder that a release was made in belongs to nobody."""

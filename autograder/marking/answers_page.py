@@ -13,7 +13,7 @@ from html import escape
 from pathlib import Path
 
 from autograder.marking.answers import COLUMNS, Answer, Answers
-from course.plain import counted
+from course.messages.yaml_text import counted
 from quizzes import rendering
 
 _STYLE = """

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from autograder.examination.subject.own_interfaces import DEFINITIONS
-from course import types
 from course.design import dye
 from course.errors import CourseError
 from course.interfaces import define
+from course.messages import types
 
 
 class UnknownTypeError(Exception):

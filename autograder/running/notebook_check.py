@@ -19,7 +19,7 @@ from autograder.examination.verdict import Verdict
 from autograder.examination.verdict_text import Report
 from autograder.processes.channel import Channel
 from autograder.running.start import ExaminerProcess
-from course.domains import lease_domain
+from course.domains.leases import lease_domain
 from course.errors import CourseError
 from course.journal.store import JournalError, journal_here
 from course.runtime.core_session import CoreSession

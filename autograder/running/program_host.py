@@ -18,7 +18,7 @@ from typing import Any, Self
 from autograder.processes.channel import Channel, ChannelClosed, ChannelTimeout
 from autograder.sandbox import BoxError, RunningSubject, subject_command
 from autograder.sandbox.prefork import ZygoteError
-from course.domains import MAX_DOMAIN
+from course.domains.leases import MAX_DOMAIN
 
 UP_TIMEOUT_S = 30.0
 """Seconds until a program must have started, and until its cells have made its nodes."""

@@ -26,7 +26,7 @@ from autograder.sandbox.boxed import BoxedSubject, Warden, WarmSubject, end
 from autograder.sandbox.host import tethered, write_files
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.place import Process
-from course.domains import MAX_DOMAIN
+from course.domains.leases import MAX_DOMAIN
 
 USER = 1000
 """The subject's user id as it sees it, where it has a user namespace."""

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from autograder.sandbox.limits import Limits
-from course import cgroups
+from course.util import cgroups
 
 _dividing = threading.Lock()
 _divided: dict[int, Path | None] = {}  # by the process that has done it

@@ -16,7 +16,7 @@ from autograder.files import scratch_folder
 from autograder.processes.fair_deadline import RunDelay, of_process
 from autograder.sandbox.environment import INLINE
 from autograder.sandbox.place import END_TIMEOUT, Process
-from course.domains import lease_domain
+from course.domains.leases import lease_domain
 
 
 class Host:

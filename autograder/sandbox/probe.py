@@ -22,8 +22,8 @@ from autograder.sandbox.host import Host
 from autograder.sandbox.network import TOOL_TIMEOUT, BoxError
 from autograder.sandbox.place import Place, subject_command
 from autograder.sandbox.prefork import ZygoteError
-from course import tools
 from course.errors import CourseError
+from course.util import executables
 
 TOOLS = {
     "bwrap": "bubblewrap", "ip": "iproute2", "prlimit": "util-linux",
@@ -130,7 +130,7 @@ def require() -> None:
 def _try() -> bool:
     """Run this Python in a sandbox; return whether its network can lose packets."""
     with Box() as box:
-        tool = tools.find("nft")
+        tool = executables.find("nft")
         nft = f"{shlex.quote(tool)} add table inet probe" if tool else "false"
         with (
             _in_the_network(box, f"{nft} && echo yes; read -r _") as said,

@@ -198,8 +198,8 @@ class Design:
             DesignError: see `node_factories`.
         """
         factories = self.node_factories()
-        # By name: who says which session is meant needs none of what `course.ambient` brings.
-        host = session or importlib.import_module("course.ambient").session()
+        # By name: who says which session is meant needs none of what the default one brings.
+        host = session or importlib.import_module("course.default_session").session()
         if earlier := _running.pop(host, []):
             host.stop(*earlier)
         nodes = _running.setdefault(host, [])

@@ -11,9 +11,9 @@ from rclpy.expand_topic_name import expand_topic_name
 from rclpy.qos import QoSProfile, qos_profile_services_default
 from rclpy.validate_full_topic_name import validate_full_topic_name
 
-from course import types
 from course.errors import CourseError
-from course.types import type_name
+from course.messages import types
+from course.messages.types import type_name
 
 
 class DesignError(CourseError):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 
-from course import neighbours
 from course.diagnosis.graph import lonely
 from course.doctor.finding import Finding, problem, warning
+from course.domains import neighbours
 from course.graph import reader
 from course.runtime.context import closing
 from course.runtime.core_session import CoreSession

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from course.doctor.finding import Finding, ok, problem, warning
-from course.domains import MAX_DOMAIN, MIN_DOMAIN
+from course.domains.leases import MAX_DOMAIN, MIN_DOMAIN
 
 RMW = "rmw_fastrtps_cpp"
 """The one middleware that there are wheels of."""

@@ -10,8 +10,8 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from course import cgroups
 from course.doctor.finding import Finding, ok, problem, warning
+from course.util import cgroups
 
 MIN_DISK, LOW_DISK = 50, 500  # MB: below, a build fails; below, a class's submissions may
 LOW_SHM = 32  # MB. A participant takes about 1 MB, and Docker gives 64 by default.

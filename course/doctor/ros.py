@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 
 from course.doctor.finding import Finding, ok, problem, warning
-from course.domains import MAX_DOMAIN, MIN_DOMAIN, domains_in_use, lease_domain
+from course.domains.leases import MAX_DOMAIN, MIN_DOMAIN, domains_in_use, lease_domain
 from course.errors import DomainError
-from course.platform_check import WHEELS_ANEW, WHEELS_TORN
+from course.util.platform_check import WHEELS_ANEW, WHEELS_TORN
 
 DEADLINE = 40.0  # s for a probe, its imports included; it takes about 1 on an idle machine
 FEW_DOMAINS = 10

@@ -12,7 +12,7 @@ from pathlib import Path
 from packaging.requirements import Requirement
 
 from course.doctor.finding import Finding, ok, problem, warning
-from course.platform_check import problem as platform_problem
+from course.util.platform_check import problem as platform_problem
 
 DISTRIBUTION = "ros2-course"
 _SHOWN = ("ros-jazzy-rclpy", "jupyterlab", "nbgrader", "ipykernel")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from course.graph.model import Endpoint, Exchange, Graph, Mismatch, Topic
-from course.plain import counted
+from course.messages.yaml_text import counted
 
 
 def describe(graph: Graph) -> str:

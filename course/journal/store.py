@@ -17,11 +17,11 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from course.errors import CourseError
-from course.files import write_text
+from course.util.files import write_text
 
 FILE = "progress.json"
 MANIFEST = ".ros2-course.json"
-"""File by which a working copy is known; `course.lab` writes it."""
+"""File by which a working copy is known; `course.workspace.lab` writes it."""
 
 VERSION = 1
 MAX_FILE = 4 * 1024 * 1024

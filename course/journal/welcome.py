@@ -6,10 +6,10 @@ import json
 from pathlib import Path
 from typing import Any
 
-from course.files import write_text
 from course.journal import page
 from course.journal.progress import WELCOME, Progress, progress_of
 from course.journal.store import Journal
+from course.util.files import write_text
 
 TAG = "progress"
 """Tag of the cell whose output is the student's progress."""

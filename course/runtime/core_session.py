@@ -14,8 +14,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from course import arguments, neighbours
-from course.domains import check_domain_id, lease_domain
+from course.domains import neighbours
+from course.domains.leases import check_domain_id, lease_domain
 from course.errors import SessionError
 from course.runtime.callbacks.jobs import current_job
 from course.runtime.context import closing, signals
@@ -26,6 +26,7 @@ from course.runtime.nodes.half_made import Remains
 from course.runtime.requests.requests import Asking
 from course.runtime.simulated_time import SimulatedTime
 from course.runtime.waiting import Pulse
+from course.util import arguments
 
 
 class CoreSession(Asking):

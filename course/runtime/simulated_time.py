@@ -18,7 +18,6 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
-from course import arguments
 from course.errors import SessionError, WaitTimeout
 from course.runtime.callbacks.jobs import current_job
 from course.runtime.executor.pool import Crew
@@ -27,6 +26,7 @@ from course.runtime.names import node_name
 from course.runtime.nodes.registry import Residents
 from course.runtime.rclpy_fixes.clock_sleep import sleeps_until
 from course.runtime.requests.hidden_node import Probe
+from course.util import arguments
 
 _NS = 1_000_000_000
 _LONGEST_STRIDE = 1000  # steps

@@ -8,7 +8,7 @@ from typing import Any
 from course.graph import layout, reader, words
 from course.graph.mermaid import mermaid
 from course.graph.model import Graph
-from course.plain import counted
+from course.messages.yaml_text import counted
 from course.runtime.core_session import CoreSession
 from course.views.live import Frame, LiveView
 

@@ -6,10 +6,10 @@ import threading
 from dataclasses import asdict
 from typing import Any
 
-from course import arguments
 from course.errors import CourseError
-from course.plain import for_json, one_line
+from course.messages.yaml_text import for_json, one_line
 from course.runtime.core_session import CoreSession
+from course.util import arguments
 from course.views import brief
 from course.views.live import Frame, LiveView
 from course.watch.parameter_values import ParameterError

@@ -10,10 +10,10 @@ from typing import Any
 from rclpy.qos import QoSProfile
 
 from course.errors import CourseError
-from course.qoslab import lab, link, rules
-from course.qoslab.experiment import COUNT, SCENARIOS, Experiment, Outcome
-from course.qoslab.lab import LabError
-from course.qoslab.profile import CHOICES, NUMBERS, Profile
+from course.qos_lab import lab, link, rules
+from course.qos_lab.experiment import COUNT, SCENARIOS, Experiment, Outcome
+from course.qos_lab.lab import LabError
+from course.qos_lab.profile import CHOICES, NUMBERS, Profile
 from course.runtime.core_session import CoreSession
 from course.views.live import Frame, LiveView
 

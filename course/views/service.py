@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from course.errors import CourseError
-from course.plain import counted, for_json, one_line
+from course.messages.yaml_text import counted, for_json, one_line
 from course.runtime.core_session import CoreSession
 from course.views import brief
 from course.views.live import Frame, LiveView

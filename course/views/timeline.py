@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from course import arguments, mcap_file
 from course.errors import SessionError
-from course.mcap_file import RecordingError
-from course.plain import counted
+from course.messages import mcap_file
+from course.messages.mcap_file import RecordingError
+from course.messages.yaml_text import counted
 from course.runtime.core_session import CoreSession
+from course.util import arguments
 from course.views.live import Frame, LiveView
 from course.watch import timeline
 from course.watch.callbacks import CallbackTap, Run

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from course import values
 from course.errors import CourseError
+from course.messages import values
 from course.runtime.core_session import CoreSession
 from course.watch import forms
 

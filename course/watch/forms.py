@@ -8,8 +8,8 @@ from typing import Any
 
 from rosidl_parser.definition import AbstractString, AbstractWString, BasicType, NamespacedType
 
-from course import plain, values
-from course.types import type_name
+from course.messages import values, yaml_text
+from course.messages.types import type_name
 
 MAX_FIELDS = 60
 """Inputs that a form has at most; what a larger type nests deeper is typed as YAML."""
@@ -77,8 +77,8 @@ def _field(slot: Any, value: Any, path: str) -> Field:
     if isinstance(slot, BasicType):
         if slot.typename == "boolean":
             return Field(path, takes, "checkbox", "true" if value else "false")
-        return Field(path, takes, "number", plain.one_line(values.to_plain(value)))
-    return Field(path, takes, "yaml", plain.one_line(values.to_plain(value, None)))
+        return Field(path, takes, "number", yaml_text.one_line(values.to_plain(value)))
+    return Field(path, takes, "yaml", yaml_text.one_line(values.to_plain(value, None)))
 
 
 def _parsed(field: Field, typed: Any) -> Any:
@@ -88,9 +88,9 @@ def _parsed(field: Field, typed: Any) -> Any:
     if field.kind == "text":
         return typed
     try:
-        read = plain.read(typed)
+        read = yaml_text.read(typed)
     except ValueError:
         read = None
     if read is None:
-        raise values.MisfitError(f"{field.path} takes {field.takes}, not {plain.shown(typed)}.")
+        raise values.MisfitError(f"{field.path} takes {field.takes}, not {yaml_text.shown(typed)}.")
     return read

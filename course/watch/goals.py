@@ -15,8 +15,8 @@ from action_msgs.srv import CancelGoal
 from rclpy.qos import QoSProfile, qos_profile_action_status_default
 from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
-from course import values
 from course.errors import CourseError
+from course.messages import values
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.actions import GoalState
 from course.watch import forms, progress

@@ -6,8 +6,8 @@ from typing import Any
 
 from rcl_interfaces.msg import ParameterType, ParameterValue
 
-from course import plain, values
 from course.errors import CourseError
+from course.messages import values, yaml_text
 
 TYPES = {
     ParameterType.PARAMETER_BOOL: ("bool_value", "true or false"),
@@ -69,15 +69,15 @@ def to_value(name: str, typed: Any, declared: int) -> ParameterValue:
     except values.MisfitError as error:
         if declared == ParameterType.PARAMETER_INTEGER and type(data) is int:
             raise ParameterError(str(error)) from None  # the range
-        raise ParameterError(f"{name} takes {takes}, not {plain.shown(typed)}.") from None
+        raise ParameterError(f"{name} takes {takes}, not {yaml_text.shown(typed)}.") from None
     except ValueError:
-        raise ParameterError(f"{name} takes {takes}, not {plain.shown(typed)}.") from None
+        raise ParameterError(f"{name} takes {takes}, not {yaml_text.shown(typed)}.") from None
     return ParameterValue(type=type_, **{field: held})
 
 
 def _data(typed: Any, declared: int) -> Any:
     if isinstance(typed, str) and declared != ParameterType.PARAMETER_STRING:
-        return plain.read(typed)
+        return yaml_text.read(typed)
     return typed.tolist() if hasattr(typed, "tolist") else typed  # numpy's
 
 

@@ -15,7 +15,7 @@ from rcl_interfaces.srv import (
     SetParameters,
 )
 
-from course import plain
+from course.messages import yaml_text
 from course.runtime.core_session import CoreSession
 from course.watch.parameter_values import ParameterError, RefusedError, to_plain, to_value
 
@@ -99,7 +99,7 @@ class ParameterSheet:
         request = SetParameters.Request(parameters=[Parameter(name=name, value=value)])
         (result,) = self._call(SetParameters, request, timeout).results
         if not result.successful:
-            shown = plain.one_line(to_plain(value))
+            shown = yaml_text.one_line(to_plain(value))
             reason = " ".join(result.reason.split()) or "it gave no reason"
             raise RefusedError(f"{self.node} refused {name} = {shown}: {reason}")
 
@@ -159,7 +159,7 @@ def _entry(name: str, value: Any, descriptor: Any) -> Entry:
 def _drawable(limits: Any) -> bool:
     """Return whether a slider can have these ends: not infinity, nor what a browser rounds."""
     ends = (limits.from_value, limits.to_value)
-    return all(math.isfinite(end) and plain.for_json(end) == end for end in ends)
+    return all(math.isfinite(end) and yaml_text.for_json(end) == end for end in ends)
 
 
 _LIKE = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from course import values
+from course.messages import values
 
 TELLING = ("percent", "progress", "fraction", "remaining", "distance")
 """Parts of names that tell of progress, the most telling first."""

@@ -11,8 +11,8 @@ import pytest
 from autograder.assignments import quiz_cells
 from autograder.assignments.build import BuildError, build, build_assignment, build_chapter, to_text
 from autograder.examination import points
-from course.content import content_root
 from course.errors import CourseError
+from course.workspace.content import content_root
 
 HEADER = """\
 # ---

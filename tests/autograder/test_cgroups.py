@@ -9,7 +9,7 @@ import pytest
 
 from autograder.sandbox import cgroups
 from autograder.sandbox.limits import Limits
-from course.cgroups import delegated
+from course.util.cgroups import delegated
 
 OWN = "user.slice/grading.scope"
 

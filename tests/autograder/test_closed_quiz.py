@@ -22,8 +22,8 @@ from autograder.commands.quiz_command import QuizCommandError
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.release import ReleaseError, release
 from autograder.grading import engine
-from course.content import content_root, copy_authoring
-from course.lab import make_copy
+from course.workspace.content import content_root, copy_authoring
+from course.workspace.lab import make_copy
 from quizzes import closing, loader, model, schema
 from tests.machine import needs_isolation
 from tests.quizzes import sample

@@ -29,9 +29,9 @@ from autograder.grading.progress import Collecting
 from autograder.running import digests, runner
 from autograder.running.cluster import Cluster, ClusterError
 from autograder.running.jobs import Job
-from course import lab
-from course.content import CONFIG, content_root, copy_authoring
 from course.errors import CourseError
+from course.workspace import lab
+from course.workspace.content import CONFIG, content_root, copy_authoring
 from tests.machine import needs_sandbox
 
 CELL = '{"grade": %s, "grade_id": "%s", "locked": %s, "schema_version": 3, "solution": %s%s}'

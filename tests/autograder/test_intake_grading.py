@@ -29,7 +29,7 @@ from autograder.gradebook.bridge import NotReadyError
 from autograder.gradebook.course_gradebook import CourseGradebook, Grade
 from autograder.gradebook.release import release
 from autograder.grading import engine
-from course.content import content_root, copy_authoring
+from course.workspace.content import content_root, copy_authoring
 from tests.machine import needs_sandbox
 
 from . import test_quiz_marks as quiz

@@ -21,7 +21,7 @@ from autograder.exercises.patterns.choices import compare
 from autograder.gradebook.release import release
 from autograder.grading import engine
 from autograder.running import runner
-from course.student_version import student_versions
+from course.workspace.student_version import student_versions
 from tests.machine import needs_isolation
 
 KEY_LINES = ('"position": ["service", "topic"]', '"navigation": ["action"]', "key=")

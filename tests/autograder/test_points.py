@@ -7,7 +7,7 @@ import pytest
 from autograder import exercises
 from autograder.assignments import listing
 from autograder.examination import points
-from course.content import content_root
+from course.workspace.content import content_root
 
 EXERCISES = points.table()
 

@@ -25,8 +25,8 @@ from autograder.grading import engine
 from autograder.grading.engine import Graded
 from autograder.grading.progress import Collecting
 from autograder.quiz import marks
-from course.content import content_root, copy_authoring
-from course.student_version import student_versions
+from course.workspace.content import content_root, copy_authoring
+from course.workspace.student_version import student_versions
 from quizzes import model
 from quizzes.loader import load_bank
 from quizzes.model import Item

@@ -8,7 +8,7 @@ import nbformat
 import pytest
 
 from autograder import exercises
-from course.content import content_root
+from course.workspace.content import content_root
 
 CHAPTER = "ch05-building-blocks.ipynb"
 

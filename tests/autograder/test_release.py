@@ -22,7 +22,7 @@ from autograder import exercise_folders
 from autograder.gradebook import course_gradebook
 from autograder.gradebook.database import GradebookLockedError
 from autograder.gradebook.release import ReleaseError, leaks, release
-from course.student_version import student_versions
+from course.workspace.student_version import student_versions
 
 REGION = re.compile(r"### BEGIN (?:SOLUTION|HIDDEN TESTS)\n(.*?)### END", re.DOTALL)
 

@@ -21,7 +21,7 @@ from autograder.running.outcome_store import OutcomeStore
 from autograder.running.runner import Outcome
 from autograder.running.start import ExaminerError, ExaminerProcess
 from autograder.sandbox import BoxError
-from course.domains import lease_domain
+from course.domains.leases import lease_domain
 from tests.machine import needs_sandbox
 
 pytestmark = needs_sandbox
@@ -309,7 +309,7 @@ def test_exit_in_a_cell_does_not_end_the_notebook() -> None:
 
 def test_no_session_of_a_student_leases_the_domain_of_the_exam() -> None:
     every = """
-from course.domains import lease_domain
+from course.domains.leases import lease_domain
 from course.errors import DomainError
 leases = []
 try:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import course
-from course import neighbours
+from course.domains import neighbours
 
 
 @pytest.fixture(autouse=True)

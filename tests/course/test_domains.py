@@ -8,8 +8,8 @@ import socket
 
 import pytest
 
-from course import domains
-from course.domains import check_domain_id, domains_in_use, lease_domain
+from course.domains import leases
+from course.domains.leases import check_domain_id, domains_in_use, lease_domain
 from course.errors import DomainError
 
 
@@ -45,8 +45,8 @@ def test_leases_are_distinct_and_never_the_default_domain():
 
 def test_a_released_domain_can_be_leased_again(monkeypatch):
     lease = lease_domain()
-    monkeypatch.setattr(domains, "MIN_DOMAIN", lease.domain_id - 1)
-    monkeypatch.setattr(domains, "MAX_DOMAIN", lease.domain_id)
+    monkeypatch.setattr(leases, "MIN_DOMAIN", lease.domain_id - 1)
+    monkeypatch.setattr(leases, "MAX_DOMAIN", lease.domain_id)
     with pytest.raises(DomainError, match="are taken"):
         lease_domain()
     lease.release()
@@ -59,14 +59,14 @@ def test_a_released_domain_can_be_leased_again(monkeypatch):
 def test_a_lease_dies_with_its_process_however_it_ends(start_script, monkeypatch):
     process = start_script(
         "import signal\n"
-        "from course.domains import lease_domain\n"
+        "from course.domains.leases import lease_domain\n"
         "lease = lease_domain()\n"
         "print(lease.domain_id, flush=True)\n"
         "signal.pause()\n"
     )
     domain_id = int(process.stdout.readline())
-    monkeypatch.setattr(domains, "MIN_DOMAIN", domain_id - 1)
-    monkeypatch.setattr(domains, "MAX_DOMAIN", domain_id)
+    monkeypatch.setattr(leases, "MIN_DOMAIN", domain_id - 1)
+    monkeypatch.setattr(leases, "MAX_DOMAIN", domain_id)
     with pytest.raises(DomainError):
         lease_domain()
     process.send_signal(signal.SIGKILL)
@@ -76,7 +76,7 @@ def test_a_lease_dies_with_its_process_however_it_ends(start_script, monkeypatch
 
 FORKED = """
 import os, signal
-from course.domains import lease_domain
+from course.domains.leases import lease_domain
 
 lease = lease_domain()
 child = os.fork()
@@ -93,8 +93,8 @@ def test_a_forked_child_does_not_keep_a_lease_alive(start_script, monkeypatch):
     try:
         process.kill()
         process.wait()
-        monkeypatch.setattr(domains, "MIN_DOMAIN", domain_id - 1)
-        monkeypatch.setattr(domains, "MAX_DOMAIN", domain_id)
+        monkeypatch.setattr(leases, "MIN_DOMAIN", domain_id - 1)
+        monkeypatch.setattr(leases, "MAX_DOMAIN", domain_id)
         lease_domain().release()
     finally:
         os.kill(child, signal.SIGKILL)

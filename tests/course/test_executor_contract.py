@@ -36,7 +36,7 @@ from std_srvs.srv import Trigger
 from test_msgs.action import Fibonacci
 
 import course
-from course.domains import lease_domain
+from course.domains.leases import lease_domain
 from course.runtime.waiting import Pulse, poll
 
 PATIENCE = 30.0

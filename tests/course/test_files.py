@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from course.files import replacing, write_text
+from course.util.files import replacing, write_text
 
 
 def test_a_file_that_cannot_be_finished_leaves_the_old_one(tmp_path: Path) -> None:

@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from course import lab
-from course.content import content_root
 from course.errors import CourseError
 from course.journal.store import MANIFEST
+from course.workspace import lab
+from course.workspace.content import content_root
 
 CHAPTER, EXERCISE = Path("ch05-building-blocks.ipynb"), Path("ch05/qos-design.ipynb")
 WELCOME = Path("start-here.ipynb")

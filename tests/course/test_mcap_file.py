@@ -25,9 +25,10 @@ from test_msgs.msg import (
 )
 
 import course
-from course import Session, mcap_file
-from course.mcap_file import RecordingError
-from course.values import to_data
+from course import Session
+from course.messages import mcap_file
+from course.messages.mcap_file import RecordingError
+from course.messages.values import to_data
 from tests.machine import needs_compiler
 
 

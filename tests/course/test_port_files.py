@@ -10,8 +10,8 @@ import pytest
 from rclpy.node import Node
 
 import course
-from course import port_files
-from course.domains import lease_domain
+from course.domains import port_files
+from course.domains.leases import lease_domain
 
 USER_PORT = 7411  # of the first participant on domain 0: DDSI-RTPS 2.2, section 9.6.1.1
 STATES = {"empty": b"", "sized": bytes(52400), "being written": (1).to_bytes(4, "little")}

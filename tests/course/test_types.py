@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from course import types
+from course.messages import types
 
 EVIL = "raise SystemExit('imported')"
 

@@ -11,7 +11,7 @@ from nbformat import NotebookNode
 
 from autograder.assignments import submission
 from autograder.assignments.cells import without_markers
-from course.content import content_root
+from course.workspace.content import content_root
 from tests.kernel import Kernel
 
 BUILT = [

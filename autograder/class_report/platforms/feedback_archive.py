@@ -31,7 +31,7 @@ from autograder.class_report.platforms.platform_names import NamesError, Partici
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.feedback import sheets
 from autograder.gradebook.feedback.sheets import Sheet
-from course.files import replacing
+from course.util.files import replacing
 
 Platform = Literal["moodle", "canvas"]
 Member = tuple[str, bytes]

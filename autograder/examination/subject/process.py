@@ -25,7 +25,7 @@ from autograder.examination.subject.shell import make_kernel
 from autograder.examination.subject.student_errors import SUBJECT_ENV
 from autograder.processes.channel import Channel, ChannelClosed
 from autograder.sandbox.limits import Limits
-from course.domains import reserve_domain
+from course.domains.leases import reserve_domain
 from course.runtime.core_session import CoreSession
 
 SHELL = (

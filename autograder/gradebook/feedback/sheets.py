@@ -22,7 +22,7 @@ from nbgrader.coursedir import CourseDirectory
 from autograder.assignments import questions
 from autograder.assignments.questions import Question
 from autograder.gradebook.database import of_cells
-from course.plain import counted
+from course.messages.yaml_text import counted
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from autograder.processes.outside.holding import Held, held
 from autograder.processes.outside.sleeping import Code, Sleeper, sleepers
 from autograder.processes.outside.stillness import HANGS, Stillness
 from autograder.processes.process_folders import Processes, Sandboxed
-from course import tools
+from course.util import executables
 
 MOST_NUMBERS, LONGEST_NAME = 2000, 200
 MOST_PORTS = 32
@@ -180,7 +180,7 @@ REQUESTS: Mapping[str, Callable[[Scene, Given], Any]] = {
 
 
 def _nft(*commands: str) -> None:
-    tool = tools.find("nft")
+    tool = executables.find("nft")
     if tool is None:
         raise CannotLoseError("nftables is not installed")
     rules = "\n".join(commands).encode()

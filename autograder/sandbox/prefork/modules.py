@@ -16,8 +16,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 COURSE = (
-    "course.ambient", "course.design.declaration", "course.design.node", "course.graph.reader",
-    "course.interfaces.magic", "course.notebook", "course.ros.magic",
+    "course.default_session", "course.design.declaration", "course.design.node",
+    "course.graph.reader", "course.interfaces.magic", "course.notebook", "course.ros_magic.magic",
 )  # fmt: skip
 ROS = ("rclpy.action", "rclpy.lifecycle", "rclpy.parameter_client")
 INTERFACES = {

@@ -18,7 +18,7 @@ import rclpy.context
 import rclpy.utilities
 from rclpy.context import Context
 
-from course import port_files
+from course.domains import port_files
 from course.errors import SessionError
 from course.runtime.context.interruptible import SessionContext
 from course.runtime.output import rcutils_tap

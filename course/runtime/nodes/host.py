@@ -8,7 +8,6 @@ from typing import Any
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
-from course import arguments
 from course.errors import SessionError
 from course.runtime.callbacks import transitions
 from course.runtime.callbacks.errors import CallbackError, ErrorLog
@@ -25,6 +24,7 @@ from course.runtime.nodes.registry import Factory, Residents
 from course.runtime.output.rcutils_tap import keep_every_level
 from course.runtime.rclpy_fixes.clock_sleep import sleeps_in_own_context
 from course.runtime.waiting import Pulse
+from course.util import arguments
 
 _TIMER_CANCELLED = "failed to call timer: timer is canceled"
 

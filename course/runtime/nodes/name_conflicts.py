@@ -11,7 +11,7 @@ from typing import Any
 
 from rclpy.node import Node
 
-from course.types import type_name
+from course.messages.types import type_name
 
 _KINDS = {
     "create_publisher": ("topic", "msg_type", "topic"),

@@ -14,7 +14,6 @@ from rclpy.context import Context
 from rclpy.executors import Executor
 from rclpy.node import Node
 
-from course import arguments
 from course.errors import SessionError
 from course.runtime.callbacks.jobs import Job, current_job
 from course.runtime.context.context import as_default_context
@@ -27,6 +26,7 @@ from course.runtime.nodes.half_made import HalfMade, Remains
 from course.runtime.output.rcutils_tap import hearing_constructors
 from course.runtime.teardown import destroy_node, is_alive, is_being_destroyed
 from course.runtime.waiting import Pulse, poll
+from course.util import arguments
 
 _CALLBACK_GRACE = 2.0  # s that stop() and pause() give a callback that is running
 

@@ -12,12 +12,12 @@ from rclpy.action.client import ActionClient, ClientGoalHandle
 from rclpy.qos import QoSProfile
 from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
-from course import arguments
 from course.errors import WaitTimeout
 from course.runtime.executor.quiescence import settle
 from course.runtime.requests.graph_queries import full_action, full_topic, why_no_service
 from course.runtime.requests.hidden_node import Probe
 from course.runtime.waiting import Deadline, poll
+from course.util import arguments
 
 _FEEDBACK_DEPTH = 1000
 SEND_GOAL = "/_action/send_goal"

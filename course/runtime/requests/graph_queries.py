@@ -19,10 +19,11 @@ from rclpy.qos import (
 from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
-from course import arguments, plain
 from course.errors import SessionError, WaitTimeout
+from course.messages import yaml_text
+from course.messages.types import load_type, type_name
 from course.runtime.names import full_name, node_name
-from course.types import load_type, type_name
+from course.util import arguments
 
 
 def full_topic(node: Node, topic: str) -> str:
@@ -70,7 +71,7 @@ def full_node(node: Node | str) -> str:
         validate_node_name(last)
     except NameValidationException as error:  # the rule, and then a drawing of where
         reason = str(error).splitlines()[0].partition(": ")[2].rstrip(":")
-        raise SessionError(f"{plain.shown(node)} is not a node name: {reason}.") from None
+        raise SessionError(f"{yaml_text.shown(node)} is not a node name: {reason}.") from None
     return name
 
 
@@ -140,7 +141,7 @@ def why_no_message(node: Node, topic: str, msg_type: Any, qos: QoSProfile) -> st
             return f"The QoS that {info.node_name} offers on {topic} does not fit: {reasons}."
     count = len(publishers)
     return (
-        f"{plain.counted(count, 'publisher')} on {topic} with a QoS that fits, "
+        f"{yaml_text.counted(count, 'publisher')} on {topic} with a QoS that fits, "
         "but nothing was published while we listened."
     )
 

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple, Self
 
 from rclpy.qos import QoSProfile
 
-from course import arguments
 from course.errors import WaitTimeout
+from course.messages.types import type_name
 from course.runtime.requests.graph_queries import (
     fitting_qos,
     full_topic,
@@ -21,7 +21,7 @@ from course.runtime.requests.graph_queries import (
 )
 from course.runtime.requests.hidden_node import Probe
 from course.runtime.waiting import poll
-from course.types import type_name
+from course.util import arguments
 
 
 class Stamped(NamedTuple):
@@ -113,7 +113,7 @@ class Recorder:
         Raises:
             RecordingError: the file cannot be written.
         """
-        from course import mcap_file
+        from course.messages import mcap_file
 
         return mcap_file.write(path, {self.topic: (self.msg_type, self.messages)})
 

@@ -11,7 +11,6 @@ from typing import Any, TypeVar
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 
-from course import arguments
 from course.errors import WaitTimeout
 from course.runtime.callbacks.jobs import current_job
 from course.runtime.context.interruptible import SessionContext
@@ -22,6 +21,7 @@ from course.runtime.requests.graph_queries import who_offers
 from course.runtime.requests.hidden_node import Probe
 from course.runtime.requests.recorder import Recorder
 from course.runtime.waiting import Deadline, poll
+from course.util import arguments
 
 T = TypeVar("T")
 

@@ -24,8 +24,9 @@ from std_srvs.srv import SetBool, Trigger
 from test_msgs.action import Fibonacci
 from test_msgs.msg import Empty
 
-from course import Session, domains, neighbours
+from course import Session
 from course.diagnosis import Diagnosis, nodes
+from course.domains import leases, neighbours
 from course.errors import WaitTimeout
 from course.graph import reader
 from tests.robot import Robot
@@ -349,7 +350,7 @@ def test_what_is_missed_here_is_in_another_notebook(
     start_script: Callable[[str], subprocess.Popen[str]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    every_domain = range(domains.MIN_DOMAIN, domains.MAX_DOMAIN + 1)
+    every_domain = range(leases.MIN_DOMAIN, leases.MAX_DOMAIN + 1)
     process = start_script(NEXT_DOOR)
     assert process.stdout is not None
     domain = int(process.stdout.readline())
@@ -384,12 +385,12 @@ def test_whoever_asks_nonsense_gets_no_answer_and_does_no_harm(session: Session)
     session.run(talker)
     session.until(lambda: session.offered(["/scan"]))
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
-        sock.sendto(b"", domains.address(session.domain_id))  # from nowhere
+        sock.sendto(b"", leases.address(session.domain_id))  # from nowhere
         sock.bind("")
         sock.settimeout(10)
         for nonsense in (b"", b"{", b"5", b"[1, null, {}]", b'["not a name", "~"]', b"[" * 9000):
-            sock.sendto(nonsense, domains.address(session.domain_id))
-        sock.sendto(b'["/scan"]', domains.address(session.domain_id))
+            sock.sendto(nonsense, leases.address(session.domain_id))
+        sock.sendto(b'["/scan"]', leases.address(session.domain_id))
         while not (answer := json.loads(sock.recv(65536)))["offers"]:
             pass
     assert answer["offers"] == {"/scan": ["/talker"]}

@@ -15,12 +15,12 @@ from typer.testing import CliRunner
 
 import course
 from autograder.assignments import listing
-from course import lab
 from course.cli import app
-from course.content import CONFIG, content_root
 from course.errors import CourseError
 from course.journal.progress import WELCOME
 from course.journal.store import FILE, MANIFEST, Journal
+from course.workspace import lab
+from course.workspace.content import CONFIG, content_root
 from quizzes import model
 from quizzes.loader import load_bank
 from quizzes.quiz import Quiz

@@ -11,10 +11,10 @@ import pytest
 from sensor_msgs.msg import CameraInfo, Image
 from test_msgs.msg import Arrays, BasicTypes, Strings
 
-from course import values
 from course.interfaces import installed
-from course.types import load_type
-from course.values import MisfitError
+from course.messages import values
+from course.messages.types import load_type
+from course.messages.values import MisfitError
 from course.watch import forms
 
 PARTS = {"msg": ("",), "srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}

@@ -21,8 +21,8 @@ from test_msgs.srv import Arrays
 
 from course import Session
 from course.errors import CourseError, SessionError, WaitTimeout
+from course.messages.values import MisfitError
 from course.runtime.requests.actions import GoalState
-from course.values import MisfitError
 from course.views.live import MAX_FRAME, LiveView
 from course.watch import forms, goals
 from course.watch.parameter_values import ParameterError

@@ -21,7 +21,7 @@ from std_msgs.msg import String
 
 from course import Session
 from course.errors import SessionError, WaitTimeout
-from course.mcap_file import RecordingError
+from course.messages.mcap_file import RecordingError
 from course.views.timeline import Timeline, describe
 from course.watch import callbacks, timeline
 from course.watch.callbacks import CallbackTap

@@ -1,0 +1,121 @@
+"""What sessions of other notebooks on this machine offer, asked beside DDS.
+
+Each notebook has a ROS domain of its own, and domains never hear each other. Whoever looks in vain
+for a topic or a service may have it in the notebook next door: so the socket that is the lease of a
+domain (see `domains`) answers a question, which names are offered there, and by which nodes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from course.domains.leases import MAX_DOMAIN, MIN_DOMAIN, DomainLease, address
+
+ANSWER = 0.5
+"""Seconds within which a session answers, unless its process is stopped."""
+
+DOMAINS: Sequence[int] = range(MIN_DOMAIN, MAX_DOMAIN + 1)
+"""Whose sessions are asked: all that lease one."""
+
+MOST_NAMES = 100
+_MOST_BYTES = 64 * 1024
+
+Offers = Callable[[list[str]], Mapping[str, list[str]]]
+"""Returns who offers each of these names, as far as anybody does: fully qualified node names."""
+
+
+class Neighbour(NamedTuple):
+    """A session of another program: its domain, the program's name, and what it offers of it."""
+
+    domain_id: int
+    program: str
+    offers: dict[str, list[str]]
+
+
+class Answering:
+    """Answers the questions of others on the socket of a lease, in a thread of its own."""
+
+    def __init__(self, lease: DomainLease, offers: Offers) -> None:
+        """Answer until `stop`, which comes before the lease is released."""
+        self._lease = lease
+        self._offers = offers
+        self._stopping = False
+        name = f"ROS neighbours of domain {lease.domain_id}"
+        self._thread = threading.Thread(target=self._answer, name=name, daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Answer no more. Idempotent."""
+        self._stopping = True
+        with suppress(OSError):  # it is closed
+            self._lease.socket.shutdown(socket.SHUT_RD)
+        self._thread.join(1.0)
+
+    def _answer(self) -> None:
+        sock = self._lease.socket
+        while not self._stopping:
+            try:
+                question, sender = sock.recvfrom(_MOST_BYTES)
+            except OSError:
+                return
+            with suppress(Exception):  # no question, an asker that has gone, nodes that go
+                sock.sendto(self._reply(question), socket.MSG_DONTWAIT, sender)
+
+    def _reply(self, question: bytes) -> bytes:
+        names = [name for name in json.loads(question) if isinstance(name, str)]
+        found = Neighbour(self._lease.domain_id, _program(), dict(self._offers(names[:MOST_NAMES])))
+        return json.dumps({**found._asdict(), "pid": os.getpid()}).encode()[:_MOST_BYTES]
+
+
+def ask(names: Iterable[str], timeout: float = ANSWER) -> list[Neighbour]:
+    """Return the sessions of other processes that offer any of ``names``, by domain."""
+    wanted = sorted(set(names))[:MOST_NAMES]
+    found = []
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sock:
+        sock.bind("")  # the kernel chooses an address, for the answers
+        waiting = sum(_sent(sock, json.dumps(wanted).encode(), domain) for domain in DOMAINS)
+        deadline = time.monotonic() + timeout
+        while waiting and (left := deadline - time.monotonic()) > 0:
+            sock.settimeout(left)
+            try:
+                answer = sock.recv(_MOST_BYTES)
+            except TimeoutError:
+                break
+            waiting -= 1
+            with suppress(ValueError, TypeError, KeyError, AttributeError):  # somebody else's bytes
+                found += _neighbours(json.loads(answer), wanted)
+    return sorted(found)
+
+
+def _sent(sock: socket.socket, question: bytes, domain_id: int) -> bool:
+    try:
+        sock.sendto(question, socket.MSG_DONTWAIT, address(domain_id))
+    except OSError:  # nobody has leased it, or nobody reads there
+        return False
+    return True
+
+
+def _neighbours(answer: dict[str, Any], wanted: list[str]) -> list[Neighbour]:
+    offers = {
+        name: [str(node) for node in answer["offers"][name]]
+        for name in wanted
+        if name in answer["offers"]
+    }
+    if not offers or answer["pid"] == os.getpid():
+        return []
+    return [Neighbour(int(answer["domain_id"]), str(answer["program"]), offers)]
+
+
+def _program() -> str:
+    """Return what people know this program by: its notebook, or its file."""
+    notebook = os.environ.get("JPY_SESSION_NAME", "")  # as Jupyter's server tells its kernels
+    return Path(notebook or sys.argv[0] or "Python").name

@@ -1,0 +1,223 @@
+"""What DDS promises for two profiles: whether they connect, and what then arrives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from course.graph.reader import incompatibilities
+from course.qos_lab.experiment import COUNT, Experiment, Outcome
+from course.qos_lab.profile import Profile
+
+OUTLIVES = 30.0
+"""Seconds that no message of an experiment grows old: a lifespan of so many has no say."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One policy of a pair: what is offered and requested, whether that fits, and the rule."""
+
+    policy: str
+    offered: str
+    requested: str
+    fits: bool
+    rule: str
+
+
+def compare(offered: Profile, requested: Profile) -> list[Rule]:
+    """Return every policy side by side with its rule (DDS 1.4, section 2.2.3)."""
+    broken = incompatibilities(offered.qos(), requested.qos())
+    return [
+        Rule(
+            "reliability", offered.reliability, requested.reliability, "RELIABILITY" not in broken,
+            "BEST_EFFORT never satisfies a request for RELIABLE; the other way round fits.",
+        ),
+        Rule(
+            "durability", offered.durability, requested.durability, "DURABILITY" not in broken,
+            "VOLATILE never satisfies a request for TRANSIENT_LOCAL; the other way round fits.",
+        ),
+        Rule(
+            "history", _queue(offered), _queue(requested), True,
+            "Each side has a queue of its own: it never matters to connecting.",
+        ),
+        Rule(
+            "deadline", _span(offered.deadline), _span(requested.deadline),
+            "DEADLINE" not in broken,
+            "What is offered must not be longer than what is requested.",
+        ),
+        Rule(
+            "lifespan", _span(offered.lifespan), _span(requested.lifespan), True,
+            "Each side's queue drops what is older than its own. It never matters to connecting.",
+        ),
+        Rule(
+            "liveliness", _liveliness(offered), _liveliness(requested),
+            "LIVELINESS" not in broken,
+            "AUTOMATIC never satisfies MANUAL_BY_TOPIC, and the offered lease must not be longer.",
+        ),
+    ]  # fmt: skip
+
+
+def connects(experiment: Experiment) -> bool:
+    """Whether DDS connects the two."""
+    return all(rule.fits for rule in compare(experiment.offered, experiment.requested))
+
+
+def reliable(experiment: Experiment) -> bool:
+    """Whether the connection is reliable: both sides must want it."""
+    return experiment.offered.reliability == experiment.requested.reliability == "RELIABLE"
+
+
+def explain(experiment: Experiment, outcome: Outcome) -> str:
+    """Return why it came out so, in one or two sentences."""
+    if not outcome.connected:
+        broken = [r for r in compare(experiment.offered, experiment.requested) if not r.fits]
+        names = ", ".join(
+            f"{r.policy} ({r.offered} offered, {r.requested} requested)" for r in broken
+        )
+        return f"DDS does not connect them: {names or 'no endpoint was found'}."
+    if experiment.scenario == "late joiner":
+        return _late(experiment, outcome)
+    if experiment.scenario == "slow reader":
+        return _slow(experiment, outcome)
+    if experiment.scenario == "deadline":
+        return (
+            f"The reader was told {outcome.deadlines_missed} times that its deadline had passed."
+            if experiment.requested.deadline
+            else "The reader asked for no deadline, so nobody told it about the pause."
+        )
+    if experiment.scenario == "liveliness":
+        return _liveliness_lost(experiment, outcome)
+    return _stream(experiment, outcome)
+
+
+def _stream(experiment: Experiment, outcome: Outcome) -> str:
+    if not outcome.missing:
+        repaired = " What the link dropped was sent again." if outcome.lossy else ""
+        return f"Every message arrived, in order.{repaired if reliable(experiment) else ''}"
+    if not reliable(experiment):
+        return (
+            f"Lost on the way: {outcome.missing}. A best-effort connection never sends anything "
+            f"twice.{_too_old(_lifespans(experiment))}"
+        )
+    missing = f"Missing, although the connection is reliable: {outcome.missing}."
+    return f"{missing} {_not_repaired(experiment)}"
+
+
+def _not_repaired(experiment: Experiment) -> str:
+    """Return why a reliable connection did not bring what the link had lost."""
+    causes = _lifespans(experiment)
+    if _room(experiment.offered) < COUNT:
+        causes.insert(0, f"the writer's queue ({_queue(experiment.offered)})")
+    if not causes:
+        return "They had not been sent again when the experiment ended."
+    return f"They were dropped before they could be sent again, by {' or '.join(causes)}."
+
+
+def _late(experiment: Experiment, outcome: Outcome) -> str:
+    if not _replays(experiment):
+        return (
+            "The late reader got nothing of the past: that needs TRANSIENT_LOCAL and RELIABLE on "
+            "both sides. A topic stores nothing by itself."
+        )
+    kept, fit = len(outcome.received), _replayed(experiment)
+    if kept < fit and _lifespans(experiment):
+        came = f"Of the writer's last messages {fit} would fit into both queues, and {kept} came."
+        return came + _too_old(_lifespans(experiment))
+    return (
+        "The writer had kept its last messages for late readers, and sent as many as fit into both "
+        f"queues: {kept}."
+    )
+
+
+def _slow(experiment: Experiment, outcome: Outcome) -> str:
+    kept = len(outcome.received)
+    if kept == outcome.sent:
+        return "The reader's queue was long enough: it found every message."
+    parts = [f"What was left in the reader's queue ({_queue(experiment.requested)}): {kept}."]
+    full = kept >= _room(experiment.requested)
+    newest = list(range(outcome.sent - kept, outcome.sent))
+    if full:
+        parts.append("Newer messages had pushed out older ones.")
+    if not full or outcome.received != newest:  # not all of them ever got there, or stayed
+        parts.append(_never_there(experiment, outcome))
+    return " ".join(filter(None, parts))
+
+
+def _never_there(experiment: Experiment, outcome: Outcome) -> str:
+    """Return why a slow reader's queue lacks messages that it had room for, if that is known."""
+    parts = []
+    if outcome.lossy and reliable(experiment):
+        parts.append(f"The link lost some. {_not_repaired(experiment)}")
+    elif outcome.lossy:
+        parts.append("The link lost some, and a best-effort connection never sends anything twice.")
+    if experiment.requested.lifespan:
+        parts.append(_too_old(_lifespans(experiment)[-1:]).strip())
+    return " ".join(parts)
+
+
+def _liveliness_lost(experiment: Experiment, outcome: Outcome) -> str:
+    if outcome.liveliness_lost:
+        return "The lease ran out without a sign of life, and DDS told the reader."
+    if not experiment.requested.lease:
+        return "The reader asked for no lease, so silence means nothing to it."
+    return (
+        "The lease is renewed by the writer's process as long as it lives (AUTOMATIC), so its "
+        "silence was not noticed."
+    )
+
+
+def expected(experiment: Experiment) -> int | None:
+    """Return how many messages must arrive by the rules; None where chance has a say."""
+    if not connects(experiment):
+        return 0
+    offered, requested = experiment.offered, experiment.requested
+    if experiment.scenario == "late joiner" and not _replays(experiment):
+        return 0
+    if 0 < min(offered.lifespan or OUTLIVES, requested.lifespan or OUTLIVES) < OUTLIVES:
+        return None  # it depends on how soon they come
+    if experiment.scenario == "late joiner":
+        return _replayed(experiment)
+    if experiment.drops and not reliable(experiment):
+        return None
+    if experiment.scenario == "slow reader":
+        return None if experiment.drops else min(COUNT, _room(requested))
+    # Lost messages are repaired only as long as the writer still has them.
+    return COUNT if not experiment.drops or _room(offered) >= COUNT else None
+
+
+def _replays(experiment: Experiment) -> bool:
+    """Whether a late reader gets what was published before it came."""
+    offered, requested = experiment.offered, experiment.requested
+    both = offered.durability == requested.durability == "TRANSIENT_LOCAL"
+    return both and reliable(experiment)
+
+
+def _replayed(experiment: Experiment) -> int:
+    """Return how many messages of the past fit into both queues."""
+    return min(COUNT, _room(experiment.offered), _room(experiment.requested))
+
+
+def _lifespans(experiment: Experiment) -> list[str]:
+    """Return the lifespans that a side has set."""
+    sides = (("writer", experiment.offered.lifespan), ("reader", experiment.requested.lifespan))
+    return [f"the {side}'s lifespan ({_span(span)})" for side, span in sides if span]
+
+
+def _too_old(lifespans: list[str]) -> str:
+    """Return the sentence, after a space, that says what becomes of old messages, if anything."""
+    return f" What is older than {' or '.join(lifespans)} is dropped." if lifespans else ""
+
+
+def _room(profile: Profile) -> int:
+    return profile.depth if profile.history == "KEEP_LAST" else 10**9
+
+
+def _queue(profile: Profile) -> str:
+    return f"KEEP_LAST({profile.depth})" if profile.history == "KEEP_LAST" else "KEEP_ALL"
+
+
+def _span(seconds: float) -> str:
+    return f"{seconds:g} s" if seconds else "none"
+
+
+def _liveliness(profile: Profile) -> str:
+    return f"{profile.liveliness}, {_span(profile.lease)}" if profile.lease else profile.liveliness
