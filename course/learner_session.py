@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from typing import TYPE_CHECKING, Any
 
 from rclpy.action.graph import get_action_names_and_types
@@ -14,6 +13,7 @@ from course.messages.types import load_type
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.graph_queries import full_action, full_node, full_service
 from course.util import arguments
+from course.util.close_matches import close_match
 
 if TYPE_CHECKING:
     from course.diagnosis import Diagnosis
@@ -176,8 +176,8 @@ class Session(CoreSession):
     def _type_of(self, what: str, name: str, known: list[tuple[str, list[str]]]) -> Any:
         types = dict(known)
         if name not in types:
-            close = difflib.get_close_matches(name, types, n=1)
-            guess = f" Is it {close[0]}?" if close else ""
+            close = close_match(name, types)
+            guess = f" Is it {close}?" if close else ""
             raise SessionError(f"Nobody offers the {what} {name}, so its type is unknown.{guess}")
         return load_type(types[name][0], name, "srv" if what == "service" else what)
 

@@ -12,7 +12,6 @@ is ``authoring/quizzes/NAME.py``. Notebooks that only one assignment has may als
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from typing import Any
 from autograder import exercise_folders
 from autograder.assignments.cells import BuildError
 from autograder.examination import points
+from course.util.close_matches import did_you_mean
 
 ASSIGNMENTS = Path("authoring") / "assignments"
 QUIZZES = Path("authoring") / "quizzes"
@@ -113,10 +113,9 @@ def _read(file: Path) -> dict[str, list[str]]:
 
 def _require(name: str, known: list[str], who: str) -> None:
     if name not in known:
-        close = difflib.get_close_matches(name, known, n=1)
-        guess = f" Did you mean '{close[0]}'?" if close else ""
         raise BuildError(
-            f"{who} '{name}', which there is not: there is {', '.join(known) or 'none'}.{guess}"
+            f"{who} '{name}', which there is not: there is {', '.join(known) or 'none'}."
+            f"{did_you_mean(name, known)}"
         )
 
 

@@ -7,7 +7,6 @@ A folder of this package, or of a course root's ``exercises/``, is an exercise: 
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import importlib.util
 import sys
@@ -18,6 +17,7 @@ from typing import Any
 from autograder import exercise_folders
 from autograder.examination.exam import Exam, ExamError
 from autograder.exercise_folders import COURSE_PACKAGE, FOLDER, Exercises
+from course.util.close_matches import did_you_mean
 
 _importing = threading.Lock()
 _imported: Exercises | None = None
@@ -49,9 +49,10 @@ def load(name: str) -> Exam[Any]:
 def require(name: str) -> None:
     """Raise ExamError if there is no exercise called ``name``; it names the ones there are."""
     if name not in names():
-        close = difflib.get_close_matches(name, names(), n=1)
-        guess = f" Did you mean '{close[0]}'?" if close else ""
-        raise ExamError(f"There is no exam '{name}': there are {', '.join(names())}.{guess}")
+        raise ExamError(
+            f"There is no exam '{name}': there are {', '.join(names())}."
+            f"{did_you_mean(name, names())}"
+        )
 
 
 def _own(module: Any, name: str) -> Exam[Any]:

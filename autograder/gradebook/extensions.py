@@ -6,7 +6,6 @@ the engine's folder until the submission is entered, by whichever door.
 
 from __future__ import annotations
 
-import difflib
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -17,6 +16,7 @@ from autograder.assignments.intake.roster import Roster
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.extension_store import WaitingExtensions
 from course.errors import CourseError
+from course.util.close_matches import is_it
 
 MAX_HOURS = 10 * 366 * 24.0
 """Longest extension: with one of some thousand years no date could be reckoned."""
@@ -94,9 +94,8 @@ def _require_known(known: Roster, root: Path, students: list[str]) -> None:
     there = {*known.known, *map(known.student, handed_in)}
     for student in students:
         if student not in there:
-            close = difflib.get_close_matches(student, there, n=1)
-            meant = f" (is it '{close[0]}'?)" if close else ""
             raise ExtensionError(
-                f"The course has no student '{student}'{meant}: add the student with `nbgrader db "
-                f"student add {student}`, then run the same command again."
+                f"The course has no student '{student}'{is_it(student, there)}: add the "
+                f"student with `nbgrader db student add {student}`, then run the same command "
+                "again."
             )

@@ -7,7 +7,6 @@ and the next run takes up what is missing.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -30,6 +29,7 @@ from autograder.running.jobs import Job, Result
 from autograder.running.outcome_store import OutcomeStore
 from autograder.running.workers import LocalWorkers, Workers
 from course.errors import CourseError
+from course.util.close_matches import is_it
 
 __all__ = ["AssignmentError", "BusyError", "Graded", "grade"]
 
@@ -190,11 +190,9 @@ def _students(
     there = {*students, *map(known.student, wrong)}
     for student in only:
         if student not in there:
-            close = difflib.get_close_matches(student, there, n=1)
-            meant = f" (is it '{close[0]}'?)" if close else ""
             raise AssignmentError(
-                f"'{student}' has not submitted '{assignment}'{meant}: there is no folder "
-                f"{gradebook.root / 'submitted' / student / assignment}."
+                f"'{student}' has not submitted '{assignment}'{is_it(student, there)}: there "
+                f"is no folder {gradebook.root / 'submitted' / student / assignment}."
             )
     if not students and not wrong:
         raise AssignmentError(

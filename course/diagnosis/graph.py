@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator
 
 from course.doctor.finding import Finding, problem, warning
@@ -10,6 +9,7 @@ from course.graph import reader, words
 from course.graph.model import Graph
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.actions import SEND_GOAL
+from course.util.close_matches import close_match
 
 NEARLY = " (is it "
 """Stands in a message that names another topic, service or action, which may have been meant."""
@@ -113,5 +113,5 @@ def lonely(graph: Graph, own: set[str]) -> list[str]:
 
 
 def _alike(name: str, names: list[str]) -> str:
-    close = difflib.get_close_matches(name, [other for other in names if other != name], n=1)
-    return f"{NEARLY}{close[0]}?)" if close else ""
+    close = close_match(name, [other for other in names if other != name])
+    return f"{NEARLY}{close}?)" if close else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from autograder.assignments.intake.file_names import entry, listed, meant, shown
 from autograder.assignments.intake.handed_in import is_junk
 from autograder.assignments.intake.times import UnclearTimeError
 from autograder.files import walk
+from course.util.close_matches import is_it
 from quizzes.record import read_plain
 
 GLOB = "*?[]"
@@ -244,11 +244,9 @@ def _bad_id(student: str) -> str:
 def _stranger(student: str, roster: Roster) -> str:
     if not roster.closed or student in roster.known:
         return ""
-    close = difflib.get_close_matches(student, roster.known, n=1)
-    meant = f" (is it '{close[0]}'?)" if close else ""
     return (
-        f"The course has no student '{student}'{meant}: rename the folder, or add the student with "
-        f"`nbgrader db student add {student}`, then grade again."
+        f"The course has no student '{student}'{is_it(student, roster.known)}: rename the folder, "
+        f"or add the student with `nbgrader db student add {student}`, then grade again."
     )
 
 

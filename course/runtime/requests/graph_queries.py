@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -24,6 +23,7 @@ from course.messages import yaml_text
 from course.messages.types import load_type, type_name
 from course.runtime.names import full_name, node_name
 from course.util import arguments
+from course.util.close_matches import close_match
 
 
 def full_topic(node: Node, topic: str) -> str:
@@ -181,8 +181,8 @@ def _published(node: Node) -> list[str]:
 
 
 def _alike(name: str, names: list[str]) -> str:
-    close = difflib.get_close_matches(name, names, n=1)
-    return f" (is it {close[0]}?)" if close else ""
+    close = close_match(name, names)
+    return f" (is it {close}?)" if close else ""
 
 
 def _reasons(reason: str) -> list[str]:
