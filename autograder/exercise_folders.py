@@ -62,9 +62,7 @@ class Exercises:
             found = _found(root / FOLDER) if root else {}
             self._state = [(name, _changed_ns(folder)) for name, folder in sorted(found.items())]
         except OSError as error:
-            raise ExerciseError(
-                f"{error.filename} cannot be read ({error.strerror}): mend its permissions."
-            ) from None
+            raise _unreadable(error) from None
         for name, folder in found.items():
             if not name.isidentifier():
                 raise ExerciseError(
@@ -153,9 +151,7 @@ def exam_files(folder: Path) -> dict[str, bytes]:
     try:
         return {path.name: path.read_bytes() for path in paths if path.is_file()}
     except OSError as error:
-        raise ExerciseError(
-            f"{error.filename} cannot be read ({error.strerror}): mend its permissions."
-        ) from None
+        raise _unreadable(error) from None
 
 
 def _is_needed(path: Path) -> bool:
@@ -192,6 +188,12 @@ def kept_from_students(package: Path = PACKAGE) -> Iterator[Path]:
                 yield entry
     kept = (EVERY, TABLE, DEMO_CLASS)
     yield from (package / path.relative_to(PACKAGE) for path in kept)
+
+
+def _unreadable(error: OSError) -> ExerciseError:
+    return ExerciseError(
+        f"{error.filename} cannot be read ({error.strerror}): mend its permissions."
+    )
 
 
 def _found(folder: Path) -> dict[str, Path]:
