@@ -2,7 +2,7 @@
 # exercise: resources
 # base: right-exemplar
 # told: as many pictures a second by the machine's clock as its rate says
-# score: 9
+# score: 11
 
 from autograder.examination.subject.server import SubjectServer
 

@@ -2,7 +2,7 @@
 # exercise: resources
 # base: right-no-thread
 # told: It took none.
-# score: 2
+# score: 4
 
 import sys
 import threading
