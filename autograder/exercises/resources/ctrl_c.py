@@ -26,7 +26,7 @@ from autograder.observe.patience import SETTLE_S
 from autograder.observe.phrases import phrase
 
 LIVES = 4
-TRIED = 4
+TRIED = 3
 """Starts that fail, beside the last of these lives."""
 MEMORY = 1024  # KiB a life: nobody has Python collect what is garbage
 WHEN = "When the driver runs in a program of its own, which is ended by Ctrl-C,"
@@ -240,8 +240,9 @@ def _watch_last_life(seen: ProgramObserver, lives: Lives, device: str, stuck: st
 
     def kept() -> list[str]:
         threads, files, memory = rig.process.usage().grown(before)
-        # Half of them: threads come and go. The life itself may keep as much memory as a start.
-        return _leaks(Usage(threads // (TRIED // 2), files // (TRIED // 2), memory // (TRIED + 1)))
+        # Most of them: threads come and go. The life itself may keep as much memory as a start.
+        most = TRIED // 2 + 1
+        return _leaks(Usage(threads // most, files // most, memory // (TRIED + 1)))
 
     if not left and not rig.ends(lambda: not kept(), seen.session):
         left = kept()
