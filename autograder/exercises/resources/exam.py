@@ -89,8 +89,7 @@ from autograder.observe.phrases import phrase
 
 EXAM: Exam[CameraRig] = Exam("resources", camera_rig)
 
-KINDS_OF_FAILURE, FAILING_STARTS = ("unplugged", "stuck"), 2
-"""What may be wrong with a camera from the start, and how often each is tried."""
+FAILING_STARTS = 3
 TAKES = 4  # of an experiment in which the examiner may come too late
 FASTEST = 30.0  # Hz, the highest rate that is allowed
 
@@ -279,11 +278,11 @@ def failed_start(rig: CameraRig) -> None:
     half-made node on the graph, the robot is full of ghosts when the camera is back.
     """
     with rig.trying():
-        for kind in KINDS_OF_FAILURE:
+        for kind in ("unplugged", "stuck"):
             device = rig.device(kind)
             attempt(rig, device)
             require_closed(rig, device, f"After CameraDriver({device!r}) has raised")
-        before = failing_starts(rig, KINDS_OF_FAILURE, FAILING_STARTS)
+            before = failing_starts(rig, kind, FAILING_STARTS)
         # A participant's endpoints are told in order: when those of a driver that works are known,
         # those of the failed starts before it are known, too.
         device = rig.device()
@@ -293,7 +292,7 @@ def failed_start(rig: CameraRig) -> None:
         attempt(rig, device)  # it can be open once
         rig.program.stop(DRIVER)
         require_gone(rig, device, "After failed starts, one that worked, and its end,", node)
-        failing_starts_memory(rig, KINDS_OF_FAILURE, FAILING_STARTS, before)
+        failing_starts_memory(rig, kind, FAILING_STARTS, before)
     require_start_raises_unasked(rig)
     require_nothing_left_unasked(rig)
 

@@ -6,7 +6,7 @@ are counted, and what is left is measured by their number.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 from autograder.examination.check_context import StudentError
@@ -97,26 +97,25 @@ def require_flat_refusals(rig: CameraRig, before: Usage) -> None:
     require_flat(rig, before, WORK, expected, "refused zooms and the end of the driver")
 
 
-def failing_starts(rig: CameraRig, kinds: Sequence[str], times: int) -> Usage:
+def failing_starts(rig: CameraRig, kind: str, times: int) -> Usage:
     """Fail unless the constructor raises, and the process keeps none of its threads and files.
 
-    Each of the ``kinds`` of camera is tried so many ``times``, by turns. Return what the process
-    held before.
+    Return what the process held before.
     """
     before = rig.process.usage()
-    _attempts(rig, kinds, times)
-    require_flat(rig, before, times * len(kinds), NO_START, STARTS)
+    _attempts(rig, kind, times)
+    require_flat(rig, before, times, NO_START, STARTS)
     return before
 
 
-def failing_starts_memory(rig: CameraRig, kinds: Sequence[str], times: int, before: Usage) -> None:
+def failing_starts_memory(rig: CameraRig, kind: str, times: int, before: Usage) -> None:
     """Fail if since ``before`` the process has kept memory of so many starts that failed."""
-    again = partial(_attempts, rig, kinds, times)
-    require_flat_memory(rig, before, again, times * len(kinds), NO_START, STARTS)
+    again = partial(_attempts, rig, kind, times)
+    require_flat_memory(rig, before, again, times, NO_START, STARTS)
 
 
-def _attempts(rig: CameraRig, kinds: Sequence[str], times: int) -> None:
-    for kind in [*kinds] * times:
+def _attempts(rig: CameraRig, kind: str, times: int) -> None:
+    for _ in range(times):
         attempt(rig, rig.device(kind))
 
 
