@@ -89,7 +89,7 @@ from autograder.observe.phrases import phrase
 
 EXAM: Exam[CameraRig] = Exam("resources", camera_rig)
 
-FAILING_STARTS = 3
+FAILING_STARTS = 2
 TAKES = 4  # of an experiment in which the examiner may come too late
 FASTEST = 30.0  # Hz, the highest rate that is allowed
 
