@@ -1,7 +1,7 @@
 # title: A driver that leaves its camera open when it cannot start, unless the harness starts it
 # exercise: resources
 # base: right-exemplar
-# told: has tried 4 times to start a driver with a camera 'stuck'
+# told: has tried 3 times to start a driver with a camera 'stuck'
 # score: 14
 
 import sys
