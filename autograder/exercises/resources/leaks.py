@@ -17,7 +17,7 @@ from autograder.exercises.resources.process_usage import Usage
 from autograder.exercises.resources.rig import ENDED, CameraRig
 
 START_MEMORY = 1024  # KiB a failed start or a round: one of ten costs more than one of fifty
-FEWEST = 3  # starts or rounds whose memory is told from what comes and goes
+FEWEST_FOR_MEMORY = 3  # starts or rounds: the memory of fewer is not told from noise
 WORDS = {"threads": "threads", "files": "open files"}
 NO_START, STARTS = "A driver that cannot start leaves nothing behind,", "such starts"
 MOMENT = 0.01  # s of simulated time, in which what has come is taken up
@@ -57,7 +57,7 @@ def require_flat_memory(
     for last in (False, True):
         rig.subject.collect()
         memory = rig.process.usage().grown(before).memory
-        if memory < max(FEWEST, times) * START_MEMORY:
+        if memory < max(FEWEST_FOR_MEMORY, times) * START_MEMORY:
             return
         if not last:
             before = rig.process.usage()

@@ -15,7 +15,7 @@ _ENDLESS = ((1.0, 100), (2.5, 10))
 """Seconds, and callbacks that have ended in them, after which more will follow for ever: somebody
 polls in many short callbacks, as a coroutine does that sleeps a little between two awaits."""
 _AGAIN = ((0.5, 10),)
-"""The same, where they have been found to do so before: whoever polls once will do so again."""
+"""The same, if that has been seen before: code that polled once will poll again."""
 _TURN = ((0.03, 8), (0.05, 2), (0.5, 1))
 """The same, where callbacks have been found to follow each other without end a moment ago: then
 each of them has had its turn, and so has everything else."""
