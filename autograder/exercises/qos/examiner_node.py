@@ -28,7 +28,7 @@ AHEAD, LAG = 4, 1.0
 
 MOST_PHASES, MOST_PAIRS = 9999, 49999
 """The highest phase, and half of the highest number, that fit a tag's usual length."""
-CLAIMED_NS = 200_000_000
+CLAIMED_NS = 100_000_000
 """By how much longer what a consumer hands on may be on its way than what it got, as it says."""
 
 INSISTENT = 0.25
