@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from concurrent.futures import Future
 
 from autograder.examination.exam import Failed
@@ -10,6 +11,7 @@ from autograder.exercises.patterns.discovery import acquaint
 from autograder.exercises.patterns.driving import Drive
 from autograder.exercises.patterns.rig import SETTLE, STEP
 from autograder.exercises.patterns.stations import require_report
+from autograder.observe.patience import IDLE_S
 from autograder.observe.phrases import ended
 from course.errors import WaitTimeout
 from course.runtime.requests.actions import GoalState
@@ -95,8 +97,8 @@ def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool 
         )
 
 
-def cancel_within(drive: Drive, seconds: float, looking: float = LOOKING) -> bool:
-    """Ask for the goal to be cancelled; return whether the robot is told to stop in time.
+def cancel(drive: Drive, seconds: float, looking: float = LOOKING) -> int:
+    """Ask for the goal to be cancelled, and let the robot have the time to be told to stop.
 
     The time counts from the request on: the answer, too, may wait for the node's clock.
 
@@ -104,6 +106,9 @@ def cancel_within(drive: Drive, seconds: float, looking: float = LOOKING) -> boo
         drive: the drive.
         seconds: of the node's clock until the stop.
         looking: seconds of wall time before that clock moves on.
+
+    Returns:
+        When that time was over (ns): a stop that was told by then is in time, see `stopped_by`.
 
     Raises:
         Failed: the request was refused, or got no answer.
@@ -120,10 +125,19 @@ def cancel_within(drive: Drive, seconds: float, looking: float = LOOKING) -> boo
         rig.await_answer(answer, "to cancel", seconds)
     # Who looks by the clock on the wall gets the time to do so before the node's moves on.
     rig.wait(stopped, looking)
-    in_time = rig.wait_stepping(stopped, seconds - (rig.elapsed - began), STOPPING)
+    while not stopped() and seconds - (rig.elapsed - began) > STEP / 2:
+        rig.step(STEP)
+    rig.patience(STOPPING, stepped=IDLE_S).wait(rig.session, stopped)
+    over = time.time_ns()
     rig.await_answer(answer, "to cancel")
     _require_agreed(drive, answer)
-    return in_time
+    return over
+
+
+def stopped_by(drive: Drive, moment: int) -> bool:
+    """Return whether the robot had been told to stop by a ``moment`` (ns), and nothing since."""
+    speeds = drive.rig.node.speeds
+    return drive.rig.speed == 0 and speeds.same_since <= moment
 
 
 def _require_agreed(drive: Drive, answer: Future[bool]) -> None:

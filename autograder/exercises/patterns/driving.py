@@ -33,6 +33,8 @@ STOOD = 1.0
 """Seconds of the node's clock without a new position, after which the aisle counts as blocked."""
 HALTS = 3
 """Times that a robot may be found halting where it had been driving a moment before."""
+RAMP = 30.0
+"""Seconds of the node's clock that a robot may take to come to its speed."""
 CLEARING = 2.0
 """Seconds of wall time that a goal gets to end after its check has failed."""
 
@@ -152,7 +154,9 @@ class Drive:
     def top_speed(self, limit: float) -> float:
         """Return the highest speed so far, once it is ``limit``; or the last, if it never is."""
         rig = self.rig
-        reached = rig.wait_stepping(lambda: rig.speed >= limit - SPEED_MARGIN or self.run.done)
+        reached = rig.wait_stepping(
+            lambda: rig.speed >= limit - SPEED_MARGIN or self.run.done, RAMP
+        )
         highest = max(rig.node.speeds, default=0.0)
         return highest if reached or highest > limit + SPEED_MARGIN else rig.speed
 

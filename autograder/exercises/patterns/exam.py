@@ -512,11 +512,11 @@ def navigation_cancel(rig: RobotRig) -> None:
 
 
 def _call_off(drive: Drive) -> None:
-    in_time = drive_ends.cancel_within(drive, drive_ends.STOPS)
+    over = drive_ends.cancel(drive, drive_ends.STOPS)
     drive_ends.require_end(
         drive, GoalState.CANCELED, "A drive that is called off ends there and then."
     )
-    if not in_time:
+    if not drive_ends.stopped_by(drive, over):
         raise Failed(
             expected=f"A drive that is called off stops the robot within {drive_ends.STOPS:g} s.",
             actual=f"{drive_ends.STOPS:g} s of the node's time later hardware/speed had not said "

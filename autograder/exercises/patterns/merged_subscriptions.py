@@ -41,6 +41,19 @@ class Ears(Sequence[T]):
         """
         return self._heard[-1][0] if self._heard else 0
 
+    @property
+    def same_since(self) -> int:
+        """When the first of the items that equal the newest was published (ns), or 0.
+
+        Those at the end are meant, without another one between them.
+        """
+        since = 0
+        for published, item in reversed(self._heard):
+            if item != self._heard[-1][1]:
+                break
+            since = published
+        return since
+
     @overload
     def __getitem__(self, index: int) -> T: ...
     @overload

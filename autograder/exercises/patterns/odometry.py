@@ -12,6 +12,7 @@ from autograder.exercises.patterns.scenarios import NAMES
 AGE = 0.5
 """Seconds of the node's time that a position may be old."""
 CLOSE = 0.011  # m
+NO_ANSWER = "nobody answered"
 MOST_NUMBERS = 12
 """In an answer that says where the robot is: a date and a time, say, and a pose."""
 LONGEST = 200  # characters of an answer that are shown
@@ -23,14 +24,16 @@ def fault(rig: RobotRig, asker: Asker, position: float, age: float = AGE) -> str
     It is the end of a sentence, with its full stop. The hardware has reported the ``position``, and
     says no more: a callback may take its time over each report. ``age`` is how old it may be (s).
     """
-    answer = ""
+    answer, right = "", False
 
-    def right() -> bool:
-        nonlocal answer
+    def known() -> bool:
+        nonlocal answer, right
         answer, found = asker(rig)
-        return any(abs(number - position) < CLOSE for number in found)
+        right = any(abs(number - position) < CLOSE for number in found)
+        return right or answer == NO_ANSWER
 
-    if rig.wait_stepping(right, age):
+    rig.wait_stepping(known, age)
+    if right:
         return ""
     return answer if answer.endswith("?") else f"{answer}{rig.because()}."
 
@@ -44,7 +47,7 @@ def ask(rig: RobotRig) -> tuple[str, list[float]]:
     """Ask by the service."""
     answer = rig.call(Trigger, NAMES["position"], Trigger.Request())
     if answer is None:
-        return "nobody answered", []
+        return NO_ANSWER, []
     found = numbers(answer.message) if answer.success else []
     if len(found) > MOST_NUMBERS:
         return f"the answer holds {len(found)} numbers: which one is the position?", []

@@ -25,6 +25,7 @@ from autograder.exercises.patterns import camera_stream, drive_ends, interface_p
 from autograder.exercises.patterns.discovery import LateJoiner, acquaint
 from autograder.exercises.patterns.driving import ACTIONS, Drive
 from autograder.exercises.patterns.rig import (
+    LEAST_IDLE,
     LEVEL_MARGIN,
     NODE,
     SETTLE,
@@ -98,9 +99,9 @@ class ProgramRig(RobotRig):
         """Tell the node that hardly any time has passed."""
         self.clock.move(0.0)
 
-    def patience(self, seconds: float) -> Patience:
+    def patience(self, seconds: float, stepped: float = 0.0) -> Patience:
         """Return for how long something is waited for that may never come."""
-        return Patience(self._threads, seconds, self._idle)
+        return Patience(self._threads, seconds, max(LEAST_IDLE, self._idle - stepped))
 
     def because(self) -> str:
         """Return nothing: nobody is asked what a callback raised."""
@@ -299,8 +300,8 @@ def _require_patience(rig: ProgramRig) -> None:
 def _require_stop(rig: ProgramRig) -> None:
     drive = _under_way(rig)
     with _untold():
-        in_time = drive_ends.cancel_within(drive, MORE * drive_ends.STOPS, looking=0.0)
-    if not in_time:
+        over = drive_ends.cancel(drive, MORE * drive_ends.STOPS, looking=0.0)
+    if not drive_ends.stopped_by(drive, over):
         raise Failed(
             expected=f"{WHEN} a drive that is called off stops the robot within "
             f"{drive_ends.STOPS:g} s.",

@@ -21,7 +21,7 @@ from std_msgs.msg import Float64
 from autograder.examination.check_context import Bench, StudentError
 from autograder.examination.exam import Failed
 from autograder.exercises.patterns.hardware import ExaminerNode
-from autograder.observe.patience import Patience
+from autograder.observe.patience import IDLE_S, Patience
 from autograder.observe.phrases import callback_raised
 from autograder.observe.stillness import Stillness
 from course.errors import WaitTimeout
@@ -39,9 +39,14 @@ SETTLE = 8.0
 ANSWERED, AGAIN = 1.0, 0.1
 """Seconds of wall time for an answer before the clock moves on, which it may wait for: the first
 time, and where one has been found to wait."""
+LATEST = 10.0
+"""Seconds of simulated time after which nothing comes any more that is to come at once."""
+LEAST_IDLE = 0.5
+"""Seconds in which all sleep, after the clock has run: what the last step brought comes in."""
 LEVEL_MARGIN = 1e-3
-STEP, GRAIN = 0.1, 0.01
-"""Seconds of simulated time in one step, and between two moments of it that nodes get to see."""
+STEP, GRAIN, FINE = 0.1, 0.01, 2.0
+"""Seconds of simulated time in one step, between two moments of it that nodes get to see, and for
+which they do: whoever waits for longer sees the steps only."""
 
 
 class RobotRig:
@@ -149,9 +154,13 @@ class RobotRig:
             return True
         return False
 
-    def patience(self, seconds: float) -> Patience:
-        """Return for how long something is waited for that may never come: so many s at most."""
-        return Patience(self._threads, seconds)
+    def patience(self, seconds: float, stepped: float = 0.0) -> Patience:
+        """Return for how long something is waited for that may never come: so many s at most.
+
+        ``stepped`` is for how long (s of wall time) the clock has run meanwhile: all were at rest
+        between two steps, so a lost message has been repaired in that time, too.
+        """
+        return Patience(self._threads, seconds, max(LEAST_IDLE, IDLE_S - stepped))
 
     def wait_stepping(
         self,
@@ -165,19 +174,22 @@ class RobotRig:
         Args:
             condition: a function without arguments. Where it moves the clock itself, as a call
                 may, that counts.
-            seconds: of simulated time that there are; None is as many as it takes.
+            seconds: of simulated time that there are; None is `LATEST`.
             timeout: seconds of wall time that it has to become visible here; None is `settle`.
             step: seconds of simulated time between two looks.
         """
-        deadline = time.monotonic() + (self.settle if timeout is None else timeout)
-        began = self.elapsed
+        most = LATEST if seconds is None else seconds
+        started, began = time.monotonic(), self.elapsed
+        deadline = started + (self.settle if timeout is None else timeout)
         while not condition():
             if time.monotonic() >= deadline:
                 return False
-            if seconds is not None and seconds - (self.elapsed - began) <= step / 2:
-                left = max(0.0, deadline - time.monotonic())
-                return self.patience(left).wait(self.session, condition)
-            self.step(step)
+            if most - (self.elapsed - began) <= step / 2:
+                now = time.monotonic()
+                patience = self.patience(max(0.0, deadline - now), now - started)
+                return patience.wait(self.session, condition)
+            # What takes so long is no matter of moments any more.
+            self.step(step, GRAIN if self.elapsed - began < FINE else step)
             self.wait(condition, 0.01)
         return True
 
@@ -197,7 +209,7 @@ class RobotRig:
         patience = self._patience(name)
         if self.wait(future.done, patience):
             return future.result()
-        if self.wait_stepping(future.done, timeout=SETTLE - patience):
+        if self.wait_stepping(future.done, timeout=max(patience, self.settle - patience)):
             self._by_the_clock.add(name)
             return future.result()
         client.remove_pending_request(future)
