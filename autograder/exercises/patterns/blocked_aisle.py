@@ -13,10 +13,10 @@ BLOCKED, BLOCKED_WALL = 1.2, 0.3
 WAITS, WAITS_ON = 5.0, 15.0
 """Seconds of the node's clock for which it cannot get on in all, and then once more: longer than a
 metre takes who reckons by the time, and than the patience of who gives up."""
-COARSE, COARSER = 0.1, 0.5
-"""Seconds of the node's clock between two looks of those who wait all that time: a tenth as many
-take a tenth of the time, and who has waited so long needs still fewer."""
-NEAR, BEFORE_GOAL = 0.1, 0.5
+COARSE, COARSER = 0.2, 0.5
+"""Seconds of the node's clock between two looks of those who wait all that time: the fewer, the
+less time they take, and who has waited so long needs still fewer."""
+NEAR, BEFORE_GOAL = 0.1, 0.6
 """Metres before the goal where the robot is held up, twice as far as a place may count as the
 station, and for how many seconds of the node's clock."""
 

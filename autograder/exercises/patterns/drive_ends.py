@@ -21,8 +21,9 @@ LOOKING, STOPPING, UNDER_WAY = 0.6, 4.0, 2.0
 stop to become visible, and for one that was under way when the result came."""
 STOPS = 0.5
 """Seconds of the node's clock within which a robot that is called off is told to stop."""
-WATCHED = 2.0
-"""Seconds of the node's clock for which a robot that was called off must stay where it is."""
+WATCHED, STANDS, SELDOM = 2.0, 0.5, 0.25
+"""Seconds of the node's clock for which a robot that was called off must stay where it is, for
+which any must at the end, and between two moments of these that nodes get to see."""
 
 
 def to_the_end(drive: Drive, *, blocked: bool = False) -> None:
@@ -80,8 +81,8 @@ def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool 
     told = rig.speed
     rig.wait_stepping(lambda: rig.speed == 0)
     if state == GoalState.CANCELED:
-        rig.step(WATCHED, STEP)
-    rig.step(0.5)
+        rig.step(WATCHED, SELDOM)
+    rig.step(STANDS, SELDOM)
     acquaint(rig)  # whatever was on its way has come in by now
     if not rig.node.speeds or rig.speed != 0:
         raise Failed(

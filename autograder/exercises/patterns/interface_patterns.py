@@ -67,7 +67,8 @@ def settle(rig: RobotRig, wanted: dict[Scenario, tuple[str, ...]]) -> dict[Scena
         wake(rig)
         if not rig.wait(lambda: known.issuperset(missing()), SETTLE_OTHER - SETTLE_AT_ONCE):
             # Where something else is offered under the name, the wanted one has had its time.
-            rig.wait(lambda: all(found[s] for s in missing()), SETTLE - SETTLE_OTHER)
+            patience = rig.patience(SETTLE - SETTLE_OTHER, stepped=SETTLE_OTHER)
+            patience.wait(rig.session, lambda: all(found[s] for s in missing()))
     known.update(missing())
     return found
 
