@@ -43,7 +43,7 @@ class Session(CoreSession):
         """
         from course.views.graph import GraphView
 
-        self._require_open()
+        self.require_open()
         return GraphView(self, everything=everything)
 
     def log_panel(self, *, level: str = "DEBUG") -> LogPanel:
@@ -54,7 +54,7 @@ class Session(CoreSession):
         """
         from course.views.log import LogPanel
 
-        self._require_open()
+        self.require_open()
         return LogPanel(self, level)
 
     def service(
@@ -108,7 +108,7 @@ class Session(CoreSession):
         """
         from course.views.parameters import ParameterPanel
 
-        self._require_open()
+        self.require_open()
         return ParameterPanel(self, full_node(node))
 
     def timeline(self, *topics: str | tuple[str, Any], window: float = 10.0) -> Timeline:
@@ -125,7 +125,7 @@ class Session(CoreSession):
         """
         from course.views.timeline import Timeline
 
-        self._require_open()
+        self.require_open()
         named = [_named(topic) for topic in topics]
         return Timeline(self, named, arguments.seconds(window, "window"))
 
@@ -145,7 +145,7 @@ class Session(CoreSession):
         """
         from course.views.qos_lab import QoSLab
 
-        self._require_open()
+        self.require_open()
         return QoSLab(self, arguments.qos(offered), arguments.qos(requested))
 
     def diagnose(self) -> Diagnosis:
@@ -161,7 +161,7 @@ class Session(CoreSession):
         """
         from course.diagnosis import diagnose
 
-        self._require_open()
+        self.require_open()
         return diagnose(self)
 
     def _further_hints(self, *, vague: bool, sought: str) -> list[str]:

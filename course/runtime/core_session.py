@@ -7,35 +7,49 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Sequence
-from typing import Any, Self
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
+from typing import Any, Self, TypeVar
 
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from course.domains import neighbours
 from course.domains.leases import check_domain_id, lease_domain
 from course.errors import SessionError
+from course.runtime.callbacks.errors import CallbackError
 from course.runtime.callbacks.jobs import current_job
+from course.runtime.callbacks.transitions import FailedTransition
 from course.runtime.context import closing, signals
 from course.runtime.context.closing import CloseReport
 from course.runtime.context.context import Discovery, open_context
+from course.runtime.context.interruptible import SessionContext
+from course.runtime.executor.blocked import BlockedCallback
 from course.runtime.logs.store import store
+from course.runtime.logs.table import LogTable
 from course.runtime.nodes.half_made import Remains
-from course.runtime.requests.requests import Asking
+from course.runtime.nodes.host import NodeHost
+from course.runtime.nodes.registry import Factory
+from course.runtime.requests.actions import GoalRun
+from course.runtime.requests.recorder import Recorder
+from course.runtime.requests.requests import Requests
 from course.runtime.simulated_time import SimulatedTime
 from course.runtime.waiting import Pulse
 from course.util import arguments
 
+T = TypeVar("T")
 
-class CoreSession(Asking):
+
+class CoreSession:
     """One private rclpy Context on one domain, and the nodes it runs in the background.
 
     Attributes:
         domain_id: the ROS domain, leased or joined.
         options: what the session was made with, by name.
-        context, threads, notices: see `Hosting`.
+        explains: whether a wait that times out says what `diagnose` finds. A program that only asks
+            whether something comes, and expects that it may not, switches it off.
     """
 
     def __init__(
@@ -75,20 +89,306 @@ class CoreSession(Asking):
         except BaseException:
             self._release_domain()
             raise
-        super().__init__(context, threads)
+        self.explains = True
+        self._host = NodeHost(context, threads)
+        self._requests = Requests(self._host, self._hints, self._now_ns)
         self._lock = threading.RLock()
         self._endings = Pulse()
         self.context.on_shutdown(self._endings.beat)
         self._report = CloseReport()
-        self._closing = False
         self._closed = False
         self._on_close: list[Callable[[], None]] = []
         self._sim: SimulatedTime | None = None
         if sim_time:
-            self._sim = SimulatedTime(self._probe, self._crew, self._residents)
-            self._residents.on_made.append(self._sim.welcome)
+            self._sim = SimulatedTime(self._requests.probe, self._host.crew, self._host.residents)
+            self._host.residents.on_made.append(self._sim.welcome)
         self._answering = neighbours.Answering(self._lease, self.offered) if self._lease else None
         closing.register(self)
+
+    @property
+    def context(self) -> SessionContext:
+        """The rclpy context that all its nodes share."""
+        return self._host.context
+
+    @property
+    def threads(self) -> int:
+        """How many threads run callbacks, unless `run` is told otherwise."""
+        return self._host.threads
+
+    @property
+    def notices(self) -> list[str]:
+        """Sentences for the learner about what the session had to put right."""
+        return self._host.notices
+
+    # Nodes: see `NodeHost`.
+
+    def run(
+        self, factory: Factory | Node, *args: Any, threads: int | None = None, **kwargs: Any
+    ) -> Node:
+        """Make a node and spin it in the background; return it.
+
+        Running the same factory with the same arguments again, or one whose node has the same
+        fully qualified name, replaces the earlier node; also one whose constructor raised, which
+        rclpy leaves on the graph half made, with all that it began.
+
+        Args:
+            factory: a Node class, a function that returns a Node, or a node of this session.
+            args: passed to the factory.
+            threads: run this node's callbacks in a pool of this many threads instead of the
+                session's own; nodes with the same number share one.
+            kwargs: passed to the factory.
+
+        Raises:
+            SessionError: the session is closed, or the factory made no node for it.
+        """
+        return self._host.run(factory, *args, threads=threads, **kwargs)
+
+    def run_beside(self, factory: Factory) -> Node:
+        """Make a node and spin it beside all others, even one of the same name or class.
+
+        ROS 2 allows two nodes of one name. In a notebook that is nearly always a cell that was run
+        twice, which is why `run` replaces; whoever hosts somebody else's classes wants this.
+
+        Raises:
+            SessionError: the session is closed, or the factory made no node for it.
+        """
+        return self._host.run_beside(factory)
+
+    def stop(self, *what: Any) -> None:
+        """Stop nodes and take them off the graph; without arguments, every node. Idempotent.
+
+        Args:
+            what: nodes, names (``"camera"`` or ``"/front/camera"``) or the classes that made them.
+
+        Raises:
+            SessionError: a name that this session never ran.
+        """
+        self._host.stop(*what)
+
+    def let_go(self, node: Node) -> None:
+        """Stop spinning a node and forget it, without destroying it: that is now up to the caller.
+
+        Idempotent.
+        """
+        self._host.let_go(node)
+
+    def pause(self, *what: Any) -> None:
+        """Stop executing callbacks of nodes, while DDS goes on receiving for them. Idempotent."""
+        self._host.pause(*what)
+
+    def resume(self, *what: Any) -> None:
+        """Execute callbacks of paused nodes again, first those of what has arrived meanwhile."""
+        self._host.resume(*what)
+
+    @property
+    def nodes(self) -> dict[str, Node]:
+        """The nodes that run, by fully qualified name (a snapshot)."""
+        return self._host.nodes
+
+    @property
+    def errors(self) -> list[CallbackError]:
+        """What callbacks raised, in order of first occurrence (a snapshot)."""
+        return self._host.errors
+
+    @property
+    def failed_transitions(self) -> list[FailedTransition]:
+        """What went wrong in transitions of managed nodes, since the last one that succeeded."""
+        return self._host.failed_transitions
+
+    def logs(self, node: Any = None, *, level: str = "INFO", last: int | None = 50) -> LogTable:
+        """Return what nodes logged and callbacks printed, as a table.
+
+        Args:
+            node: a node, its name or its class; None for all.
+            level: the lowest level to show: DEBUG, INFO, WARN, ERROR or FATAL.
+            last: how many of the latest rows; None for all that are kept (1000 a node).
+
+        Raises:
+            SessionError: an unknown level, or a name that this session never ran.
+        """
+        return self._host.logs(node, level=level, last=last)
+
+    def blocked_callbacks(self, longer_than: float = 1.0) -> list[BlockedCallback]:
+        """Return the callbacks that have been running for over `longer_than` seconds.
+
+        Each says where it is, why it does not return if that can be told (a deadlock, above all),
+        and what to do about it.
+        """
+        return self._host.blocked_callbacks(longer_than)
+
+    def take_back_stolen_nodes(self) -> None:
+        """Spin nodes again that `rclpy.spin_once(node)` and its like took away; leave a notice.
+
+        Every wait of this session does this first.
+        """
+        self._host.take_back_stolen_nodes()
+
+    # Waiting and asking: see `Requests`.
+
+    def until(
+        self, condition: Callable[[], T], timeout: float = 5.0, what: str = "the condition"
+    ) -> T:
+        """Return the first true value of `condition`.
+
+        It is asked after each callback of this session, and every 20 ms.
+
+        Args:
+            condition: a function without arguments.
+            timeout: seconds to wait at most.
+            what: what is waited for, to be named in the error.
+
+        Raises:
+            WaitTimeout: it was not true in time.
+        """
+        return self._requests.until(condition, timeout, what)
+
+    def next_message(
+        self,
+        msg_type: Any,
+        topic: str,
+        *,
+        qos: QoSProfile | int | None = None,
+        timeout: float = 5.0,
+    ) -> Any:
+        """Return the next message on `topic`, or the one that a late joiner is given.
+
+        Args:
+            msg_type: the message class.
+            topic: its name.
+            qos: the QoS to request; None requests the strongest that every publisher offers.
+            timeout: seconds to wait at most.
+
+        Raises:
+            WaitTimeout: none came in time; it says why, as far as the ROS graph knows.
+        """
+        return self._requests.next_message(msg_type, topic, qos=qos, timeout=timeout)
+
+    def publish(
+        self, topic: str, message: Any, *, qos: QoSProfile | int = 10, timeout: float = 5.0
+    ) -> None:
+        """Publish one message, once somebody is there to get it.
+
+        Args:
+            topic: its name.
+            message: what to publish.
+            qos: the QoS to offer.
+            timeout: seconds to wait for a subscription that fits, and for it to have the message.
+
+        Raises:
+            WaitTimeout: nobody subscribes with a QoS that fits, or the topic has another type.
+        """
+        self._requests.publish(topic, message, qos=qos, timeout=timeout)
+
+    def publisher(
+        self, msg_type: Any, topic: str, *, qos: QoSProfile | int = 10, timeout: float = 5.0
+    ) -> AbstractContextManager[Publisher]:
+        """Give a publisher of the session's own for the time of a `with` block.
+
+        At the block's end, `timeout` seconds are given to what is under way to reliable
+        subscriptions.
+
+        Raises:
+            WaitTimeout: the topic has another type.
+        """
+        return self._requests.publisher(msg_type, topic, qos=qos, timeout=timeout)
+
+    def paced(self, times: int, rate: float) -> Iterator[int]:
+        """Yield 1, 2, ..., `times`, `rate` times a second, while the session is open."""
+        return self._requests.paced(times, rate)
+
+    def wait_for_service(self, srv_type: Any, name: str, timeout: float = 5.0) -> None:
+        """Return when a server of `name` is ready.
+
+        Raises:
+            WaitTimeout: none was in time; it says why.
+        """
+        self._requests.wait_for_service(srv_type, name, timeout)
+
+    def call(self, srv_type: Any, name: str, request: Any, timeout: float = 5.0) -> Any:
+        """Call a service and return its response.
+
+        Raises:
+            WaitTimeout: no server, or no answer, within `timeout` seconds; it says which.
+        """
+        return self._requests.call(srv_type, name, request, timeout)
+
+    def answers(self, srv_type: Any, names: Sequence[str], timeout: float = 1.0) -> dict[str, Any]:
+        """Return what these services respond to an empty request, by name.
+
+        All are asked at the same time; those that do not answer within `timeout` seconds are left
+        out.
+        """
+        return self._requests.answers(srv_type, names, timeout)
+
+    def send_goal(
+        self,
+        action_type: Any,
+        name: str,
+        goal: Any,
+        *,
+        timeout: float = 10.0,
+        on_feedback: Callable[[Any], None] | None = None,
+    ) -> GoalRun:
+        """Send a goal; return when the server has accepted or rejected it.
+
+        Args:
+            action_type: the action class.
+            name: the action's name.
+            goal: the goal message.
+            timeout: seconds for server and answer together.
+            on_feedback: called with each feedback message, in a background thread.
+
+        Raises:
+            WaitTimeout: no server, or no answer, in time.
+        """
+        return self._requests.send_goal(
+            action_type, name, goal, timeout=timeout, on_feedback=on_feedback
+        )
+
+    def record(
+        self,
+        topic: str,
+        msg_type: Any | None = None,
+        *,
+        qos: QoSProfile | int | None = None,
+        limit: int = 1000,
+        timeout: float = 5.0,
+    ) -> Recorder:
+        """Record a topic from now on.
+
+        Args:
+            topic: its name.
+            msg_type: the message class; None takes the topic's type from the graph.
+            qos: the QoS to request; None requests the strongest that every publisher offers now.
+            limit: how many messages to keep.
+            timeout: seconds to wait for somebody to give the topic a type, without `msg_type`.
+
+        Raises:
+            WaitTimeout: `msg_type` is None, and the topic does not appear.
+        """
+        return self._requests.record(topic, msg_type, qos=qos, limit=limit, timeout=timeout)
+
+    def offered(self, names: Sequence[str]) -> dict[str, list[str]]:
+        """Return which nodes of this domain publish these topics, or serve these services.
+
+        Args:
+            names: as the graph spells them; an action is served as ``/dock/_action/send_goal``.
+
+        Returns:
+            The fully qualified names of the nodes, by topic or service; those that nobody offers
+            are left out.
+        """
+        return self._requests.offered(names)
+
+    def participate(self) -> None:
+        """Take part in DDS until the session is closed, also while it runs no node.
+
+        Without it the participant comes with the first node and goes with the last one, and
+        whoever comes next has to find all others anew.
+        """
+        self._requests.participate()
+
+    # Time, and looking on.
 
     @property
     def sim(self) -> SimulatedTime:
@@ -106,7 +406,7 @@ class CoreSession(Asking):
     @property
     def observer(self) -> Node:
         """The hidden node through which the session looks at the graph."""
-        return self._probe.node
+        return self._requests.probe.node
 
     def watch(
         self,
@@ -124,31 +424,35 @@ class CoreSession(Asking):
 
         For live views: a node that blocks does not hold it up. `unwatch` ends it.
         """
-        return self._probe.subscribe(msg_type, topic, callback, qos, raw=raw)
+        return self._requests.probe.subscribe(msg_type, topic, callback, qos, raw=raw)
 
     def unwatch(self, subscription: Subscription) -> None:
         """End a `watch`. Idempotent."""
         if not self.closed:
-            self._probe.drop(subscription)
+            self._requests.probe.drop(subscription)
 
     def moved_nodes(self) -> list[str]:
         """Return the names of nodes that are in an executor of the learner's own."""
-        return self._residents.moved()
+        return self._host.residents.moved()
 
     def half_made(self) -> list[Remains]:
         """Return what is left of nodes whose constructor raised."""
-        return self._residents.half_made.all()
+        return self._host.residents.half_made.all()
 
     def paused_nodes(self) -> list[str]:
         """Return the names of paused nodes."""
-        return [resident.name for resident in self._residents.all() if resident.paused]
+        return [resident.name for resident in self._host.residents.all() if resident.paused]
 
     # Closing.
 
     @property
     def closed(self) -> bool:
         """True once the session has been closed, or its context shut down by rclpy.shutdown()."""
-        return self._closing or not self.context.ok()
+        return self._host.closed
+
+    def require_open(self) -> None:
+        """Raise a `SessionError` if the session is closed."""
+        self._host.require_open()
 
     def spin(self) -> None:
         """Block until Ctrl-C, SIGTERM or the end of the session; for scripts.
@@ -156,7 +460,7 @@ class CoreSession(Asking):
         Returns normally in each case: close the session afterwards, or leave its `with` block.
         """
         seen = self._endings.count
-        self._require_open()
+        self.require_open()
         with signals.ending(self._endings.beat):
             self._endings.wait(seen)
 
@@ -171,15 +475,15 @@ class CoreSession(Asking):
             from a callback of this session, it returns at once, and the report is filled in later.
         """
         job = current_job()
-        if job is not None and job.home.session_key is self._crew:
+        if job is not None and job.home.session_key is self._host.crew:
             # A thread cannot wait for its own end: another one does it, once this callback is over.
-            self._closing = True
+            self._host.closing = True
             threading.Thread(target=self.close, args=(timeout,), name="ROS session closer").start()
             return self._report
         timeout = arguments.seconds(timeout)
         with self._lock:
             if not self._closed:
-                self._closing = True
+                self._host.closing = True
                 closing.close(self, self._report, timeout)
                 self._closed = True
             return self._report
@@ -208,6 +512,13 @@ class CoreSession(Asking):
         if self._lease is not None:
             self._lease.release()
 
+    def _hints(self, *, vague: bool, sought: str) -> list[str]:
+        return self._further_hints(vague=vague, sought=sought) if self.explains else []
+
+    def _further_hints(self, *, vague: bool, sought: str) -> list[str]:
+        """Return what else may be the reason that a wait was in vain, the likeliest first."""
+        return []
+
     def _now_ns(self) -> int | None:
         return None if self._sim is None else self._sim.now_ns
 
@@ -219,15 +530,15 @@ class CoreSession(Asking):
         self._endings.beat()
         if self._answering is not None:
             self._answering.stop()
-        leaked = self._crew.stop(deadline)
-        leaked += self._residents.forget_all()
+        leaked = self._host.crew.stop(deadline)
+        leaked += self._host.residents.forget_all()
         for callback in self._on_close:
             callback()
-        self._pulse.beat()
+        self._host.pulse.beat()
         self.context.try_shutdown()
-        self._crew.shutdown(deadline)
+        self._host.crew.shutdown(deadline)
         self.context.join(max(0.1, deadline - time.monotonic()))
         self.context.destroy()
         self._release_domain()
-        store.disclaim(self._crew)
+        store.disclaim(self._host.crew)
         return leaked

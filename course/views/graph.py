@@ -35,7 +35,7 @@ class GraphView(LiveView):
     @property
     def graph(self) -> Graph:
         """What is there now."""
-        self.session._require_open()
+        self.session.require_open()
         own = list(self.session.nodes.values())
         return reader.read(self.session.observer, everything=self._everything, own=own)
 
