@@ -56,10 +56,7 @@ FULL = 15.0
 SEED = 36
 """Not the usual one: what is known by heart from other runs must not be right by chance."""
 
-pytestmark = [
-    needs_isolation,
-    pytest.mark.xdist_group("hostile"),  # one listener on the host, which no attack may reach
-]
+pytestmark = needs_isolation
 
 
 @dataclass(frozen=True)

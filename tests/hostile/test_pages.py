@@ -26,7 +26,7 @@ from tests.machine import needs_isolation
 
 from .test_hostile import FULL, Class, class_in
 
-pytestmark = [needs_isolation, pytest.mark.xdist_group("hostile")]
+pytestmark = needs_isolation
 
 HONEST = "honest"
 WRITES_A_MARK = "fetch('/formgrader/api/grade/1', {method: 'PUT', body: '{}'})"

@@ -155,7 +155,7 @@ REQUESTS = [
 ]  # fmt: skip
 """What a warden is asked for; the first and the last two are asked for by examiners, too."""
 
-pytestmark = [needs_isolation, pytest.mark.xdist_group("hostile")]
+pytestmark = needs_isolation
 
 
 def take(monkeypatch: pytest.MonkeyPatch, program: str, *, warm: bool) -> None:
