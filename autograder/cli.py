@@ -59,16 +59,16 @@ def build(
     """Build the notebooks from their text sources."""
     from autograder.assignments.build import build as build_notebooks
 
-    for path in build_notebooks(_root(root), check=check, with_solutions=with_solutions):
+    for path in build_notebooks(_use_root(root), check=check, with_solutions=with_solutions):
         out.print(str(path), soft_wrap=True)
 
 
 @app.command()
 def release(assignment: str, root: Root = None) -> None:
     """Make the student version of an assignment with nbgrader."""
-    from autograder.gradebook.release import release as release_assignment
+    from autograder.gradebook.release import make_release as release_assignment
 
-    out.print(str(release_assignment(_root(root), assignment)), soft_wrap=True)
+    out.print(str(release_assignment(_use_root(root), assignment)), soft_wrap=True)
 
 
 @app.command()
@@ -108,16 +108,16 @@ def grade(
     from autograder.gradebook.course_gradebook import CourseGradebook
     from autograder.grading import engine, progress
 
-    where = _root(root)
+    where = _use_root(root)
     done = engine.grade(
         where, assignment, students=student or (), jobs=jobs, fresh=fresh, trust=trust,
         scheduler=scheduler, progress=progress.for_console(out, err, machine=as_json),
     )  # fmt: skip
     gradebook = CourseGradebook(where)
-    every = {name: gradebook.grades(name) for name in gradebook.assignments()}
+    every = {name: gradebook.read_grades(name) for name in gradebook.assignment_names()}
     meant = {graded.student for graded in done}
     grades = [grade for grade in every[assignment] if not student or grade.student in meant]
-    grades_csv.write(every, where / "grades.csv")
+    grades_csv.write_grades(every, where / "grades.csv")
     problems = {
         graded.student: graded.problem if graded.entered else f"NOT ENTERED: {graded.problem}"
         for graded in done
@@ -162,8 +162,8 @@ def claim(
     """
     from autograder.commands import claim_command
 
-    said = claim_command.claim(
-        _root(root), assignment, student, notebook, file, nothing=nothing, withdraw=withdraw
+    said = claim_command.keep_claim(
+        _use_root(root), assignment, student, notebook, file, nothing=nothing, withdraw=withdraw
     )
     out.print(said, soft_wrap=True)
 
@@ -180,7 +180,7 @@ def extend(
     """Give students more time for an assignment, in place of an earlier extension of theirs."""
     from autograder.gradebook import extensions
 
-    for due in extensions.extend(_root(root), assignment, students, hours):
+    for due in extensions.grant_extensions(_use_root(root), assignment, students, hours):
         then = (
             "it counts once the work is graded."
             if due.waits
@@ -219,20 +219,20 @@ def corpus(
     from course.workspace.content import ContentError
 
     with suppress(ContentError):  # outside of a course root, there are those of the package
-        _root(root)
+        _use_root(root)
     if as_table:
-        sys.stdout.write(tables.matrix(command.cases(exercise)))
+        sys.stdout.write(tables.checks_matrix(command.load_cases(exercise)))
         return
-    trials = command.run(
+    trials = command.run_corpus(
         exercise, only=case or (), repeat=repeat, jobs=jobs, load=load, seed=seed,
-        say=_say(as_json),
+        say=_line_printer(as_json),
     )  # fmt: skip
     different = [trial for trial in trials if trial.difference]
     flips = tables.all_flips(trials)
     if as_json:
         _print_json(tables.as_data(trials))
     else:
-        out.print(tables.table(trials))
+        out.print(tables.trials_table(trials))
         out.print(
             f"{len(trials)} runs: {len(different)} with another verdict than expected, "
             f"{len(flips)} checks that changed between repeats."
@@ -289,9 +289,9 @@ def report(
     """
     from autograder.commands import quiz_report, report_command
 
-    where = _root(root)
+    where = _use_root(root)
     assignment = quiz_report.assignment_of(where, assignment)
-    made = report_command.run(
+    made = report_command.make_report(
         where, assignment, column=column, provisional=provisional, threshold=similarity,
         zero_absent=zero_absent,
     )  # fmt: skip
@@ -303,12 +303,12 @@ def report(
         _print_json(shown)
         return
     _grades_table(list(grades), {})
-    out.print(*made.tables(), sep="\n")
+    out.print(*made.as_tables(), sep="\n")
     for remark in made.remarks:
         out.print(remark, soft_wrap=True)
     out.print(f"Written: {', '.join(map(str, made.files))}", soft_wrap=True)
     for quiz in quizzes:
-        out.print(*quiz.tables(), sep="\n")
+        out.print(*quiz.as_tables(), sep="\n")
         out.print(f"Written: {', '.join(map(str, quiz.files))}", soft_wrap=True)
 
 
@@ -340,17 +340,19 @@ def feedback(
     the name of theirs.
     """
     from autograder.class_report.platforms import feedback_archive
-    from course.messages.yaml_text import counted
+    from course.messages.yaml_text import format_count
 
     if platform not in ("moodle", "canvas"):
         raise typer.BadParameter("moodle or canvas", param_hint="--platform")
-    where = _root(root)
+    where = _use_root(root)
     file = to or where / "reports" / assignment / f"feedback-{platform}.zip"
-    packed = feedback_archive.pack(where, assignment, platform, names, file)  # type: ignore[arg-type]
+    packed = feedback_archive.pack_feedback(where, assignment, platform, names, file)  # type: ignore[arg-type]
     if as_json:
         _print_json(vars(packed))
         return
-    out.print(f"Feedback for {counted(len(packed.students), 'student')}: {file}", soft_wrap=True)
+    out.print(
+        f"Feedback for {format_count(len(packed.students), 'student')}: {file}", soft_wrap=True
+    )
     for why, who in packed.left_out.items():
         out.print(f"Not in it, {why}: {', '.join(who)}.", soft_wrap=True)
 
@@ -371,7 +373,9 @@ def demo(
     from autograder.grading import progress
 
     shown = progress.for_console(out, err, machine=as_json)
-    done = demo_run.run(folder, every=every, jobs=jobs, say=_say(as_json), progress=shown)
+    done = demo_run.run_demo(
+        folder, every=every, jobs=jobs, say=_line_printer(as_json), progress=shown
+    )
     if as_json:
         rows = [{**vars(row), "grade": vars(row.grade)} for row in done.rows]
         _print_json({"root": str(done.root), "rows": rows, "as_expected": done.as_expected})
@@ -403,10 +407,10 @@ def _demo_table(done: Any) -> None:
 def _grades_table(grades: list[Any], problems: dict[str, str]) -> None:
     from autograder.grading import grades_table
 
-    out.print(grades_table.table(grades, problems))
+    out.print(grades_table.make_table(grades, problems))
 
 
-def _say(silent: bool) -> Any:
+def _line_printer(silent: bool) -> Any:
     return (lambda _line: None) if silent else (lambda line: out.print(line, soft_wrap=True))
 
 
@@ -414,12 +418,12 @@ def _print_json(data: Any) -> None:
     sys.stdout.write(visible_json(json.dumps(data, default=str, ensure_ascii=False)) + "\n")
 
 
-def _root(root: Path | None) -> Path:
+def _use_root(root: Path | None) -> Path:
     from autograder import exercise_folders
     from course.workspace.content import working_root
 
     found = working_root() if root is None else root.resolve()
-    exercise_folders.use(found)
+    exercise_folders.use_course(found)
     return found
 
 

@@ -15,11 +15,11 @@ from autograder.assignments import listing, submission
 from autograder.assignments.build import build
 from autograder.class_report.platforms import grades_csv
 from autograder.corpus import Case
-from autograder.corpus.command import untrusting
+from autograder.corpus.command import needs_trust
 from autograder.corpus.trials import notebooks_of
 from autograder.examination import points
 from autograder.gradebook.course_gradebook import CourseGradebook, Grade
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from autograder.grading.engine import Graded
 from autograder.grading.progress import Collecting, Progress
@@ -63,7 +63,7 @@ class Demo:
         return not any(row.difference for row in self.rows)
 
 
-def run(
+def run_demo(
     folder: Path,
     *,
     every: bool = False,
@@ -83,8 +83,8 @@ def run(
     Raises:
         CourseError: ``folder`` holds something that is not a demo.
     """
-    exercise_folders.use(content_root())
-    cases = _cases()
+    exercise_folders.use_course(content_root())
+    cases = _load_cases()
     class_ = bundled_class(cases, every=every)
     handed_in = {exam for student in class_.values() for exam in student}
     cases = {exam: own for exam, own in cases.items() if exam in handed_in}
@@ -92,19 +92,19 @@ def run(
     say(f"Building the notebooks in {root}")
     build(root)
     say(f"Releasing {ASSIGNMENT} with nbgrader")
-    release(root, ASSIGNMENT)
-    collect(root, class_, cases)
+    make_release(root, ASSIGNMENT)
+    collect_submissions(root, class_, cases)
     say(f"Collected {len(class_)} submissions; grading them on real DDS")
-    trust = untrusting(say)
+    trust = needs_trust(say)
     graded: dict[str, Graded] = {}
     engine.grade(
         root, ASSIGNMENT, jobs=jobs, trust=trust, progress=Collecting(graded, then=progress)
     )
-    grades = CourseGradebook(root).grades(ASSIGNMENT)
+    grades = CourseGradebook(root).read_grades(ASSIGNMENT)
     csv = root / "grades.csv"
-    grades_csv.write({ASSIGNMENT: grades}, csv)
+    grades_csv.write_grades({ASSIGNMENT: grades}, csv)
     by_student = {grade.student: grade for grade in grades}
-    rows = [_row(class_[s], graded[s], by_student[s], cases) for s in sorted(graded)]
+    rows = [_make_row(class_[s], graded[s], by_student[s], cases) for s in sorted(graded)]
     return Demo(root, csv, tuple(rows))
 
 
@@ -121,14 +121,14 @@ def bundled_class(cases: Cases, *, every: bool) -> Class:
     return {**class_, first["damaged"]: {"title": "A file that was cut off", exam: CUT_OFF}}
 
 
-def _cases() -> Cases:
+def _load_cases() -> Cases:
     return {
-        exam: {case.name: case for case in corpus.load(exam)}
-        for exam in listing.one(content_root(), ASSIGNMENT).exercises
+        exam: {case.name: case for case in corpus.load_cases(exam)}
+        for exam in listing.read_assignment(content_root(), ASSIGNMENT).exercises
     }
 
 
-def collect(root: Path, class_: Class, cases: Cases) -> None:
+def collect_submissions(root: Path, class_: Class, cases: Cases) -> None:
     """Write what the class hands in into the course's ``submitted`` folder."""
     for student, handed_in in class_.items():
         folder = root / "submitted" / student / ASSIGNMENT
@@ -145,8 +145,8 @@ def _hand_in(root: Path, folder: Path, exam: str, name: str, cases: dict[str, Ca
         whole = released_file.read_text(encoding="utf-8")
         (folder / file).write_text(whole[: len(whole) // 2], encoding="utf-8")
         return
-    source = submission.read(root / "source" / ASSIGNMENT / file)
-    handed_in = cases[name].submission(source, submission.read(released_file))
+    source = submission.read_notebook(root / "source" / ASSIGNMENT / file)
+    handed_in = cases[name].make_submission(source, submission.read_notebook(released_file))
     nbformat.write(handed_in, folder / file)  # type: ignore[no-untyped-call]
 
 
@@ -169,7 +169,7 @@ def _course_root(folder: Path, exams: list[str]) -> Path:
     return notebooks_of(folder, exams, ASSIGNMENT)
 
 
-def _row(handed_in: dict[str, str], graded: Graded, grade: Grade, cases: Cases) -> Row:
+def _make_row(handed_in: dict[str, str], graded: Graded, grade: Grade, cases: Cases) -> Row:
     """Return a student's line: what had to come out, and what came out differently."""
     expected, differences = [], []
     for exam, own in cases.items():

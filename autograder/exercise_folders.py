@@ -8,7 +8,7 @@ A folder is an exercise if it has one of the first three of these, and its name 
 - ``objectives.toml``: what each of them shows about a learner;
 - ``corpus/``: submissions with known verdicts; ``design.md``: what the checks are for.
 
-One course root at a time has its exercises among them: `use` and `of_course` say which.
+One course root at a time has its exercises among them: `use_course` and `of_course` say which.
 """
 
 from __future__ import annotations
@@ -57,12 +57,12 @@ class Exercises:
         Raises:
             ExerciseError: one of the course root has a name that it cannot have.
         """
-        packaged = _found(PACKAGE / FOLDER)
+        packaged = _find_exercises(PACKAGE / FOLDER)
         try:
-            found = _found(root / FOLDER) if root else {}
+            found = _find_exercises(root / FOLDER) if root else {}
             self._state = [(name, _changed_ns(folder)) for name, folder in sorted(found.items())]
         except OSError as error:
-            raise _unreadable(error) from None
+            raise _unreadable_error(error) from None
         for name, folder in found.items():
             if not name.isidentifier():
                 raise ExerciseError(
@@ -86,7 +86,7 @@ class Exercises:
 _current: Exercises | None = None
 
 
-def current() -> Exercises:
+def current_exercises() -> Exercises:
     """Return the exercises of the package and of the course root in use.
 
     What is read of them may be kept for as long as this is the same object.
@@ -97,13 +97,13 @@ def current() -> Exercises:
     return _current
 
 
-def packaged() -> frozenset[str]:
+def packaged_names() -> frozenset[str]:
     """Return the names of those that come with the course."""
-    exercises = current()
+    exercises = current_exercises()
     return frozenset(exercises.folders.keys() - exercises.own)
 
 
-def use(root: Path | None) -> None:
+def use_course(root: Path | None) -> None:
     """Have the exercises of the course at ``root`` among them, in place of another course's.
 
     Raises:
@@ -111,29 +111,32 @@ def use(root: Path | None) -> None:
     """
     global _current
     found = Exercises(root.resolve() if root else None)
-    if not found.is_like(current()):
+    if not found.is_like(current_exercises()):
         _current = found
 
 
 @contextmanager
 def of_course(root: Path) -> Iterator[None]:
-    """Have the exercises of the course at ``root`` among them for the block; raises as `use`."""
+    """Have the exercises of the course at ``root`` among them for the block.
+
+    It raises as `use_course`.
+    """
     global _current
-    before = current()
-    use(root)
+    before = current_exercises()
+    use_course(root)
     try:
         yield
     finally:
         _current = before
 
 
-def file(name: str, part: str) -> Path:
+def exercise_file(name: str, part: str) -> Path:
     """Return a file of an exercise that there is.
 
     Raises:
         ExerciseError: it does not have it.
     """
-    path = current().folders[name] / part
+    path = current_exercises().folders[name] / part
     if not path.is_file():
         raise ExerciseError(f"The exercise '{name}' has no {part}: write {path}.")
     return path
@@ -151,7 +154,7 @@ def exam_files(folder: Path) -> dict[str, bytes]:
     try:
         return {path.name: path.read_bytes() for path in paths if path.is_file()}
     except OSError as error:
-        raise _unreadable(error) from None
+        raise _unreadable_error(error) from None
 
 
 def _is_needed(path: Path) -> bool:
@@ -165,7 +168,7 @@ def own_exam_files(names: Iterable[str]) -> dict[str, bytes]:
 
     A folder with these files is a course root to whoever uses it.
     """
-    exercises = current()
+    exercises = current_exercises()
     return {
         f"{FOLDER}/{name}/{file}": content
         for name in sorted(exercises.own.intersection(names))
@@ -190,13 +193,13 @@ def kept_from_students(package: Path = PACKAGE) -> Iterator[Path]:
     yield from (package / path.relative_to(PACKAGE) for path in kept)
 
 
-def _unreadable(error: OSError) -> ExerciseError:
+def _unreadable_error(error: OSError) -> ExerciseError:
     return ExerciseError(
         f"{error.filename} cannot be read ({error.strerror}): mend its permissions."
     )
 
 
-def _found(folder: Path) -> dict[str, Path]:
+def _find_exercises(folder: Path) -> dict[str, Path]:
     return {
         entry.name: entry
         for entry in (sorted(folder.iterdir()) if folder.is_dir() else ())

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
 
-from course.util.files import PARTIAL, replacing
+from course.util.files import PARTIAL, replace_file
 
 SCRATCH = "ros2-course-scratch-"
 PRIVATE = 0o600
@@ -43,11 +43,11 @@ def write_whole(path: Path, text: str) -> None:
         OSError: it cannot be written; what stood there before still does.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path, PRIVATE) as file:
+    with replace_file(path, PRIVATE) as file:
         file.write(text.encode("utf-8", errors="replace"))
 
 
-def walk(folder: Path) -> list[Path]:
+def walk_files(folder: Path) -> list[Path]:
     """Return the files anywhere in a stranger's folder, the upper ones first; no link is followed.
 
     There may be any number of them, as deep as paths go: no more than `MAX_FILES` are returned, and
@@ -59,7 +59,7 @@ def walk(folder: Path) -> list[Path]:
     for _ in range(MAX_DEPTH):
         below: list[Path] = []
         for place in level[: max(0, MAX_FILES - seen)]:
-            files, folders = _listed(place)
+            files, folders = _list_folder(place)
             found += files
             below += folders
             seen += 1
@@ -69,7 +69,7 @@ def walk(folder: Path) -> list[Path]:
     return found
 
 
-def _listed(folder: Path) -> tuple[list[Path], list[Path]]:
+def _list_folder(folder: Path) -> tuple[list[Path], list[Path]]:
     """Return the files (links, pipes and devices, too) and the folders right in a folder."""
     try:
         with os.scandir(folder) as entries:
@@ -92,8 +92,11 @@ def remove_partial(folder: Path) -> None:
 
 @contextmanager
 def scratch_folder() -> Iterator[Path]:
-    """Make a folder for the block, and remove it afterwards; `sweep` does if this is killed."""
-    folder, handle = _locked()
+    """Make a folder for the block, and remove it afterwards.
+
+    `sweep_scratch` does if this is killed.
+    """
+    folder, handle = _make_locked_folder()
     try:
         yield folder
     finally:
@@ -102,7 +105,7 @@ def scratch_folder() -> Iterator[Path]:
         os.close(handle)
 
 
-def _locked() -> tuple[Path, int]:
+def _make_locked_folder() -> tuple[Path, int]:
     """Return a new folder and the descriptor that holds a lock on it."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=SCRATCH))
@@ -113,16 +116,16 @@ def _locked() -> tuple[Path, int]:
         os.close(handle)
 
 
-def sweep() -> int:
+def sweep_scratch() -> int:
     """Remove scratch folders whose processes are gone; return how many there were."""
     swept = 0
     for folder in Path(tempfile.gettempdir()).glob(f"{SCRATCH}*"):
         with suppress(OSError):
-            swept += _abandoned(folder)
+            swept += _remove_abandoned(folder)
     return swept
 
 
-def _abandoned(folder: Path) -> bool:
+def _remove_abandoned(folder: Path) -> bool:
     """Remove a folder of ours that nobody holds; return whether it was one."""
     if folder.lstat().st_uid != os.geteuid():
         return False

@@ -28,12 +28,12 @@ class Terminal(Console):
     def render_str(self, text: str, **options: Any) -> Text:
         """Return a string as it is shown: rich asks for this wherever it meets a string."""
         options |= {"markup": False, "emoji": False, "highlight": False}
-        return super().render_str(visible(text), **options)
+        return super().render_str(visible_text(text), **options)
 
 
-def visible(text: str) -> str:
+def visible_text(text: str) -> str:
     """Return a text in which nothing acts on a terminal."""
-    return _ACTING.sub(lambda found: _escape(found[0]), text)
+    return _ACTING.sub(lambda found: _escape_letter(found[0]), text)
 
 
 def visible_json(text: str) -> str:
@@ -41,5 +41,5 @@ def visible_json(text: str) -> str:
     return _ACTING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
-def _escape(letter: str) -> str:
+def _escape_letter(letter: str) -> str:
     return letter.encode("unicode_escape", "surrogatepass").decode("ascii")

@@ -11,7 +11,7 @@ from course.util import platform_check
 # Message modules read this when they load: a wrong field type then fails where it is assigned.
 os.environ.setdefault("ROS_PYTHON_CHECK_FIELDS", "1")
 
-if platform_check.problem() is None:
+if platform_check.find_problem() is None:
     # From here on `from example_interfaces.srv import SetBool` finds, or builds, the package.
     from course import interfaces
 

@@ -52,10 +52,10 @@ def lab(
     folder = folder.expanduser().absolute()
     copied = course_lab.make_copy(folder)
     for name in copied.new:
-        _print(f"new: {folder / name}")
+        _print_text(f"new: {folder / name}")
     for name, beside in copied.beside.items():
-        _print(f"The course has a newer {name}. Yours is untouched; the new one is {beside}.")
-    _print(f"Your working copy is {folder}")
+        _print_text(f"The course has a newer {name}. Yours is untouched; the new one is {beside}.")
+    _print_text(f"Your working copy is {folder}")
     if not copy_only:
         course_lab.open_lab(folder, ["--no-browser", *rest] if no_browser else rest)
 
@@ -72,7 +72,7 @@ def progress(
     from course.workspace import lab as course_lab
 
     inside = course_lab.DEFAULT if course_lab.DEFAULT.is_dir() else None
-    _print(repr(read(folder.expanduser() if folder else inside)))
+    _print_text(repr(read(folder.expanduser() if folder else inside)))
 
 
 @app.command()
@@ -83,18 +83,18 @@ def doctor(
     from course import doctor as course_doctor
 
     findings = []
-    for finding in course_doctor.examine():
+    for finding in course_doctor.examine_all():
         findings.append(finding)
         if not as_json:
-            _print(finding.text())
+            _print_text(finding.as_text())
     if as_json:
-        _print(json.dumps([finding.as_data() for finding in findings], ensure_ascii=False))
+        _print_text(json.dumps([finding.as_data() for finding in findings], ensure_ascii=False))
     else:
-        _print(course_doctor.summary(findings))
+        _print_text(course_doctor.summary_line(findings))
     raise typer.Exit(course_doctor.exit_code(findings))
 
 
-def _print(text: str) -> None:
+def _print_text(text: str) -> None:
     out.print(text, markup=False, highlight=False, soft_wrap=True)
 
 

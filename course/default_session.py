@@ -43,7 +43,7 @@ def session(**options: Any) -> Session:
     global _session
     with _lock:
         if _session is not None and not _session.closed:
-            _agree(_session, options)
+            _check_options(_session, options)
             return _session
         if _session is not None:
             _session.close()  # rclpy.shutdown() ended its context: let its threads go as well
@@ -54,7 +54,7 @@ def session(**options: Any) -> Session:
         return _session
 
 
-def current() -> Session | None:
+def current_session() -> Session | None:
     """Return this process's session if it is open, else None."""
     return _session if _session is not None and not _session.closed else None
 
@@ -66,7 +66,7 @@ def run(factory: Callable[..., Node] | Node, *args: Any, **kwargs: Any) -> Node:
 
 def stop(*what: Any) -> None:
     """Stop nodes of this process's session; see `Session.stop`."""
-    if (open_session := current()) is not None:
+    if (open_session := current_session()) is not None:
         open_session.stop(*what)
 
 
@@ -142,7 +142,7 @@ def spin() -> None:
     session().spin()
 
 
-def _agree(open_session: Session, options: dict[str, Any]) -> None:
+def _check_options(open_session: Session, options: dict[str, Any]) -> None:
     for name, wanted in options.items():
         actual = open_session.domain_id if name == "domain_id" else open_session.options.get(name)
         if actual != wanted:

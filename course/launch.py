@@ -22,15 +22,15 @@ from course.util.platform_check import (
 
 def course() -> None:
     """Run the ``course`` command."""
-    _run("course")
+    _run_command("course")
 
 
 def autograder() -> None:
     """Run the ``autograder`` command."""
-    _run("autograder")
+    _run_command("autograder")
 
 
-def _run(name: str) -> None:
+def _run_command(name: str) -> None:
     try:
         require_supported_platform()
     except UnsupportedPlatformError as error:

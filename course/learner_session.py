@@ -74,7 +74,7 @@ class Session(CoreSession):
 
         if srv_type is not None:
             arguments.ros_type(srv_type, "service")
-        timeout = arguments.seconds(timeout)
+        timeout = arguments.check_seconds(timeout)
         full = full_service(self.observer, name)
         known = self.observer.get_service_names_and_types()
         found = srv_type or self._type_of("service", full, known)
@@ -126,8 +126,8 @@ class Session(CoreSession):
         from course.views.timeline import Timeline
 
         self.require_open()
-        named = [_named(topic) for topic in topics]
-        return Timeline(self, named, arguments.seconds(window, "window"))
+        named = [_check_topic(topic) for topic in topics]
+        return Timeline(self, named, arguments.check_seconds(window, "window"))
 
     def qos_lab(
         self, offered: QoSProfile | int | None = None, requested: QoSProfile | int | None = None
@@ -146,7 +146,7 @@ class Session(CoreSession):
         from course.views.qos_lab import QoSLab
 
         self.require_open()
-        return QoSLab(self, arguments.qos(offered), arguments.qos(requested))
+        return QoSLab(self, arguments.check_qos(offered), arguments.check_qos(requested))
 
     def diagnose(self) -> Diagnosis:
         """Return what is wrong, or may be, with the nodes here: in plain words, with the mend.
@@ -165,10 +165,10 @@ class Session(CoreSession):
         return diagnose(self)
 
     def _further_hints(self, *, vague: bool, sought: str) -> list[str]:
-        from course.diagnosis import likely
+        from course.diagnosis import likely_reasons
 
         try:
-            found = likely(self, vague=vague, sought=sought)
+            found = likely_reasons(self, vague=vague, sought=sought)
         except Exception:  # noqa: BLE001 - the session may end meanwhile; the wait has its own error
             return []
         return [f"{finding.message} {finding.mend}" for finding in found]
@@ -182,15 +182,15 @@ class Session(CoreSession):
         return load_type(types[name][0], name, "srv" if what == "service" else what)
 
 
-def _named(topic: Any) -> tuple[str, Any | None]:
+def _check_topic(topic: Any) -> tuple[str, Any | None]:
     """Return the name of a topic and, if it was given, its message class.
 
     Raises:
         SessionError: it is neither a name nor such a pair.
     """
     if not isinstance(topic, tuple) or len(topic) != 2:
-        return arguments.text(topic, "A topic", "/scan"), None
+        return arguments.check_text(topic, "A topic", "/scan"), None
     name, msg_type = topic
     if msg_type is not None:
         arguments.ros_type(msg_type, "message")
-    return arguments.text(name, "A topic", "/scan"), msg_type
+    return arguments.check_text(name, "A topic", "/scan"), msg_type

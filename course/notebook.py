@@ -24,16 +24,16 @@ def load_ipython_extension(shell: Any) -> None:
     magic.register(shell)
     ros_magic.register(shell)
     unload_ipython_extension(shell)
-    for session in closing.known():
+    for session in closing.known_sessions():
         if isinstance(session, CoreSession) and session.closed:
-            _reported.news(session)  # of cells that ran before: no news of the next one
-    shell.events.register("post_run_cell", _report)
+            _reported.unseen_news(session)  # of cells that ran before: no news of the next one
+    shell.events.register("post_run_cell", _report_news)
 
 
 def unload_ipython_extension(shell: Any) -> None:
     """Stop reporting; IPython calls this for `%unload_ext course`."""
-    if _report in shell.events.callbacks["post_run_cell"]:
-        shell.events.unregister("post_run_cell", _report)
+    if _report_news in shell.events.callbacks["post_run_cell"]:
+        shell.events.unregister("post_run_cell", _report_news)
 
 
 class News:
@@ -66,12 +66,12 @@ class _Reported:
         self._notices: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
         self._blocked: weakref.WeakKeyDictionary[Any, set[Any]] = weakref.WeakKeyDictionary()
 
-    def news(self, session: CoreSession) -> list[News]:
+    def unseen_news(self, session: CoreSession) -> list[News]:
         seen = self._errors.setdefault(session, {})
         news = []
         for index, error in enumerate(session.errors):
             if error.count > seen.get(index, 0):
-                news.append(_about(error, again=index in seen))
+                news.append(_news_about(error, again=index in seen))
                 seen[index] = error.count
         latest = self._transitions.get(session, 0)
         for failure in session.failed_transitions:
@@ -95,7 +95,7 @@ _reported = _Reported()
 _notes = CellNotes()
 
 
-def _about(error: CallbackError, *, again: bool) -> News:
+def _news_about(error: CallbackError, *, again: bool) -> News:
     sentence = str(error)
     if not sentence.endswith((".", "!", "?")):
         sentence += "."  # what was raised may be a sentence already
@@ -104,10 +104,10 @@ def _about(error: CallbackError, *, again: bool) -> News:
     return News(f"{sentence} The node goes on spinning.", error.traceback)
 
 
-def _report(result: Any) -> None:
+def _report_news(result: Any) -> None:
     from IPython.display import display
 
-    if problem := _notes.after(result):
+    if problem := _notes.note_cell(result):
         display(News(problem))  # type: ignore[no-untyped-call]
     error = getattr(result, "error_in_exec", None)
     if isinstance(error, RuntimeError) and _INIT_TWICE in str(error):
@@ -125,9 +125,9 @@ def _report(result: Any) -> None:
                 "first."
             )
         )
-    for session in closing.known():
+    for session in closing.known_sessions():
         if isinstance(session, CoreSession):
             if not session.closed:
                 session.take_back_stolen_nodes()
-            for item in _reported.news(session):
+            for item in _reported.unseen_news(session):
                 display(item)  # type: ignore[no-untyped-call]

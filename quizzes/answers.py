@@ -27,7 +27,7 @@ MAX_NUMBER = 1e300
 """Numbers beyond this are no answers, neither when given nor when read from a file."""
 
 
-def normal(item: Item, given: Any) -> Answer:
+def normalize_answer(item: Item, given: Any) -> Answer:
     """Return an answer in its saved form; None and "" take an answer back.
 
     Args:
@@ -42,28 +42,28 @@ def normal(item: Item, given: Any) -> Answer:
         return NOTHING
     if isinstance(item.variant, Numeric):
         try:
-            return number(given)
+            return parse_number(given)
         except ValueError:
-            raise _wrong(item, given) from None
-    letters = _letters(item, given)
+            raise _answer_error(item, given) from None
+    letters = _parse_letters(item, given)
     unknown = sorted(set(letters) - set(item.letters) - {OPEN})
     if unknown:
-        raise AnswerError(f"Question {item.number} has no {unknown[0]!r}: {fits(item)}.")
+        raise AnswerError(f"Question {item.number} has no {unknown[0]!r}: {describe_format(item)}.")
     if isinstance(item.variant, Matching):
         if len(letters) != len(item.variant.pairs):
-            raise _wrong(item, given)
+            raise _answer_error(item, given)
         return NOTHING if set(letters) == {OPEN} else letters
     if OPEN in letters or len(set(letters)) < len(letters):
-        raise _wrong(item, given)
+        raise _answer_error(item, given)
     if isinstance(item.variant, Multiple):
         return "".join(sorted(letters))
     wanted = len(item.letters) if isinstance(item.variant, Ordering) else 1
     if len(letters) != wanted:
-        raise _wrong(item, given)
+        raise _answer_error(item, given)
     return letters
 
 
-def number(given: Any) -> float:
+def parse_number(given: Any) -> float:
     """Return a numeric answer: any real number (also numpy's) or its text, up to `MAX_NUMBER`.
 
     Raises:
@@ -81,14 +81,14 @@ def number(given: Any) -> float:
     return found
 
 
-def complete(item: Item, answer: Answer) -> bool:
+def is_complete(item: Item, answer: Answer) -> bool:
     """Whether a saved answer answers the question (rightly or not)."""
     if isinstance(item.variant, Matching):
         return answer != NOTHING and OPEN not in str(answer)
     return answer != NOTHING
 
 
-def fits(item: Item) -> str:
+def describe_format(item: Item) -> str:
     """Return a phrase that says what an answer to this question looks like."""
     first, last = item.letters[:1], item.letters[-1:]
     if isinstance(item.variant, Numeric):
@@ -103,7 +103,7 @@ def fits(item: Item) -> str:
     return f"answer with one letter from {first} to {last}"
 
 
-def _letters(item: Item, given: Any) -> str:
+def _parse_letters(item: Item, given: Any) -> str:
     if isinstance(given, Mapping) and isinstance(item.variant, Matching):
         lefts = range(1, len(item.variant.pairs) + 1)
         if not set(given) <= set(lefts):
@@ -114,22 +114,22 @@ def _letters(item: Item, given: Any) -> str:
         given = [given.get(left, OPEN) for left in lefts]
     elif isinstance(given, AnySet):
         if isinstance(item.variant, Ordering | Matching):
-            raise _wrong(item, given)  # a set has no order
+            raise _answer_error(item, given)  # a set has no order
         given = sorted(given, key=str)
     if not isinstance(given, str):
         if not isinstance(given, Iterable) or isinstance(given, bytes | Mapping):
-            raise _wrong(item, given)
+            raise _answer_error(item, given)
         given = list(given)
         if not all(isinstance(letter, str) and len(letter.strip()) == 1 for letter in given):
-            raise _wrong(item, given)
+            raise _answer_error(item, given)
         given = "".join(given)
     return re.sub(r"[\s,;]", "", given).lower()
 
 
-def _wrong(item: Item, given: Any) -> AnswerError:
+def _answer_error(item: Item, given: Any) -> AnswerError:
     try:
         shown = repr(given)
     except ValueError:  # an integer of too many digits
         shown = "That"
     shown = shown if len(shown) <= 40 else f"{shown[:37]}..."
-    return AnswerError(f"{shown} does not fit question {item.number}: {fits(item)}.")
+    return AnswerError(f"{shown} does not fit question {item.number}: {describe_format(item)}.")

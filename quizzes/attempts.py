@@ -20,13 +20,13 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from quizzes.errors import AttemptsError, UnwritableError
-from quizzes.record import MAX_FILE, Attempt, filename, parse
+from quizzes.record import MAX_FILE, Attempt, attempts_filename, parse_attempts
 
 LOCK_TIMEOUT = 10.0
 """Seconds to wait for another tab that is writing; it needs milliseconds."""
 
 
-def _plain(path: str, flags: int) -> int:
+def _open_plain(path: str, flags: int) -> int:
     """Open a file, but nothing that never ends, such as a pipe or a device."""
     handle = os.open(path, flags | os.O_NONBLOCK)
     if stat.S_ISREG(os.fstat(handle).st_mode):
@@ -40,7 +40,7 @@ class AttemptsFile:
 
     def __init__(self, folder: Path, quiz: str) -> None:
         """Use ``folder``; nothing is written before there is something to keep."""
-        self.path = folder / filename(quiz)
+        self.path = folder / attempts_filename(quiz)
         self._quiz = quiz
         self._draft = folder / f".quiz-{quiz}.draft.json"
         self._lock = folder / f".quiz-{quiz}.lock"
@@ -51,7 +51,7 @@ class AttemptsFile:
         A damaged file is kept aside as ``NAME.corrupt-N``; its sound lines stay in use.
         """
         try:
-            attempts, damaged = parse(self._content())
+            attempts, damaged = parse_attempts(self._read_content())
         except OSError as error:
             return [], (
                 f"Your attempts in {self.path} cannot be read ({error.strerror or error}), so "
@@ -60,10 +60,10 @@ class AttemptsFile:
         if not damaged:
             return attempts, ""
         try:
-            with self._locked():
-                return self._mend()
+            with self._hold_lock():
+                return self._mend_file()
         except OSError as error:
-            return attempts, str(self._unwritable(error))
+            return attempts, str(self._unwritable_error(error))
         except AttemptsError as error:
             return attempts, str(error)
 
@@ -75,21 +75,21 @@ class AttemptsFile:
             AttemptsError: another tab has submitted this attempt already, or is writing for long.
         """
         try:
-            with self._locked():
-                content = self._content()
-                known, damaged = parse(content)
+            with self._hold_lock():
+                content = self._read_content()
+                known, damaged = parse_attempts(content)
                 if damaged:
-                    known, _ = self._mend()
+                    known, _ = self._mend_file()
                     content = b""
                 if any((a.student, a.attempt) == (attempt.student, attempt.attempt) for a in known):
-                    raise self._over(attempt.attempt)
+                    raise self._submitted_error(attempt.attempt)
                 # The last line may have lost its end, to an editor or to a copy that was cut short.
                 ended = content.endswith(b"\n") or not content
-                self._add(f"{'' if ended else chr(10)}{attempt.to_json()}\n".encode())
+                self._append_line(f"{'' if ended else chr(10)}{attempt.to_json()}\n".encode())
                 if self.read_draft().get("student") == attempt.student:
                     self._draft.unlink(missing_ok=True)
         except OSError as error:
-            raise self._unwritable(error) from None
+            raise self._unwritable_error(error) from None
 
     def save_draft(
         self, student: str, attempt: int, edition: str, answers: Mapping[str, Any]
@@ -106,10 +106,10 @@ class AttemptsFile:
         whose = {"quiz": self._quiz, "student": student, "attempt": attempt, "edition": edition}
         temporary = self._draft.with_name(f"{self._draft.name}.{os.getpid()}")
         try:
-            with self._locked():
-                known, _ = parse(self._content())
+            with self._hold_lock():
+                known, _ = parse_attempts(self._read_content())
                 if any(a.student == student and a.attempt >= attempt for a in known):
-                    raise self._over(attempt)
+                    raise self._submitted_error(attempt)
                 kept = self.read_draft()
                 same = {name: kept.get(name) for name in whose} == whose
                 before = kept.get("answers") if same else {}
@@ -121,7 +121,7 @@ class AttemptsFile:
                 finally:
                     temporary.unlink(missing_ok=True)
         except OSError as error:
-            raise self._unwritable(error) from None
+            raise self._unwritable_error(error) from None
         return merged
 
     def read_draft(self) -> dict[str, Any]:
@@ -132,14 +132,14 @@ class AttemptsFile:
             return {}
         return draft if isinstance(draft, dict) else {}
 
-    def _content(self) -> bytes:
+    def _read_content(self) -> bytes:
         try:
-            with open(self.path, "rb", opener=_plain) as file:
+            with open(self.path, "rb", opener=_open_plain) as file:
                 return file.read(MAX_FILE + 1)
         except FileNotFoundError:
             return b""
 
-    def _add(self, line: bytes) -> None:
+    def _append_line(self, line: bytes) -> None:
         """Append a line in one write; a line that a full disk cut short is taken back."""
         before = self.path.stat().st_size if self.path.exists() else 0
         handle = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o644)
@@ -165,9 +165,9 @@ class AttemptsFile:
             finally:
                 os.close(handle)
 
-    def _mend(self) -> tuple[list[Attempt], str]:
+    def _mend_file(self) -> tuple[list[Attempt], str]:
         """Keep a damaged file aside and its sound lines in use; call it with the lock held."""
-        attempts, damaged = parse(self._content())
+        attempts, damaged = parse_attempts(self._read_content())
         if not damaged:
             return attempts, ""  # another tab was faster
         aside = self._free_name()
@@ -191,7 +191,7 @@ class AttemptsFile:
         return aside
 
     @contextmanager
-    def _locked(self) -> Iterator[None]:
+    def _hold_lock(self) -> Iterator[None]:
         # Where no file can be made, say so at once: the library would wait or make folders.
         os.close(os.open(self._lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644))
         lock = FileLock(self._lock, timeout=LOCK_TIMEOUT)
@@ -207,13 +207,13 @@ class AttemptsFile:
         finally:
             lock.release()
 
-    def _over(self, attempt: int) -> AttemptsError:
+    def _submitted_error(self, attempt: int) -> AttemptsError:
         return AttemptsError(
             f"Attempt {attempt} has been submitted already, in another window: run this cell again "
             "to see its result."
         )
 
-    def _unwritable(self, error: OSError) -> UnwritableError:
+    def _unwritable_error(self, error: OSError) -> UnwritableError:
         return UnwritableError(
             f"Nothing can be saved in {self.path.parent} ({error.strerror or error}): you can go "
             "on, but attempts made now do not count until the folder can be written."

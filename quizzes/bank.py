@@ -48,10 +48,12 @@ class Option(Part):
     @classmethod
     def _wrong_ones_have_a_reason(cls, value: str | None, info: ValidationInfo) -> str | None:
         correct = info.data.get("correct")
-        if correct is False and value is None and fields.teaches():
-            fields.require([("", "a wrong option needs a misconception in a quiz that teaches")])
+        if correct is False and value is None and fields.is_teaching():
+            fields.refuse_problems(
+                [("", "a wrong option needs a misconception in a quiz that teaches")]
+            )
         if correct is True and value is not None:
-            fields.require([("", "a right option has no misconception")])
+            fields.refuse_problems([("", "a right option has no misconception")])
         return value
 
 
@@ -71,12 +73,12 @@ class _Choice(_Variant):
     """What there is to choose from; each learner sees it in another order."""
 
     @property
-    def texts(self) -> list[str]:
+    def lettered_texts(self) -> list[str]:
         """The texts that letters stand for, in the order of the bank."""
         return [option.text for option in self.options]
 
     @property
-    def right(self) -> list[int]:
+    def right_positions(self) -> list[int]:
         """The positions of the right options, in the order of the bank."""
         return [index for index, option in enumerate(self.options) if option.correct]
 
@@ -87,7 +89,7 @@ class _OneRight(_Choice):
     def _one_key(cls, options: list[Option]) -> list[Option]:
         count = sum(option.correct for option in options)
         problem = f"exactly one option must be correct, not {count}"
-        fields.require([("", problem)] if count != 1 else [])
+        fields.refuse_problems([("", problem)] if count != 1 else [])
         return options
 
 
@@ -118,7 +120,7 @@ class Multiple(_Choice):
     def _some_right_some_wrong(cls, options: list[Option]) -> list[Option]:
         problem = "at least one option must be correct and one wrong"
         some = 0 < sum(option.correct for option in options) < len(options)
-        fields.require([] if some else [("", problem)])
+        fields.refuse_problems([] if some else [("", problem)])
         return options
 
 
@@ -136,9 +138,9 @@ class Trap(Part):
     show: Code | None = None
     """Python that demonstrates on live nodes what really happens."""
 
-    def holds(self, number: float) -> bool:
+    def is_hit(self, number: float) -> bool:
         """Whether ``number`` is the one this trap is about."""
-        return near(number, self.value, self.tolerance)
+        return is_near(number, self.value, self.tolerance)
 
 
 class _Built(_Variant):
@@ -177,24 +179,24 @@ class Numeric(_Variant):
     """Python that demonstrates on live nodes what really happens."""
 
     @property
-    def texts(self) -> list[str]:
+    def lettered_texts(self) -> list[str]:
         """No letters here."""
         return []
 
-    def holds(self, number: float) -> bool:
+    def is_right(self, number: float) -> bool:
         """Whether ``number`` is right."""
-        return near(number, self.answer, self.tolerance)
+        return is_near(number, self.answer, self.tolerance)
 
     @field_validator("traps")
     @classmethod
     def _traps_are_wrong(cls, traps: list[Trap], info: ValidationInfo) -> list[Trap]:
         answer, tolerance = info.data.get("answer"), info.data.get("tolerance")
         if answer is not None and tolerance is not None:
-            fields.require([
+            fields.refuse_problems([
                 (f"{number} value",
                  f"the trap {trap.value:g} lies within the tolerance of the answer")
                 for number, trap in enumerate(traps, start=1)
-                if near(trap.value, answer, tolerance)
+                if is_near(trap.value, answer, tolerance)
             ])  # fmt: skip
         return traps
 
@@ -208,7 +210,7 @@ class Ordering(_Built):
     """The items in the right order."""
 
     @property
-    def texts(self) -> list[str]:
+    def lettered_texts(self) -> list[str]:
         """The texts that letters stand for, in the right order."""
         return list(self.items)
 
@@ -233,7 +235,7 @@ class Matching(_Built):
     """Right sides that belong to nothing."""
 
     @property
-    def texts(self) -> list[str]:
+    def lettered_texts(self) -> list[str]:
         """The right sides that letters stand for, each once; those of the pairs come first."""
         return list(dict.fromkeys([*(pair.right for pair in self.pairs), *self.extras]))
 
@@ -248,14 +250,14 @@ class Matching(_Built):
         ]
         if len({pair.right for pair in pairs}) < 2:
             problems.append(("", "all have the same right side, so there is nothing to match"))
-        fields.require(problems)
+        fields.refuse_problems(problems)
         return pairs
 
     @field_validator("extras")
     @classmethod
     def _extras_belong_to_nothing(cls, extras: list[str], info: ValidationInfo) -> list[str]:
         rights = {pair.right for pair in info.data.get("pairs", [])}
-        fields.require([
+        fields.refuse_problems([
             (f"{number}", "an extra is the right side of a pair, too")
             for number, extra in enumerate(extras, start=1)
             if extra in rights
@@ -279,7 +281,7 @@ class Concept(Part):
     """Questions that can stand in for one another: each attempt gets one of them. At least 4 in a
     quiz that teaches, so that a retry is another quiz; one is enough for a closed quiz."""
 
-    def variant(self, name: str) -> Variant | None:
+    def find_variant(self, name: str) -> Variant | None:
         """Return the variant with the id ``name``, if there is one."""
         return next((variant for variant in self.variants if variant.id == name), None)
 
@@ -316,7 +318,7 @@ class Bank(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _needs_more_to_teach(cls, data: Any, handler: Callable[[Any], Bank]) -> Bank:
-        with fields.validating(teaches=not fields.is_closed(data)):
+        with fields.validating_bank(teaches=not fields.is_closed(data)):
             return handler(data)
 
     @property
@@ -325,7 +327,7 @@ class Bank(Part):
         return self._folder
 
     @property
-    def counted(self) -> int:
+    def attempt_limit(self) -> int:
         """How many attempts count: `COUNTED`, or 1 of a closed quiz, unless the bank says it."""
         return self.attempts or (1 if self.closed else COUNTED)
 
@@ -341,23 +343,23 @@ class Bank(Part):
         Mending a key, a stem or a feedback keeps it, so saved answers can be marked anew.
         """
         content = [
-            [concept.id, [[variant.id, variant.kind, _texts(variant, by_name=self.closed)]
+            [concept.id, [[variant.id, variant.kind, _referred_texts(variant, by_name=self.closed)]
                           for variant in concept.variants]]
             for concept in self.concepts
         ]  # fmt: skip
         return hashlib.sha256(json.dumps([DEAL, content]).encode()).hexdigest()[:16]
 
-    def concept(self, name: str) -> Concept | None:
+    def find_concept(self, name: str) -> Concept | None:
         """Return the concept with the id ``name``, if there is one."""
         return next((concept for concept in self.concepts if concept.id == name), None)
 
 
-def near(number: float, target: float, tolerance: float) -> bool:
+def is_near(number: float, target: float, tolerance: float) -> bool:
     """Whether a number is within ``tolerance`` of ``target``; rounding in binary is forgiven."""
     return abs(number - target) <= tolerance + 1e-9 * max(1.0, abs(target))
 
 
-def _texts(variant: Variant, *, by_name: bool) -> list[str]:
+def _referred_texts(variant: Variant, *, by_name: bool) -> list[str]:
     """Return what letters refer to; ``by_name`` if the order of the bank is not for learners."""
     lefts = [pair.left for pair in variant.pairs] if isinstance(variant, Matching) else []
-    return [*lefts, *(sorted(variant.texts) if by_name else variant.texts)]
+    return [*lefts, *(sorted(variant.lettered_texts) if by_name else variant.lettered_texts)]

@@ -13,7 +13,7 @@ from typing import Any
 
 from quizzes import rendering
 from quizzes.bank import MIN_VARIANTS
-from quizzes.faults import Problem, inside
+from quizzes.faults import Problem, get_part
 from quizzes.fields import is_closed
 from quizzes.yaml_text import Place
 
@@ -23,7 +23,7 @@ _DEEPEST = 4
 _NO_MARKDOWN = ("id", "kind", "unit", "proof")
 
 
-def problems(data: Any, quiz: str, folder: Path) -> Iterator[Problem]:
+def find_problems(data: Any, quiz: str, folder: Path) -> Iterator[Problem]:
     """Yield what does not hold together in the data of a bank.
 
     Args:
@@ -38,14 +38,14 @@ def problems(data: Any, quiz: str, folder: Path) -> Iterator[Problem]:
         yield Problem(("quiz",), said)
     if data.get("keyless") is True and not is_closed(data):
         yield Problem(("keyless",), "only the questions of a closed quiz go without keys")
-    concepts = _list(data.get("concepts"))
+    concepts = _list_or_empty(data.get("concepts"))
     needed = data.get("pass_mark")
     if type(needed) is int and concepts and needed > len(concepts):
         yield Problem(("pass_mark",), f"{needed} of {len(concepts)} concepts is impossible")
-    yield from _ids(concepts)
+    yield from _repeated_ids(concepts)
     for number, concept in enumerate(concepts):
         place: Place = ("concepts", number, "variants")
-        variants = _list(inside(concept, "variants"))
+        variants = _list_or_empty(get_part(concept, "variants"))
         if not is_closed(data) and 0 < len(variants) < MIN_VARIANTS:
             least = f"at least {MIN_VARIANTS} in a quiz that teaches"
             yield Problem(place, f"it must have {least}, not {len(variants)}")
@@ -54,19 +54,19 @@ def problems(data: Any, quiz: str, folder: Path) -> Iterator[Problem]:
                 yield Problem((*place, which, *where), phrase)
 
 
-def _list(data: Any) -> list[Any]:
+def _list_or_empty(data: Any) -> list[Any]:
     return data if isinstance(data, list) else []
 
 
-def _ids(concepts: list[Any]) -> Iterator[Problem]:
+def _repeated_ids(concepts: list[Any]) -> Iterator[Problem]:
     seen: set[str] = set()
     for number, concept in enumerate(concepts):
         place: Place = ("concepts", number)
-        variants = _list(inside(concept, "variants"))
+        variants = _list_or_empty(get_part(concept, "variants"))
         parts = [(place, concept)]
         parts += [((*place, "variants", which), one) for which, one in enumerate(variants)]
         for where, part in parts:
-            name = inside(part, "id")
+            name = get_part(part, "id")
             if isinstance(name, str):
                 if name in seen:
                     yield Problem((*where, "id"), "this id is used twice")
@@ -74,7 +74,7 @@ def _ids(concepts: list[Any]) -> Iterator[Problem]:
 
 
 def _of_variant(variant: Any, known: Any, folder: Path) -> Iterator[tuple[Place, str]]:
-    for place, value in _texts(variant):
+    for place, value in _walk_texts(variant):
         field = place[-1]
         if field == "misconception":
             if isinstance(known, dict | None) and value not in (known or {}):
@@ -87,23 +87,23 @@ def _of_variant(variant: Any, known: Any, folder: Path) -> Iterator[tuple[Place,
                 yield place, f"this is no Python ({error})"
         elif place[0] not in _NO_MARKDOWN:
             try:
-                rendering.check(value, folder)
+                rendering.check_text(value, folder)
             except rendering.RenderError as error:
                 yield place, str(error)
     for field, inner in (("options", ("text",)), ("items", ())):
-        texts = [_text(one, inner) for one in _list(inside(variant, field))]
+        texts = [_text_at(one, inner) for one in _list_or_empty(get_part(variant, field))]
         for number, text in enumerate(texts):
             if text is not None and text in texts[:number]:
                 yield (field, number, *inner), f"the text {text!r} stands there twice"
 
 
-def _text(data: Any, place: Place) -> str | None:
+def _text_at(data: Any, place: Place) -> str | None:
     for step in place:
-        data = inside(data, step)
+        data = get_part(data, step)
     return data.strip() if isinstance(data, str) else None
 
 
-def _texts(data: Any, place: Place = ()) -> Iterator[tuple[Place, str]]:
+def _walk_texts(data: Any, place: Place = ()) -> Iterator[tuple[Place, str]]:
     """Yield (place, text) for every text of a variant."""
     if isinstance(data, str) and place:
         yield place, data
@@ -111,7 +111,7 @@ def _texts(data: Any, place: Place = ()) -> Iterator[tuple[Place, str]]:
         if isinstance(data, dict):
             for key, value in data.items():
                 if isinstance(key, str):
-                    yield from _texts(value, (*place, key))
+                    yield from _walk_texts(value, (*place, key))
         elif isinstance(data, list):
             for number, value in enumerate(data):
-                yield from _texts(value, (*place, number))
+                yield from _walk_texts(value, (*place, number))

@@ -27,12 +27,12 @@ _HEAD = """\
 """
 
 
-def filename(quiz: str) -> str:
+def sheet_filename(quiz: str) -> str:
     """Return the name of the file with the questions of a closed quiz."""
     return f"{PREFIX}{quiz}{SUFFIX}"
 
 
-def sheet(bank: Bank) -> str:
+def make_sheet(bank: Bank) -> str:
     """Return the question sheet of a closed quiz, as YAML.
 
     Raises:
@@ -45,28 +45,29 @@ def sheet(bank: Bank) -> str:
         )
     data: dict[str, Any] = {
         "quiz": bank.quiz, "title": bank.title, "chapter": bank.chapter,
-        "pass_mark": bank.pass_mark, "attempts": bank.counted, "closed": True, "keyless": True,
+        "pass_mark": bank.pass_mark, "attempts": bank.attempt_limit,
+        "closed": True, "keyless": True,
         "concepts": [
             {"id": concept.id, "objective": SAYS,
-             "variants": [_questions(variant) for variant in concept.variants]}
+             "variants": [_question_data(variant) for variant in concept.variants]}
             for concept in bank.concepts
         ],
     }  # fmt: skip
     return _HEAD + yaml.safe_dump(data, allow_unicode=True, sort_keys=False, width=100)
 
 
-def pictures(bank: Bank) -> list[str]:
+def picture_files(bank: Bank) -> list[str]:
     """Return the files in the bank's folder that its questions show, each once."""
     found: dict[str, None] = {}
     for concept in bank.concepts:
         for variant in concept.variants:
             lefts = [pair.left for pair in variant.pairs] if isinstance(variant, Matching) else []
-            for text in (variant.stem, *lefts, *variant.texts):
-                found |= dict.fromkeys(rendering.pictures(text))
+            for text in (variant.stem, *lefts, *variant.lettered_texts):
+                found |= dict.fromkeys(rendering.picture_sources(text))
     return list(found)
 
 
-def sheets(folder: Path) -> dict[str, Path]:
+def find_sheets(folder: Path) -> dict[str, Path]:
     """Return the question sheets in a folder by the name of their quiz."""
     return {quiz_of(path): path for path in sorted(folder.glob(f"{PREFIX}*{SUFFIX}"))}
 
@@ -74,10 +75,10 @@ def sheets(folder: Path) -> dict[str, Path]:
 def quiz_of(path: Path) -> str:
     """Return the quiz whose question sheet is called so; empty if that is no sheet's name."""
     quiz = path.name.removeprefix(PREFIX).removesuffix(SUFFIX)
-    return quiz if path.name == filename(quiz) else ""
+    return quiz if path.name == sheet_filename(quiz) else ""
 
 
-def read(path: Path, quiz: str) -> Bank:
+def read_sheet(path: Path, quiz: str) -> Bank:
     """Return the questions in a sheet.
 
     Raises:
@@ -89,13 +90,13 @@ def read(path: Path, quiz: str) -> Bank:
     return bank
 
 
-def _questions(variant: Variant) -> dict[str, Any]:
+def _question_data(variant: Variant) -> dict[str, Any]:
     data: dict[str, Any] = {"id": variant.id, "kind": variant.kind, "stem": variant.stem}
     if variant.code:
         data["code"] = variant.code
     if isinstance(variant, Numeric):
         return {**data, "answer": 0.0, "unit": variant.unit}
-    texts = sorted(variant.texts)
+    texts = sorted(variant.lettered_texts)
     if isinstance(variant, Ordering):
         return {**data, "items": texts}
     if isinstance(variant, Matching):

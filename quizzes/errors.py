@@ -40,7 +40,7 @@ class UnwritableError(AttemptsError):
     """Nothing can be saved in the folder; the quiz itself goes on."""
 
 
-def guess(name: object, known: Iterable[str]) -> str:
+def suggest_name(name: object, known: Iterable[str]) -> str:
     """Return a question that names what was meant, with a blank before it; or nothing."""
     by_lower = {one.lower(): one for one in known}
     close = difflib.get_close_matches(str(name).lower(), by_lower, n=1)

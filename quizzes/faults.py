@@ -12,8 +12,8 @@ from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from quizzes.bank import Bank, Concept, Option, Pair, Trap, Variant
-from quizzes.errors import guess
-from quizzes.fields import FieldError, validating
+from quizzes.errors import suggest_name
+from quizzes.fields import FieldError, validating_bank
 from quizzes.yaml_text import Document, Place
 
 KINDS: dict[str, type[BaseModel]] = {
@@ -49,19 +49,19 @@ def of_schema(
         teaches: whether its bank teaches.
     """
     for detail in error.errors(include_url=False):
-        place = _place(document.data, (*above, *detail["loc"]))
+        place = _clean_place(document.data, (*above, *detail["loc"]))
         cause = detail.get("ctx", {}).get("error")
         if isinstance(cause, FieldError):
             for inside, phrase in cause.problems:
                 steps = (int(s) - 1 if s.isdigit() else s for s in inside.split())
                 yield Problem((*place, *steps), phrase)
         elif detail["type"] == "invalid_key":
-            yield Problem(place[:-1], _phrase(detail, place[:-1], document))
+            yield Problem(place[:-1], _describe_detail(detail, place[:-1], document))
         else:
             if detail["type"].startswith("union_tag"):  # no kind, or none that there is
                 yield from _as_meant(detail["input"], document, place, teaches=teaches)
                 place = (*place, "kind")
-            yield Problem(place, _phrase(detail, place, document))
+            yield Problem(place, _describe_detail(detail, place, document))
 
 
 def _as_meant(
@@ -75,13 +75,13 @@ def _as_meant(
     meant = next(iter([*close, *(kind for field, kind in telling.items() if field in variant)]), "")
     if meant:
         try:
-            with validating(teaches=teaches):
+            with validating_bank(teaches=teaches):
                 KINDS[meant].model_validate({**variant, "kind": meant})
         except ValidationError as error:
             yield from of_schema(error, document, (*place, meant), teaches=teaches)
 
 
-def sentences(
+def describe_problems(
     problems: Iterable[Problem], document: Document, source: str, noun: str = "item"
 ) -> list[str]:
     """Return problems as sentences, in the order of the file's lines.
@@ -100,8 +100,8 @@ def sentences(
     ]
     found = []
     for problem in problems:
-        line = document.line(problem.place) if document.node else 0
-        item, field = _named(document.data, problem.place)
+        line = document.line_of(problem.place) if document.node else 0
+        item, field = _locate_item(document.data, problem.place)
         where = [source]
         where += [f"line {line}"] if line else []
         where += [f"{noun} '{item}'"] if item else []
@@ -112,7 +112,7 @@ def sentences(
     return list(dict.fromkeys([*repeated, *ordered]))
 
 
-def inside(data: Any, step: str | int) -> Any:
+def get_part(data: Any, step: str | int) -> Any:
     """Return a part of some data, or None."""
     try:
         return data[step]
@@ -120,13 +120,13 @@ def inside(data: Any, step: str | int) -> Any:
         return None
 
 
-def _place(data: Any, location: Place) -> Place:
+def _clean_place(data: Any, location: Place) -> Place:
     """Return where pydantic found something, without its names of kinds and of keys."""
     place: list[str | int] = []
     for step in location:
         here = data
         for known in place:
-            here = inside(here, known)
+            here = get_part(here, known)
         if step in KINDS and not (isinstance(here, dict) and step in here):
             continue  # pydantic names the kind of a variant as if it were a field
         if step != "[key]":
@@ -136,11 +136,11 @@ def _place(data: Any, location: Place) -> Place:
     return tuple(place)
 
 
-def _named(data: Any, place: Place) -> tuple[str, str]:
+def _locate_item(data: Any, place: Place) -> tuple[str, str]:
     """Return the id of the item at a place, and the field in it; positions count from 1."""
     item, fields = "", list[str]()
     for step in place:
-        data = inside(data, step)
+        data = get_part(data, step)
         if isinstance(data, dict) and isinstance(data.get("id"), str):
             item, fields = data["id"][:_LONGEST], []
         else:
@@ -148,18 +148,18 @@ def _named(data: Any, place: Place) -> tuple[str, str]:
     return item, " ".join(fields)
 
 
-def _phrase(detail: ErrorDetails, place: Place, document: Document) -> str:
+def _describe_detail(detail: ErrorDetails, place: Place, document: Document) -> str:
     """Return what is wrong in the words of somebody who writes a bank."""
     kind, context = detail["type"], detail.get("ctx", {})
     if kind == "missing":
         return "it is missing, and is required here"
     if kind == "extra_forbidden":
-        return _unknown(detail["loc"])
+        return _unknown_field(detail["loc"])
     if kind.startswith("union_tag"):
-        given = inside(detail["input"], "kind")
+        given = get_part(detail["input"], "kind")
         return f"it must be one of {', '.join(KINDS)}{_or_is_it(given, KINDS)}"
     if kind in _MUST_BE:
-        return _of_another_kind(_MUST_BE[kind], detail["input"], document.written(place))
+        return _of_another_kind(_MUST_BE[kind], detail["input"], document.written_value(place))
     if kind == "string_pattern_mismatch":
         given = str(detail["input"])[:_LONGEST]
         return f"{given!r} is no id: write lower-case words joined by hyphens, such as qos-purpose"
@@ -222,7 +222,7 @@ def _way_to_write(wanted: str, given: Any) -> str:
     return f": write {given.replace(',', '.')} without quotes"
 
 
-def _unknown(location: Place) -> str:
+def _unknown_field(location: Place) -> str:
     model: type[BaseModel] = Bank
     for step in location[:-1]:
         model = _PARTS.get(step, model)
@@ -232,5 +232,5 @@ def _unknown(location: Place) -> str:
 
 
 def _or_is_it(given: object, known: Iterable[str]) -> str:
-    question = guess(given, known) if isinstance(given, str) else ""
+    question = suggest_name(given, known) if isinstance(given, str) else ""
     return f": {question[1:2].lower()}{question[2:]}" if question else ""

@@ -49,7 +49,7 @@ class Part(BaseModel):
 
 
 @contextmanager
-def validating(*, teaches: bool) -> Iterator[None]:
+def validating_bank(*, teaches: bool) -> Iterator[None]:
     """Say meanwhile whether the bank that is validated teaches."""
     token = _teaches.set(teaches)
     try:
@@ -66,12 +66,12 @@ def is_closed(data: object) -> bool:
     return isinstance(data, dict) and data.get("closed", False) is not False
 
 
-def teaches() -> bool:
+def is_teaching() -> bool:
     """Whether the bank that is being validated teaches."""
     return _teaches.get()
 
 
-def require(problems: list[tuple[str, str]]) -> None:
+def refuse_problems(problems: list[tuple[str, str]]) -> None:
     """Return if there are no problems.
 
     Raises:
@@ -85,7 +85,7 @@ Content = TypeVar("Content")
 
 
 def _to_teach(value: Content | None) -> Content | None:
-    if value is None and teaches():
+    if value is None and is_teaching():
         needed = "it is required in a quiz that teaches; one with 'closed: true' goes without"
         raise FieldError(("", needed))
     return value

@@ -9,7 +9,7 @@ from typing import Any
 from quizzes.errors import QuizError
 
 
-def login() -> str:
+def current_login() -> str:
     """Return who is at work: the user of JupyterHub, or of this machine."""
     if name := os.environ.get("JUPYTERHUB_USER", "").strip():
         return name
@@ -19,7 +19,7 @@ def login() -> str:
         return f"user-{os.getuid()}"
 
 
-def named(student: Any) -> str:
+def validate_name(student: Any) -> str:
     """Return a learner's name as it is saved.
 
     Raises:

@@ -81,7 +81,7 @@ def wrong_answers(bank: Bank) -> Iterator[WrongAnswer]:
             yield from _wrong_answers(variant)
 
 
-def findings(bank: Bank) -> list[Finding]:
+def list_findings(bank: Bank) -> list[Finding]:
     """Return all that should be mended in a bank; an empty list is a clean one.
 
     A closed quiz does not teach, so what is there to teach is not looked for in it.
@@ -129,7 +129,7 @@ def _of_question(variant: Variant) -> Iterator[Finding]:
         yield finding("stem", f"it asks {asked} questions; one question asks one thing")
     elif not asked and not _TASK.search(prose):
         yield finding("stem", "it asks nothing: end it with a question, or say what to do")
-    for text in variant.texts:
+    for text in variant.lettered_texts:
         if _REFERS.search(_CODE.sub("", text)):
             yield finding("options", f"{text!r} refers to other options, which are shuffled")
     if isinstance(variant, Single | Predict | Multiple):
@@ -148,12 +148,12 @@ def _of_lesson(variant: Variant) -> Iterator[Finding]:
         name = answer.where.removeprefix(f"{variant.id} ")
         if answer.show is None:
             yield finding(name, "it has no cell that shows what really happens")
-    for name, feedback in _feedback(variant):
+    for name, feedback in _feedback_texts(variant):
         if sum(character.isalnum() for character in feedback) < MIN_FEEDBACK:
             yield finding(name, "its feedback is too short to say why")
 
 
-def _feedback(variant: Variant) -> Iterator[tuple[str, str]]:
+def _feedback_texts(variant: Variant) -> Iterator[tuple[str, str]]:
     """Yield (where, text) for every feedback that a learner may get."""
     if isinstance(variant, Single | Predict | Multiple):
         for number, option in enumerate(variant.options, start=1):
@@ -188,14 +188,14 @@ def _of_repeated_texts(bank: Bank) -> Iterator[Finding]:
     places: defaultdict[str, list[tuple[str, str]]] = defaultdict(list)
     for concept in bank.concepts:
         for variant in concept.variants:
-            places[_plain(variant.stem)].append((variant.id, "stem"))
+            places[_normalize_text(variant.stem)].append((variant.id, "stem"))
             if isinstance(variant, Single | Multiple):
                 for option in variant.options:
                     if len(option.text) < FEW_CHARACTERS:
                         continue
-                    places[_plain(option.text)].append((variant.id, "options"))
+                    places[_normalize_text(option.text)].append((variant.id, "options"))
     for answer in wrong_answers(bank):
-        places[_plain(answer.feedback or "")].append((answer.variant.id, "feedback"))
+        places[_normalize_text(answer.feedback or "")].append((answer.variant.id, "feedback"))
     for text, ((item, field), *others) in places.items():
         if text and others:
             elsewhere = ", ".join(sorted({name for name, _ in others}))
@@ -209,7 +209,7 @@ def _of_key_lengths(bank: Bank) -> Iterator[Finding]:
     for concept in bank.concepts:
         for variant in concept.variants:
             if isinstance(variant, Single | Predict):
-                [key] = variant.right
+                [key] = variant.right_positions
                 lengths = [len(option.text) for option in variant.options]
                 others = lengths[:key] + lengths[key + 1 :]
                 count += 1
@@ -230,7 +230,7 @@ def _of_key_places(bank: Bank) -> Iterator[Finding]:
     written: defaultdict[int, Counter[int]] = defaultdict(Counter)
     for variant in (variant for concept in bank.concepts for variant in concept.variants):
         if isinstance(variant, Single | Predict):
-            written[len(variant.options)][variant.right[0]] += 1
+            written[len(variant.options)][variant.right_positions[0]] += 1
     for count, seen in sorted(written.items()):
         for place, times in sorted(seen.items()):
             if seen.total() >= FEWEST_KEYS and times > HABIT * seen.total():
@@ -243,7 +243,7 @@ def _of_key_places(bank: Bank) -> Iterator[Finding]:
     for learner in range(LEARNERS):
         for item in model.draw(bank, f"learner {learner}", 1 + learner % 3).items:
             if isinstance(item.variant, Single | Predict):
-                [key] = item.variant.right
+                [key] = item.variant.right_positions
                 dealt[len(item.order)][item.order.index(key)] += 1
     for count, seen in sorted(dealt.items()):
         fair = seen.total() / count
@@ -256,5 +256,5 @@ def _of_key_places(bank: Bank) -> Iterator[Finding]:
                 yield Finding(bank.quiz, "options", problem)
 
 
-def _plain(text: str) -> str:
+def _normalize_text(text: str) -> str:
     return re.sub(r"\W+", " ", text).strip().casefold()

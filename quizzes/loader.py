@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from quizzes import checks, faults, yaml_text
 from quizzes.bank import Bank
-from quizzes.errors import BankError, guess
+from quizzes.errors import BankError, suggest_name
 from quizzes.fields import is_closed
 from quizzes.yaml_text import Document
 
@@ -54,11 +54,11 @@ def load_bank(name: str, folder: Path = BANKS, others: Iterable[str] = ()) -> Ba
         known = sorted({*known, *others})
         raise BankError(
             f"There is no quiz {str(name)!r}: there are {', '.join(known) or 'none'}."
-            + (_named_otherwise(str(name), folder) or guess(name, known))
+            + (_named_otherwise(str(name), folder) or suggest_name(name, known))
         )
     path = folder / f"{name}.yaml"
     status = path.stat()
-    return _cached(path, status.st_mtime_ns, status.st_size)
+    return _load_cached(path, status.st_mtime_ns, status.st_size)
 
 
 def _named_otherwise(name: str, folder: Path) -> str:
@@ -68,7 +68,7 @@ def _named_otherwise(name: str, folder: Path) -> str:
 
 
 @lru_cache(maxsize=16)
-def _cached(path: Path, _changed: int, _size: int) -> Bank:
+def _load_cached(path: Path, _changed: int, _size: int) -> Bank:
     return read_bank(path)
 
 
@@ -109,10 +109,12 @@ def bank_of(text: str, name: str, folder: Path, quiz: str = "") -> Bank:
     Raises:
         BankError: it is no YAML, or does not hold together.
     """
-    return _sound(yaml_text.parse(text, name), name, quiz or Path(name).stem, folder, "item")
+    return _validate_document(
+        yaml_text.parse_document(text, name), name, quiz or Path(name).stem, folder, "item"
+    )
 
 
-def sound(data: Any, source: str, quiz: str, folder: Path, noun: str = "item") -> Bank:
+def validate_bank(data: Any, source: str, quiz: str, folder: Path, noun: str = "item") -> Bank:
     """Return the bank that ``data`` makes, if all of it holds together.
 
     Args:
@@ -125,26 +127,26 @@ def sound(data: Any, source: str, quiz: str, folder: Path, noun: str = "item") -
     Raises:
         BankError: it does not; the message names source, item and field.
     """
-    return _sound(Document(data), source, quiz, folder, noun)
+    return _validate_document(Document(data), source, quiz, folder, noun)
 
 
-def _sound(document: Document, source: str, quiz: str, folder: Path, noun: str) -> Bank:
+def _validate_document(document: Document, source: str, quiz: str, folder: Path, noun: str) -> Bank:
     data = document.data
     if data is None:
         raise BankError(f"{source} is empty: it must hold a quiz, with fields such as 'quiz'.")
-    problems = list(checks.problems(data, quiz, folder))
+    problems = list(checks.find_problems(data, quiz, folder))
     bank: Bank | None = None
     try:
         bank = Bank.model_validate(data)
     except ValidationError as error:
         problems += faults.of_schema(error, document, teaches=not is_closed(data))
-    found = faults.sentences(problems, document, source, noun)
+    found = faults.describe_problems(problems, document, source, noun)
     if bank is None or found:
-        raise BankError(_summary(found), found)
+        raise BankError(_summarize_faults(found), found)
     bank._folder = folder
     return bank
 
 
-def _summary(found: list[str]) -> str:
+def _summarize_faults(found: list[str]) -> str:
     more = f" (and {len(found) - 1} more)." if len(found) > 1 else ""
     return found[0].removesuffix(".") + more if more else found[0]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from quizzes import model, text
-from quizzes.answers import NOTHING, OPEN, Answer, complete
+from quizzes.answers import NOTHING, OPEN, Answer, is_complete
 from quizzes.bank import Matching, Multiple, Numeric, Option, Ordering, Predict, Single
 from quizzes.marks import Mark, Remark
 from quizzes.model import Item, Paper
@@ -32,7 +32,7 @@ class Result:
     @property
     def right(self) -> int:
         """How many concepts were fully right."""
-        return sum(mark.right for mark in self.marks)
+        return sum(mark.is_right for mark in self.marks)
 
     @property
     def passed(self) -> bool:
@@ -67,10 +67,10 @@ def mark_paper(paper: Paper, answers: Mapping[str, Answer]) -> Result:
         return Result(
             paper, tuple(Mark(item, given[item.concept.id], 0.0, ()) for item in paper.items)
         )
-    return Result(paper, tuple(mark(item, given[item.concept.id]) for item in paper.items))
+    return Result(paper, tuple(mark_answer(item, given[item.concept.id]) for item in paper.items))
 
 
-def mark(item: Item, answer: Answer) -> Mark:
+def mark_answer(item: Item, answer: Answer) -> Mark:
     """Mark one answer in its saved form (see `quizzes.answers`).
 
     One choice is right or wrong. Of several choices each right one earns its share and each wrong
@@ -78,29 +78,29 @@ def mark(item: Item, answer: Answer) -> Mark:
     a matching each pair.
     """
     variant = item.variant
-    if not complete(item, answer) and not isinstance(variant, Matching):
+    if not is_complete(item, answer) and not isinstance(variant, Matching):
         return Mark(item, answer, 0.0, (Remark(False, "There is no answer."),))
     if isinstance(variant, Numeric):
-        return _numeric(item, variant, float(answer))
+        return _mark_numeric(item, variant, float(answer))
     letters = str(answer)
     if isinstance(variant, Multiple):
-        return _multiple(item, variant, letters)
+        return _mark_multiple(item, variant, letters)
     if isinstance(variant, Single | Predict):
-        option = variant.options[item.place(letters)]
-        remark = _remark(option, letters, right=option.correct)
+        option = variant.options[item.place_of(letters)]
+        remark = _option_remark(option, letters, right=option.correct)
         return Mark(item, answer, float(option.correct), (remark,))
-    return _built(item, variant, letters)
+    return _mark_built(item, variant, letters)
 
 
-def _remark(option: Option, letter: str, *, right: bool) -> Remark:
+def _option_remark(option: Option, letter: str, *, right: bool) -> Remark:
     return Remark(right, option.feedback or "", letter, option.misconception, option.show)
 
 
-def _numeric(item: Item, variant: Numeric, number: float) -> Mark:
-    if variant.holds(number):
+def _mark_numeric(item: Item, variant: Numeric, number: float) -> Mark:
+    if variant.is_right(number):
         return Mark(item, number, 1.0, (Remark(True, variant.feedback or ""),))
     for trap in variant.traps:
-        if trap.holds(number):
+        if trap.is_hit(number):
             remark = Remark(False, trap.feedback or "", "", trap.misconception, trap.show)
             return Mark(item, number, 0.0, (remark,))
     general = variant.wrong_feedback or variant.feedback or ""
@@ -108,20 +108,20 @@ def _numeric(item: Item, variant: Numeric, number: float) -> Mark:
     return Mark(item, number, 0.0, (remark,))
 
 
-def _multiple(item: Item, variant: Multiple, letters: str) -> Mark:
-    ticked = [variant.options[item.place(letter)].correct for letter in letters]
-    share = (ticked.count(True) - ticked.count(False)) / len(variant.right)
+def _mark_multiple(item: Item, variant: Multiple, letters: str) -> Mark:
+    ticked = [variant.options[item.place_of(letter)].correct for letter in letters]
+    share = (ticked.count(True) - ticked.count(False)) / len(variant.right_positions)
     remarks = []
     for letter in item.letters:
-        option = variant.options[item.place(letter)]
+        option = variant.options[item.place_of(letter)]
         if option.correct or letter in letters:
             well = option.correct and letter in letters
-            remarks.append(_remark(option, letter, right=well))
+            remarks.append(_option_remark(option, letter, right=well))
     return Mark(item, letters, max(0.0, share), tuple(remarks))
 
 
-def _built(item: Item, variant: Ordering | Matching, letters: str) -> Mark:
-    wanted = str(model.key(item))
+def _mark_built(item: Item, variant: Ordering | Matching, letters: str) -> Mark:
+    wanted = str(model.right_answer(item))
     given = letters or OPEN * len(wanted)
     share = sum(a == b for a, b in zip(given, wanted, strict=True)) / len(wanted)
     if share == 1.0:

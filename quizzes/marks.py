@@ -33,7 +33,7 @@ class Mark:
     remarks: tuple[Remark, ...]
 
     @property
-    def right(self) -> bool:
+    def is_right(self) -> bool:
         """Whether the answer is fully right."""
         return self.credit == 1.0
 

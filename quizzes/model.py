@@ -34,11 +34,11 @@ class Item:
         """The letters of this question, "abcd" for four texts; empty where a number is asked."""
         return LETTERS[: len(self.order)]
 
-    def text(self, letter: str) -> str:
+    def text_of(self, letter: str) -> str:
         """Return the Markdown that a letter stands for."""
-        return self.variant.texts[self.place(letter)]
+        return self.variant.lettered_texts[self.place_of(letter)]
 
-    def place(self, letter: str) -> int:
+    def place_of(self, letter: str) -> int:
         """Return the position in the bank of what a letter stands for."""
         return self.order[LETTERS.index(letter)]
 
@@ -56,7 +56,7 @@ class Paper:
     attempt: int
     items: tuple[Item, ...]
 
-    def item(self, concept: str) -> Item | None:
+    def find_item(self, concept: str) -> Item | None:
         """Return the question about a concept, if it is in this quiz."""
         return next((item for item in self.items if item.concept.id == concept), None)
 
@@ -69,13 +69,15 @@ def draw(bank: Bank, student: str, attempt: int) -> Paper:
     """
     items = []
     for number, concept in enumerate(bank.concepts, start=1):
-        variant = _variant(bank, concept, student, attempt)
+        variant = _choose_variant(bank, concept, student, attempt)
         seed = f"{student}\0{bank.quiz}\0{attempt}\0{variant.id}"
-        items.append(Item(number, concept, variant, _order(variant, seed, closed=bank.closed)))
+        items.append(
+            Item(number, concept, variant, _letter_order(variant, seed, closed=bank.closed))
+        )
     return Paper(bank, student, attempt, tuple(items))
 
 
-def _variant(bank: Bank, concept: Concept, student: str, attempt: int) -> Variant:
+def _choose_variant(bank: Bank, concept: Concept, student: str, attempt: int) -> Variant:
     count = len(concept.variants)
     round_, step = divmod(attempt - 1, count)
     if count < 3:
@@ -89,14 +91,14 @@ def _variant(bank: Bank, concept: Concept, student: str, attempt: int) -> Varian
     return concept.variants[places[step]]
 
 
-def _order(variant: Variant, seed: str, *, closed: bool) -> tuple[int, ...]:
+def _letter_order(variant: Variant, seed: str, *, closed: bool) -> tuple[int, ...]:
     if isinstance(variant, Numeric):
         return ()
-    places = _shuffled(len(variant.texts), seed)
+    places = _shuffled(len(variant.lettered_texts), seed)
     if isinstance(variant, Ordering | Matching) or closed:
         # The bank has these in the right order: whoever knows the shuffle could turn it back. From
         # the alphabet's order it leads nowhere; nor does a closed quiz's bank give away an order.
-        base = sorted(range(len(places)), key=variant.texts.__getitem__)
+        base = sorted(range(len(places)), key=variant.lettered_texts.__getitem__)
         places = [base[place] for place in places]
     if isinstance(variant, Ordering) and places == sorted(places) and not closed:
         places = [*places[1:], places[0]]  # shown in the right order, it would need no answer
@@ -109,7 +111,7 @@ def _shuffled(count: int, seed: str) -> list[int]:
     )
 
 
-def key(item: Item) -> str | float:
+def right_answer(item: Item) -> str | float:
     """Return the right answer to a question, in the form in which answers are saved."""
     variant = item.variant
     if isinstance(variant, Numeric):
@@ -117,5 +119,5 @@ def key(item: Item) -> str | float:
     if isinstance(variant, Ordering):
         return item.letters_of(range(len(variant.items)))
     if isinstance(variant, Matching):
-        return item.letters_of(variant.texts.index(pair.right) for pair in variant.pairs)
-    return "".join(sorted(item.letters_of(variant.right)))
+        return item.letters_of(variant.lettered_texts.index(pair.right) for pair in variant.pairs)
+    return "".join(sorted(item.letters_of(variant.right_positions)))

@@ -36,17 +36,17 @@ def load(
             not sound.
         QuizError: ``student`` is no name, or ``folder`` or ``banks`` is no path.
     """
-    place = None if folder is None else _path("folder", folder)
+    place = None if folder is None else _folder_path("folder", folder)
     if banks is not None:
-        bank = loader.load_bank(name, _path("banks", banks))
+        bank = loader.load_bank(name, _folder_path("banks", banks))
     else:
-        sheets = closing.sheets(place or Path.cwd())
+        sheets = closing.find_sheets(place or Path.cwd())
         path = sheets.get(str(name))
-        bank = closing.read(path, name) if path else loader.load_bank(name, others=sheets)
+        bank = closing.read_sheet(path, name) if path else loader.load_bank(name, others=sheets)
     return Quiz(bank, student=student, folder=place)
 
 
-def _path(argument: str, given: Any) -> Path:
+def _folder_path(argument: str, given: Any) -> Path:
     try:
         path = Path(given)
         with suppress(OSError):

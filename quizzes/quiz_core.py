@@ -15,7 +15,7 @@ from quizzes.answers import Answer
 from quizzes.attempts import AttemptsFile
 from quizzes.bank import Bank
 from quizzes.errors import AnswerError, QuizError, UnwritableError
-from quizzes.identity import login, named
+from quizzes.identity import current_login, validate_name
 from quizzes.marking import Result
 from quizzes.model import Item, Paper
 from quizzes.record import Attempt, Given
@@ -25,7 +25,7 @@ Arguments = ParamSpec("Arguments")
 Back = TypeVar("Back")
 
 
-def _alone(
+def _with_lock(
     method: Callable[Concatenate[QuizCore, Arguments], Back],
 ) -> Callable[Concatenate[QuizCore, Arguments], Back]:
     """Let one thread at a time in: a widget's messages are handled while a cell runs."""
@@ -52,7 +52,7 @@ class QuizCore:
             QuizError: the student's name is no text that can be saved.
         """
         self.bank = bank
-        self.student = named(student or login())
+        self.student = validate_name(student or current_login())
         self._file = AttemptsFile((folder or Path.cwd()).absolute(), bank.quiz)
         self._lock = threading.RLock()
         self.notice = ""
@@ -62,17 +62,17 @@ class QuizCore:
         self._result: Result | None = None
         self.reload()
 
-    @_alone
+    @_with_lock
     def reload(self) -> None:
         """Take up what is saved: an attempt that was begun, else the last one with its result."""
         found, self.notice = self._file.read()
         mine = [a for a in found if (a.quiz, a.student) == (self.bank.quiz, self.student)]
-        self.attempts = [regrade.refreshed(self.bank, attempt) for attempt in mine]
+        self.attempts = [regrade.refresh_score(self.bank, attempt) for attempt in mine]
         if self._restore_draft():
             return
-        last = regrade.again(self.bank, self.attempts[-1]) if self.attempts else None
+        last = regrade.mark_again(self.bank, self.attempts[-1]) if self.attempts else None
         if last is None:
-            self._begin(self._next_number())
+            self._begin_attempt(self._next_number())
         else:
             self._paper, self._result = last.paper, last
             self._answers = {mark.item.concept.id: mark.answer for mark in last.marks}
@@ -107,7 +107,7 @@ class QuizCore:
     @property
     def counted(self) -> list[Attempt]:
         """The attempts that count; what comes after them is practice (see `quizzes.regrade`)."""
-        return [attempt for attempt in self.attempts if attempt.attempt <= self.bank.counted]
+        return [attempt for attempt in self.attempts if attempt.attempt <= self.bank.attempt_limit]
 
     @property
     def best(self) -> Attempt | None:
@@ -117,14 +117,14 @@ class QuizCore:
     @property
     def more(self) -> bool:
         """Whether there is another attempt after the one at hand."""
-        return not self.bank.closed or self.attempt < self.bank.counted
+        return not self.bank.closed or self.attempt < self.bank.attempt_limit
 
     @property
     def open_questions(self) -> list[int]:
         """The numbers of the questions that have no complete answer yet."""
         return [
             item.number for item in self.items
-            if not answers.complete(item, self._answers.get(item.concept.id, ""))
+            if not answers.is_complete(item, self._answers.get(item.concept.id, ""))
         ]  # fmt: skip
 
     def question(self, which: int | str) -> QuestionText:
@@ -150,7 +150,7 @@ class QuizCore:
 
     # What a learner does
 
-    @_alone
+    @_with_lock
     def answer(self, which: int | str, given: Any) -> None:
         """Answer a question; a new answer replaces the one before.
 
@@ -170,11 +170,11 @@ class QuizCore:
                 f"Attempt {self.attempt} is submitted, so its answers stand: begin another quiz "
                 "with quiz.retry()."
             )
-        answer = answers.normal(item, given)
+        answer = answers.normalize_answer(item, given)
         if self._answers.get(item.concept.id, answers.NOTHING) != answer:
             self._save_draft({item.concept.id: answer})
 
-    @_alone
+    @_with_lock
     def submit(self) -> Result:
         """Submit the answers and return the marked quiz; a second call returns the same.
 
@@ -188,7 +188,7 @@ class QuizCore:
             numbers = " and ".join(map(str, self.open_questions))
             raise AnswerError(f"Not submitted yet: question {numbers} has no complete answer.")
         result = marking.mark_paper(self._paper, self._answers)
-        attempt = self._record(result)
+        attempt = self._make_record(result)
         try:
             self._file.append(attempt)
             self.notice = ""
@@ -198,7 +198,7 @@ class QuizCore:
         self._result = result
         return result
 
-    @_alone
+    @_with_lock
     def retry(self) -> None:
         """Begin another quiz: other questions on the same concepts.
 
@@ -210,9 +210,13 @@ class QuizCore:
                 f"Attempt {self.attempt} is still open: submit it with quiz.submit() first."
             )
         if not self.more:
-            attempts = "one attempt" if self.bank.counted == 1 else f"{self.bank.counted} attempts"
+            attempts = (
+                "one attempt"
+                if self.bank.attempt_limit == 1
+                else f"{self.bank.attempt_limit} attempts"
+            )
             raise QuizError(f"This quiz has {attempts}, and you have handed in the last.")
-        self._begin(self._next_number())
+        self._begin_attempt(self._next_number())
         self._save_draft({})
 
     def demo(self, which: int | str) -> None:
@@ -248,14 +252,14 @@ class QuizCore:
 
     # What is kept
 
-    def _begin(self, number: int) -> None:
+    def _begin_attempt(self, number: int) -> None:
         self._paper = model.draw(self.bank, self.student, number)
         self._answers, self._result = {}, None
 
     def _next_number(self) -> int:
         return max((a.attempt for a in self.attempts), default=0) + 1
 
-    def _record(self, result: Result) -> Attempt:
+    def _make_record(self, result: Result) -> Attempt:
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         given = {
             item.concept.id: Given(item.variant.id, self._answers[item.concept.id])
@@ -281,7 +285,7 @@ class QuizCore:
         for item in self.items:
             if item.concept.id in given:
                 with suppress(AnswerError):
-                    answer = answers.normal(item, given[item.concept.id])
+                    answer = answers.normalize_answer(item, given[item.concept.id])
                     self._answers[item.concept.id] = answer
 
     def _restore_draft(self) -> bool:
@@ -293,6 +297,6 @@ class QuizCore:
             return False
         if number != self._next_number() or not isinstance(given, Mapping):
             return False
-        self._begin(self._next_number())
+        self._begin_attempt(self._next_number())
         self._take_up({item.concept.id: given.get(item.concept.id) for item in self.items})
         return True

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from quizzes.answers import Answer, number
+from quizzes.answers import Answer, parse_number
 
 VERSION = 1
 MAX_LINE = 64 * 1024
@@ -55,7 +55,7 @@ class Attempt:
         return json.dumps(asdict(self), ensure_ascii=False, allow_nan=False)
 
 
-def filename(quiz: str) -> str:
+def attempts_filename(quiz: str) -> str:
     """Return the name of the file with the attempts of a quiz."""
     return f"quiz-{quiz}.attempts.jsonl"
 
@@ -75,7 +75,7 @@ def read_plain(path: Path, most: int) -> bytes:
         return file.read(most)
 
 
-def parse(content: bytes) -> tuple[list[Attempt], int]:
+def parse_attempts(content: bytes) -> tuple[list[Attempt], int]:
     """Return the attempts in a file's content, and how many of its lines are none."""
     attempts, damaged = [], 0
     # An editor may have put a byte order mark in front.
@@ -83,13 +83,13 @@ def parse(content: bytes) -> tuple[list[Attempt], int]:
         if not line.strip():
             continue
         try:
-            attempts.append(_attempt(line))
+            attempts.append(_parse_attempt(line))
         except (ValueError, KeyError, TypeError, RecursionError, AttributeError):
             damaged += 1
     return attempts, damaged + (len(content) > MAX_FILE)
 
 
-def _attempt(line: bytes) -> Attempt:
+def _parse_attempt(line: bytes) -> Attempt:
     if len(line) > MAX_LINE:
         raise ValueError("too long")
     data = json.loads(line.decode("utf-8"))
@@ -98,25 +98,27 @@ def _attempt(line: bytes) -> Attempt:
     if data["version"] != VERSION or not data.keys() <= Attempt.__dataclass_fields__.keys():
         raise ValueError("not of this version")
     for name in ("quiz", "student", "edition", "submitted"):
-        _must(isinstance(data[name], str) and len(data[name]) <= MAX_TEXT)
+        _require_valid(isinstance(data[name], str) and len(data[name]) <= MAX_TEXT)
     for name in ("attempt", "right"):
-        _must(type(data[name]) is int and 0 <= data[name] < 10**6)
-    _must(data["attempt"] > 0 and type(data["passed"]) is bool)
-    _must(type(data["score"]) in (int, float))
-    number(data["score"])
-    answers = {str(name): _given(given) for name, given in data["answers"].items()}
+        _require_valid(type(data[name]) is int and 0 <= data[name] < 10**6)
+    _require_valid(data["attempt"] > 0 and type(data["passed"]) is bool)
+    _require_valid(type(data["score"]) in (int, float))
+    parse_number(data["score"])
+    answers = {str(name): _parse_given(given) for name, given in data["answers"].items()}
     return Attempt(**{**data, "answers": answers})
 
 
-def _given(data: Any) -> Given:
+def _parse_given(data: Any) -> Given:
     variant, answer = data["variant"], data["answer"]
-    _must(data.keys() == {"variant", "answer"} and isinstance(variant, str))
+    _require_valid(data.keys() == {"variant", "answer"} and isinstance(variant, str))
     if type(answer) in (int, float):
-        answer = number(answer)
-    _must(isinstance(answer, float) or (isinstance(answer, str) and len(answer) <= MAX_TEXT))
+        answer = parse_number(answer)
+    _require_valid(
+        isinstance(answer, float) or (isinstance(answer, str) and len(answer) <= MAX_TEXT)
+    )
     return Given(variant, answer)
 
 
-def _must(holds: bool) -> None:
+def _require_valid(holds: bool) -> None:
     if not holds:
         raise ValueError("a value of the wrong kind")

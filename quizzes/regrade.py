@@ -5,12 +5,12 @@ questions that it names. The letters in it mean nothing without that deal: under
 are guesses. A file that was copied whole still says under which login it was made.
 
 Nobody is kept from practising, but the best of thousands of guesses would be full marks. So the
-first `Bank.counted` attempts of a file count, by their number and in the order of the file, whoever
-made them. Twenty, as in most banks, is four times through all variants of a concept with five, and
-who guesses has one chance in some hundreds to get everything right in it. A file that goes on from
-there, or in which attempts follow one another faster than anybody reads (`HASTE`), is for a person
-to look at, with the reason: what it earns is what its first attempts earn. Time stamps are easily
-forged, so they only ever add a reason to look.
+first `Bank.attempt_limit` attempts of a file count, by their number and in the order of the file,
+whoever made them. Twenty, as in most banks, is four times through all variants of a concept with
+five, and who guesses has one chance in some hundreds to get everything right in it. A file that
+goes on from there, or in which attempts follow one another faster than anybody reads (`HASTE`), is
+for a person to look at, with the reason: what it earns is what its first attempts earn.
+Time stamps are easily forged, so they only ever add a reason to look.
 """
 
 from __future__ import annotations
@@ -47,12 +47,12 @@ class Marked:
     doubt: str = ""
 
     @property
-    def best(self) -> Result | None:
+    def best_result(self) -> Result | None:
         """The result with the best score, the earliest of equal ones."""
         return max(self.results, key=lambda r: (r.score, -r.paper.attempt), default=None)
 
     @property
-    def first(self) -> Result | None:
+    def first_result(self) -> Result | None:
         """The result of the attempt with the lowest number."""
         return min(self.results, key=lambda r: r.paper.attempt, default=None)
 
@@ -64,7 +64,7 @@ class Marked:
 
 def mark_file(bank: Bank, content: bytes) -> Marked:
     """Mark every attempt in the content of an attempts file."""
-    found, damaged = record.parse(content)
+    found, damaged = record.parse_attempts(content)
     return mark_all(bank, found, damaged)
 
 
@@ -78,25 +78,25 @@ def mark_all(bank: Bank, found: Iterable[Attempt], damaged: int = 0) -> Marked:
     for attempt in found:
         name = f"Attempt {attempt.attempt} of '{attempt.student}'"
         who = (attempt.student, attempt.attempt)
-        stamps.append(_seconds(attempt.submitted))
+        stamps.append(_submission_time(attempt.submitted))
         if attempt.quiz != bank.quiz:
             problems.append(f"{name} belongs to the quiz '{attempt.quiz}'.")
         elif attempt.edition != bank.edition:
             other_edition += 1
         elif who in seen:
             problems.append(f"{name} is there more than once; the first one counts.")
-        elif attempt.attempt > bank.counted or len(results) == bank.counted:
+        elif attempt.attempt > bank.attempt_limit or len(results) == bank.attempt_limit:
             surplus += 1
-        elif (result := again(bank, attempt)) is None:
+        elif (result := mark_again(bank, attempt)) is None:
             problems.append(f"{name} answers questions that were not asked in it.")
         else:
             seen.add(who)
             results.append(result)
-    doubt = _doubt(stamps, surplus, bank.counted)
+    doubt = _describe_doubt(stamps, surplus, bank.attempt_limit)
     return Marked(tuple(results), tuple(problems), other_edition, damaged, doubt)
 
 
-def _doubt(stamps: list[float], surplus: int, counted: int) -> str:
+def _describe_doubt(stamps: list[float], surplus: int, counted: int) -> str:
     """Say why attempts may not have been made by a person; empty if nothing speaks for it."""
     reasons = []
     if surplus:
@@ -110,7 +110,7 @@ def _doubt(stamps: list[float], surplus: int, counted: int) -> str:
     return f"A person should look at the attempts: {', and '.join(reasons)}." if reasons else ""
 
 
-def _seconds(submitted: str) -> float:
+def _submission_time(submitted: str) -> float:
     """Return when an attempt was submitted; all without a time that can be read are of one time."""
     try:
         moment = datetime.fromisoformat(submitted)
@@ -119,7 +119,7 @@ def _seconds(submitted: str) -> float:
         return 0.0
 
 
-def again(bank: Bank, attempt: Attempt) -> Result | None:
+def mark_again(bank: Bank, attempt: Attempt) -> Result | None:
     """Mark an attempt again; None if this edition of the bank could not have dealt it."""
     if (attempt.quiz, attempt.edition) != (bank.quiz, bank.edition):
         return None
@@ -132,15 +132,15 @@ def again(bank: Bank, attempt: Attempt) -> Result | None:
         if saved is None or saved.variant != item.variant.id:
             return None
         try:
-            given[item.concept.id] = answers.normal(item, saved.answer)
+            given[item.concept.id] = answers.normalize_answer(item, saved.answer)
         except AnswerError:
             return None
     return marking.mark_paper(paper, given)
 
 
-def refreshed(bank: Bank, attempt: Attempt) -> Attempt:
+def refresh_score(bank: Bank, attempt: Attempt) -> Attempt:
     """Return an attempt with the score that its answers earn, if they can be marked again."""
-    result = again(bank, attempt)
+    result = mark_again(bank, attempt)
     if result is None:
         return attempt
     return replace(attempt, score=result.score, right=result.right, passed=result.passed)

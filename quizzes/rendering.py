@@ -34,28 +34,28 @@ class RenderError(ValueError):
     """A text that cannot be shown; the message is a phrase that says why."""
 
 
-def block(text: str, folder: Path) -> str:
+def render_block(text: str, folder: Path) -> str:
     """Return Markdown as HTML; images are looked for in ``folder``.
 
     Raises:
         RenderError: an image is not there or not one that can be shown, or LaTeX is not sound.
     """
-    return str(_markdown().render(text, {"folder": folder}))
+    return str(_make_parser().render(text, {"folder": folder}))
 
 
-def inline(text: str, folder: Path) -> str:
+def render_inline(text: str, folder: Path) -> str:
     """Return Markdown as HTML for inside a line; a text with a fence or a list stays a block.
 
     Raises:
-        RenderError: as `block`.
+        RenderError: as `render_block`.
     """
-    rendered = block(text, folder).strip()
+    rendered = render_block(text, folder).strip()
     inner = rendered.removeprefix("<p>").removesuffix("</p>")
     single = rendered == f"<p>{inner}</p>" and "<p>" not in inner
     return inner if single else rendered
 
 
-def code(source: str, language: str = "python") -> str:
+def render_code(source: str, language: str = "python") -> str:
     """Return a piece of code as HTML, each token in a span of its pygments class."""
     try:
         lexer = get_lexer_by_name(language or "text")
@@ -69,10 +69,10 @@ def code(source: str, language: str = "python") -> str:
     )
 
 
-def plain(text: str) -> str:
+def render_plain(text: str) -> str:
     """Return Markdown as plain text on one line, for places that hold nothing else."""
     words: list[str] = []
-    for token in _markdown().parse(text):
+    for token in _make_parser().parse(text):
         words.append(" " if token.block else "")
         for child in token.children or [token]:
             if child.type == "image":
@@ -84,50 +84,52 @@ def plain(text: str) -> str:
     return " ".join("".join(words).split())
 
 
-def pictures(text: str) -> list[str]:
+def picture_sources(text: str) -> list[str]:
     """Return where the pictures of a Markdown text come from, in order."""
-    inner = (child for token in _markdown().parse(text) for child in token.children or ())
+    inner = (child for token in _make_parser().parse(text) for child in token.children or ())
     return [str(child.attrGet("src")) for child in inner if child.type == "image"]
 
 
-def check(text: str, folder: Path) -> None:
+def check_text(text: str, folder: Path) -> None:
     """Return if ``text`` can be rendered.
 
     Raises:
         RenderError: it cannot; the message says why.
     """
     if "![" in text or "$" in text:
-        block(text, folder)
+        render_block(text, folder)
 
 
 @cache
-def _markdown() -> Any:
+def _make_parser() -> Any:
     markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
     markdown.use(
         dollarmath_plugin, allow_digits=False, allow_space=False, double_inline=True,
-        renderer=lambda source, options: _math(source, display=bool(options["display_mode"])),
+        renderer=lambda source, options: _render_math(
+            source, display=bool(options["display_mode"])
+        ),
     )  # fmt: skip
-    markdown.add_render_rule("fence", _fence)
-    markdown.add_render_rule("code_block", _fence)
-    markdown.add_render_rule("image", _image)
+    markdown.add_render_rule("fence", _render_fence)
+    markdown.add_render_rule("code_block", _render_fence)
+    markdown.add_render_rule("image", _render_image)
     return markdown
 
 
-def _math(source: str, *, display: bool) -> str:
+def _render_math(source: str, *, display: bool) -> str:
     try:
         return from_latex(source, display=display)
     except LatexError as error:
         raise RenderError(str(error)) from error
 
 
-def _fence(
+def _render_fence(
     _renderer: RendererHTML, tokens: Sequence[Token], index: int, _options: Any, _env: Any
 ) -> str:
     token = tokens[index]
-    return code(token.content, (token.info.split() or [""])[0]) + "\n"
+    return render_code(token.content, (token.info.split() or [""])[0]) + "\n"
 
 
-def _image(
+def _render_image(
     _renderer: RendererHTML, tokens: Sequence[Token], index: int, _options: Any, env: Any
 ) -> str:
     token = tokens[index]

@@ -43,26 +43,26 @@ def json_schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **Bank.model_json_schema()}
 
 
-def markdown() -> str:
+def as_markdown() -> str:
     """Return the page: each field of each part, and two examples."""
     schema = json_schema()
     parts = schema["$defs"]
-    lines = [_HEAD, "## The bank", "", *_table(schema), "", "## Each concept", ""]
-    lines += [*_table(parts["Concept"]), "", "## Each question", ""]
+    lines = [_HEAD, "## The bank", "", *_fields_table(schema), "", "## Each concept", ""]
+    lines += [*_fields_table(parts["Concept"]), "", "## Each question", ""]
     common = _in_all([parts[model.__name__] for model in KINDS.values()])
     lines += ["Every question has these fields, and those of its kind.", ""]
-    lines += _table(parts["Single"], only=common)
+    lines += _fields_table(parts["Single"], only=common)
     kinds = ", ".join(f"`{kind}`" for kind in KINDS)
     lines.append(_ROW.format("`kind`", "The kind of question.", f"one of {kinds}", "", "always"))
     for kind, model in KINDS.items():
         part = parts[model.__name__]
         own = [name for name in part["properties"] if name not in (*common, "kind")]
-        lines += ["", f"### kind: {kind}", "", _sentence(part["description"]), ""]
-        lines += _table(part, only=own)
+        lines += ["", f"### kind: {kind}", "", _clean_sentence(part["description"]), ""]
+        lines += _fields_table(part, only=own)
     for name in ("Option", "Trap", "Pair"):
         part = parts[name]
-        lines += ["", f"## {_PARTS[name]}", "", _sentence(part["description"]), ""]
-        lines += _table(part)
+        lines += ["", f"## {_PARTS[name]}", "", _clean_sentence(part["description"]), ""]
+        lines += _fields_table(part)
     for title, name in (("A closed quiz", "exam"), ("A quiz that teaches", "lesson")):
         text = (EXAMPLES / f"{name}.yaml").read_text(encoding="utf-8")
         lines += ["", f"## {title}, whole", "", f"`{name}.yaml`:", "", "```yaml", text.rstrip()]
@@ -76,7 +76,7 @@ def _in_all(parts: list[dict[str, Any]]) -> list[str]:
     return [name for name in first if all(other.get(name) == first[name] for other in others)]
 
 
-def _table(part: dict[str, Any], only: list[str] | None = None) -> list[str]:
+def _fields_table(part: dict[str, Any], only: list[str] | None = None) -> list[str]:
     names = [name for name in part["properties"] if only is None or name in only]
     lines = [_ROW.format("Field", "What", "Value", "If left out", "Required")]
     lines.append(_ROW.format("---", "---", "---", "---", "---"))
@@ -84,17 +84,17 @@ def _table(part: dict[str, Any], only: list[str] | None = None) -> list[str]:
         field = part["properties"][name]
         required = name in part.get("required", ())
         needed = "always" if required else "to teach" if field.get(TO_TEACH) else ""
-        default = "" if required else _default(field)
-        what = _sentence(field.get("description", ""))
-        lines.append(_ROW.format(f"`{name}`", what, _value(field), default, needed))
+        default = "" if required else _describe_default(field)
+        what = _clean_sentence(field.get("description", ""))
+        lines.append(_ROW.format(f"`{name}`", what, _describe_value(field), default, needed))
     return lines
 
 
-def _sentence(text: str) -> str:
+def _clean_sentence(text: str) -> str:
     return " ".join(text.split()).replace("|", "\\|").replace("``", "`")
 
 
-def _default(field: dict[str, Any]) -> str:
+def _describe_default(field: dict[str, Any]) -> str:
     if "default" not in field:
         return "none"
     value = field["default"]
@@ -103,10 +103,12 @@ def _default(field: dict[str, Any]) -> str:
     return f"`{str(value).lower()}`"
 
 
-def _value(field: dict[str, Any]) -> str:
+def _describe_value(field: dict[str, Any]) -> str:
     """Return what may stand in a field, with its bounds, in words."""
     if "anyOf" in field:
-        return " or ".join(_value(one) for one in field["anyOf"] if one.get("type") != "null")
+        return " or ".join(
+            _describe_value(one) for one in field["anyOf"] if one.get("type") != "null"
+        )
     if "const" in field:
         return f"`{field['const']}`"
     if "oneOf" in field:
@@ -115,8 +117,10 @@ def _value(field: dict[str, Any]) -> str:
         return str(field["$ref"]).rpartition("/")[2].lower()
     kind = field["type"]
     if kind == "array":
-        count = _range(field.get("minItems"), field.get("maxItems"))
-        return " ".join(["list of", *([count] if count else []), f"{_value(field['items'])}s"])
+        count = _describe_range(field.get("minItems"), field.get("maxItems"))
+        return " ".join(
+            ["list of", *([count] if count else []), f"{_describe_value(field['items'])}s"]
+        )
     if kind == "object":
         return "ids, each with a text"
     if kind == "string":
@@ -124,11 +128,11 @@ def _value(field: dict[str, Any]) -> str:
             return f"id, at most {field['maxLength']} characters"
         return "text" if field.get("minLength") else "text, may be empty"
     name = {"integer": "whole number", "number": "number", "boolean": "`true` or `false`"}[kind]
-    bounds = _range(field.get("minimum"), field.get("maximum"))
+    bounds = _describe_range(field.get("minimum"), field.get("maximum"))
     return f"{name}, {bounds}" if bounds else name
 
 
-def _range(least: float | None, most: float | None) -> str:
+def _describe_range(least: float | None, most: float | None) -> str:
     if least is not None and most is not None:
         return f"{least:g} to {most:g}"
     if least is not None:

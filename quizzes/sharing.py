@@ -12,7 +12,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 
 from quizzes import record
-from quizzes.answers import Answer, number
+from quizzes.answers import Answer, parse_number
 from quizzes.record import Attempt
 
 CANNOT_KNOW = (
@@ -35,9 +35,9 @@ def same_attempts(quiz: str, contents: Mapping[str, bytes]) -> list[tuple[str, .
     """
     having: defaultdict[str, set[str]] = defaultdict(set)
     for person, content in contents.items():
-        for attempt in record.parse(content)[0]:
+        for attempt in record.parse_attempts(content)[0]:
             if attempt.quiz == quiz:
-                for identity in _identities(attempt):
+                for identity in _attempt_identities(attempt):
                     having[identity].add(person)
     groups: list[set[str]] = []
     for people in having.values():
@@ -48,13 +48,14 @@ def same_attempts(quiz: str, contents: Mapping[str, bytes]) -> list[tuple[str, .
     return sorted(tuple(sorted(group)) for group in groups)
 
 
-def _identities(attempt: Attempt) -> Iterator[str]:
+def _attempt_identities(attempt: Attempt) -> Iterator[str]:
     """Yield what two attempts have in common, one or the other, if one is a copy.
 
     All answers, or all but one of them; scores are not looked at.
     """
     answers = sorted(
-        (name, given.variant, _read(given.answer)) for name, given in attempt.answers.items()
+        (name, given.variant, _comparable_answer(given.answer))
+        for name, given in attempt.answers.items()
     )
     same = [answers]
     if FEWEST <= len(answers) <= MOST:
@@ -63,9 +64,9 @@ def _identities(attempt: Attempt) -> Iterator[str]:
         yield json.dumps([attempt.student, attempt.attempt, attempt.submitted, some])
 
 
-def _read(answer: Answer) -> Answer:
+def _comparable_answer(answer: Answer) -> Answer:
     """Return what an answer has in common with others that may be marked alike: its letters."""
     try:
-        return number(answer)
+        return parse_number(answer)
     except ValueError:
         return "".join(sorted(filter(str.isalnum, str(answer).casefold())))

@@ -60,8 +60,8 @@ def of_question(item: Item) -> str:
     if isinstance(variant, Matching):
         lefts = (f"{number}. {pair.left}" for number, pair in enumerate(variant.pairs, start=1))
         parts.append("\n".join(lefts))
-    parts += [f"{letter}) {item.text(letter)}" for letter in item.letters]
-    how = answers.fits(item)
+    parts += [f"{letter}) {item.text_of(letter)}" for letter in item.letters]
+    how = answers.describe_format(item)
     parts.append(f"*{how[0].upper()}{how[1:]}.*")
     return "\n\n".join(parts)
 
@@ -75,12 +75,12 @@ def of_answer(item: Item, answer: Answer) -> str:
         return f"{answer:g} {variant.unit}".strip()
     letters = str(answer)
     if isinstance(variant, Ordering):
-        return " → ".join(item.text(letter) for letter in letters)
+        return " → ".join(item.text_of(letter) for letter in letters)
     if isinstance(variant, Matching):
-        rights = [item.text(c) if c in LETTERS else "nothing" for c in letters]
+        rights = [item.text_of(c) if c in LETTERS else "nothing" for c in letters]
         pairs = zip(variant.pairs, rights, strict=True)
         return "; ".join(f"{pair.left}: {right}" for pair, right in pairs)
-    return "; ".join(f"{c}) {item.text(c)}" for c in letters)
+    return "; ".join(f"{c}) {item.text_of(c)}" for c in letters)
 
 
 def of_result(result: Marked) -> str:
@@ -92,7 +92,7 @@ def of_result(result: Marked) -> str:
 
 def of_mark(mark: Mark) -> str:
     """Return a marked answer as Markdown: what it earned, and the feedback to it."""
-    lines = [f"**Question {mark.item.number}: {verdict(mark)}**"]
+    lines = [f"**Question {mark.item.number}: {describe_mark(mark)}**"]
     several = isinstance(mark.item.variant, Multiple)
     for remark in mark.remarks:
         label = f"{remark.letter}) " if several and remark.letter else ""
@@ -103,8 +103,8 @@ def of_mark(mark: Mark) -> str:
     return "\n\n".join(lines)
 
 
-def verdict(mark: Mark) -> str:
+def describe_mark(mark: Mark) -> str:
     """Return what an answer earned, in words."""
-    if mark.right:
+    if mark.is_right:
         return "right"
     return f"partly right, {mark.credit:.2g} of 1" if mark.credit else "not right"

@@ -53,21 +53,21 @@ class Document:
     node: yaml.Node | None = None
     repeated: tuple[tuple[int, int, str], ...] = ()
 
-    def line(self, place: Place) -> int:
+    def line_of(self, place: Place) -> int:
         """Return the line, from 1, where a part stands, or else what should hold it."""
-        return self._found(place)[0]
+        return self._find_part(place)[0]
 
-    def written(self, place: Place) -> str | None:
+    def written_value(self, place: Place) -> str | None:
         """Return a value as it is written, if it is a plain one without quotes."""
-        _, node = self._found(place)
+        _, node = self._find_part(place)
         plain = isinstance(node, yaml.ScalarNode) and node.style is None
         return node.value if plain else None  # type: ignore[union-attr]
 
-    def _found(self, place: Place) -> tuple[int, yaml.Node | None]:
+    def _find_part(self, place: Place) -> tuple[int, yaml.Node | None]:
         node = self.node
         line = node.start_mark.line + 1 if node else 1
         for step in place:
-            found = _inside(node, step)
+            found = _find_inside(node, step)
             if found is None:
                 return line, None
             key, node = found
@@ -75,7 +75,7 @@ class Document:
         return line, node
 
 
-def parse(text: str, name: str) -> Document:
+def parse_document(text: str, name: str) -> Document:
     """Return what the text of a file called ``name`` holds.
 
     Raises:
@@ -86,7 +86,7 @@ def parse(text: str, name: str) -> Document:
         node = loader.get_single_node()
         if node is None:
             return Document(None)
-        repeated = sorted(_repeated(node, set()))  # while what is merged does not repeat any
+        repeated = sorted(_repeated_fields(node, set()))  # while what is merged does not repeat any
         data = loader.construct_document(node)
         return Document(data, node, tuple(repeated))
     except yaml.reader.ReaderError as error:
@@ -94,7 +94,7 @@ def parse(text: str, name: str) -> Document:
         problem = f"line {line}: the character {ord(text[error.position]):#06x} is not allowed"
         raise BankError(f"{name} is not valid YAML: {problem}; delete it.") from None
     except yaml.MarkedYAMLError as error:
-        raise BankError(f"{name} is not valid YAML: {_explained(error, text)}.") from None
+        raise BankError(f"{name} is not valid YAML: {_explain_error(error, text)}.") from None
     except RecursionError:
         raise BankError(f"{name} is not valid YAML: it is nested too deeply.") from None
     except (yaml.YAMLError, ValueError, OverflowError, TypeError) as error:
@@ -122,7 +122,7 @@ for _tag, _looks, _first in (
 _Loader.add_constructor("tag:yaml.org,2002:int", _Loader.construct_whole_number)
 
 
-def _inside(node: yaml.Node | None, step: str | int) -> tuple[yaml.Node, yaml.Node] | None:
+def _find_inside(node: yaml.Node | None, step: str | int) -> tuple[yaml.Node, yaml.Node] | None:
     """Return where a part begins, and the part."""
     if isinstance(node, yaml.SequenceNode) and isinstance(step, int):
         item = node.value[step] if step < len(node.value) else None
@@ -134,13 +134,13 @@ def _inside(node: yaml.Node | None, step: str | int) -> tuple[yaml.Node, yaml.No
     return None
 
 
-def _repeated(node: yaml.Node, seen: set[int]) -> Iterator[tuple[int, int, str]]:
+def _repeated_fields(node: yaml.Node, seen: set[int]) -> Iterator[tuple[int, int, str]]:
     if id(node) in seen:
         return
     seen.add(id(node))
     if isinstance(node, yaml.SequenceNode):
         for item in node.value:
-            yield from _repeated(item, seen)
+            yield from _repeated_fields(item, seen)
     elif isinstance(node, yaml.MappingNode):
         lines: dict[str, int] = {}
         for key, value in node.value:
@@ -149,10 +149,10 @@ def _repeated(node: yaml.Node, seen: set[int]) -> Iterator[tuple[int, int, str]]
                 if key.value in lines:
                     yield line, lines[key.value], key.value
                 lines.setdefault(key.value, line)
-            yield from _repeated(value, seen)
+            yield from _repeated_fields(value, seen)
 
 
-def _explained(error: yaml.MarkedYAMLError, text: str) -> str:
+def _explain_error(error: yaml.MarkedYAMLError, text: str) -> str:
     """Say in which line the text is no YAML, and what to do about it."""
     problem = " ".join(str(error.problem or error.context or "it cannot be read").split())
     mark = error.problem_mark or error.context_mark

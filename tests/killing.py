@@ -108,7 +108,7 @@ class Engine:
 
     def grades(self) -> dict[str, Grade]:
         """Return what stands in the gradebook."""
-        found = CourseGradebook(self.root).grades(self.assignment)
+        found = CourseGradebook(self.root).read_grades(self.assignment)
         return {grade.student: grade for grade in found}
 
 

@@ -19,7 +19,11 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from course.errors import CourseError
-from course.util.platform_check import UnsupportedPlatformError, problem, require_supported_platform
+from course.util.platform_check import (
+    UnsupportedPlatformError,
+    find_problem,
+    require_supported_platform,
+)
 from course.workspace import content
 from tests.modules import modules_of
 
@@ -145,7 +149,7 @@ def test_copying_the_sources_says_what_is_wrong(tmp_path: Path) -> None:
     ],
 )
 def test_a_platform_without_wheels_is_one_clear_sentence(change: dict[str, Any], says: str) -> None:
-    sentence = problem(**{**HERE, **change})
+    sentence = find_problem(**{**HERE, **change})
     assert sentence is not None
     assert says in sentence
     assert "\n" not in sentence
@@ -153,14 +157,14 @@ def test_a_platform_without_wheels_is_one_clear_sentence(change: dict[str, Any],
 
 @pytest.mark.parametrize("version", [(3, 11), (3, 12), (3, 13), (3, 14)])
 def test_the_platforms_that_have_wheels_are_welcome(version: tuple[int, int]) -> None:
-    assert problem(**{**HERE, "version": version}) is None
+    assert find_problem(**{**HERE, "version": version}) is None
     require_supported_platform()
 
 
 def test_the_platform_check_and_the_metadata_agree(project: dict[str, Any]) -> None:
     bounds = Requirement(f"python{project['project']['requires-python']}").specifier
     for minor in range(9, 18):
-        welcome = problem(**{**HERE, "version": (3, minor)}) is None
+        welcome = find_problem(**{**HERE, "version": (3, minor)}) is None
         assert bounds.contains(f"3.{minor}") == welcome, minor
 
 

@@ -40,21 +40,21 @@ def is_too_deep(data: Any) -> bool:
 
 
 def excess_of_parts(data: dict[str, Any]) -> str:
-    """Say what there is too much of in a notebook's JSON to look at it closely, as `excess` does.
+    """Say what a notebook's JSON has too much of to look at it closely.
 
-    Tags that could not be compared in time are taken out.
+    It does so as `excess_of_notebook` does. Tags that could not be compared in time are taken out.
     """
-    cells = [cell for cell in _list(data.get("cells")) if isinstance(cell, dict)]
-    if too_many := _excess_of_cells(_list(data.get("cells"))):
+    cells = [cell for cell in _as_list(data.get("cells")) if isinstance(cell, dict)]
+    if too_many := _excess_of_cells(_as_list(data.get("cells"))):
         return too_many
     for cell in cells:
         about = cell.get("metadata")
         if not isinstance(about, dict):
             continue
-        tags = _list(about.get("tags"))
+        tags = _as_list(about.get("tags"))
         if len(tags) > MAX_TAGS or not all(isinstance(tag, str) for tag in tags):
             about.pop("tags")
-    outputs = sum(len(_list(cell.get("outputs"))) for cell in cells)
+    outputs = sum(len(_as_list(cell.get("outputs"))) for cell in cells)
     level: list[Any] = [data]
     parts = 0
     while level and parts <= MAX_PARTS:
@@ -72,7 +72,7 @@ def excess_of_parts(data: dict[str, Any]) -> str:
     return ""
 
 
-def _list(value: Any) -> list[Any]:
+def _as_list(value: Any) -> list[Any]:
     return value if isinstance(value, list) else []
 
 
@@ -85,7 +85,7 @@ def _excess_of_cells(cells: list[Any]) -> str:
     )
 
 
-def excess(notebook: NotebookNode) -> str:
+def excess_of_notebook(notebook: NotebookNode) -> str:
     """Say what there is too much of in a notebook, and what to do; empty if there is not."""
     if too_many := _excess_of_cells(notebook.cells):
         return too_many

@@ -20,7 +20,7 @@ from autograder import exercise_folders
 from autograder.assignments import cells, listing
 from autograder.assignments.cells import BuildError
 from autograder.assignments.submission import grade_id
-from course.util.files import replacing
+from course.util.files import replace_file
 
 SOLUTIONS_TAG = "solutions"
 """Tag of the chapters' cells that only an instructor's build keeps."""
@@ -66,16 +66,16 @@ def build(
             from autograder.examination import points as exams
 
             points = exams.of_grade_cells() | quiz_cells.of_grade_cells(root)
-        built = dict(_built(root, points, with_solutions))
+        built = dict(_build_files(root, points, with_solutions))
     if not built:
         raise BuildError(
             f"There is nothing to build: no chapters and assignments in {root / 'authoring'}."
         )
-    stale = [path for path, content in built.items() if _content(path) != content]
+    stale = [path for path, content in built.items() if _read_content(path) != content]
     if check:
-        _require_in_step(root, stale, orphans(root, built))
+        _require_in_step(root, stale, find_orphans(root, built))
     for path in stale:
-        _write(path, built[path])
+        _write_file(path, built[path])
     return list(built)
 
 
@@ -86,7 +86,7 @@ PLACES = (
 """Where a course has what is built, and what was released of it."""
 
 
-def orphans(root: Path, built: Iterable[Path]) -> list[Path]:
+def find_orphans(root: Path, built: Iterable[Path]) -> list[Path]:
     """Return the notebooks and exams of a course that are none of those ``built``.
 
     They lost their source.
@@ -103,19 +103,20 @@ def _require_in_step(root: Path, stale: list[Path], orphaned: list[Path]) -> Non
     problems = []
     if stale:
         problems.append(
-            f"Not in step with the sources in {root / 'authoring'}: {_names(root, stale)}; "
+            f"Not in step with the sources in {root / 'authoring'}: {_list_paths(root, stale)}; "
             "run `autograder build`."
         )
     if orphaned:
         problems.append(
-            f"Without a source in {root / 'authoring'} or an exercise: {_names(root, orphaned)}; "
+            f"Without a source in {root / 'authoring'} or an exercise: "
+            f"{_list_paths(root, orphaned)}; "
             "remove what is no part of the course any more, or put its source back."
         )
     if problems:
         raise BuildError(" ".join(problems))
 
 
-def _names(root: Path, paths: Iterable[Path]) -> str:
+def _list_paths(root: Path, paths: Iterable[Path]) -> str:
     return ", ".join(str(path.relative_to(root)) for path in paths)
 
 
@@ -132,10 +133,10 @@ def build_assignment(
     Raises:
         BuildError: the metadata are not what nbgrader needs; names ``name`` and the cell.
     """
-    notebook = _read(source, name)
+    notebook = _parse_source(source, name)
     cells.fill_points(notebook, points)
-    cells.validate(notebook, name)
-    return _finish(notebook, name)
+    cells.validate_assignment(notebook, name)
+    return _finish_notebook(notebook, name)
 
 
 def build_chapter(
@@ -146,12 +147,12 @@ def build_chapter(
     Raises:
         BuildError: ``source`` is not py:percent text; names ``name``.
     """
-    notebook = _read(source, name)
+    notebook = _parse_source(source, name)
     if not with_solutions:
         notebook.cells = [
             cell for cell in notebook.cells if SOLUTIONS_TAG not in cell.metadata.get("tags", [])
         ]
-    return _finish(notebook, name)
+    return _finish_notebook(notebook, name)
 
 
 def to_text(notebook: NotebookNode) -> str:
@@ -160,19 +161,19 @@ def to_text(notebook: NotebookNode) -> str:
     return text.rstrip("\n") + "\n"
 
 
-def _built(
+def _build_files(
     root: Path, points: Mapping[str, float], with_solutions: bool
 ) -> Iterator[tuple[Path, bytes]]:
     from autograder.assignments import quiz_sheets
 
     for path in sorted((root / "authoring" / "chapters").glob("*.py")):
-        name = _name(root, path)
-        notebook = build_chapter(_source(path), with_solutions=with_solutions, name=name)
+        name = _relative_name(root, path)
+        notebook = build_chapter(_read_source(path), with_solutions=with_solutions, name=name)
         yield root / "chapters" / f"{path.stem}.ipynb", to_text(notebook).encode()
     for assignment in listing.of_course(root).values():
         folder = root / "source" / assignment.name
         for file_name, path in assignment.texts.items():
-            notebook = build_assignment(_source(path), points, name=_name(root, path))
+            notebook = build_assignment(_read_source(path), points, name=_relative_name(root, path))
             yield folder / f"{file_name}.ipynb", to_text(notebook).encode()
             for file, content in quiz_sheets.of_notebooks(root, [notebook]).items():
                 yield folder / file, content
@@ -180,18 +181,18 @@ def _built(
             yield folder / file, content
 
 
-def _name(root: Path, path: Path) -> str:
+def _relative_name(root: Path, path: Path) -> str:
     return str(path.relative_to(root) if path.is_relative_to(root) else path)
 
 
-def _source(path: Path) -> str:
+def _read_source(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeError) as error:
         raise BuildError(f"{path} cannot be read as UTF-8 text: {error}.") from error
 
 
-def _content(path: Path) -> bytes | None:
+def _read_content(path: Path) -> bytes | None:
     try:
         return path.read_bytes()
     except FileNotFoundError:
@@ -200,11 +201,11 @@ def _content(path: Path) -> bytes | None:
         raise BuildError(f"{path} cannot be read: {error}.") from error
 
 
-def _write(path: Path, content: bytes) -> None:
+def _write_file(path: Path, content: bytes) -> None:
     """Replace a file's content in one step: a full disk must not leave half a notebook."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(path) as file:
+        with replace_file(path) as file:
             file.write(content)
     except OSError as error:
         raise BuildError(
@@ -213,7 +214,7 @@ def _write(path: Path, content: bytes) -> None:
         ) from error
 
 
-def _read(source: str, name: str) -> NotebookNode:
+def _parse_source(source: str, name: str) -> NotebookNode:
     try:
         notebook: NotebookNode = jupytext.reads(source, fmt="py:percent")
     except (ValueError, SyntaxError) as error:
@@ -223,10 +224,10 @@ def _read(source: str, name: str) -> NotebookNode:
     return notebook
 
 
-def _finish(notebook: NotebookNode, name: str) -> NotebookNode:
+def _finish_notebook(notebook: NotebookNode, name: str) -> NotebookNode:
     """Return a clean notebook: our cell ids, our metadata, nothing of jupytext's."""
     seen: dict[str, int] = {}
-    finished_cells = [_cell(cell, seen) for cell in notebook.cells]
+    finished_cells = [_finish_cell(cell, seen) for cell in notebook.cells]
     data = {"cells": finished_cells, "metadata": _METADATA, "nbformat": 4, "nbformat_minor": 5}
     finished: NotebookNode = nbformat.from_dict(data)  # type: ignore[no-untyped-call]
     try:
@@ -236,7 +237,7 @@ def _finish(notebook: NotebookNode, name: str) -> NotebookNode:
     return finished
 
 
-def _cell(cell: NotebookNode, seen: dict[str, int]) -> dict[str, Any]:
+def _finish_cell(cell: NotebookNode, seen: dict[str, int]) -> dict[str, Any]:
     kept = {key: value for key, value in cell.metadata.items() if key != "lines_to_next_cell"}
     finished = {
         "cell_type": cell.cell_type,

@@ -16,7 +16,7 @@ from nbgrader.nbgraderformat import (
     ValidationError,
 )
 
-from autograder.assignments.submission import grade_id, metadata
+from autograder.assignments.submission import grade_id, nbgrader_metadata
 from course.errors import CourseError
 
 MARKERS = ("SOLUTION", "HIDDEN TESTS", "MARK SCHEME")
@@ -33,13 +33,13 @@ class BuildError(CourseError):
 def fill_points(notebook: NotebookNode, points: Mapping[str, float]) -> None:
     """Enter the points of every grade cell that ``points`` knows by its grade id."""
     for cell in notebook.cells:
-        data = metadata(cell)
+        data = nbgrader_metadata(cell)
         if data.get("grade") and grade_id(cell) in points:
             worth = float(points[grade_id(cell)])
             data["points"] = int(worth) if worth.is_integer() else worth
 
 
-def validate(notebook: NotebookNode, name: str) -> None:
+def validate_assignment(notebook: NotebookNode, name: str) -> None:
     """Return if nbgrader can work with every cell of an assignment.
 
     Raises:
@@ -54,11 +54,11 @@ def validate(notebook: NotebookNode, name: str) -> None:
         seen |= {grade_id(cell)} - {""}
         for problem in _marker_problems(cell):
             raise BuildError(f"{where}: {problem}")
-    if not any(metadata(cell).get("grade") for cell in notebook.cells):
+    if not any(nbgrader_metadata(cell).get("grade") for cell in notebook.cells):
         raise BuildError(f"{name} has no grade cell: nothing in it would be graded.")
 
 
-def regions(source: str) -> Iterator[tuple[str, str]]:
+def marked_lines(source: str) -> Iterator[tuple[str, str]]:
     """Yield (marker, line) for each line of a cell; the marker is "" outside of every region.
 
     The lines that carry the markers themselves are left out.
@@ -73,13 +73,13 @@ def regions(source: str) -> Iterator[tuple[str, str]]:
 
 def without_hidden(source: str) -> str:
     """Return a cell's text as a release has it: without the lines of its hidden tests."""
-    kept = [line for marker, line in regions(source) if marker != "HIDDEN TESTS"]
+    kept = [line for marker, line in marked_lines(source) if marker != "HIDDEN TESTS"]
     return "\n".join(kept).strip("\n")
 
 
 def without_markers(source: str) -> str:
     """Return a cell's whole text, solution included, without the lines that carry markers."""
-    return "\n".join(line for _, line in regions(source))
+    return "\n".join(line for _, line in marked_lines(source))
 
 
 def has_marker(source: str) -> bool:
@@ -90,7 +90,7 @@ def has_marker(source: str) -> bool:
 def _validate_cell(cell: NotebookNode, where: str) -> None:
     if "nbgrader" not in cell.metadata:
         return
-    data = metadata(cell)
+    data = nbgrader_metadata(cell)
     if data.get("grade") and not data.get("points"):
         raise BuildError(
             f"{where}: a grade cell without points; add it to the points.toml of its exercise or "
@@ -111,7 +111,7 @@ def _validate_cell(cell: NotebookNode, where: str) -> None:
 
 
 def _marker_problems(cell: NotebookNode) -> Iterator[str]:
-    data = metadata(cell)
+    data = nbgrader_metadata(cell)
     inside = ""
     for line in cell.source.splitlines():
         found = _MARKER.search(line)

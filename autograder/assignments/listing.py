@@ -43,7 +43,7 @@ def of_course(root: Path) -> dict[str, Assignment]:
         BuildError: a list is not sound, or names what there is not.
         ExerciseError: a table of points is not sound, or an exercise has no text.
     """
-    return {name: one(root, name) for name in sorted(names(root))}
+    return {name: read_assignment(root, name) for name in sorted(assignment_names(root))}
 
 
 def exam_files(assignment: Assignment) -> dict[Path, bytes]:
@@ -55,17 +55,17 @@ def exam_files(assignment: Assignment) -> dict[Path, bytes]:
     return {Path(name): content for name, content in files.items()}
 
 
-def names(root: Path) -> set[str]:
+def assignment_names(root: Path) -> set[str]:
     """Return the names of the assignments that the course at ``root`` has texts for."""
-    return _names(root / ASSIGNMENTS)
+    return _listed_names(root / ASSIGNMENTS)
 
 
-def _names(folder: Path) -> set[str]:
+def _listed_names(folder: Path) -> set[str]:
     lists = {path.stem for path in folder.glob("*.toml")}
     return lists | {path.parent.name for path in folder.glob("*/*.py")}
 
 
-def write(root: Path, name: str, exercises: list[str]) -> None:
+def write_list(root: Path, name: str, exercises: list[str]) -> None:
     """Write the list of an assignment of these exercises into the course at ``root``."""
     folder = root / ASSIGNMENTS
     folder.mkdir(parents=True, exist_ok=True)
@@ -73,28 +73,32 @@ def write(root: Path, name: str, exercises: list[str]) -> None:
     (folder / f"{name}.toml").write_text(f"exercises = [{listed}]\n", encoding="utf-8")
 
 
-def one(root: Path, name: str) -> Assignment:
+def read_assignment(root: Path, name: str) -> Assignment:
     """Return an assignment that the course has texts for; raises as `of_course`."""
     file = root / ASSIGNMENTS / f"{name}.toml"
-    data = _read(file) if file.is_file() else {"exercises": [], "quizzes": []}
+    data = _read_list(file) if file.is_file() else {"exercises": [], "quizzes": []}
     texts: dict[str, Path] = {}
     for exercise in data["exercises"]:
-        _require(exercise, list(exercise_folders.current().folders), f"{file} lists the exercise")
-        text = exercise_folders.file(exercise, exercise_folders.TASK)
-        exercise_folders.file(exercise, exercise_folders.POINTS)
-        _add(texts, points.table()[exercise].notebook, text, file)
+        _require_known(
+            exercise,
+            list(exercise_folders.current_exercises().folders),
+            f"{file} lists the exercise",
+        )
+        text = exercise_folders.exercise_file(exercise, exercise_folders.TASK)
+        exercise_folders.exercise_file(exercise, exercise_folders.POINTS)
+        _add_text(texts, points.table()[exercise].notebook, text, file)
     quizzes = {path.stem: path for path in sorted((root / QUIZZES).glob("*.py"))}
     for quiz in data["quizzes"]:
-        _require(quiz, list(quizzes), f"{file} lists the quiz")
-        _add(texts, quiz, quizzes[quiz], file)
+        _require_known(quiz, list(quizzes), f"{file} lists the quiz")
+        _add_text(texts, quiz, quizzes[quiz], file)
     for path in sorted((root / ASSIGNMENTS / name).glob("*.py")):
-        _add(texts, path.stem, path, path)
+        _add_text(texts, path.stem, path, path)
     if not texts:
         raise BuildError(f"{file} lists nothing: exercises = ['…'] names what the assignment has.")
     return Assignment(name, texts, tuple(data["exercises"]))
 
 
-def _read(file: Path) -> dict[str, list[str]]:
+def _read_list(file: Path) -> dict[str, list[str]]:
     try:
         data: dict[str, Any] = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
@@ -111,7 +115,7 @@ def _read(file: Path) -> dict[str, list[str]]:
     return listed
 
 
-def _require(name: str, known: list[str], who: str) -> None:
+def _require_known(name: str, known: list[str], who: str) -> None:
     if name not in known:
         raise BuildError(
             f"{who} '{name}', which there is not: there is {', '.join(known) or 'none'}."
@@ -119,7 +123,7 @@ def _require(name: str, known: list[str], who: str) -> None:
         )
 
 
-def _add(texts: dict[str, Path], notebook: str, text: Path, file: Path) -> None:
+def _add_text(texts: dict[str, Path], notebook: str, text: Path, file: Path) -> None:
     if notebook in texts:
         raise BuildError(
             f"{file}: the notebook '{notebook}' would be there twice, from {texts[notebook]} and "

@@ -76,13 +76,13 @@ def of_notebook(notebook: NotebookNode, name: str) -> dict[str, Question]:
     found: dict[str, Question] = {}
     above: list[_Section] = []
     for cell in notebook.cells:
-        data = submission.metadata(cell)
+        data = submission.nbgrader_metadata(cell)
         grade_id = submission.grade_id(cell)
         if data.get("grade") and grade_id:
-            title = _free(_title(grade_id, above), {q.title for q in found.values()})
-            found[grade_id] = _question(cell, name, title, above)
+            title = _free_title(_cell_title(grade_id, above), {q.title for q in found.values()})
+            found[grade_id] = _make_question(cell, name, title, above)
         elif cell.cell_type == "markdown" and submission.is_locked(cell):
-            for section in _sections(cell.source):
+            for section in _split_sections(cell.source):
                 above = [s for s in above if s.level < section.level] + [section]
     return found
 
@@ -100,7 +100,7 @@ def of_assignment(coursedir: CourseDirectory, assignment: str) -> dict[str, dict
     }
 
 
-def known(coursedir: CourseDirectory, assignment: str) -> dict[str, dict[str, Question]]:
+def known_questions(coursedir: CourseDirectory, assignment: str) -> dict[str, dict[str, Question]]:
     """Return what `of_assignment` does, and nothing where the source cannot be read."""
     try:
         return of_assignment(coursedir, assignment)
@@ -108,7 +108,7 @@ def known(coursedir: CourseDirectory, assignment: str) -> dict[str, dict[str, Qu
         return {}  # then cells are called by their grade ids: better than no word about them
 
 
-def called(asked: Asked, notebook: str, grade_id: str) -> str:
+def describe_cell(asked: Asked, notebook: str, grade_id: str) -> str:
     """Return what a graded cell is called where the reader does not see its exercise."""
     question = asked.get(notebook, {}).get(grade_id)
     exercise = title_of_notebook(notebook)
@@ -125,11 +125,11 @@ def title_of_notebook(notebook: str) -> str:
 
 @lru_cache(maxsize=64)
 def _of_file(path: Path, _changed_ns: int) -> Mapping[str, Question]:
-    return of_notebook(submission.read(path), path.stem)
+    return of_notebook(submission.read_notebook(path), path.stem)
 
 
-def _question(cell: NotebookNode, name: str, title: str, above: list[_Section]) -> Question:
-    data = submission.metadata(cell)
+def _make_question(cell: NotebookNode, name: str, title: str, above: list[_Section]) -> Question:
+    data = submission.nbgrader_metadata(cell)
     grade_id, worth = submission.grade_id(cell), float(data.get("points") or 0)
     if not data.get("solution"):
         return Question(name, grade_id, title, False, worth)
@@ -137,12 +137,14 @@ def _question(cell: NotebookNode, name: str, title: str, above: list[_Section]) 
         name, grade_id, title, True, worth,
         text=above[-1].body if above else "",
         rules=above[-2].body if len(above) > 1 and above[-2].level > 1 else "",
-        model="\n".join(line for mark, line in cells.regions(cell.source) if mark == "SOLUTION"),
-        stub="\n".join(line for mark, line in cells.regions(cell.source) if not mark).strip(),
+        model="\n".join(
+            line for mark, line in cells.marked_lines(cell.source) if mark == "SOLUTION"
+        ),
+        stub="\n".join(line for mark, line in cells.marked_lines(cell.source) if not mark).strip(),
     )  # fmt: skip
 
 
-def _title(grade_id: str, above: list[_Section]) -> str:
+def _cell_title(grade_id: str, above: list[_Section]) -> str:
     if grade_id in points.grade_cells():
         _, part = points.grade_cells()[grade_id]
         return PARTS.get(part, part.capitalize())
@@ -151,7 +153,7 @@ def _title(grade_id: str, above: list[_Section]) -> str:
     return above[-1].title if above else grade_id
 
 
-def _free(title: str, taken: set[str]) -> str:
+def _free_title(title: str, taken: set[str]) -> str:
     """Return a title that no other cell has: the second under one heading gets a number."""
     number = 2
     wanted = title
@@ -160,7 +162,7 @@ def _free(title: str, taken: set[str]) -> str:
     return wanted
 
 
-def _sections(source: str) -> Iterator[_Section]:
+def _split_sections(source: str) -> Iterator[_Section]:
     """Yield the sections that begin in a Markdown cell."""
     section, fenced = None, ""
     for line in source.splitlines():
@@ -169,7 +171,7 @@ def _sections(source: str) -> Iterator[_Section]:
         if not fenced and (heading := _HEADING.fullmatch(line)):
             if section:
                 yield section
-            section = _Section(len(heading[1]), rendering.plain(heading[2]), "")
+            section = _Section(len(heading[1]), rendering.render_plain(heading[2]), "")
         elif section:
             section.body = f"{section.body}\n{line}".strip("\n")
     if section:

@@ -22,7 +22,7 @@ class QuizMarksError(CourseError):
     """A quiz whose bank cannot be used for marking."""
 
 
-def names(root: Path) -> list[str]:
+def quiz_names(root: Path) -> list[str]:
     """Return the names of the quizzes that a course can use: its own, and those of the package."""
     return sorted({*loader.names(root / BANKS), *loader.names()})
 
@@ -52,12 +52,16 @@ def of_grade_cells(root: Path) -> dict[str, float]:
     Raises:
         QuizMarksError: a bank is not sound.
     """
-    return {f"{PREFIX}{name}": float(len(find_bank(root, name).concepts)) for name in names(root)}
+    return {
+        f"{PREFIX}{name}": float(len(find_bank(root, name).concepts)) for name in quiz_names(root)
+    }
 
 
 def in_cells(notebook: NotebookNode) -> Iterator[str]:
     """Yield the names in a notebook's grade cells of quizzes, whether or not there are such."""
     for cell in notebook.cells:
-        graded = bool(submission.metadata(cell).get("grade")) and submission.is_locked(cell)
+        graded = bool(submission.nbgrader_metadata(cell).get("grade")) and submission.is_locked(
+            cell
+        )
         if graded and submission.grade_id(cell).startswith(PREFIX):
             yield submission.grade_id(cell).removeprefix(PREFIX)

@@ -27,7 +27,7 @@ def of_notebooks(root: Path, notebooks: Iterable[NotebookNode]) -> dict[Path, by
         QuizMarksError: a bank is not sound.
         QuizSheetError: students could not open the quiz, or a picture cannot be read.
     """
-    own, known = loader.names(root / quiz_cells.BANKS), quiz_cells.names(root)
+    own, known = loader.names(root / quiz_cells.BANKS), quiz_cells.quiz_names(root)
     found: dict[Path, bytes] = {}
     for notebook in notebooks:
         for name in quiz_cells.in_cells(notebook):
@@ -35,9 +35,9 @@ def of_notebooks(root: Path, notebooks: Iterable[NotebookNode]) -> dict[Path, by
                 continue
             bank = quiz_cells.find_bank(root, name)
             if bank.closed:
-                found[Path(closing.filename(name))] = closing.sheet(bank).encode()
-                found |= {Path(source): _picture(bank.folder / source)
-                          for source in closing.pictures(bank)}  # fmt: skip
+                found[Path(closing.sheet_filename(name))] = closing.make_sheet(bank).encode()
+                found |= {Path(source): _read_picture(bank.folder / source)
+                          for source in closing.picture_files(bank)}  # fmt: skip
             elif name in own:
                 raise QuizSheetError(
                     f"{root / quiz_cells.BANKS / name}.yaml does not reach students with its keys: "
@@ -46,7 +46,7 @@ def of_notebooks(root: Path, notebooks: Iterable[NotebookNode]) -> dict[Path, by
     return found
 
 
-def _picture(path: Path) -> bytes:
+def _read_picture(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:

@@ -31,13 +31,13 @@ class SubmissionError(CourseError):
     """A submission that cannot be read; the message says why, for the student's grade."""
 
 
-def read(path: Path) -> NotebookNode:
+def read_notebook(path: Path) -> NotebookNode:
     """Return the notebook at ``path``.
 
     Raises:
         SubmissionError: missing, no plain file, too large, not JSON, or not a notebook of format 4.
     """
-    return parse(_text(path), path.name)
+    return parse(_read_text(path), path.name)
 
 
 def parse(text: str, name: str) -> NotebookNode:
@@ -71,19 +71,19 @@ def parse(text: str, name: str) -> NotebookNode:
     try:
         # Half of a surrogate pair is legal in JSON, but no text that anything could write again.
         clean = json.dumps(data, ensure_ascii=False).encode("utf-8", "replace").decode()
-        notebook = _sound(nbformat.v4.reads(clean))  # type: ignore[no-untyped-call]
+        notebook = _normalise_notebook(nbformat.v4.reads(clean))  # type: ignore[no-untyped-call]
     except Exception as error:  # noqa: BLE001 - a stranger's data: nbformat fails in many ways
         reason = (str(error) or type(error).__name__).splitlines()[0][:160]
         raise SubmissionError(
             f"{name} does not follow the notebook format ({reason}): open it in JupyterLab, "
             "save it, and hand it in again."
         ) from None
-    if excess := bounds.excess(notebook):
+    if excess := bounds.excess_of_notebook(notebook):
         raise SubmissionError(f"{name} {excess}")
     return notebook
 
 
-def _text(path: Path) -> str:
+def _read_text(path: Path) -> str:
     try:
         status = path.lstat()  # a link may lead to another student's work
         if not stat.S_ISREG(status.st_mode):
@@ -93,7 +93,7 @@ def _text(path: Path) -> str:
                 f"{path.name} has {status.st_size / 2**20:.0f} MB, more than the "
                 f"{MAX_NOTEBOOK // 2**20} MB that are read: clear its outputs and hand it in again."
             )
-        return decoded(path.read_bytes(), path.name)
+        return decode_text(path.read_bytes(), path.name)
     except FileNotFoundError:
         raise SubmissionError(f"There is no {path.name} in the submission.") from None
     except OSError as error:
@@ -102,7 +102,7 @@ def _text(path: Path) -> str:
         ) from None
 
 
-def decoded(content: bytes, name: str) -> str:
+def decode_text(content: bytes, name: str) -> str:
     """Return the text of a notebook's file; ``name`` is the file's, for what is said of it.
 
     Raises:
@@ -117,7 +117,7 @@ def decoded(content: bytes, name: str) -> str:
         ) from None
 
 
-def _sound(notebook: NotebookNode) -> NotebookNode:
+def _normalise_notebook(notebook: NotebookNode) -> NotebookNode:
     """Return a valid notebook, with the cell ids that editors of other versions leave out."""
     with warnings.catch_warnings():
         # Missing or repeated ids are mended right here, so nobody needs to be warned.
@@ -128,7 +128,7 @@ def _sound(notebook: NotebookNode) -> NotebookNode:
     return sound
 
 
-def metadata(cell: NotebookNode) -> dict[str, Any]:
+def nbgrader_metadata(cell: NotebookNode) -> dict[str, Any]:
     """Return a cell's nbgrader metadata, or an empty dict whatever nonsense stands there."""
     found = cell.metadata.get("nbgrader")
     return found if isinstance(found, dict) else {}
@@ -136,16 +136,16 @@ def metadata(cell: NotebookNode) -> dict[str, Any]:
 
 def grade_id(cell: NotebookNode) -> str:
     """Return a cell's grade id, or an empty string."""
-    return str(metadata(cell).get("grade_id") or "")
+    return str(nbgrader_metadata(cell).get("grade_id") or "")
 
 
 def is_locked(cell: NotebookNode) -> bool:
     """Whether the instructor's text of this cell always wins, as nbgrader defines it."""
-    data = metadata(cell)
+    data = nbgrader_metadata(cell)
     return not data.get("solution") and bool(data.get("grade") or data.get("locked"))
 
 
-def restore(
+def restore_cells(
     submitted: NotebookNode, source: NotebookNode, released: NotebookNode
 ) -> tuple[NotebookNode, list[str]]:
     """Return the submission with the instructor's cells as they should be, and what was mended.
@@ -158,12 +158,12 @@ def restore(
     originals = {grade_id(cell): cell for cell in source.cells if grade_id(cell)}
     notes: list[str] = []
     kept: list[NotebookNode] = []
-    chosen = _choose(submitted, reference, notes)
+    chosen = _choose_cells(submitted, reference, notes)
     for cell in submitted.cells:
         name = grade_id(cell)
         counts = bool(name) and chosen.get(name) is cell
         if counts:
-            cell = _mend(cell, reference[name], originals.get(name, reference[name]), notes)
+            cell = _mend_cell(cell, reference[name], originals.get(name, reference[name]), notes)
         else:
             cell.metadata = nbformat.from_dict({})  # type: ignore[no-untyped-call]
         kept.append(cell)
@@ -177,7 +177,7 @@ def restore(
     return mended, notes
 
 
-def _choose(
+def _choose_cells(
     submitted: NotebookNode, reference: dict[str, NotebookNode], notes: list[str]
 ) -> dict[str, NotebookNode]:
     """Pick the cell that counts for each grade id: of several, the first that was worked on."""
@@ -196,13 +196,13 @@ def _choose(
     return chosen
 
 
-def _mend(
+def _mend_cell(
     cell: NotebookNode, reference: NotebookNode, original: NotebookNode, notes: list[str]
 ) -> NotebookNode:
     name = grade_id(reference)
     if cell.cell_type != reference.cell_type:
         notes.append(f"The cell '{name}' had become a {cell.cell_type} cell; it was changed back.")
-        cell = _copy(reference, cell.source)
+        cell = _copy_cell(reference, cell.source)
     if is_locked(reference):
         if cell.source.strip() != reference.source.strip():
             notes.append(f"The text of cell '{name}' had been changed; the original was used.")
@@ -225,13 +225,13 @@ def _put_back(
             position = present[0] + 1
             continue
         text = originals.get(name, cell).source if is_locked(cell) else cell.source
-        cells.insert(position, _copy(cell, text))
+        cells.insert(position, _copy_cell(cell, text))
         position += 1
         if cell.cell_type == "code":
             notes.append(f"The cell '{name}' had been deleted; it was put back.")
 
 
-def _copy(cell: NotebookNode, source: str) -> NotebookNode:
+def _copy_cell(cell: NotebookNode, source: str) -> NotebookNode:
     same = copy.deepcopy(cell)
     same.source = source
     if same.cell_type == "code":
@@ -239,7 +239,7 @@ def _copy(cell: NotebookNode, source: str) -> NotebookNode:
     return same
 
 
-def program(notebook: NotebookNode) -> Program:
+def extract_program(notebook: NotebookNode) -> Program:
     """Return what is to be run, in order: code cells, and the places where exams are sat."""
     cells = []
     ours = points.grade_cells()

@@ -32,17 +32,17 @@ class ClassReport:
     means: means.Means
 
     @property
-    def examined(self) -> int:
+    def examined_count(self) -> int:
         """How many submissions some check was run on."""
         return len(self.times.seconds)
 
     @property
-    def median(self) -> float:
+    def median_score(self) -> float:
         """The median score in points."""
         return statistics.median(grade.score for grade in self.data.grades)
 
     @property
-    def mean(self) -> float:
+    def mean_score(self) -> float:
         """The mean score in points."""
         return statistics.fmean(grade.score for grade in self.data.grades)
 

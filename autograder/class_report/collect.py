@@ -11,7 +11,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from autograder.assignments import questions
 from autograder.assignments.intake import roster
-from autograder.assignments.intake.file_names import normal
+from autograder.assignments.intake.file_names import normalise_name
 from autograder.assignments.intake.notebooks import GRADED_AS
 from autograder.assignments.intake.roster import Roster
 from autograder.assignments.questions import Question
@@ -20,7 +20,7 @@ from autograder.gradebook import records
 from autograder.gradebook.bridge import WORK_FOLDER
 from autograder.gradebook.course_gradebook import CourseGradebook, Grade
 from autograder.gradebook.records import Record, RecordError
-from quizzes.errors import guess
+from quizzes.errors import suggest_name
 
 
 @dataclass(frozen=True)
@@ -84,13 +84,13 @@ class ClassData:
         left_out = sum(notebook in notebooks for notebooks in self.left_out.values())
         return len(self.absent) + left_out
 
-    def called(self, student: str) -> str:
+    def display_name(self, student: str) -> str:
         """Return how a student is called: the name, if one is known, with the id behind it."""
         person = self.people.get(student)
         return f"{person.name} ({student})" if person and person.name else student
 
 
-def collect(root: Path, assignment: str) -> ClassData:
+def collect_class(root: Path, assignment: str) -> ClassData:
     """Read what is known of an assignment's class.
 
     Raises:
@@ -101,12 +101,13 @@ def collect(root: Path, assignment: str) -> ClassData:
     """
     gradebook = CourseGradebook(root)
     try:
-        _require(gradebook, assignment)
-        grades = tuple(gradebook.grades(assignment))
-        people = _people(gradebook)
+        _require_assignment(gradebook, assignment)
+        grades = tuple(gradebook.read_grades(assignment))
+        people = _read_people(gradebook)
     except SQLAlchemyError as error:
         raise InsightError(
-            f"The gradebook of {gradebook.root} cannot be read ({_reason(error)}): if another "
+            f"The gradebook of {gradebook.root} cannot be read ({_error_reason(error)}): if "
+            "another "
             "program uses it, wait until that is done; if it is damaged, put a copy back."
         ) from None
     if not grades:
@@ -114,28 +115,28 @@ def collect(root: Path, assignment: str) -> ClassData:
             f"Nothing of '{assignment}' has been graded yet: run `autograder grade {assignment}` "
             "first."
         )
-    found, notes = _records(gradebook.root, assignment, grades)
+    found, notes = _load_records(gradebook.root, assignment, grades)
     known = {grade.student for grade in grades}
-    handed_in = _submitted(gradebook, assignment, known | people.keys())
+    handed_in = _find_submitters(gradebook, assignment, known | people.keys())
     absent = people.keys() - known - set(handed_in)
     return ClassData(
         gradebook.root, assignment, max(grade.max_score for grade in grades), grades, people,
         found, tuple(student for student in handed_in if student not in known), tuple(notes),
         tuple(sorted(absent)), _left_out(gradebook.root, assignment, found),
-        questions.known(gradebook.coursedir, assignment),
+        questions.known_questions(gradebook.coursedir, assignment),
     )  # fmt: skip
 
 
-def _require(gradebook: CourseGradebook, assignment: str) -> None:
-    known = gradebook.assignments()
+def _require_assignment(gradebook: CourseGradebook, assignment: str) -> None:
+    known = gradebook.assignment_names()
     if assignment not in known:
         raise InsightError(
             f"There is no assignment '{assignment}' in the gradebook of {gradebook.root}: there "
-            f"are {', '.join(known) or 'none yet'}.{guess(assignment, known)}"
+            f"are {', '.join(known) or 'none yet'}.{suggest_name(assignment, known)}"
         )
 
 
-def _people(gradebook: CourseGradebook) -> dict[str, Person]:
+def _read_people(gradebook: CourseGradebook) -> dict[str, Person]:
     courses = gradebook.coursedir
     with Gradebook(courses.db_url, courses.course_id) as book:
         return {
@@ -143,11 +144,11 @@ def _people(gradebook: CourseGradebook) -> dict[str, Person]:
                 s.id, s.first_name or "", s.last_name or "", s.email or "", s.lms_user_id or ""
             )
             for s in book.students
-            if s.id not in gradebook.excluded
+            if s.id not in gradebook.excluded_students
         }
 
 
-def _records(
+def _load_records(
     root: Path, assignment: str, grades: tuple[Grade, ...]
 ) -> tuple[dict[str, dict[str, Record]], list[str]]:
     found: dict[str, dict[str, Record]] = {}
@@ -157,7 +158,9 @@ def _records(
         of_student = found.setdefault(grade.student, {})
         for notebook in grade.cells:
             try:
-                record = records.load(root / WORK_FOLDER, assignment, grade.student, notebook)
+                record = records.load_record(
+                    root / WORK_FOLDER, assignment, grade.student, notebook
+                )
             except RecordError as error:
                 notes.append(str(error))
                 continue
@@ -184,7 +187,9 @@ def _left_out(
         taken = any(GRADED_AS in note for note in record.notes)
         if record.unreadable or taken or any(c.status != "not_checked" for c in results):
             return False
-        return not (roster.folder(root, student) / assignment / f"{notebook}.ipynb").exists()
+        return not (
+            roster.student_folder(root, student) / assignment / f"{notebook}.ipynb"
+        ).exists()
 
     return {
         student: frozenset(n for n, record in notebooks.items() if is_missing(student, n, record))
@@ -192,16 +197,18 @@ def _left_out(
     }
 
 
-def _submitted(gradebook: CourseGradebook, assignment: str, known: Collection[str]) -> list[str]:
+def _find_submitters(
+    gradebook: CourseGradebook, assignment: str, known: Collection[str]
+) -> list[str]:
     """Return who has handed in something, be it where it is not looked for.
 
     A name that is ``known`` in another form of Unicode is that.
     """
-    assignments = gradebook.assignments()
-    students, wrong = roster.submissions(gradebook.root, assignment, Roster(), assignments)
-    ids = {normal(student): student for student in known}
-    return sorted({ids.get(normal(name), name) for name in (*students, *wrong)})
+    assignments = gradebook.assignment_names()
+    students, wrong = roster.find_submissions(gradebook.root, assignment, Roster(), assignments)
+    ids = {normalise_name(student): student for student in known}
+    return sorted({ids.get(normalise_name(name), name) for name in (*students, *wrong)})
 
 
-def _reason(error: SQLAlchemyError) -> str:
+def _error_reason(error: SQLAlchemyError) -> str:
     return str(getattr(error, "orig", None) or error).splitlines()[0][:200]

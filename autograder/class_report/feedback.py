@@ -38,16 +38,16 @@ class Group:
     students: tuple[str, ...]
 
 
-def common(data: ClassData) -> list[Group]:
+def common_groups(data: ClassData) -> list[Group]:
     """Return the groups of what was observed, the most common first."""
     groups: dict[tuple[str, str], set[str]] = {}
-    for student, about, text in _observed(data):
-        groups.setdefault((about, stripped(text, [student])), set()).add(student)
+    for student, about, text in _collect_observations(data):
+        groups.setdefault((about, strip_details(text, [student])), set()).add(student)
     found = (Group(about, text, tuple(sorted(who))) for (about, text), who in groups.items())
     return sorted(found, key=lambda group: (-len(group.students), group.about, group.text))
 
 
-def stripped(text: str, names: Iterable[str] = ()) -> str:
+def strip_details(text: str, names: Iterable[str] = ()) -> str:
     """Return ``text`` with what differs from one submission to the next taken out.
 
     Quoted words, what stands in angle brackets, topics and ``names`` become ``…``; numbers, and
@@ -63,9 +63,9 @@ def stripped(text: str, names: Iterable[str] = ()) -> str:
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 
 
-def _observed(data: ClassData) -> Iterator[tuple[str, str, str]]:
+def _collect_observations(data: ClassData) -> Iterator[tuple[str, str, str]]:
     """Yield (student, about, text) for what failed, and for what a notebook's own cells raised."""
-    for student, _, result in figures.results(data):
+    for student, _, result in figures.check_results(data):
         if result.status == "failed" and result.actual:
             yield student, result.title, result.actual
     for student, notebooks in data.records.items():

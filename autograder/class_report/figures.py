@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from autograder.assignments.quiz_cells import PREFIX
 from autograder.class_report.collect import ClassData
 from autograder.examination.verdict import CheckResult, Status
-from quizzes.insight.analysis import FEWEST_WRONG, discrimination
+from quizzes.insight.analysis import FEWEST_WRONG, compute_discrimination
 
 FEW = 10
 """Submissions below which figures say little; they are shown all the same, and marked."""
@@ -57,7 +57,7 @@ class CheckFigures:
     not_handed_in: int = 0
 
     @property
-    def examined(self) -> int:
+    def examined_count(self) -> int:
         """The n of failure rate and discrimination: submissions on which it was examined."""
         return self.passed + self.failed
 
@@ -69,17 +69,17 @@ class Times:
     seconds: dict[str, float]
 
     @property
-    def median(self) -> float:
+    def median_seconds(self) -> float:
         """The median in seconds; 0 if nothing was run."""
         return statistics.median(self.seconds.values()) if self.seconds else 0.0
 
     @property
-    def slowest(self) -> list[tuple[str, float]]:
+    def slowest_submissions(self) -> list[tuple[str, float]]:
         """The five submissions that took longest, the longest first."""
         return sorted(self.seconds.items(), key=lambda item: (-item[1], item[0]))[:5]
 
 
-def results(data: ClassData) -> Iterator[tuple[str, Key, CheckResult]]:
+def check_results(data: ClassData) -> Iterator[tuple[str, Key, CheckResult]]:
     """Yield (student, check, result) for the checks of every submission that could be run.
 
     The questions of quizzes are no checks; they have a report of their own.
@@ -94,11 +94,11 @@ def results(data: ClassData) -> Iterator[tuple[str, Key, CheckResult]]:
                         yield student, (notebook, grade_id, result.name), result
 
 
-def checks(data: ClassData) -> tuple[CheckFigures, ...]:
+def check_figures(data: ClassData) -> tuple[CheckFigures, ...]:
     """Return the figures of each check, in the order in which they stand in the verdicts."""
     by_check: dict[Key, dict[str, CheckResult]] = {}
     totals: defaultdict[str, float] = defaultdict(float)
-    for student, key, result in results(data):
+    for student, key, result in check_results(data):
         by_check.setdefault(key, {})[student] = result
     for found in by_check.values():
         for student, result in found.items():
@@ -106,11 +106,11 @@ def checks(data: ClassData) -> tuple[CheckFigures, ...]:
     notebooks = {key[0]: None for key in sorted(by_check, key=lambda key: key[0])}
     ordered = (key for notebook in notebooks for key in by_check if key[0] == notebook)
     return tuple(
-        _figures(key, by_check[key], totals, data.not_handed_in(key[0])) for key in ordered
+        _make_figures(key, by_check[key], totals, data.not_handed_in(key[0])) for key in ordered
     )
 
 
-def times(data: ClassData) -> Times:
+def run_times(data: ClassData) -> Times:
     """Return how long the submissions took that could be run."""
     seconds = {
         student: sum(record.seconds for record in notebooks.values())
@@ -123,14 +123,14 @@ def times(data: ClassData) -> Times:
     return Times(seconds)
 
 
-def _figures(
+def _make_figures(
     key: Key, found: dict[str, CheckResult], totals: Mapping[str, float], not_handed_in: int
 ) -> CheckFigures:
     counts = Counter(result.status for result in found.values())
     examined = counts["passed"] + counts["failed"]
     rate = counts["failed"] / examined if examined else None
     # Rounded, because sums of tenths in another order differ in their last bit.
-    correlation = discrimination(
+    correlation = compute_discrimination(
         (float(result.passed), round(totals[student] - result.points, 6))
         for student, result in found.items()
         if result.status in ("passed", "failed")
@@ -139,11 +139,11 @@ def _figures(
     return CheckFigures(
         *key, any_result.title, any_result.max_points,
         counts["passed"], counts["failed"], counts["not_checked"], counts["grader_error"],
-        rate, correlation, _advice(counts, examined, rate, correlation), not_handed_in,
+        rate, correlation, _give_advice(counts, examined, rate, correlation), not_handed_in,
     )  # fmt: skip
 
 
-def _advice(
+def _give_advice(
     counts: Counter[Status], examined: int, rate: float | None, correlation: float | None
 ) -> str:
     if counts["grader_error"]:

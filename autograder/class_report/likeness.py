@@ -32,75 +32,75 @@ def texts_of(data: ClassData, given: GivenText) -> tuple[dict[str, dict[str, Own
     unread = []
     handed_out = files_beside(data.root / "release" / data.assignment).files
     for grade in data.grades:
-        folder = roster.folder(data.root, grade.student) / data.assignment
-        notebooks = {**_notebooks(folder, names), **_graded(data, grade.student)}
+        folder = roster.student_folder(data.root, grade.student) / data.assignment
+        notebooks = {**_read_notebooks(folder, names), **_read_graded(data, grade.student)}
         if not notebooks:
             unread.append(grade.student)
             continue
         for name, notebook in notebooks.items():
             title = questions.title_of_notebook(name)
-            texts[title][grade.student] = given.own({name: notebook}, {})
-            for question, answer in _answers(notebook, data.questions.get(name, {})):
-                texts[called(title, question)][grade.student] = answer
+            texts[title][grade.student] = given.extract_own_text({name: notebook}, {})
+            for question, answer in _find_answers(notebook, data.questions.get(name, {})):
+                texts[answers_title(title, question)][grade.student] = answer
         files = files_beside(folder).files
         own = {name: content for name, content in files.items() if content != handed_out.get(name)}
-        if (beside := given.own({}, own)).lines:
+        if (beside := given.extract_own_text({}, own)).lines:
             texts[BESIDE][grade.student] = beside
     if not unread:
         return dict(texts), []
     more = f" and {len(unread) - 10} more" if len(unread) > 10 else ""
-    who = ", ".join(map(data.called, unread[:10]))
+    who = ", ".join(map(data.display_name, unread[:10]))
     return dict(texts), [f"Not compared, because no notebook can be read: {who}{more}."]
 
 
-def compare(data: ClassData, texts: Texts, given: GivenText, threshold: float) -> Likeness:
+def compare_class(data: ClassData, texts: Texts, given: GivenText, threshold: float) -> Likeness:
     """Return which students' programs and answers are alike; see `similarity`."""
     asked = {
-        called(questions.title_of_notebook(name), question): question
+        answers_title(questions.title_of_notebook(name), question): question
         for name, found in data.questions.items()
         for question in found.values()
     }
     programs = [where for where in texts if where not in asked]
     # The work grows with the square of what is compared at a time.
     work = int(similarity.MOST_WORK / math.sqrt(max(1, len(programs))))
-    return similarity.together(
-        similarity.alike_in_words(found, _given(asked[where]), threshold, where)
+    return similarity.merge_findings(
+        similarity.alike_in_words(found, _given_text(asked[where]), threshold, where)
         if where in asked
-        else similarity.alike(found, given, threshold, where, work)
+        else similarity.compare_programs(found, given, threshold, where, work)
         for where, found in texts.items()
     )
 
 
-def called(title: str, question: Question) -> str:
+def answers_title(title: str, question: Question) -> str:
     """Return what the answers to a question of an exercise are called."""
     return f"{title}: {question.title}"
 
 
-def _given(question: Question) -> str:
+def _given_text(question: Question) -> str:
     return "\n".join((question.text, question.rules, question.model, question.stub))
 
 
-def _notebooks(folder: Path, names: list[str]) -> dict[str, NotebookNode]:
+def _read_notebooks(folder: Path, names: list[str]) -> dict[str, NotebookNode]:
     notebooks = {}
     for name in names:
         try:
-            notebooks[name] = submission.read(folder / f"{name}.ipynb")
+            notebooks[name] = submission.read_notebook(folder / f"{name}.ipynb")
         except SubmissionError:
             continue  # "what needs a person" names it, and why it cannot be read
     return notebooks
 
 
-def _graded(data: ClassData, student: str) -> dict[str, NotebookNode]:
+def _read_graded(data: ClassData, student: str) -> dict[str, NotebookNode]:
     """Return what was graded, under whichever name it was handed in.
 
     Its cells are recognised: one that came without metadata says there which it is.
     """
     records = data.records.get(student, {})
     read = [name for name, record in records.items() if not record.unreadable]
-    return _notebooks(data.root / "autograded" / student / data.assignment, read)
+    return _read_notebooks(data.root / "autograded" / student / data.assignment, read)
 
 
-def _answers(
+def _find_answers(
     notebook: NotebookNode, asked: Mapping[str, Question]
 ) -> list[tuple[Question, OwnText]]:
     found = []

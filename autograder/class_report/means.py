@@ -58,10 +58,12 @@ class Means:
 
 def of_class(data: ClassData) -> Means:
     """Return the means of a class."""
-    return Means(tuple(_exercises(data)), tuple(_questions(data)), tuple(_objectives(data)))
+    return Means(
+        tuple(_exercise_means(data)), tuple(_question_means(data)), tuple(_objective_means(data))
+    )
 
 
-def objectives() -> Mapping[tuple[str, str], str]:
+def load_objectives() -> Mapping[tuple[str, str], str]:
     """Return {(exam, check or grade id): objective}, exercise by exercise.
 
     What a learner shows by a check or a written answer stands in the ``objectives.toml`` of the
@@ -70,7 +72,7 @@ def objectives() -> Mapping[tuple[str, str], str]:
     Raises:
         ExerciseError: such a file is not sound.
     """
-    return _objectives_of(exercise_folders.current())
+    return _objectives_of(exercise_folders.current_exercises())
 
 
 @lru_cache(maxsize=2)
@@ -78,12 +80,14 @@ def _objectives_of(exercises: Exercises) -> Mapping[tuple[str, str], str]:
     return {
         (exam, name): objective
         for exam in points.table()
-        for objective, names in _listed(exercises.folders[exam] / exercise_folders.OBJECTIVES)
+        for objective, names in _read_objectives(
+            exercises.folders[exam] / exercise_folders.OBJECTIVES
+        )
         for name in names
     }
 
 
-def _listed(file: Path) -> list[tuple[str, list[str]]]:
+def _read_objectives(file: Path) -> list[tuple[str, list[str]]]:
     if not file.is_file():
         return []
     try:
@@ -93,8 +97,8 @@ def _listed(file: Path) -> list[tuple[str, list[str]]]:
         raise ExerciseError(f"{file} lists no names of checks: {error}.") from None
 
 
-def _exercises(data: ClassData) -> Iterator[Mean]:
-    for notebook in _notebooks(data):
+def _exercise_means(data: ClassData) -> Iterator[Mean]:
+    for notebook in _notebook_names(data):
         earned, waiting = [], 0
         for grade in data.grades:
             cells = grade.cells.get(notebook)
@@ -107,11 +111,11 @@ def _exercises(data: ClassData) -> Iterator[Mean]:
                 earned.append(sum(marked))
         title = questions.title_of_notebook(notebook)
         worth = sum(q.max_points for q in data.questions.get(notebook, {}).values())
-        yield _mean(title, "", earned, worth, waiting)
+        yield _make_mean(title, "", earned, worth, waiting)
 
 
-def _questions(data: ClassData) -> Iterator[Mean]:
-    for notebook in _notebooks(data):
+def _question_means(data: ClassData) -> Iterator[Mean]:
+    for notebook in _notebook_names(data):
         about = questions.title_of_notebook(notebook)
         for question in data.questions.get(notebook, {}).values():
             earned, waiting = [], 0
@@ -124,30 +128,30 @@ def _questions(data: ClassData) -> Iterator[Mean]:
                     waiting += 1
                 else:
                     earned.append(value)
-            yield _mean(about, question.title, earned, question.max_points, waiting)
+            yield _make_mean(about, question.title, earned, question.max_points, waiting)
 
 
-def _objectives(data: ClassData) -> Iterator[Mean]:
+def _objective_means(data: ClassData) -> Iterator[Mean]:
     """Yield for each objective the mean share that students have of what is marked for them."""
     earned: defaultdict[str, defaultdict[str, list[tuple[float, float]]]]
     earned = defaultdict(lambda: defaultdict(list))
     waiting: defaultdict[str, set[str]] = defaultdict(set)
-    for student, objective, got, most in _shown(data):
+    for student, objective, got, most in _objective_points(data):
         if got is None:
             waiting[objective].add(student)
         else:
             earned[objective][student].append((got, most))
-    known = [*dict.fromkeys(objectives().values()), *earned, *waiting]
+    known = [*dict.fromkeys(load_objectives().values()), *earned, *waiting]
     for objective in dict.fromkeys(known):
         if objective in earned or objective in waiting:
             shares = [
                 sum(got for got, _ in found) / sum(most for _, most in found)
                 for found in earned[objective].values()
             ]
-            yield _mean("", objective, shares, 1.0, len(waiting[objective]))
+            yield _make_mean("", objective, shares, 1.0, len(waiting[objective]))
 
 
-def _shown(data: ClassData) -> Iterator[tuple[str, str, float | None, float]]:
+def _objective_points(data: ClassData) -> Iterator[tuple[str, str, float | None, float]]:
     """Yield (student, objective, points or None while they wait, points to earn)."""
     for student, notebooks in data.records.items():
         for notebook, record in notebooks.items():
@@ -156,7 +160,9 @@ def _shown(data: ClassData) -> Iterator[tuple[str, str, float | None, float]]:
             for verdict in record.verdicts.values():
                 quiz = verdict.exam.startswith(PREFIX)
                 for check in verdict.checks:
-                    what = check.title if quiz else objectives().get((verdict.exam, check.name))
+                    what = (
+                        check.title if quiz else load_objectives().get((verdict.exam, check.name))
+                    )
                     if what and check.max_points:
                         open_ = check.status in ("grader_error", "not_examined")
                         yield student, what, None if open_ else check.points, check.max_points
@@ -169,15 +175,15 @@ def _shown(data: ClassData) -> Iterator[tuple[str, str, float | None, float]]:
                 continue
             for question in data.questions.get(notebook, {}).values():
                 cell = question.grade_id
-                what = objectives().get((exams.get(cell, ""), cell))
+                what = load_objectives().get((exams.get(cell, ""), cell))
                 if what and cell in cells:
                     yield grade.student, what, cells[cell], question.max_points
 
 
-def _notebooks(data: ClassData) -> list[str]:
+def _notebook_names(data: ClassData) -> list[str]:
     return sorted({notebook for grade in data.grades for notebook in grade.cells})
 
 
-def _mean(about: str, title: str, earned: list[float], most: float, waiting: int) -> Mean:
+def _make_mean(about: str, title: str, earned: list[float], most: float, waiting: int) -> Mean:
     mean = statistics.fmean(earned) if earned else None
     return Mean(about, title, len(earned), mean, most, waiting)

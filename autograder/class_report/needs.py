@@ -30,7 +30,7 @@ def people_needed(data: ClassData) -> list[Need]:
     """Return the reasons to look, the urgent ones first."""
     found: dict[tuple[bool, str], set[str]] = {}
     for grade in data.grades:
-        for urgent, why in _reasons(data, grade):
+        for urgent, why in _find_reasons(data, grade):
             found.setdefault((urgent, why), set()).add(grade.student)
     for student in data.not_entered:
         why = (
@@ -57,12 +57,12 @@ def _shared_attempts(data: ClassData) -> Iterator[Need]:
             yield Need(why, group, True)
 
 
-def _reasons(data: ClassData, grade: Grade) -> Iterator[tuple[bool, str]]:
+def _find_reasons(data: ClassData, grade: Grade) -> Iterator[tuple[bool, str]]:
     explained = False
     for notebook, cells in grade.cells.items():
         if notebook in grade.asked:
             explained = True
-            yield True, feedback.stripped(grade.asked[notebook], [grade.student])
+            yield True, feedback.strip_details(grade.asked[notebook], [grade.student])
             continue
         record = data.records.get(grade.student, {}).get(notebook)
         waiting = [cell for cell, points in cells.items() if points is None]
@@ -80,7 +80,7 @@ def _reasons(data: ClassData, grade: Grade) -> Iterator[tuple[bool, str]]:
                 yield False, f"Written answers of {exercise} wait for their marks."
             elif not reasons:
                 explained = True
-                called = questions.called(data.questions, notebook, cell)
+                called = questions.describe_cell(data.questions, notebook, cell)
                 yield True, f"{called} was flagged for a manual grade."
     if grade.needs_manual_grade and not explained:
         yield True, "nbgrader says that it needs a manual grade."
@@ -94,5 +94,5 @@ def _of_record(record: Record, notebook: str, student: str) -> Iterator[tuple[bo
     for verdict in record.verdicts.values():
         for result in verdict.checks:
             if result.status in ("grader_error", "not_examined"):
-                what = feedback.stripped(result.actual, [student])
+                what = feedback.strip_details(result.actual, [student])
                 yield True, f"{notebook}, “{result.title}”: {what}"

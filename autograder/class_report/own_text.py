@@ -75,10 +75,14 @@ class GivenText:
             for cell in notebook.cells
             if cell.cell_type == "code"
         ]
-        self.lines = frozenset(bare(line) for s in sources + solved for line in s.splitlines())
-        self.names = frozenset(text for s in sources for is_name, text in _lex(s) if is_name)
+        self.lines = frozenset(bare_line(line) for s in sources + solved for line in s.splitlines())
+        self.names = frozenset(
+            text for s in sources for is_name, text in _split_tokens(s) if is_name
+        )
 
-    def own(self, notebooks: Mapping[str, NotebookNode], files: Mapping[str, bytes]) -> OwnText:
+    def extract_own_text(
+        self, notebooks: Mapping[str, NotebookNode], files: Mapping[str, bytes]
+    ) -> OwnText:
         """Return what a student wrote in their notebooks, and in Python files beside them."""
         texts = [
             cell.source
@@ -96,7 +100,7 @@ class GivenText:
 
     def is_given(self, line: str) -> bool:
         """Whether a line stands in the assignment itself."""
-        return bare(line) in self.lines
+        return bare_line(line) in self.lines
 
     def _is_given(self, name: str, cell: NotebookNode) -> bool:
         grade_id = submission.grade_id(cell)
@@ -108,28 +112,30 @@ class GivenText:
 def common_ground(texts: Iterable[OwnText]) -> frozenset[str]:
     """Return the lines that so many of a class have that they say nothing about two of them."""
     all_texts = list(texts)
-    counts = Counter(line for text in all_texts for line in {bare(line) for line in text.lines})
+    counts = Counter(
+        line for text in all_texts for line in {bare_line(line) for line in text.lines}
+    )
     many = max(MANY, COMMON * len(all_texts))
     return frozenset(line for line, count in counts.items() if count > many)
 
 
-def tokens(
+def own_tokens(
     text: OwnText, given: GivenText, common: frozenset[str], most: int = MAX_TOKENS
 ) -> tuple[str, ...]:
     """Return the first ``most`` tokens of what counts; names that the student chose are one."""
-    left = [line for line in text.lines if bare(line) not in given.lines | common]
+    left = [line for line in text.lines if bare_line(line) not in given.lines | common]
     chosen = _chosen_names("\n".join(text.lines)) - given.names
-    return tuple(islice(_normal("\n".join(left), chosen), most))
+    return tuple(islice(_normalise_names("\n".join(left), chosen), most))
 
 
-def words(text: OwnText, given: str) -> tuple[str, ...]:
+def own_words(text: OwnText, given: str) -> tuple[str, ...]:
     """Return the words of an answer, without what it has in common with a ``given`` text.
 
     That is every run of `RUN` words or more which stands there, too.
     """
-    known = _words(given)
+    known = _split_words(given)
     runs = {known[n : n + RUN] for n in range(len(known) - RUN + 1)}
-    own = _words("\n".join(text.lines))[:MAX_TOKENS]
+    own = _split_words("\n".join(text.lines))[:MAX_TOKENS]
     taken: set[int] = set()
     for n in range(len(own) - RUN + 1):
         if own[n : n + RUN] in runs:
@@ -137,23 +143,23 @@ def words(text: OwnText, given: str) -> tuple[str, ...]:
     return tuple(word for n, word in enumerate(own) if n not in taken)
 
 
-def _words(text: str) -> tuple[str, ...]:
+def _split_words(text: str) -> tuple[str, ...]:
     return tuple(re.findall(r"\w+", text.casefold()))
 
 
-def _normal(text: str, chosen: set[str]) -> Iterator[str]:
-    for is_name, token in _lex(text):
+def _normalise_names(text: str, chosen: set[str]) -> Iterator[str]:
+    for is_name, token in _split_tokens(text):
         yield OWN_NAME if is_name and token in chosen else token
 
 
-def _lex(text: str) -> Iterator[tuple[bool, str]]:
+def _split_tokens(text: str) -> Iterator[tuple[bool, str]]:
     """Yield (whether it is a name, token) for what means something; never fails on any text.
 
     Five times as fast as pygments, which would take most of the time that a class is compared in.
     """
     for found in _TOKEN.finditer(text):
         if found.lastgroup == "formatted":
-            yield from _lex(found["inside"].strip("'\""))  # names stand in it, too
+            yield from _split_tokens(found["inside"].strip("'\""))  # names stand in it, too
         elif found.lastgroup != "nothing":
             yield found.lastgroup == "name", found[0]
 
@@ -164,13 +170,13 @@ def _chosen_names(text: str) -> set[str]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # a student's odd escapes are not the reader's concern
             tree = ast.parse(text)
-        names = {name for node in ast.walk(tree) if (name := _bound(node))}
+        names = {name for node in ast.walk(tree) if (name := _bound_name(node))}
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return set()
     return {name for name in names if not keyword.iskeyword(name) and not hasattr(builtins, name)}
 
 
-def _bound(node: ast.AST) -> str | None:
+def _bound_name(node: ast.AST) -> str | None:
     """Return the name that a node gives to something, if it does."""
     if isinstance(node, ast.Name):
         return node.id if isinstance(node.ctx, ast.Store) else None
@@ -183,6 +189,6 @@ def _bound(node: ast.AST) -> str | None:
     return node.asname if isinstance(node, ast.alias) else None
 
 
-def bare(line: str) -> str:
+def bare_line(line: str) -> str:
     """Return a line without its comment and its blanks."""
     return "".join(line.split("#")[0].split())

@@ -16,7 +16,7 @@ from autograder.class_report.class_report import ClassReport
 from autograder.class_report.figures import FEW, CheckFigures
 from autograder.class_report.means import Mean
 from autograder.class_report.similarity import MOST_PAIRS, Pair, side_by_side
-from course.messages.yaml_text import counted
+from course.messages.yaml_text import format_count
 
 CHECK_COLUMNS = (
     "check", "points", "passed", "failed", "not checked", "not handed in", "grader error", "n",
@@ -52,19 +52,19 @@ summary { cursor: pointer; }
 """
 
 
-def page(report: ClassReport) -> str:
+def render_page(report: ClassReport) -> str:
     """Return the report as one HTML page."""
     title = f"{report.data.assignment}: class report"
     parts = [
         f"<h1>{escape(title)}</h1>",
-        *_scores(report),
-        *_needs(report),
-        *_absent(report),
-        *_means(report),
-        *_checks(report),
-        *_feedback(report),
-        *_times(report),
-        *_alike(report),
+        *_scores_section(report),
+        *_needs_section(report),
+        *_absent_section(report),
+        *_means_section(report),
+        *_checks_section(report),
+        *_feedback_section(report),
+        *_times_section(report),
+        *_alike_section(report),
         *_left_out(report),
     ]
     return (
@@ -77,50 +77,54 @@ def page(report: ClassReport) -> str:
     )
 
 
-def _scores(report: ClassReport) -> list[str]:
+def _scores_section(report: ClassReport) -> list[str]:
     grades, most = report.data.grades, report.data.max_score
     waiting = sum(grade.needs_manual_grade for grade in grades)
     said = (
-        f"{counted(len(grades), 'student')} with a grade, of {most:g} points; "
-        f"median {report.median:g}, mean {report.mean:.1f} (n = {len(grades)})."
+        f"{format_count(len(grades), 'student')} with a grade, of {most:g} points; "
+        f"median {report.median_score:g}, mean {report.mean_score:.1f} (n = {len(grades)})."
     )
     if waiting:
         said += (
-            f" {counted(waiting, 'grade')} still {'waits' if waiting == 1 else 'wait'} for a "
+            f" {format_count(waiting, 'grade')} still {'waits' if waiting == 1 else 'wait'} for a "
             "person: points that are not given yet count as 0 here."
         )
-    drawn = plots.scores([grade.score for grade in grades], most)
-    return [f"<p>{escape(said)}</p>", _figure(drawn, "How many students have how many points.")]
+    drawn = plots.plot_scores([grade.score for grade in grades], most)
+    return [
+        f"<p>{escape(said)}</p>",
+        _figure_html(drawn, "How many students have how many points."),
+    ]
 
 
-def _needs(report: ClassReport) -> list[str]:
+def _needs_section(report: ClassReport) -> list[str]:
     parts = ["<h2>What needs a person</h2>"]
     if not report.needs:
         return [*parts, "<p>Nothing.</p>"]
     rows = "".join(
         f'<tr><td class="{"urgent" if need.urgent else "text"}">{escape(need.why)}</td>'
-        f'<td class="number">{len(need.students)}</td><td>{_names(report, need.students)}</td></tr>'
+        f'<td class="number">{len(need.students)}</td>'
+        f"<td>{_names_html(report, need.students)}</td></tr>"
         for need in report.needs
     )
     caption = "Reasons, and whom they hold for; without a mark from you these grades are not final"
-    return [*parts, _table(caption, ("why", "how many", "students"), rows)]
+    return [*parts, _table_html(caption, ("why", "how many", "students"), rows)]
 
 
-def _absent(report: ClassReport) -> list[str]:
+def _absent_section(report: ClassReport) -> list[str]:
     absent, left_out = report.data.absent, report.data.left_out
     parts = ["<h2>What was not handed in</h2>"]
     if absent:
-        number = counted(len(absent), "student")
-        parts.append(f"<p>Nothing, by {number}: {_names(report, absent)}</p>")
+        number = format_count(len(absent), "student")
+        parts.append(f"<p>Nothing, by {number}: {_names_html(report, absent)}</p>")
     for notebook in sorted({name for names in left_out.values() for name in names}):
         who = [student for student, names in sorted(left_out.items()) if notebook in names]
         title = questions.title_of_notebook(notebook)
-        number = counted(len(who), "more student")
-        parts.append(f"<p>{escape(title)}, by {number}: {_names(report, who)}</p>")
+        number = format_count(len(who), "more student")
+        parts.append(f"<p>{escape(title)}, by {number}: {_names_html(report, who)}</p>")
     return parts if len(parts) > 1 else []
 
 
-def _means(report: ClassReport) -> list[str]:
+def _means_section(report: ClassReport) -> list[str]:
     found = report.means
     if not found.exercises:
         return []
@@ -128,12 +132,14 @@ def _means(report: ClassReport) -> list[str]:
         "<h2>Means</h2><p><em>n</em> is how many students are in a mean: who has not handed in an "
         "exercise, or still waits for a mark in it, is not. What lateness takes off is left out."
         "</p>",
-        _table("By exercise", ("exercise", *MEAN_COLUMNS), _mean_rows(found.exercises, "about")),
-        _table(
+        _table_html(
+            "By exercise", ("exercise", *MEAN_COLUMNS), _mean_rows(found.exercises, "about"),
+        ),
+        _table_html(
             "By question", ("exercise", "question", *MEAN_COLUMNS),
             _mean_rows(found.questions, "about", "title"),
         ),
-        *([_table(
+        *([_table_html(
             "By learning objective: the share of its points that students have, of those that are "
             "given so far", ("objective", *MEAN_COLUMNS[1:]),
             _mean_rows(found.objectives, "title", points=False),
@@ -154,20 +160,20 @@ def _mean_rows(found: Iterable[Mean], *texts: str, points: bool = True) -> str:
     return "".join(rows)
 
 
-def _checks(report: ClassReport) -> list[str]:
+def _checks_section(report: ClassReport) -> list[str]:
     parts = ["<h2>Checks</h2>"]
     if not report.checks:
         return [*parts, "<p>No check was run on any submission.</p>"]
     parts.append(_EXPLAINED)
-    if report.examined < FEW:
+    if report.examined_count < FEW:
         few = f"With fewer than {FEW} submissions these figures say little."
         parts.append(f"<p><strong>{few}</strong></p>")
     for number, (notebook, found) in enumerate(groupby(report.checks, key=lambda c: c.notebook)):
         shown = list(found)
         caption = f"What came of the checks of {notebook}, and whether they tell who does well."
-        parts.append(_figure(plots.checks(shown, f"checks-{number}"), caption))
+        parts.append(_figure_html(plots.plot_checks(shown, f"checks-{number}"), caption))
         rows = "".join(_check_row(check) for check in shown)
-        parts.append(_table(f"Figures of the checks of {notebook}", CHECK_COLUMNS, rows))
+        parts.append(_table_html(f"Figures of the checks of {notebook}", CHECK_COLUMNS, rows))
     return parts
 
 
@@ -185,7 +191,7 @@ _EXPLAINED = (
 def _check_row(check: CheckFigures) -> str:
     numbers = (
         f"{check.max_points:g}", str(check.passed), str(check.failed), str(check.not_checked),
-        str(check.not_handed_in), str(check.grader_errors), str(check.examined),
+        str(check.not_handed_in), str(check.grader_errors), str(check.examined_count),
         "" if check.failure_rate is None else f"{100 * check.failure_rate:.0f} %",
         "" if check.discrimination is None else f"{check.discrimination:+.2f}",
     )  # fmt: skip
@@ -195,13 +201,13 @@ def _check_row(check: CheckFigures) -> str:
     )
 
 
-def _feedback(report: ClassReport) -> list[str]:
+def _feedback_section(report: ClassReport) -> list[str]:
     parts = ["<h2>Most common feedback</h2>"]
     if not report.feedback:
         return [*parts, "<p>No check failed.</p>"]
     rows = "".join(
         f'<tr><td class="number">{len(group.students)}</td><td>{escape(group.about)}</td>'
-        f"<td>{escape(group.text)}</td><td>{_names(report, group.students)}</td></tr>"
+        f"<td>{escape(group.text)}</td><td>{_names_html(report, group.students)}</td></tr>"
         for group in report.feedback[:MOST_GROUPS]
     )
     shown = min(MOST_GROUPS, len(report.feedback))
@@ -209,33 +215,34 @@ def _feedback(report: ClassReport) -> list[str]:
         f"What was observed where a check failed: the {shown} most common of "
         f"{len(report.feedback)}; # stands for a number, … for a name"
     )
-    return [*parts, _table(caption, ("students", "about", "observed", "who"), rows)]
+    return [*parts, _table_html(caption, ("students", "about", "observed", "who"), rows)]
 
 
-def _times(report: ClassReport) -> list[str]:
+def _times_section(report: ClassReport) -> list[str]:
     seconds = report.times.seconds
     if not seconds:
         return []
     slowest = ", ".join(
-        f"{report.data.called(who)} {taken:.1f} s" for who, taken in report.times.slowest
+        f"{report.data.display_name(who)} {taken:.1f} s"
+        for who, taken in report.times.slowest_submissions
     )
     said = (
-        f"Median {report.times.median:.1f} s (n = {len(seconds)}), all together "
+        f"Median {report.times.median_seconds:.1f} s (n = {len(seconds)}), all together "
         f"{sum(seconds.values()) / 60:.1f} min one after another. The slowest: {slowest}."
     )
-    drawn = plots.times(list(seconds.values()))
+    drawn = plots.plot_times(list(seconds.values()))
     return [
         "<h2>Time</h2>",
-        _figure(drawn, "How long the submissions took to run."),
+        _figure_html(drawn, "How long the submissions took to run."),
         f"<p>{escape(said)}</p>",
     ]
 
 
-def _alike(report: ClassReport) -> list[str]:
+def _alike_section(report: ClassReport) -> list[str]:
     found = report.alike
     said = (
         f"{found.compared} programs and answers compared, each exercise and each "
-        f"question by itself; {counted(found.found, 'pair')} at least "
+        f"question by itself; {format_count(found.found, 'pair')} at least "
         f"{100 * report.threshold:.0f} % alike in what the students wrote themselves. The "
         "assignment's own lines and its model answers, lines that a good part of the class has, "
         "comments and chosen names do not count."
@@ -249,15 +256,15 @@ def _alike(report: ClassReport) -> list[str]:
     parts = [f"<h2>Alike</h2><p><strong>{escape(hint)}</strong></p><p>{escape(said)}</p>"]
     if not found.pairs:
         return parts
-    rows = "".join(_pair(report, pair) for pair in found.pairs)
+    rows = "".join(_pair_rows(report, pair) for pair in found.pairs)
     caption = "Where, who, and how much of it" + (
         f"; the {MOST_PAIRS} most alike" if found.found > MOST_PAIRS else ""
     )
-    return [*parts, _table(caption, ("exercise", "one", "the other", "alike"), rows)]
+    return [*parts, _table_html(caption, ("exercise", "one", "the other", "alike"), rows)]
 
 
-def _pair(report: ClassReport, pair: Pair) -> str:
-    names = [escape(report.data.called(who)) for who in (pair.left, pair.right)]
+def _pair_rows(report: ClassReport, pair: Pair) -> str:
+    names = [escape(report.data.display_name(who)) for who in (pair.left, pair.right)]
     texts = report.texts[pair.where]
     rows = side_by_side(texts[pair.left], texts[pair.right])
     head = "".join(f'<th scope="col">{name}</th>' for name in (names[0], "", names[1]))
@@ -287,12 +294,12 @@ def _left_out(report: ClassReport) -> list[str]:
     return [f"<h2>Left out</h2><ul>{items}</ul>"]
 
 
-def _figure(svg: str, caption: str) -> str:
+def _figure_html(svg: str, caption: str) -> str:
     described = svg.replace("<svg", f'<svg role="img" aria-label="{escape(caption)}"', 1)
     return f"<figure>{described}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
-def _table(caption: str, columns: Sequence[str], rows: str) -> str:
+def _table_html(caption: str, columns: Sequence[str], rows: str) -> str:
     head = "".join(f'<th scope="col">{escape(column)}</th>' for column in columns)
     return (
         f'<div class="scroll"><table><caption>{escape(caption)}</caption>'
@@ -300,15 +307,15 @@ def _table(caption: str, columns: Sequence[str], rows: str) -> str:
     )
 
 
-def _names(report: ClassReport, students: Sequence[str]) -> str:
-    called = [report.data.called(student) for student in students]
+def _names_html(report: ClassReport, students: Sequence[str]) -> str:
+    called = [report.data.display_name(student) for student in students]
     if len(called) <= MOST_NAMES:
-        return _listed(called)
+        return _join_names(called)
     return (
-        f"{_listed(called[:MOST_NAMES])}<details><summary>and {len(called) - MOST_NAMES} more"
-        f"</summary>{_listed(called[MOST_NAMES:])}</details>"
+        f"{_join_names(called[:MOST_NAMES])}<details><summary>and {len(called) - MOST_NAMES} more"
+        f"</summary>{_join_names(called[MOST_NAMES:])}</details>"
     )
 
 
-def _listed(students: Iterable[str]) -> str:
+def _join_names(students: Iterable[str]) -> str:
     return escape(", ".join(students))

@@ -36,7 +36,7 @@ _STYLE: dict[Any, Any] = {
 }
 
 
-def scores(earned: Sequence[float], most: float) -> str:
+def plot_scores(earned: Sequence[float], most: float) -> str:
     """Return how many students have how many points, in at most twenty steps up to ``most``."""
     steps = max(1, min(20, round(most)))
     with mpl.rc_context(_STYLE):
@@ -48,7 +48,7 @@ def scores(earned: Sequence[float], most: float) -> str:
         return svg_of(figure, "scores")
 
 
-def times(seconds: Sequence[float]) -> str:
+def plot_times(seconds: Sequence[float]) -> str:
     """Return how many submissions took how long, in seconds."""
     with mpl.rc_context(_STYLE):
         figure, axes = new_axes(8.0, 2.4)
@@ -60,7 +60,7 @@ def times(seconds: Sequence[float]) -> str:
         return svg_of(figure, "times")
 
 
-def checks(shown: Sequence[CheckFigures], name: str) -> str:
+def plot_checks(shown: Sequence[CheckFigures], name: str) -> str:
     """Return what came of each check, beside its discrimination, both with the n of each row.
 
     Args:
@@ -71,8 +71,8 @@ def checks(shown: Sequence[CheckFigures], name: str) -> str:
     with mpl.rc_context(_STYLE):
         figure = Figure(figsize=(9.0, 1.6 + 0.5 * len(shown)), layout="constrained")
         left, right = figure.subplots(1, 2, sharey=True, width_ratios=[3, 2])
-        _bars(left, shown)
-        _say_n(left, [sum(_counts(c)) for c in shown])
+        _draw_bars(left, shown)
+        _say_n(left, [sum(_outcome_counts(c)) for c in shown])
         left.set_yticks(places, [textwrap.fill(c.title, 40) for c in shown], fontsize=8)
         left.set(xlim=(0, 100), xlabel="% of the submissions", ylim=(len(shown) - 0.4, -0.6))
         left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=4, fontsize=8,
@@ -85,11 +85,11 @@ def checks(shown: Sequence[CheckFigures], name: str) -> str:
         right.scatter([r for _, r in known], [place for place, _ in known], color="#0072b2", s=36)
         right.set(xlim=(-1.05, 1.05), xlabel="discrimination")
         right.tick_params(axis="y", length=0)
-        _say_n(right, [c.examined for c in shown])
+        _say_n(right, [c.examined_count for c in shown])
         return svg_of(figure, name)
 
 
-def _counts(check: CheckFigures) -> tuple[int, ...]:
+def _outcome_counts(check: CheckFigures) -> tuple[int, ...]:
     return check.passed, check.failed, check.not_checked, check.grader_errors
 
 
@@ -101,8 +101,8 @@ def _say_n(axes: Any, numbers: Sequence[int]) -> None:
                       fontsize=8)  # fmt: skip
 
 
-def _bars(axes: Any, shown: Sequence[CheckFigures]) -> None:
-    counts = [_counts(c) for c in shown]
+def _draw_bars(axes: Any, shown: Sequence[CheckFigures]) -> None:
+    counts = [_outcome_counts(c) for c in shown]
     starts = [0.0] * len(shown)
     for number, (label, colour, hatch) in enumerate(_PARTS):
         widths = [100 * row[number] / (sum(row) or 1) for row in counts]

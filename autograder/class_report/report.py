@@ -19,34 +19,36 @@ from autograder.class_report import (
     similarity,
 )
 from autograder.class_report.class_report import ClassReport
-from autograder.class_report.collect import ClassData, collect
+from autograder.class_report.collect import ClassData, collect_class
 from autograder.class_report.own_text import GivenText
 from autograder.class_report.platforms import exports
 from autograder.class_report.platforms.exports import Export
 from autograder.gradebook.course_gradebook import CourseGradebook
-from course.messages.yaml_text import counted
+from course.messages.yaml_text import format_count
 
 PAGE, CANVAS, MOODLE = "class-report.html", "canvas.csv", "moodle.csv"
 
 
-def make(root: Path, assignment: str, threshold: float = similarity.THRESHOLD) -> ClassReport:
+def make_report(
+    root: Path, assignment: str, threshold: float = similarity.THRESHOLD
+) -> ClassReport:
     """Make the report of an assignment from the gradebook, the records and the submissions.
 
     Raises:
         InsightError: no such assignment, or nothing of it has been graded yet.
         GradebookError: ``root`` is no course.
     """
-    data = collect(root, assignment)
-    given = GivenText(_notebooks(data, "release"), _notebooks(data, "source"))
+    data = collect_class(root, assignment)
+    given = GivenText(_read_notebooks(data, "release"), _read_notebooks(data, "source"))
     texts, notes = likeness.texts_of(data, given)
     return ClassReport(
-        data, figures.checks(data), figures.times(data), feedback.common(data),
-        needs.people_needed(data), likeness.compare(data, texts, given, threshold), texts, given,
-        threshold, (*data.notes, *notes), means.of_class(data),
+        data, figures.check_figures(data), figures.run_times(data), feedback.common_groups(data),
+        needs.people_needed(data), likeness.compare_class(data, texts, given, threshold),
+        texts, given, threshold, (*data.notes, *notes), means.of_class(data),
     )  # fmt: skip
 
 
-def write(
+def write_report(
     report: ClassReport, column: str = "", *, provisional: bool = False, zero_absent: bool = False
 ) -> list[Path]:
     """Write the page and both exports into ``reports/ASSIGNMENT``; return the files.
@@ -59,9 +61,9 @@ def write(
     folder = report.data.root / "reports" / report.data.assignment
     chosen = {"provisional": provisional, "zero_absent": zero_absent}
     contents = {
-        PAGE: page.page(report),
-        CANVAS: exports.canvas(report.data, column, **chosen).text,
-        MOODLE: exports.moodle(report.data, column, **chosen).text,
+        PAGE: page.render_page(report),
+        CANVAS: exports.export_canvas(report.data, column, **chosen).text,
+        MOODLE: exports.export_moodle(report.data, column, **chosen).text,
     }
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -89,13 +91,15 @@ def export_remarks(export: Export) -> list[str]:
     if export.waiting:
         number = len(export.waiting)
         remarks.append(
-            f"Empty for {counted(number, 'student')} whose {'grade' if number == 1 else 'grades'} "
+            f"Empty for {format_count(number, 'student')} whose "
+            f"{'grade' if number == 1 else 'grades'} "
             f"still {'waits' if number == 1 else 'wait'} for a person (--provisional takes them "
             "in)."
         )
     if export.absent:
         remarks.append(
-            f"Empty for {counted(len(export.absent), 'student')} who handed in nothing: whether "
+            f"Empty for {format_count(len(export.absent), 'student')} who handed in nothing: "
+            "whether "
             "that is a 0 is your course's rule, which the platforms can apply themselves "
             "(--zero-absent writes it)."
         )
@@ -107,7 +111,7 @@ def export_remarks(export: Export) -> list[str]:
     return remarks
 
 
-def _notebooks(data: ClassData, step: Literal["source", "release"]) -> dict[str, NotebookNode]:
+def _read_notebooks(data: ClassData, step: Literal["source", "release"]) -> dict[str, NotebookNode]:
     coursedir = CourseGradebook(data.root).coursedir
     directory = {"source": coursedir.source_directory, "release": coursedir.release_directory}
     folder = Path(coursedir.format_path(directory[step], ".", data.assignment))
@@ -115,7 +119,7 @@ def _notebooks(data: ClassData, step: Literal["source", "release"]) -> dict[str,
     found = {}
     for path in sorted(folder.glob("*.ipynb")):
         try:
-            found[path.stem] = submission.read(path)
+            found[path.stem] = submission.read_notebook(path)
         except SubmissionError as error:
             raise InsightError(
                 f"{error} It lies in {folder}: run `autograder {mend[step]}` again."

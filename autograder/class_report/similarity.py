@@ -23,8 +23,8 @@ from autograder.class_report.own_text import (
     GivenText,
     OwnText,
     common_ground,
-    tokens,
-    words,
+    own_tokens,
+    own_words,
 )
 
 THRESHOLD = 0.9
@@ -71,7 +71,7 @@ class Likeness:
     too_short: tuple[str, ...]
 
 
-def alike(
+def compare_programs(
     texts: Mapping[str, OwnText],
     given: GivenText,
     threshold: float = THRESHOLD,
@@ -89,34 +89,34 @@ def alike(
     """
     common = common_ground(texts.values())
     most = max(FEWEST_TOKENS, min(MAX_TOKENS, work // max(1, len(texts))))
-    own = {student: tokens(text, given, common, most) for student, text in texts.items()}
-    return _compare(own, FEWEST_TOKENS, threshold, where)
+    own = {student: own_tokens(text, given, common, most) for student, text in texts.items()}
+    return _compare_texts(own, FEWEST_TOKENS, threshold, where)
 
 
 def alike_in_words(
     texts: Mapping[str, OwnText], given: str, threshold: float = THRESHOLD, where: str = ""
 ) -> Likeness:
-    """Compare every student's answer with every other's; arguments as in `alike`.
+    """Compare every student's answer with every other's; arguments as in `compare_programs`.
 
     ``given`` is the question with its model answer.
     """
     most = MOST_WORK // max(1, len(texts))
-    own = {student: words(text, given)[:most] for student, text in texts.items()}
-    return _compare(own, FEWEST_WORDS, threshold, where)
+    own = {student: own_words(text, given)[:most] for student, text in texts.items()}
+    return _compare_texts(own, FEWEST_WORDS, threshold, where)
 
 
-def together(found: Iterable[Likeness]) -> Likeness:
+def merge_findings(found: Iterable[Likeness]) -> Likeness:
     """Return what several comparisons have found as one."""
     every = list(found)
     return Likeness(
-        tuple(_top([pair for likeness in every for pair in likeness.pairs])),
+        tuple(_top_pairs([pair for likeness in every for pair in likeness.pairs])),
         sum(likeness.found for likeness in every),
         sum(likeness.compared for likeness in every),
         tuple(student for likeness in every for student in likeness.too_short),
     )
 
 
-def _compare(
+def _compare_texts(
     own: Mapping[str, tuple[str, ...]], fewest: int, threshold: float, where: str
 ) -> Likeness:
     long_enough = {student: text for student, text in own.items() if len(text) >= fewest}
@@ -125,13 +125,13 @@ def _compare(
         same[long_enough[student]].append(student)
     found = 0
     best: list[Pair] = []
-    for similarity, left, right in _scores(same, threshold):
+    for similarity, left, right in _score_pairs(same, threshold):
         found += 1
         best.append(Pair(min(left, right), max(left, right), similarity, where))
         if len(best) > 50 * MOST_PAIRS:
-            best = _top(best)
+            best = _top_pairs(best)
     short = tuple(sorted(own.keys() - long_enough.keys()))
-    return Likeness(tuple(_top(best)), found, len(long_enough), short)
+    return Likeness(tuple(_top_pairs(best)), found, len(long_enough), short)
 
 
 def side_by_side(left: OwnText, right: OwnText) -> list[tuple[str, str, str]]:
@@ -148,23 +148,23 @@ def side_by_side(left: OwnText, right: OwnText) -> list[tuple[str, str, str]]:
                 b[b1 + n] if b1 + n < b2 else "",
             ))  # fmt: skip
     if len(left.lines) > MOST_LINES or len(right.lines) > MOST_LINES:
-        rows.append(("cut", _rest(left), _rest(right)))
+        rows.append(("cut", _rest_text(left), _rest_text(right)))
     return rows
 
 
-def _rest(text: OwnText) -> str:
+def _rest_text(text: OwnText) -> str:
     more = len(text.lines) - MOST_LINES
     return f"… {more} more lines" if more > 0 else ""
 
 
-def _scores(
+def _score_pairs(
     same: Mapping[tuple[str, ...], list[str]], threshold: float
 ) -> Iterator[tuple[float, str, str]]:
     for group in same.values():
         for left, right in combinations(group, 2):
             yield 1.0, left, right
     unique = list(same)
-    encoded = _encoded(unique)
+    encoded = _encode_texts(unique)
     for start in range(0, len(unique), BLOCK):
         block = encoded[start : start + BLOCK]
         # Only what stands to the right of the diagonal: each pair once.
@@ -179,7 +179,7 @@ def _scores(
                         yield float(matrix[row, column]), left, right
 
 
-def _encoded(texts: list[tuple[str, ...]]) -> list[str]:
+def _encode_texts(texts: list[tuple[str, ...]]) -> list[str]:
     """Return each text as a string with one character a token, which compares fastest."""
     counts = Counter(token for text in texts for token in set(text))
     # Rare tokens beyond what Unicode has room for share one character: they count as equal.
@@ -187,5 +187,5 @@ def _encoded(texts: list[tuple[str, ...]]) -> list[str]:
     return ["".join(codes[token] for token in text) for text in texts]
 
 
-def _top(pairs: list[Pair]) -> list[Pair]:
+def _top_pairs(pairs: list[Pair]) -> list[Pair]:
     return sorted(pairs, key=lambda p: (-p.similarity, p.where, p.left, p.right))[:MOST_PAIRS]

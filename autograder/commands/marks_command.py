@@ -26,7 +26,7 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")
 
 
 @app.command("export")
-def export(
+def export_marks(
     assignment: str,
     question: Annotated[
         str, typer.Argument(help="Its title, a part of it, or its grade id; all if left out.")
@@ -44,27 +44,27 @@ def export(
     from autograder.gradebook.course_gradebook import CourseGradebook
     from autograder.marking import answers, answers_page
 
-    gradebook = CourseGradebook(_root(root))
+    gradebook = CourseGradebook(_course_root(root))
     asked = (
-        [answers.find(gradebook, assignment, question)]
+        [answers.find_question(gradebook, assignment, question)]
         if question
-        else answers.written(gradebook, assignment)
+        else answers.written_questions(gradebook, assignment)
     )
-    found = [answers.collect(gradebook, assignment, one) for one in asked]
+    found = [answers.collect_answers(gradebook, assignment, one) for one in asked]
     files: list[Path] = []
     folder = gradebook.root / "reports" / assignment
     if question:
         name = f"marks-{asked[0].grade_id}"
         files = [folder / f"{name}.html", folder / f"{name}.csv"]
         folder.mkdir(parents=True, exist_ok=True)
-        write_whole(files[0], answers_page.page(found[0], f"{name}.csv"))
+        write_whole(files[0], answers_page.render_page(found[0], f"{name}.csv"))
         write_whole(files[1], answers.as_file(found[0]))
     if as_json:
         _print_json({
             "questions": [
                 {"question": a.question.grade_id, "title": a.question.title,
                  "notebook": a.question.notebook, "answers": len(a.answers),
-                 "waiting": a.waiting, "empty": len(a.empty)}
+                 "waiting": a.waiting_count, "empty": len(a.empty)}
                 for a in found
             ],
             "files": [str(path) for path in files],
@@ -72,7 +72,7 @@ def export(
         return
     table = Table("Question", "Grade id", "Answers", "Waiting", "Empty")
     for a in found:
-        counts = (str(len(a.answers)), str(a.waiting), str(len(a.empty)))
+        counts = (str(len(a.answers)), str(a.waiting_count), str(len(a.empty)))
         table.add_row(a.question.title, a.question.grade_id, *counts)
     out.print(table)
     if files:
@@ -80,7 +80,7 @@ def export(
 
 
 @app.command("import")
-def enter(
+def import_marks(
     file: Annotated[Path, typer.Argument(help="A file of marks that was filled in.")],
     root: Root = None,
     as_json: AsJson = False,
@@ -92,14 +92,14 @@ def enter(
     """
     from autograder.gradebook.course_gradebook import CourseGradebook
     from autograder.marking import answers
-    from course.messages.yaml_text import counted
+    from course.messages.yaml_text import format_count
 
-    entered = answers.enter(CourseGradebook(_root(root)), file)
+    entered = answers.enter_marks(CourseGradebook(_course_root(root)), file)
     if as_json:
         _print_json(vars(entered))
     else:
         said = (
-            f"{entered.question}: {counted(len(entered.marked), 'mark')} entered, "
+            f"{entered.question}: {format_count(len(entered.marked), 'mark')} entered, "
             f"{len(entered.already)} as they were, {len(entered.blank)} left blank."
         )
         out.print(said, soft_wrap=True)
@@ -118,10 +118,10 @@ def _print_json(data: Any) -> None:
     sys.stdout.write(visible_json(json.dumps(data, default=str, ensure_ascii=False)) + "\n")
 
 
-def _root(root: Path | None) -> Path:
+def _course_root(root: Path | None) -> Path:
     from autograder import exercise_folders
     from course.workspace.content import working_root
 
     found = working_root() if root is None else root.resolve()
-    exercise_folders.use(found)
+    exercise_folders.use_course(found)
     return found

@@ -50,11 +50,11 @@ def export_command(
     from quizzes.exchange import files
 
     with as_course_errors():
-        bank = files.open_bank(quiz, _banks(root))
+        bank = files.open_bank(quiz, _banks_folder(root))
         path, notes = files.export_bank(bank, format_name, to)
     points, variants = len(bank.concepts), sum(len(c.variants) for c in bank.concepts)
     worth = f"{points} of {variants} questions are drawn, {points} points"
-    _say(f"Written: {path} ({worth})", notes)
+    _print_notes(f"Written: {path} ({worth})", notes)
 
 
 @app.command("import")
@@ -68,9 +68,9 @@ def import_command(
     from quizzes.exchange import files
 
     with as_course_errors():
-        path, merged = files.import_gift(file, files.open_bank(into, _banks(root)), to)
+        path, merged = files.import_gift(file, files.open_bank(into, _banks_folder(root)), to)
     changes = "nothing has changed" if not merged.changed else f"{merged.changed} new or changed"
-    _say(f"Written: {path} ({changes})", merged.notes)
+    _print_notes(f"Written: {path} ({changes})", merged.notes)
 
 
 @app.command()
@@ -83,24 +83,24 @@ def lint(quizzes: Quizzes, root: Root = None) -> None:
     sound = True
     for quiz in quizzes:
         try:
-            bank = files.open_bank(quiz, _banks(root))
+            bank = files.open_bank(quiz, _banks_folder(root))
         except BankError as error:
             sound = False
-            _faults(quiz, error)
+            _print_faults(quiz, error)
             continue
-        found = [str(finding) for finding in bank_lint.findings(bank)]
-        _say(f"{bank.quiz}: {len(found)} to mend", found)
+        found = [str(finding) for finding in bank_lint.list_findings(bank)]
+        _print_notes(f"{bank.quiz}: {len(found)} to mend", found)
         sound = sound and not found
     if not sound:
         raise typer.Exit(1)
 
 
-def _faults(quiz: str, error: BankError) -> None:
+def _print_faults(quiz: str, error: BankError) -> None:
     if error.faults == (str(error),):  # it could not be read at all, or has a single fault
         err.print(f"autograder: {error}", soft_wrap=True)
         return
     then = "Its questions are read critically once these are mended."
-    _say(f"{quiz}: {len(error.faults)} to mend", [*error.faults, then])
+    _print_notes(f"{quiz}: {len(error.faults)} to mend", [*error.faults, then])
 
 
 @app.command()
@@ -115,11 +115,11 @@ def schema(
     if as_json:
         text = json.dumps(bank_schema.json_schema(), indent=2, ensure_ascii=False) + "\n"
     else:
-        text = bank_schema.markdown()
+        text = bank_schema.as_markdown()
     sys.stdout.write(text)
 
 
-def _banks(root: Path | None) -> Path | None:
+def _banks_folder(root: Path | None) -> Path | None:
     """Return the folder of the course's own banks; None if there is no course here."""
     from autograder.assignments.quiz_cells import BANKS
     from course.workspace.content import ContentError, working_root
@@ -141,6 +141,6 @@ def as_course_errors() -> Iterator[None]:
         raise QuizCommandError(str(error)) from error
 
 
-def _say(headline: str, notes: list[str]) -> None:
+def _print_notes(headline: str, notes: list[str]) -> None:
     for line in (headline, *(f"  {note}" for note in notes)):
         out.print(line, soft_wrap=True)

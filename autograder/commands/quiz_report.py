@@ -11,7 +11,7 @@ from rich.table import Table
 
 from autograder.assignments import quiz_cells
 from autograder.assignments.intake import attempts
-from autograder.assignments.intake.file_names import normal
+from autograder.assignments.intake.file_names import normalise_name
 from autograder.commands.quiz_command import QuizCommandError, as_course_errors
 from autograder.gradebook import bridge as bridge
 from autograder.gradebook.course_gradebook import CourseGradebook, GradebookError
@@ -50,7 +50,7 @@ class QuizReport:
             "files": [str(path) for path in self.files],
         }
 
-    def tables(self) -> tuple[Table, ...]:
+    def as_tables(self) -> tuple[Table, ...]:
         """Return the items, the misconceptions that somebody holds, and who shares attempts."""
         from quizzes.insight import report
 
@@ -81,7 +81,7 @@ def assignment_of(root: Path, name: str) -> str:
         NotReadyError: the source of one is damaged.
     """
     source = root / "source"
-    if (source / name).is_dir() or name not in quiz_cells.names(root):
+    if (source / name).is_dir() or name not in quiz_cells.quiz_names(root):
         return name
     having = sorted({
         path.parent.name for path in source.glob("*/*.ipynb")
@@ -104,11 +104,11 @@ def of_assignment(root: Path, assignment: str) -> list[QuizReport]:
         QuizCommandError: the reports cannot be written.
     """
     reports = []
-    for name in quiz_cells.names(root):
-        taken = _taken(root, assignment, name)
+    for name in quiz_cells.quiz_names(root):
+        taken = _collect_attempts(root, assignment, name)
         if taken.unread or any(content is not None for content in taken.contents.values()):
             bank = quiz_cells.find_bank(root, name)
-            reports.append(_report(bank, taken, root / "reports" / assignment))
+            reports.append(_write_report(bank, taken, root / "reports" / assignment))
     return reports
 
 
@@ -127,22 +127,22 @@ class _Taken:
     asked: list[str] = field(default_factory=list)
 
 
-def _class(root: Path) -> frozenset[str]:
+def _known_students(root: Path) -> frozenset[str]:
     """Return whom the gradebook knows, if there is one."""
     with suppress(GradebookError):
-        return CourseGradebook(root).roster().known
+        return CourseGradebook(root).read_roster().known
     return frozenset()
 
 
-def _taken(root: Path, assignment: str, quiz: str) -> _Taken:
+def _collect_attempts(root: Path, assignment: str, quiz: str) -> _Taken:
     taken = _Taken()
-    class_ = _class(root)
+    class_ = _known_students(root)
     for folder in sorted((root / "submitted").glob(f"*/{assignment}")):
-        learner = normal(folder.parent.name)
+        learner = normalise_name(folder.parent.name)
         try:
-            found = attempts.find(folder, quiz, learner, root, class_)
+            found = attempts.find_attempts(folder, quiz, learner, root, class_)
         except OSError as error:
-            name = record.filename(quiz)
+            name = record.attempts_filename(quiz)
             taken.unread.append(f"{name} of {learner} cannot be read ({error.strerror or error}).")
             continue
         if found.question:
@@ -152,16 +152,16 @@ def _taken(root: Path, assignment: str, quiz: str) -> _Taken:
     return taken
 
 
-def _report(bank: Bank, taken: _Taken, target: Path) -> QuizReport:
+def _write_report(bank: Bank, taken: _Taken, target: Path) -> QuizReport:
     from quizzes import insight  # plots take a moment to import
 
     with as_course_errors():
-        collected = insight.collect(bank, taken.contents)
+        collected = insight.collect_class(bank, taken.contents)
         handed_in = {who: what for who, what in taken.contents.items() if what is not None}
         shared = sharing.same_attempts(bank.quiz, handed_in)
         notes = [
             *(f"The same attempts were handed in by {', '.join(group)}." for group in shared),
             *sorted([*collected.notes, *taken.unread, *taken.asked]),
         ]
-        analysis = insight.analyse(bank, collected.results, notes)
-        return QuizReport(analysis, insight.write(analysis, target), tuple(shared))
+        analysis = insight.analyse_results(bank, collected.results, notes)
+        return QuizReport(analysis, insight.write_report(analysis, target), tuple(shared))

@@ -29,7 +29,7 @@ class Made:
         files = [str(path) for path in self.files]
         return {**self.report.as_data(), "remarks": self.remarks, "files": files}
 
-    def tables(self) -> list[Table]:
+    def as_tables(self) -> list[Table]:
         """Return the checks, and what needs a person, for a terminal."""
         checks = Table("Check", "n", "Fails", "r", "Remark", padding=(0, 0))
         checks.caption = (
@@ -39,21 +39,21 @@ class Made:
         for check in self.report.checks:
             rate = "" if check.failure_rate is None else f"{100 * check.failure_rate:.0f} %"
             r = "" if check.discrimination is None else f"{check.discrimination:+.2f}"
-            checks.add_row(check.title, str(check.examined), rate, r, check.advice)
+            checks.add_row(check.title, str(check.examined_count), rate, r, check.advice)
         means = Table("Exercise", "Mean", "n", "Waiting", padding=(0, 1))
         for mean in self.report.means.exercises:
             value = "" if mean.mean is None else f"{mean.mean:.1f} of {mean.max_points:g}"
             means.add_row(mean.about, value, str(mean.n), str(mean.waiting or ""))
         needs = Table("Needs a person", "How many", "Who")
         for need in self.report.needs:
-            named = [self.report.data.called(student) for student in need.students[:5]]
+            named = [self.report.data.display_name(student) for student in need.students[:5]]
             who = ", ".join(named) + (", …" if len(need.students) > 5 else "")
             style = "bold" if need.urgent else None
             needs.add_row(need.why, str(len(need.students)), who, style=style)
         return [table for table in (means, checks, needs) if table.row_count]
 
 
-def run(
+def make_report(
     root: Path,
     assignment: str,
     *,
@@ -67,15 +67,15 @@ def run(
     Raises:
         InsightError: no such assignment, nothing graded, or a folder that cannot be written.
     """
-    made = report.make(root, assignment, threshold)
+    made = report.make_report(root, assignment, threshold)
     chosen = {"provisional": provisional, "zero_absent": zero_absent}
-    files = report.write(made, column, **chosen)
-    export = exports.canvas(made.data, column, **chosen)
-    remarks = [*_absent(made), *made.notes, *report.export_remarks(export)]
+    files = report.write_report(made, column, **chosen)
+    export = exports.export_canvas(made.data, column, **chosen)
+    remarks = [*_absence_remarks(made), *made.notes, *report.export_remarks(export)]
     return Made(made, files, remarks)
 
 
-def _absent(made: ClassReport) -> list[str]:
-    absent = [made.data.called(student) for student in made.data.absent]
+def _absence_remarks(made: ClassReport) -> list[str]:
+    absent = [made.data.display_name(student) for student in made.data.absent]
     more = f" and {len(absent) - MOST_NAMES} more" if len(absent) > MOST_NAMES else ""
     return [f"Nothing handed in: {', '.join(absent[:MOST_NAMES])}{more}."] if absent else []

@@ -70,7 +70,7 @@ class Case:
         if self.fails == {EVERYTHING}:
             return frozenset()
         if self.fails == {ROOTS}:
-            checks = exercises.load(self.exam).checks.values()
+            checks = exercises.load_exam(self.exam).checks.values()
             return frozenset(check.name for check in checks if not check.needs)
         return self.fails
 
@@ -79,7 +79,7 @@ class Case:
         """What must fail, as a phrase for a table."""
         return ", ".join(sorted(self.fails)) or "nothing"
 
-    def submission(self, source: NotebookNode, released: NotebookNode) -> NotebookNode:
+    def make_submission(self, source: NotebookNode, released: NotebookNode) -> NotebookNode:
         """Return the released notebook as this student hands it in.
 
         Raises:
@@ -88,13 +88,15 @@ class Case:
         exemplar = {submission.grade_id(cell): cell.source for cell in source.cells}
         for grade_id in (*self.cells, *self.stub, *self.splices):
             if grade_id not in exemplar:
-                raise self._wrong(f"there is no cell '{grade_id}' in the notebook")
+                raise self._corpus_error(f"there is no cell '{grade_id}' in the notebook")
         notebook: NotebookNode = nbformat.from_dict(dict(released))  # type: ignore[no-untyped-call]
         notebook.cells = [nbformat.from_dict(dict(cell)) for cell in released.cells]  # type: ignore[no-untyped-call]
         for cell in notebook.cells:
-            name, data = submission.grade_id(cell), submission.metadata(cell)
+            name, data = submission.grade_id(cell), submission.nbgrader_metadata(cell)
             if name in self.splices:
-                cell.source = self._spliced(without_markers(exemplar[name]), self.splices[name])
+                cell.source = self._apply_splices(
+                    without_markers(exemplar[name]), self.splices[name]
+                )
             elif name in self.cells:
                 cell.source = self.cells[name]
             elif name in self.stub:
@@ -108,16 +110,16 @@ class Case:
                 cell.source = f"My idea: {self.title[0].lower()}{self.title[1:]}."
         return notebook
 
-    def _spliced(self, text: str, splices: tuple[Splice, ...]) -> str:
+    def _apply_splices(self, text: str, splices: tuple[Splice, ...]) -> str:
         for old, new in splices:
             if text.count(old) != 1:
-                raise self._wrong(
+                raise self._corpus_error(
                     f"{old!r} stands {text.count(old)} times in the exemplar, not once"
                 )
             text = text.replace(old, new)
         return text
 
-    def _wrong(self, what: str) -> CorpusError:
+    def _corpus_error(self, what: str) -> CorpusError:
         return CorpusError(f"Corpus case {self.exam}/{self.name}: {what}.")
 
     def verdict_of(self, outcome: Outcome) -> str:
@@ -149,17 +151,23 @@ class Case:
             reasons = {checks[name].actual for name in spoilt}
             differences.append(f"grader error in {', '.join(sorted(spoilt))}: {min(reasons)!r}")
         for name in sorted(failed - self.must_fail):
-            differences.append(f"{name} failed but must not: {_words(checks[name])!r}")
+            differences.append(f"{name} failed but must not: {_result_text(checks[name])!r}")
         # With other numbers than the usual ones, texts have other numbers in them.
         usual = all(verdict.seed == USUAL_SEED for verdict in outcome.verdicts.values())
         for name, fragment in self.says.items() if usual else ():
-            if name in checks and name not in unknown and fragment not in _words(checks[name]):
-                differences.append(f"{name} does not say {fragment!r}: {_words(checks[name])!r}")
-        texts = [_words(check) for check in checks.values() if check.name not in spoilt]
+            if (
+                name in checks
+                and name not in unknown
+                and fragment not in _result_text(checks[name])
+            ):
+                differences.append(
+                    f"{name} does not say {fragment!r}: {_result_text(checks[name])!r}"
+                )
+        texts = [_result_text(check) for check in checks.values() if check.name not in spoilt]
         for text in (*texts, *(note for v in outcome.verdicts.values() for note in v.notes)):
             differences += [f"feedback holds {ours!r}: {text!r}" for ours in OURS if ours in text]
         return "; ".join(differences)
 
 
-def _words(result: CheckResult) -> str:
+def _result_text(result: CheckResult) -> str:
     return f"{result.expected} {result.actual} {result.note}"

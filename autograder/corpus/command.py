@@ -12,18 +12,18 @@ from autograder.corpus.trials import Trial
 from autograder.examination.draws import USUAL_SEED
 
 
-def cases(exam: str = "") -> dict[str, list[Case]]:
+def load_cases(exam: str = "") -> dict[str, list[Case]]:
     """Return the cases of one exam or (empty) of all, by exam.
 
     Raises:
         ExamError: there is no such exam; names the ones there are.
         CorpusError: a corpus is missing or not well formed.
     """
-    chosen = [exercises.load(exam).name] if exam else exercises.names()
-    return {name: files.load(name) for name in chosen}
+    chosen = [exercises.load_exam(exam).name] if exam else exercises.exercise_names()
+    return {name: files.load_cases(name) for name in chosen}
 
 
-def run(
+def run_corpus(
     exam: str = "",
     *,
     only: Sequence[str] = (),
@@ -48,20 +48,20 @@ def run(
         ExamError: an unknown exam.
         CorpusError: no case of that name; or a corpus that is not well formed.
     """
-    chosen = _chosen(cases(exam), only)
-    trust = untrusting(say)
+    chosen = _choose_cases(load_cases(exam), only)
+    trust = needs_trust(say)
     done = []
     with trials.busy_loops(load):
         for name, own in chosen.items():
-            source, released = trials.notebooks(name)
+            source, released = trials.make_notebooks(name)
             done += trials.run(
                 own, source, released, jobs=jobs, repeat=repeat, trust=trust, seed=seed,
-                done=lambda trial: say(_line(trial)),
+                done=lambda trial: say(_describe_trial(trial)),
             )  # fmt: skip
     return done
 
 
-def _chosen(every: dict[str, list[Case]], only: Sequence[str]) -> dict[str, list[Case]]:
+def _choose_cases(every: dict[str, list[Case]], only: Sequence[str]) -> dict[str, list[Case]]:
     """Return the cases with the names in ``only``; all, if there are none."""
     names = sorted({case.name for own in every.values() for case in own})
     for name in only:
@@ -76,14 +76,14 @@ def _chosen(every: dict[str, list[Case]], only: Sequence[str]) -> dict[str, list
     return {exam: own for exam, own in chosen.items() if own}
 
 
-def untrusting(say: Callable[[str], None]) -> bool:
+def needs_trust(say: Callable[[str], None]) -> bool:
     """Return whether our own bundled submissions must do without a sandbox; say so if they must."""
     if problem := sandbox.abilities().problem:
         say(f"Going on without a sandbox, as these submissions are the course's own. {problem}")
     return bool(problem)
 
 
-def _line(trial: Trial) -> str:
+def _describe_trial(trial: Trial) -> str:
     case = trial.case
     return (
         f"  {case.exam}/{case.name}: {trial.difference or 'as expected'} "

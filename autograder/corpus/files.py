@@ -42,7 +42,9 @@ _LINE = re.compile(r"# (\w+): (.*)\n")
 _CELL = re.compile(r"^# %% ([\w-]+)\n", re.MULTILINE)
 
 
-def load(exam: str, folder: Path | None = None, every: Path = exercise_folders.EVERY) -> list[Case]:
+def load_cases(
+    exam: str, folder: Path | None = None, every: Path = exercise_folders.EVERY
+) -> list[Case]:
     """Return the cases of an exam, sorted by name.
 
     Args:
@@ -53,16 +55,16 @@ def load(exam: str, folder: Path | None = None, every: Path = exercise_folders.E
     Raises:
         CorpusError: it is missing, or a case is not well formed.
     """
-    folder = folder or exercise_folders.current().folders[exam] / exercise_folders.CORPUS
+    folder = folder or exercise_folders.current_exercises().folders[exam] / exercise_folders.CORPUS
     own, mutants = sorted(folder.glob("*.py")), folder / MUTANTS
     if not own and not mutants.exists():
         raise CorpusError(
             f"There is no corpus for '{exam}': write cases into {folder}, as "
             "notebooks/authoring/README.md says."
         )
-    cases = [_case(exam, file) for file in own]
-    cases += [_case(exam, file, every=True) for file in sorted(every.glob("*.py"))]
-    cases += _mutants(exam, mutants)
+    cases = [_read_case(exam, file) for file in own]
+    cases += [_read_case(exam, file, every=True) for file in sorted(every.glob("*.py"))]
+    cases += _read_mutants(exam, mutants)
     names = [case.name for case in cases]
     for name in names:
         if names.count(name) > 1:
@@ -84,7 +86,7 @@ def _like_the_stub(exam: str, cases: list[Case]) -> Iterator[Case]:
             yield replace(case, fails=stub.fails, says=stub.says, points=stub.points)
 
 
-def _case(exam: str, file: Path, *, every: bool = False) -> Case:
+def _read_case(exam: str, file: Path, *, every: bool = False) -> Case:
     text = file.read_text(encoding="utf-8")
     header = _HEADER.match(text)
     fields: dict[str, list[str]] = {}
@@ -93,33 +95,33 @@ def _case(exam: str, file: Path, *, every: bool = False) -> Case:
     if header is None or "title" not in fields or "fails" not in fields:
         raise CorpusError(f"{file} must begin with the lines '# title: …' and '# fails: …'.")
     says = [line.partition(": ") for line in fields.get("says", [])]
-    texts = _texts(exam, text[header.end() :])
+    texts = _split_cells(exam, text[header.end() :])
     in_stub = "in" in fields
     if in_stub and fields["in"] != ["the stub"]:
         raise CorpusError(f"{file}: '# in:' can be 'the stub', not '{fields['in'][0]}'.")
     return Case(
-        exam, file.stem, fields["title"][0], _fails(fields["fails"][0]),
+        exam, file.stem, fields["title"][0], _parse_fails(fields["fails"][0]),
         says={check: fragment for check, _, fragment in says},
         cells={} if in_stub else texts, stub=texts if in_stub else {},
         blank=every and not in_stub, cell_timeout=float(fields.get("seconds", [CELL_TIMEOUT])[0]),
-        points=_points(file, fields["points"][0]) if "points" in fields else None,
+        points=_parse_points(file, fields["points"][0]) if "points" in fields else None,
     )  # fmt: skip
 
 
-def _points(file: Path, text: str) -> float:
+def _parse_points(file: Path, text: str) -> float:
     try:
         return float(text)
     except ValueError:
         raise CorpusError(f"{file}: '# points:' is a number, not '{text}'.") from None
 
 
-def _fails(text: str) -> frozenset[str]:
+def _parse_fails(text: str) -> frozenset[str]:
     if text in (EVERYTHING, ROOTS, AS_STUB):
         return frozenset({text})
     return frozenset() if text == "nothing" else frozenset(re.findall(r"\w+", text))
 
 
-def _texts(exam: str, body: str) -> dict[str, str]:
+def _split_cells(exam: str, body: str) -> dict[str, str]:
     first, *rest = _CELL.split(body)
     texts = {f"{exam}-solution": first.strip() + "\n"} if first.strip() or not rest else {}
     for grade_id, text in zip(rest[::2], rest[1::2], strict=True):
@@ -127,7 +129,7 @@ def _texts(exam: str, body: str) -> dict[str, str]:
     return texts
 
 
-def _mutants(exam: str, file: Path) -> Iterator[Case]:
+def _read_mutants(exam: str, file: Path) -> Iterator[Case]:
     try:
         tables = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     except tomllib.TOMLDecodeError as error:
@@ -136,7 +138,7 @@ def _mutants(exam: str, file: Path) -> Iterator[Case]:
         try:
             yield Case(
                 exam, name, data["title"], frozenset(data["fails"]), says=data.get("says", {}),
-                splices=_splices(exam, data["splices"]),
+                splices=_parse_splices(exam, data["splices"]),
             )  # fmt: skip
         except (KeyError, TypeError, AttributeError) as error:
             what = f"{error} is missing" if isinstance(error, KeyError) else str(error)
@@ -145,7 +147,7 @@ def _mutants(exam: str, file: Path) -> Iterator[Case]:
             ) from error
 
 
-def _splices(exam: str, data: list[dict[str, Any]]) -> dict[str, tuple[Splice, ...]]:
+def _parse_splices(exam: str, data: list[dict[str, Any]]) -> dict[str, tuple[Splice, ...]]:
     splices: dict[str, tuple[Splice, ...]] = {f"{exam}-solution": ()}
     for splice in data:
         cell = splice.get("cell", f"{exam}-solution")

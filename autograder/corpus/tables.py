@@ -13,13 +13,13 @@ from autograder.corpus.trials import Trial
 from autograder.examination import points
 
 
-def table(trials: list[Trial]) -> Table:
+def trials_table(trials: list[Trial]) -> Table:
     """Return one row a case: what it must fail, how often it came out so, and its time."""
     rows = Table("Case", "Must fail", "As expected", "Flips", "Seconds a run (median)")
     for (exam, name), runs in _by_case(trials).items():
         right = sum(not run.difference for run in runs)
         seconds = sorted(run.outcome.seconds for run in runs)[len(runs) // 2]
-        flips = str(len(flipped(runs)) or "-")
+        flips = str(len(flipped_checks(runs)) or "-")
         fails = runs[0].case.fails_in_words
         rows.add_row(f"{exam}/{name}", fails, f"{right} of {len(runs)}", flips, f"{seconds:.1f}")
     return rows
@@ -30,17 +30,17 @@ def as_data(trials: list[Trial]) -> list[dict[str, Any]]:
     return [
         {
             "exam": trial.case.exam, "case": trial.case.name,
-            "must_fail": trial.case.fails_in_words, "statuses": trial.statuses,
+            "must_fail": trial.case.fails_in_words, "statuses": trial.check_statuses,
             "difference": trial.difference, "seconds": trial.outcome.seconds,
         }
         for trial in trials
     ]  # fmt: skip
 
 
-def flipped(runs: list[Trial]) -> list[str]:
+def flipped_checks(runs: list[Trial]) -> list[str]:
     """Return the checks whose status was not the same in all runs of a case."""
-    names = {name for run in runs for name in run.statuses}
-    return sorted(name for name in names if len({run.statuses.get(name) for run in runs}) > 1)
+    names = {name for run in runs for name in run.check_statuses}
+    return sorted(name for name in names if len({run.check_statuses.get(name) for run in runs}) > 1)
 
 
 def all_flips(trials: list[Trial]) -> list[str]:
@@ -48,17 +48,17 @@ def all_flips(trials: list[Trial]) -> list[str]:
     return [
         f"{exam}/{name}: {check}"
         for (exam, name), runs in _by_case(trials).items()
-        for check in flipped(runs)
+        for check in flipped_checks(runs)
     ]
 
 
 def without_mutant(exam: str, cases: list[Case]) -> list[str]:
     """Return the checks of an exam that no case must fail: checks that nobody needs."""
     killed = {name for case in cases for name in case.must_fail}
-    return [name for name in exercises.load(exam).checks if name not in killed]
+    return [name for name in exercises.load_exam(exam).checks if name not in killed]
 
 
-def matrix(cases: dict[str, list[Case]]) -> str:
+def checks_matrix(cases: dict[str, list[Case]]) -> str:
     """Return the Markdown table of checks and the cases that each must catch, exam by exam."""
     lines = [
         "# Checks and the mutants that prove them",
@@ -81,7 +81,7 @@ def matrix(cases: dict[str, list[Case]]) -> str:
         lines += [f"- `{case.name}`: {case.title}" for case in right]
         lines += ["", "| Check | Points | Must be caught |", "|---|---|---|"]
         worth = {name: p for part in entry.parts.values() for name, p in part.items()}
-        for name in exercises.load(exam).checks:
+        for name in exercises.load_exam(exam).checks:
             killers = [f"`{case.name}`" for case in own if name in case.must_fail]
             lines.append(f"| `{name}` | {worth.get(name, 0):g} | {', '.join(killers)} |")
         unexamined = [f"`{case.name}`" for case in own if case.fails and not case.must_fail]

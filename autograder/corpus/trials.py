@@ -21,7 +21,7 @@ from autograder.assignments.build import build
 from autograder.corpus.case import Case
 from autograder.examination import points
 from autograder.examination.draws import USUAL_SEED
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 from autograder.running import runner
 from autograder.running.runner import Outcome
 from course.workspace.content import content_root, copy_authoring
@@ -42,22 +42,22 @@ class Trial:
     difference: str
 
     @property
-    def statuses(self) -> dict[str, str]:
+    def check_statuses(self) -> dict[str, str]:
         """{check: status} over all parts."""
         verdicts = self.outcome.verdicts.values()
         return {check.name: check.status for verdict in verdicts for check in verdict.checks}
 
 
-def notebooks(exam: str) -> Notebooks:
+def make_notebooks(exam: str) -> Notebooks:
     """Build and release the notebook of one exam by itself; return both versions."""
-    exercise_folders.file(exercises.load(exam).name, exercise_folders.POINTS)
+    exercise_folders.exercise_file(exercises.load_exam(exam).name, exercise_folders.POINTS)
     entry = points.table()[exam]
     with tempfile.TemporaryDirectory(prefix="ros2-course-corpus-") as folder:
         root = one_notebook(Path(folder), exam)
         build(root)
-        release(root, ASSIGNMENT)
+        make_release(root, ASSIGNMENT)
         source, released = (
-            submission.read(root / step / ASSIGNMENT / f"{entry.notebook}.ipynb")
+            submission.read_notebook(root / step / ASSIGNMENT / f"{entry.notebook}.ipynb")
             for step in ("source", "release")
         )
     return source, released
@@ -70,10 +70,10 @@ def one_notebook(folder: Path, exam: str, assignment: str = ASSIGNMENT) -> Path:
 
 def notebooks_of(folder: Path, exams: Iterable[str], assignment: str = ASSIGNMENT) -> Path:
     """Make ``folder`` a course root with one assignment, of these exams' notebooks; return it."""
-    chosen, known = list(exams), exercise_folders.current()
+    chosen, known = list(exams), exercise_folders.current_exercises()
     root = copy_authoring(content_root(), folder)
     shutil.rmtree(root / listing.ASSIGNMENTS)
-    listing.write(root, assignment, chosen)
+    listing.write_list(root, assignment, chosen)
     for exam in known.own.intersection(chosen):
         shutil.copytree(known.folders[exam], root / exercise_folders.FOLDER / exam,
                         dirs_exist_ok=True)  # fmt: skip
@@ -97,9 +97,9 @@ def run(
     """
 
     def one(case: Case) -> Trial:
-        handed_in = case.submission(source, released)
-        notebook, _ = submission.restore(handed_in, source, released)
-        program = submission.program(notebook)
+        handed_in = case.make_submission(source, released)
+        notebook, _ = submission.restore_cells(handed_in, source, released)
+        program = submission.extract_program(notebook)
         outcome = runner.run(program, cell_timeout=case.cell_timeout, trust=trust, seed=seed)
         trial = Trial(case, outcome, case.verdict_of(outcome))
         done(trial)

@@ -63,7 +63,7 @@ class StudentError(Exception):
         self.missing = missing
 
     @property
-    def told(self) -> str:
+    def feedback_text(self) -> str:
         """Return what was raised, and where in the student's own lines, as feedback tells it."""
         if self.missing:
             return str(self)
@@ -100,7 +100,7 @@ class Subject:
             threads: how many threads run the nodes' callbacks.
             sim_time: the nodes follow simulated time, which only `advance` moves.
         """
-        self._ask("open", "a session", threads=threads, sim_time=sim_time)
+        self._ask_harness("open", "a session", threads=threads, sim_time=sim_time)
 
     def start(self, name: str, *args: Any) -> str:
         """Make a node of a class of the notebook and spin it; return its fully qualified name.
@@ -114,8 +114,8 @@ class Subject:
             StudentError: the class is missing or its constructor raised.
             SubjectGone: the process ended or hangs.
         """
-        reply = self._ask("start", name, args=args)
-        return self._node(reply)
+        reply = self._ask_harness("start", name, args=args)
+        return self._node_name(reply)
 
     def start_all(self, name: str) -> dict[str, str]:
         """Make every node that an object of the notebook declares; return {label: node name}.
@@ -126,8 +126,8 @@ class Subject:
         Raises:
             StudentError: the object is missing or declares nothing, or a node could not be made.
         """
-        reply = self._ask("declare", name, doing=f"bring up the nodes of `{name}`")
-        labels = self._read(lambda: _texts(reply["labels"], MAX_NAME))
+        reply = self._ask_harness("declare", name, doing=f"bring up the nodes of `{name}`")
+        labels = self._read_reply(lambda: _bounded_texts(reply["labels"], MAX_NAME))
         if not labels:
             raise StudentError(
                 f"`{name}` declares no nodes: its node_factories() gave none.", missing=True
@@ -137,16 +137,16 @@ class Subject:
 
     def _start_declared(self, name: str, label: str) -> str:
         doing = f"bring up the nodes of `{name}`, and {label[:60]} did not come up"
-        reply = self._ask("start_declared", name, label=label, doing=doing)
-        return self._node(reply)
+        reply = self._ask_harness("start_declared", name, label=label, doing=doing)
+        return self._node_name(reply)
 
-    def _node(self, reply: dict[str, Any]) -> str:
+    def _node_name(self, reply: dict[str, Any]) -> str:
         """Return the name of the node in a reply, of which names of its services are made.
 
         Raises:
             StudentError: it is none that a node can have: a class may override how it is asked.
         """
-        name = self._read(lambda: _text(reply["node"], MAX_NAME))
+        name = self._read_reply(lambda: _bounded_text(reply["node"], MAX_NAME))
         if not NODE_NAME.fullmatch(name):
             raise StudentError(f"A node cannot be called {name[:60]!r}.", missing=True)
         return name
@@ -157,7 +157,7 @@ class Subject:
         DDS announces a process's endpoints in order: whoever sees both on the graph has seen all
         that the subject's nodes had before. So what is missing then is missing, not late.
         """
-        self._ask("mark", name, doing="make a small node beside yours")
+        self._ask_harness("mark", name, doing="make a small node beside yours")
 
     def stop(self, name: str, *, bare: bool = False) -> None:
         """Destroy the node made of a class, as a session does: its ``destroy_node`` is called.
@@ -167,7 +167,7 @@ class Subject:
             bare: nobody tidies up after ``destroy_node``, as in a program without a session, and
                 the program still refers to the node, until it is stopped once more.
         """
-        self._ask("stop", name, bare=bare)
+        self._ask_harness("stop", name, bare=bare)
 
     def collect(self) -> None:
         """Have Python free what nobody refers to any more.
@@ -175,15 +175,15 @@ class Subject:
         A node and its callbacks refer to each other: without it a destroyed node stays in memory,
         and a lifecycle node's own services on the graph, until Python happens to look.
         """
-        self._ask("collect", "garbage")
+        self._ask_harness("collect", "garbage")
 
     def pause(self, name: str) -> None:
         """Stop executing the node's callbacks while its endpoints go on receiving."""
-        self._ask("pause", name)
+        self._ask_harness("pause", name)
 
     def resume(self, name: str) -> None:
         """Execute the node's callbacks again, beginning with what queued up."""
-        self._ask("resume", name)
+        self._ask_harness("resume", name)
 
     def advance(self, seconds: float, step: float = 0.01) -> bool:
         """Move simulated time on (see `course.Session.sim`); needs `open` with ``sim_time``.
@@ -195,15 +195,15 @@ class Subject:
             StudentError: a callback held up a step for longer than PATIENCE.
             SubjectGone: it does not answer at all.
         """
-        reply = self._ask(
+        reply = self._ask_harness(
             "advance", f"{seconds:g} s of simulated time", REPLY_TIMEOUT + PATIENCE,
             seconds=seconds, step=step, patience=PATIENCE,
         )  # fmt: skip
-        return self._read(lambda: bool(reply["goes_on"]))
+        return self._read_reply(lambda: bool(reply["goes_on"]))
 
     def nudge(self) -> None:
         """Tell its nodes that a nanosecond of simulated time has passed; wait for no callback."""
-        self._ask("nudge", "", doing="tell its nodes that time goes on")
+        self._ask_harness("nudge", "", doing="tell its nodes that time goes on")
 
     def call(self, name: str, method: str, *args: Any, timeout: float = REPLY_TIMEOUT) -> Any:
         """Call a method of the node made of a class, in the main thread, while the node spins.
@@ -220,7 +220,7 @@ class Subject:
             StudentError: there is no such method, or it raised.
             SubjectGone: the process ended or the method hangs.
         """
-        reply = self._ask(
+        reply = self._ask_harness(
             "call", f"{name}.{method}()", timeout, node=name, method=method, args=args
         )
         return reply.get("value")
@@ -231,8 +231,8 @@ class Subject:
         Raises:
             StudentError: there is no such variable, or it is made of something else.
         """
-        reply = self._ask("value", name, doing=f"read the variable `{name}`")
-        return self._read(lambda: reply["value"])
+        reply = self._ask_harness("value", name, doing=f"read the variable `{name}`")
+        return self._read_reply(lambda: reply["value"])
 
     def sees(self, name: str, endpoints: Endpoints) -> dict[str, dict[str, int]]:
         """Return how many endpoints of a kind and name the node made of a class has discovered.
@@ -246,10 +246,10 @@ class Subject:
                 "services", "clients".
         """
         wanted = {kind: list(names) for kind, names in endpoints.items()}
-        reply = self._ask(
+        reply = self._ask_harness(
             "sees", name, endpoints=wanted, doing=f"say what the node of `{name}` has discovered"
         )
-        return self._read(
+        return self._read_reply(
             lambda: {
                 kind: {n: int(reply["counts"][kind][n]) for n in names}
                 for kind, names in wanted.items()
@@ -262,18 +262,18 @@ class Subject:
         Each is like ``wait_for_service: Asker.ask of /asker (at line 7: ...)``, where the method is
         rclpy's, or without it: see `autograder.examination.subject.wall_waits`.
         """
-        reply = self._ask("wall_waits", "", doing="say what its callbacks wait for")
-        return self._read(lambda: _texts(reply["waits"], MAX_ERROR))
+        reply = self._ask_harness("wall_waits", "", doing="say what its callbacks wait for")
+        return self._read_reply(lambda: _bounded_texts(reply["waits"], MAX_ERROR))
 
     def errors(self) -> list[str]:
         """Return what the student's callbacks raised: for an explanation, never as evidence."""
-        reply = self._ask("errors", "", doing="list its errors")
-        return self._read(lambda: _texts(reply["errors"], MAX_ERROR))
+        reply = self._ask_harness("errors", "", doing="list its errors")
+        return self._read_reply(lambda: _bounded_texts(reply["errors"], MAX_ERROR))
 
     def thread_errors(self) -> list[str]:
         """Return what ended threads of the student's: for an explanation, never as evidence."""
-        reply = self._ask("errors", "", doing="list its errors")
-        return self._read(lambda: _texts(reply["of_threads"], MAX_ERROR))
+        reply = self._ask_harness("errors", "", doing="list its errors")
+        return self._read_reply(lambda: _bounded_texts(reply["of_threads"], MAX_ERROR))
 
     def own_errors(self) -> dict[str, int]:
         """Return what left the student's callbacks and was raised by a line of theirs, how often.
@@ -281,15 +281,15 @@ class Subject:
         What rclpy raised, in a call of theirs or elsewhere, is not among it: that may be a race of
         its own.
         """
-        reply = self._ask("own_errors", "", doing="list its errors")
-        return self._read(
+        reply = self._ask_harness("own_errors", "", doing="list its errors")
+        return self._read_reply(
             lambda: {
-                _text(error["told"], MAX_ERROR): int(error["count"])
+                _bounded_text(error["told"], MAX_ERROR): int(error["count"])
                 for error in reply["errors"][:MOST_TOLD]
             }
         )
 
-    def _ask(
+    def _ask_harness(
         self,
         operation: str,
         what: str,
@@ -303,10 +303,10 @@ class Subject:
         doing = doing or f"{operation.replace('_', ' ')} {what}"
         try:
             self._channel.send({"op": operation, "name": what, **more})
-            with self._counting():
+            with self._count_time():
                 reply = self._channel.receive_fairly(min(timeout, self._left), self.delay)
         except ChannelBroken as error:
-            raise self._broken(str(error)) from None
+            raise self._channel_error(str(error)) from None
         except ChannelClosed:
             self._gone = f"Your program ended while it was asked to {doing}."
             raise SubjectGone(self._gone) from None
@@ -322,15 +322,17 @@ class Subject:
             self.hangs = self._gone
             raise SubjectGone(self._gone) from None
         if "missing" in reply:
-            missing = self._read(lambda: _text(reply["missing"], MAX_ERROR))
+            missing = self._read_reply(lambda: _bounded_text(reply["missing"], MAX_ERROR))
             raise StudentError(missing, missing=True)
         if not reply.get("ok"):
-            raised = self._read(lambda: _text(reply["error"], MAX_ERROR))
-            raise StudentError(raised, self._read(lambda: _text(reply.get("trace", ""), MAX_TRACE)))
+            raised = self._read_reply(lambda: _bounded_text(reply["error"], MAX_ERROR))
+            raise StudentError(
+                raised, self._read_reply(lambda: _bounded_text(reply.get("trace", ""), MAX_TRACE))
+            )
         return reply
 
     @contextmanager
-    def _counting(self) -> Iterator[None]:
+    def _count_time(self) -> Iterator[None]:
         """Count the time of the block, as far as the subject was not kept from running by others.
 
         At least a third of it counts: a reply can be put off no further. Of a quick one all counts,
@@ -342,10 +344,10 @@ class Subject:
         finally:
             took = time.monotonic() - began
             if took > QUICK_REPLY_S:
-                took = max(took / 3, took - self.delay.since(mark))
+                took = max(took / 3, took - self.delay.delay_since(mark))
             self._left = max(0.0, self._left - took)
 
-    def _read(self, found: Callable[[], T]) -> T:
+    def _read_reply(self, found: Callable[[], T]) -> T:
         """Return what is found in a reply, if it is one of the harness's.
 
         Raises:
@@ -354,9 +356,9 @@ class Subject:
         try:
             return found()
         except (LookupError, TypeError, ValueError, ArithmeticError):
-            raise self._broken("it is no answer to what was asked") from None
+            raise self._channel_error("it is no answer to what was asked") from None
 
-    def _broken(self, how: str) -> SubjectGone:
+    def _channel_error(self, how: str) -> SubjectGone:
         self._gone = f"Something in the notebook wrote to the grader's own channel: {how}."
         return SubjectGone(self._gone)
 
@@ -368,16 +370,16 @@ class Subject:
             self._gone = self._gone or "Your program ended."
 
 
-def _text(found: Any, most: int) -> str:
+def _bounded_text(found: Any, most: int) -> str:
     if not isinstance(found, str):
         raise TypeError("no text")
     return found[:most]
 
 
-def _texts(found: Any, most: int) -> list[str]:
+def _bounded_texts(found: Any, most: int) -> list[str]:
     if not isinstance(found, list):
         raise TypeError("no list")
-    return [_text(line, most) for line in found[:MOST_TOLD]]
+    return [_bounded_text(line, most) for line in found[:MOST_TOLD]]
 
 
 class Bench:

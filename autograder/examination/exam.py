@@ -158,14 +158,16 @@ class Exam(Generic[RigT]):
                         rig = stack.enter_context(self.rig(bench))
                     except (StudentError, SubjectGone) as error:
                         roots = [name for name in self.checks if not self.checks[name].needs]
-                        done.update((name, _blamed(self.checks[name], error)) for name in roots)
+                        done.update(
+                            (name, _student_failure(self.checks[name], error)) for name in roots
+                        )
                         rig = None
                 table = self.part(part.name)
                 bench.key = part.key
-                results = [self._result(name, rig, done, gone, deadline) for name in table]
+                results = [self._examine_check(name, rig, done, gone, deadline) for name in table]
                 told.update(table)
                 results = [self._with_reason(result, done, told) for result in results]
-                checks = tuple(_worth(result, table[result.name]) for result in results)
+                checks = tuple(_with_points(result, table[result.name]) for result in results)
                 yield Verdict(self.name, part.name, checks)
             if bench.ends:
                 self._left_up = stack.pop_all()
@@ -180,7 +182,7 @@ class Exam(Generic[RigT]):
             return result
         return replace(result, actual=f"{result.actual} It failed: {hidden[0].actual}")
 
-    def _result(
+    def _examine_check(
         self,
         name: str,
         rig: RigT | None,
@@ -191,28 +193,30 @@ class Exam(Generic[RigT]):
         if name not in done:
             check = self.checks[name]
             for need in check.needs:
-                self._result(need, rig, done, gone, deadline)
+                self._examine_check(need, rig, done, gone, deadline)
             missing = [done[need] for need in check.needs if not done[need].passed]
             if missing:
                 done[name] = _not_checked(check, missing[0])
-            elif not deadline.left:
+            elif not deadline.seconds_left:
                 done[name] = _too_late(check)
             else:
                 assert rig is not None  # without one, what needs nothing has failed already
-                done[name] = _run(check, rig, gone)
+                done[name] = _run_check(check, rig, gone)
         return done[name]
 
 
-def _worth(result: CheckResult, points: float) -> CheckResult:
+def _with_points(result: CheckResult, points: float) -> CheckResult:
     # A check may quote what a student's code said of itself, at any length.
-    expected, actual, note = (_cut(t) for t in (result.expected, result.actual, result.note))
+    expected, actual, note = (
+        _shorten_text(t) for t in (result.expected, result.actual, result.note)
+    )
     earned = points if result.passed else 0.0
     return replace(
         result, points=earned, max_points=points, expected=expected, actual=actual, note=note
     )
 
 
-def _cut(text: str) -> str:
+def _shorten_text(text: str) -> str:
     return text if len(text) <= MAX_TEXT else f"{text[:MAX_TEXT]} [{len(text) - MAX_TEXT} more]"
 
 
@@ -246,7 +250,7 @@ def _not_reached(check: Check[RigT], gone: CheckResult) -> CheckResult:
     )
 
 
-def _run(check: Check[RigT], rig: RigT, gone: list[CheckResult]) -> CheckResult:
+def _run_check(check: Check[RigT], rig: RigT, gone: list[CheckResult]) -> CheckResult:
     """Run a check; add its result to ``gone`` if it lost the subject.
 
     What comes after a check that did is not at fault.
@@ -254,47 +258,51 @@ def _run(check: Check[RigT], rig: RigT, gone: list[CheckResult]) -> CheckResult:
     try:
         note = check.run(rig) or ""
     except Failed as failed:
-        result = _failed(check, failed.expected, failed.actual)
+        result = _failed_result(check, failed.expected, failed.actual)
         if isinstance(failed.__cause__, SubjectGone):
             gone.append(result)
         return result
     except StudentError as error:
-        return _blamed(check, error)
+        return _student_failure(check, error)
     except SubjectGone as error:
         if gone:
             return _not_reached(check, gone[0])
-        gone.append(_blamed(check, error))
+        gone.append(_student_failure(check, error))
         return gone[0]
     except (NotExaminable, SlowProgramError) as reason:
         return replace(_result_of(check, "not_examined"), actual=str(reason))
     except Exception as error:  # noqa: BLE001 - whatever else goes wrong in here is our fault
         if isinstance(error, UnicodeDecodeError) and _read_by_ros(error):
-            return _failed(check, *_no_text(error))
+            return _failed_result(check, *_no_text(error))
         return replace(
             _result_of(check, "grader_error"),
             actual=f"The grader itself failed ({type(error).__name__}: {error}, in "
-            f"{_place(error)}). This is not your fault; after a hand-in a person looks at it.",
+            f"{_describe_place(error)}). This is not your fault; after a hand-in a person looks at "
+            "it.",
         )
     return replace(_result_of(check, "passed"), note=note)
 
 
-def _blamed(check: Check[RigT], error: StudentError | SubjectGone) -> CheckResult:
+def _student_failure(check: Check[RigT], error: StudentError | SubjectGone) -> CheckResult:
     """Return the failure of a check that the student's own code or process has cut short."""
     if isinstance(error, StudentError):
-        expected, actual = "Your code does what it is asked for without an error.", error.told
+        expected, actual = (
+            "Your code does what it is asked for without an error.",
+            error.feedback_text,
+        )
     else:
         expected = "Your program keeps running and answering while it is examined."
         actual = str(error)
-    return _failed(check, expected, actual)
+    return _failed_result(check, expected, actual)
 
 
-def _failed(check: Check[RigT], expected: str, actual: str) -> CheckResult:
+def _failed_result(check: Check[RigT], expected: str, actual: str) -> CheckResult:
     return replace(_result_of(check, "failed"), expected=expected, actual=actual)
 
 
 def _read_by_ros(error: BaseException) -> bool:
     """Whether rclpy raised it: it makes text of what it has heard from others."""
-    place = _innermost(error)
+    place = _innermost_frame(error)
     return place is not None and place.tb_frame.f_globals.get("__name__", "").startswith("rclpy.")
 
 
@@ -307,19 +315,21 @@ def _no_text(error: UnicodeDecodeError) -> tuple[str, str]:
     )
 
 
-def _innermost(error: BaseException) -> TracebackType | None:
+def _innermost_frame(error: BaseException) -> TracebackType | None:
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
     return trace
 
 
-def _place(error: BaseException) -> str:
-    trace = _innermost(error)
+def _describe_place(error: BaseException) -> str:
+    trace = _innermost_frame(error)
     return f"{trace.tb_frame.f_code.co_name}, line {trace.tb_lineno}" if trace else "unknown"
 
 
-def unexamined(exam: Exam[RigT], part: str, reason: str, status: Status = "not_checked") -> Verdict:
+def unexamined_verdict(
+    exam: Exam[RigT], part: str, reason: str, status: Status = "not_checked"
+) -> Verdict:
     """Return the verdict of a part that could not be sat.
 
     ``status`` says whose fault it is: ``"not_checked"`` the subject's, ``"grader_error"`` ours.

@@ -58,7 +58,7 @@ class Program:
         """Have its nodes ended, or made anew if they are."""
         self._ask(wants="interrupt")
 
-    def ended(self) -> bool:
+    def has_ended(self) -> bool:
         """Whether its process has gone, with all that it started."""
         try:
             return not self._outside.ask("threads")
@@ -81,7 +81,7 @@ class Programs:
         self._replies, self._requests, self._outside = replies, requests, outside
         self._count = 0
 
-    def _ask(self, **request: Any) -> dict[str, Any]:
+    def _ask_engine(self, **request: Any) -> dict[str, Any]:
         self._requests.write(json.dumps(request) + "\n")
         self._requests.flush()
         reply: dict[str, Any] = json.loads(self._replies.readline())
@@ -125,19 +125,20 @@ class Programs:
         self._count += 1
         domain = MAX_DOMAIN - 1 - self._count % DOMAINS
         try:
-            reply = self._ask(
-                wants="program", nodes=_told(nodes), then=[
-                    {"nodes": _told(life.nodes), "tried": _told(life.tried)} for life in then
+            reply = self._ask_engine(
+                wants="program", nodes=_nodes_as_data(nodes), then=[
+                    {"nodes": _nodes_as_data(life.nodes), "tried": _nodes_as_data(life.tried)}
+                    for life in then
                 ],
                 threads=threads, sim_time=sim_time, apart=apart, twice=twice, shut_down=shut_down,
                 goes_on=goes_on, domain=domain,
             )  # fmt: skip
             with CoreSession(domain_id=domain) as session:
                 session.explains = False
-                yield Program(session, bool(reply["up"]), domain, self._ask, self._outside)
+                yield Program(session, bool(reply["up"]), domain, self._ask_engine, self._outside)
         finally:
-            self._ask(wants="end")
+            self._ask_engine(wants="end")
 
 
-def _told(nodes: Nodes) -> list[list[Any]]:
+def _nodes_as_data(nodes: Nodes) -> list[list[Any]]:
     return [[name, [*given]] for name, given in nodes]

@@ -42,14 +42,14 @@ def table() -> dict[str, Entry]:
     Raises:
         ExerciseError: a table of points is not sound.
     """
-    return _table(exercise_folders.current())
+    return _load_table(exercise_folders.current_exercises())
 
 
 @lru_cache(maxsize=2)
-def _table(exercises: Exercises) -> dict[str, Entry]:
+def _load_table(exercises: Exercises) -> dict[str, Entry]:
     files = {name: folder / exercise_folders.POINTS for name, folder in exercises.folders.items()}
-    entries = {name: read(file) for name, file in files.items() if file.is_file()}
-    entries = dict(sorted(entries.items(), key=lambda named: _place(named[1])))
+    entries = {name: read_points(file) for name, file in files.items() if file.is_file()}
+    entries = dict(sorted(entries.items(), key=lambda named: _title_order(named[1])))
     notebooks: dict[str, str] = {}
     for name, entry in entries.items():
         other = notebooks.setdefault(entry.notebook, name)
@@ -61,11 +61,11 @@ def _table(exercises: Exercises) -> dict[str, Entry]:
     return entries
 
 
-def _place(entry: Entry) -> tuple[list[int], str]:
+def _title_order(entry: Entry) -> tuple[list[int], str]:
     return [int(n) for n in re.findall(r"\d+", entry.title)], entry.title
 
 
-def read(file: Path) -> Entry:
+def read_points(file: Path) -> Entry:
     """Return what the table of points in an exercise's folder says.
 
     Raises:

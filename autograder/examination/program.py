@@ -26,7 +26,7 @@ class Cell:
 Program = tuple[Cell, ...]
 
 
-def digest(program: Program, files: Mapping[str, bytes], salt: str) -> str:
+def program_digest(program: Program, files: Mapping[str, bytes], salt: str) -> str:
     """Return a key for the results of a program: equal programs behave alike.
 
     ``files`` are the other files it finds, ``salt`` is what else the results depend on: the exams.

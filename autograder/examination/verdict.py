@@ -53,7 +53,7 @@ class CheckResult:
         """Whether the behaviour was seen and right."""
         return self.status == "passed"
 
-    def texts(self) -> Iterator[str]:
+    def all_texts(self) -> Iterator[str]:
         """Yield all that it says in words."""
         yield from (self.name, self.title, self.rationale, self.expected, self.actual)
         yield from (*self.hints, self.read, self.note)
@@ -86,15 +86,15 @@ class Verdict:
     @property
     def needs_human(self) -> bool:
         """Whether a check was left to a person: it could not be examined, or the grader failed."""
-        return self.spoilt or any(check.status == "not_examined" for check in self.checks)
+        return self.has_grader_error or any(check.status == "not_examined" for check in self.checks)
 
     @property
-    def spoilt(self) -> bool:
+    def has_grader_error(self) -> bool:
         """Whether the grader itself failed somewhere: another try may well succeed."""
         return any(check.status == "grader_error" for check in self.checks)
 
     @property
-    def unexamined(self) -> float:
+    def unexamined_points(self) -> float:
         """Points of the checks that could not be examined on this machine."""
         return sum(check.max_points for check in self.checks if check.status == "not_examined")
 
@@ -124,7 +124,7 @@ class Verdict:
             raise VerdictError("a check has a part of its points")
         if any(check.points and check.status != "passed" for check in self.checks):
             raise VerdictError("a check has points and did not pass")
-        texts = [*self.notes, *(text for check in self.checks for text in check.texts())]
+        texts = [*self.notes, *(text for check in self.checks for text in check.all_texts())]
         if any(len(text) > MAX_TEXT for text in texts) or len(texts) > MOST_TEXTS:
             raise VerdictError("it says more than a verdict does")
 
@@ -141,7 +141,7 @@ class Verdict:
                     f"A verdict of version {data['version']} cannot be read by this release, which "
                     f"reads version {VERSION}: grade the submission again."
                 )
-            checks = tuple(_check(item) for item in data["checks"])
+            checks = tuple(_check_from_data(item) for item in data["checks"])
             notes = tuple(str(note) for note in data["notes"])
             return cls(str(data["exam"]), str(data["part"]), checks, notes, int(data["seed"]))
         except (ValueError, KeyError, TypeError, RecursionError, OverflowError) as error:
@@ -150,7 +150,7 @@ class Verdict:
             ) from error
 
 
-def _check(item: dict[str, Any]) -> CheckResult:
+def _check_from_data(item: dict[str, Any]) -> CheckResult:
     if item["status"] not in STATUSES:
         raise ValueError(f"unknown status {item['status']!r}")
     points, max_points = float(item["points"]), float(item["max_points"])
@@ -158,6 +158,6 @@ def _check(item: dict[str, Any]) -> CheckResult:
         raise ValueError(f"{points} points of {max_points}")
     hints = tuple(item["hints"])
     result = CheckResult(**{**item, "points": points, "max_points": max_points, "hints": hints})
-    if not all(isinstance(text, str) for text in result.texts()):
+    if not all(isinstance(text, str) for text in result.all_texts()):
         raise TypeError("something else where a text belongs")
     return result

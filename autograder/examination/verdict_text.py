@@ -37,37 +37,40 @@ class Report:
     def __repr__(self) -> str:
         """Return the report as plain text."""
         verdict = self._verdict
-        lines = [f"{verdict.exam}: {_points(verdict.score)} of {_points(verdict.max_score)} points"]
+        lines = [
+            f"{verdict.exam}: {_format_points(verdict.score)} of "
+            f"{_format_points(verdict.max_score)} points"
+        ]
         lines += [f"  note: {note}" for note in verdict.notes]
         for check in verdict.checks:
-            lines.append(f"{MARKS[check.status]} {check.title} ({_outcome(check)})")
-            lines += [f"    {label}: {text}" for label, text in self._details(check)]
+            lines.append(f"{MARKS[check.status]} {check.title} ({_describe_outcome(check)})")
+            lines += [f"    {label}: {text}" for label, text in self._check_details(check)]
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
         verdict = self._verdict
         head = (
-            f"<p><strong>{escape(verdict.exam)}: {_points(verdict.score)} of "
-            f"{_points(verdict.max_score)} points</strong></p>"
+            f"<p><strong>{escape(verdict.exam)}: {_format_points(verdict.score)} of "
+            f"{_format_points(verdict.max_score)} points</strong></p>"
         )
         notes = "".join(f"<p>{escape(note)}</p>" for note in verdict.notes)
-        items = "".join(self._item(check) for check in verdict.checks)
+        items = "".join(self._item_html(check) for check in verdict.checks)
         return f'{head}{notes}<ul style="list-style:none;padding-left:0">{items}</ul>'
 
-    def _item(self, check: CheckResult) -> str:
+    def _item_html(self, check: CheckResult) -> str:
         details = "".join(
             f'<div style="margin-left:1.6em"><em>{escape(label)}:</em> '
             f'<span style="white-space:pre-wrap">{escape(text)}</span></div>'
-            for label, text in self._details(check)
+            for label, text in self._check_details(check)
         )
         return (
             f'<li style="margin:.4em 0"><span style="color:{COLOURS[check.status]}" '
             f'aria-hidden="true">{MARKS[check.status]}</span> '
             f"<strong>{escape(check.title)}</strong> "
-            f"({_outcome(check)}){details}</li>"
+            f"({_describe_outcome(check)}){details}</li>"
         )
 
-    def _details(self, check: CheckResult) -> list[tuple[str, str]]:
+    def _check_details(self, check: CheckResult) -> list[tuple[str, str]]:
         if check.passed:
             return [("note", check.note)] if check.note else []
         details = [
@@ -86,11 +89,13 @@ class Report:
         return [(label, text) for label, text in details if text]
 
 
-def _outcome(check: CheckResult) -> str:
+def _describe_outcome(check: CheckResult) -> str:
     if not check.max_points:
         return f"{WORDS[check.status]}; {NEEDED}"
-    return f"{WORDS[check.status]}, {_points(check.points)}/{_points(check.max_points)}"
+    return (
+        f"{WORDS[check.status]}, {_format_points(check.points)}/{_format_points(check.max_points)}"
+    )
 
 
-def _points(value: float) -> str:
+def _format_points(value: float) -> str:
     return f"{value:g}"

@@ -23,39 +23,39 @@ _importing = threading.Lock()
 _imported: Exercises | None = None
 
 
-def names() -> list[str]:
+def exercise_names() -> list[str]:
     """Return the names of the exercises there are."""
-    return list(exercise_folders.current().folders)
+    return list(exercise_folders.current_exercises().folders)
 
 
-def load(name: str) -> Exam[Any]:
+def load_exam(name: str) -> Exam[Any]:
     """Return the exam of the exercise called ``name``.
 
     Raises:
         ExamError: there is none, and the message names the ones there are; or it has none.
         ExerciseError: it has no ``exam.py``.
     """
-    exercises = exercise_folders.current()
-    require(name)
-    exercise_folders.file(name, exercise_folders.EXAM)
+    exercises = exercise_folders.current_exercises()
+    require_exercise(name)
+    exercise_folders.exercise_file(name, exercise_folders.EXAM)
     if name not in exercises.own:
         exam: Exam[Any] = importlib.import_module(f"autograder.exercises.{name}.exam").EXAM
         return exam
     with _importing:
         _stand_for(exercises)
-        return _own(importlib.import_module(f"{COURSE_PACKAGE}.{name}.exam"), name)
+        return _exam_of_module(importlib.import_module(f"{COURSE_PACKAGE}.{name}.exam"), name)
 
 
-def require(name: str) -> None:
+def require_exercise(name: str) -> None:
     """Raise ExamError if there is no exercise called ``name``; it names the ones there are."""
-    if name not in names():
+    if name not in exercise_names():
         raise ExamError(
-            f"There is no exam '{name}': there are {', '.join(names())}."
-            f"{did_you_mean(name, names())}"
+            f"There is no exam '{name}': there are {', '.join(exercise_names())}."
+            f"{did_you_mean(name, exercise_names())}"
         )
 
 
-def _own(module: Any, name: str) -> Exam[Any]:
+def _exam_of_module(module: Any, name: str) -> Exam[Any]:
     exam = getattr(module, "EXAM", None)
     if not isinstance(exam, Exam) or exam.name != name:
         raise ExamError(f"{module.__file__} must make its exam with EXAM = Exam('{name}', ...).")

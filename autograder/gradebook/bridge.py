@@ -72,21 +72,21 @@ class SubmissionExporter(NotebookExporter):
         """Return the notebook at ``filename``; the released one, with why, if it is unreadable."""
         resources = resources or {}
         converter: Any = self.parent
-        exercise_folders.use(Path(converter.coursedir.root))
-        coursedir, (assignment, student, name) = converter.coursedir, _names(resources)
-        folder = nbgrader_commands.submitted(coursedir, assignment, student)
+        exercise_folders.use_course(Path(converter.coursedir.root))
+        coursedir, (assignment, student, name) = converter.coursedir, _submission_key(resources)
+        folder = nbgrader_commands.submitted_folder(coursedir, assignment, student)
         try:
             if Path(filename).parent == folder:
-                intake = _intake(coursedir, assignment, student)
-                found = intake.notebook(name)
+                intake = _make_intake(coursedir, assignment, student)
+                found = intake.find_notebook(name)
                 notebook = found.notebook
                 resources[FOUND_KEY] = found
                 if found.item is not None:
-                    resources[ATTACHMENTS_KEY] = intake.beside(found)
+                    resources[ATTACHMENTS_KEY] = intake.find_attachments(found)
             else:  # nbgrader reads a second time what it has written itself
-                notebook = submission.read(Path(filename))
+                notebook = submission.read_notebook(Path(filename))
         except SubmissionError as error:
-            _, notebook = originals(coursedir, assignment, name)
+            _, notebook = read_originals(coursedir, assignment, name)
             resources[UNREADABLE_KEY] = str(error)
             if isinstance(error, UnclearError):
                 resources[UNCLEAR_KEY] = f"{error} {error.suggestion}"
@@ -100,26 +100,29 @@ class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ship
         """Mend ``nb`` against the source and the released notebook; remember what was mended."""
         from autograder.quiz import marks
 
-        coursedir, (assignment, student, notebook) = _coursedir(self), _names(resources)
-        source, released = originals(coursedir, assignment, notebook)
-        known = cell_matching.recognise(nb, released)
-        nb, notes = submission.restore(nb, source, released)
+        coursedir, (assignment, student, notebook) = (
+            _course_directory(self),
+            _submission_key(resources),
+        )
+        source, released = read_originals(coursedir, assignment, notebook)
+        known = cell_matching.recognise_cells(nb, released)
+        nb, notes = submission.restore_cells(nb, source, released)
         found = resources.pop(FOUND_KEY, None)
         doubts = {} if found is not None and found.claimed else known.doubts
         before = found.notes if found is not None else ()
         notes = [*before, *known.notes, *dict.fromkeys(doubts.values()), *notes]
         for name, why in doubts.items():
-            ask(nb, why, [name])
+            ask_about_cells(nb, why, [name])
         if UNCLEAR_KEY in resources:
-            ask(nb, resources.pop(UNCLEAR_KEY), graded_cells(nb))
+            ask_about_cells(nb, resources.pop(UNCLEAR_KEY), graded_cells(nb))
         folder, root = (
-            nbgrader_commands.submitted(coursedir, assignment, student),
+            nbgrader_commands.submitted_folder(coursedir, assignment, student),
             Path(coursedir.root),
         )
-        class_ = nbgrader_commands.students(coursedir)
-        quizzes = marks.questions(nb, folder, student, root, class_)
+        class_ = nbgrader_commands.known_students(coursedir)
+        quizzes = marks.quiz_questions(nb, folder, student, root, class_)
         for name, (why, command) in quizzes.items():
-            ask(nb, f"{why} Say it with `{command}`.", [name])
+            ask_about_cells(nb, f"{why} Say it with `{command}`.", [name])
         allowed_html.screen_texts(nb, released, Page())
         # The grading steps read what is written here: nothing of a submission's own metadata is.
         nb.metadata[NOTES_KEY] = notes
@@ -142,22 +145,26 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         notes = list(nb.metadata.pop(NOTES_KEY, []))
         asked = dict(nb.metadata.pop(ASKED_KEY, {}))
         unreadable = str(nb.metadata.pop(UNREADABLE_KEY, ""))
-        outcome = prepared.get(_names(resources)) or self._outcome(nb, resources, unreadable)
+        outcome = prepared.get(_submission_key(resources)) or self._compute_outcome(
+            nb, resources, unreadable
+        )
         outcome = runner.with_notes(outcome, notes)
         texts = Page()
         code_cells = [cell for cell in nb.cells if cell.cell_type == "code"]
         for cell, shown in zip(code_cells, outcome.outputs, strict=True):
             verdict = outcome.verdicts.get(submission.grade_id(cell))
             if verdict is None:
-                shown = outputs.of_test(shown, float(submission.metadata(cell).get("points") or 0))
+                shown = outputs.of_test(
+                    shown, float(submission.nbgrader_metadata(cell).get("points") or 0)
+                )
                 cell.outputs = [
-                    new_output(**allowed_html.screened(output, texts))  # type: ignore[no-untyped-call]
+                    new_output(**allowed_html.screen_output(output, texts))  # type: ignore[no-untyped-call]
                     for output in shown
                 ]
             else:
                 # What stands here goes into the student's feedback: no hidden check, no key.
                 cell.source = cells.without_hidden(cell.source)
-                cell.outputs = _graded(verdict)
+                cell.outputs = _verdict_outputs(verdict)
         resources["ros2_course_outcome"] = outcome
         if outcome.unreadable:  # nobody knows what it is worth, nor whether answers are empty
             asked = {**dict.fromkeys(graded_cells(nb), " ".join(outcome.notes)), **asked}
@@ -166,29 +173,29 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
         resources[ASKED_KEY] = asked
         return nb, resources
 
-    def _outcome(self, nb: NotebookNode, resources: Resources, unreadable: str) -> Any:
+    def _compute_outcome(self, nb: NotebookNode, resources: Resources, unreadable: str) -> Any:
         """Return what comes of a notebook that the engine has not run before."""
         from autograder.quiz import marks
         from autograder.running import runner
         from autograder.running.outcome_store import OutcomeStore
 
-        coursedir = _coursedir(self)
-        exercise_folders.use(Path(coursedir.root))
-        assignment, student, _ = _names(resources)
+        coursedir = _course_directory(self)
+        exercise_folders.use_course(Path(coursedir.root))
+        assignment, student, _ = _submission_key(resources)
         folder = Path(coursedir.format_path(coursedir.submitted_directory, student, assignment))
         root = Path(coursedir.root)
-        program = submission.program(nb)
+        program = submission.extract_program(nb)
         if unreadable:
-            outcome = runner.refuse(program, unreadable)
+            outcome = runner.refused_outcome(program, unreadable)
         else:
             attachments = resources.pop(ATTACHMENTS_KEY, None) or files_beside(folder)
             store = OutcomeStore(
                 root / WORK_FOLDER / "outcomes", trust=self.trust_submissions, hidden=[root]
             )
             outcome = runner.with_notes(
-                store.outcome(program, attachments.files), attachments.notes
+                store.get_or_run(program, attachments.files), attachments.notes
             )
-        class_ = nbgrader_commands.students(coursedir)
+        class_ = nbgrader_commands.known_students(coursedir)
         return marks.with_quizzes(outcome, nb, folder, student, root, class_)
 
 
@@ -200,19 +207,21 @@ class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]
 
         The penalty for lateness is next: an extension that waits for this submission is granted.
         """
-        assignment, student, notebook = _names(resources)
-        waiting = WaitingExtensions(Path(_coursedir(self).root) / WORK_FOLDER, assignment)
-        if hours := waiting.of(student):
+        assignment, student, notebook = _submission_key(resources)
+        waiting = WaitingExtensions(Path(_course_directory(self).root) / WORK_FOLDER, assignment)
+        if hours := waiting.hours_for(student):
             with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
                 gradebook.grant_extension(assignment, student, hours=hours)
-            waiting.put(student, 0)  # it is in the gradebook from now on
+            waiting.set_hours(student, 0)  # it is in the gradebook from now on
         if "ros2_course_outcome" in resources:
-            work = Path(_coursedir(self).root) / WORK_FOLDER
-            records.keep(work, assignment, student, notebook, resources["ros2_course_outcome"])
+            work = Path(_course_directory(self).root) / WORK_FOLDER
+            records.write_record(
+                work, assignment, student, notebook, resources["ros2_course_outcome"]
+            )
             asked = resources[ASKED_KEY]
             why = " ".join(dict.fromkeys(asked.values()))
             question = open_questions.Question(why, tuple(asked)) if asked else None
-            open_questions.keep(work, assignment, student, notebook, question)
+            open_questions.keep_question(work, assignment, student, notebook, question)
         self._correct_time(resources)
         self._ask_about_missing(resources)
         flags = resources.get("ros2_course_flags", [])
@@ -229,33 +238,33 @@ class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]
 
     def _ask_about_missing(self, resources: Resources) -> None:
         """Ask about what nbgrader has not found under its own name, and given zero points."""
-        assignment, student, _ = _names(resources)
-        coursedir = _coursedir(self)
-        folder = nbgrader_commands.submitted(coursedir, assignment, student)
-        gone = nbgrader_commands.missing(folder, _notebooks(coursedir, assignment))
+        assignment, student, _ = _submission_key(resources)
+        coursedir = _course_directory(self)
+        folder = nbgrader_commands.submitted_folder(coursedir, assignment, student)
+        gone = nbgrader_commands.missing_notebooks(folder, _notebook_names(coursedir, assignment))
         if gone:
             work = Path(coursedir.root) / WORK_FOLDER
-            intake = _intake(coursedir, assignment, student)
+            intake = _make_intake(coursedir, assignment, student)
             with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
                 nbgrader_commands.ask_about(gradebook, intake, gone, assignment, student, work)
 
     def _correct_time(self, resources: Resources) -> None:
         """Have lateness counted from the time that was meant: nbgrader misreads some zones."""
-        assignment, student, _ = _names(resources)
-        coursedir = _coursedir(self)
+        assignment, student, _ = _submission_key(resources)
+        coursedir = _course_directory(self)
         folder = coursedir.format_path(coursedir.submitted_directory, student, assignment)
         file = Path(folder) / "timestamp.txt"
         if not file.exists():
             return
         zone = str(self.config.Exchange.get("timezone", ""))
-        time = roster.timestamp(file, zone)
+        time = roster.read_timestamp(file, zone)
         with Gradebook(resources["nbgrader"]["db_url"]) as gradebook:
             submitted = gradebook.find_submission(assignment, student)
             submitted.timestamp = parse_utc(time)
             gradebook.db.commit()
 
 
-def ask(notebook: NotebookNode, why: str, cells_: Iterable[str]) -> None:
+def ask_about_cells(notebook: NotebookNode, why: str, cells_: Iterable[str]) -> None:
     """Have a person asked about grade cells of a notebook: they wait for points by hand."""
     asked = dict(notebook.metadata.get(ASKED_KEY, {}))
     for name in cells_:
@@ -265,10 +274,14 @@ def ask(notebook: NotebookNode, why: str, cells_: Iterable[str]) -> None:
 
 def graded_cells(notebook: NotebookNode) -> list[str]:
     """Return the grade ids of the cells of a restored notebook that earn points."""
-    return [submission.grade_id(c) for c in notebook.cells if submission.metadata(c).get("grade")]
+    return [
+        submission.grade_id(c)
+        for c in notebook.cells
+        if submission.nbgrader_metadata(c).get("grade")
+    ]
 
 
-def originals(
+def read_originals(
     coursedir: CourseDirectory, assignment: str, notebook: str
 ) -> tuple[NotebookNode, NotebookNode]:
     """Return the source and the released version of a notebook of an assignment.
@@ -276,28 +289,28 @@ def originals(
     Raises:
         NotReadyError: one of them is missing or damaged: no submission is to blame.
     """
-    source = _original(coursedir, coursedir.source_directory, assignment, notebook)
-    return source, _original(coursedir, coursedir.release_directory, assignment, notebook)
+    source = _read_original(coursedir, coursedir.source_directory, assignment, notebook)
+    return source, _read_original(coursedir, coursedir.release_directory, assignment, notebook)
 
 
-def _original(
+def _read_original(
     coursedir: CourseDirectory, step: str, assignment: str, notebook: str
 ) -> NotebookNode:
     path = Path(coursedir.format_path(step, ".", assignment)) / f"{notebook}.ipynb"
     if step == coursedir.source_directory:
         return read_source(path)
-    return _instructors(path, f"autograder release {assignment}")
+    return _read_instructor_notebook(path, f"autograder release {assignment}")
 
 
 def read_source(path: Path) -> NotebookNode:
-    """Return a notebook of an assignment's source; raises as `originals`."""
-    return _instructors(path, "autograder build")
+    """Return a notebook of an assignment's source; raises as `read_originals`."""
+    return _read_instructor_notebook(path, "autograder build")
 
 
-def _instructors(path: Path, command: str) -> NotebookNode:
+def _read_instructor_notebook(path: Path, command: str) -> NotebookNode:
     """Return a notebook of the instructor's, which a ``command`` makes again."""
     try:
-        return submission.read(path)
+        return submission.read_notebook(path)
     except SubmissionError:
         wrong = "damaged" if path.exists() else "missing"
         raise NotReadyError(
@@ -306,27 +319,27 @@ def _instructors(path: Path, command: str) -> NotebookNode:
         ) from None
 
 
-def _notebooks(coursedir: CourseDirectory, assignment: str) -> list[str]:
+def _notebook_names(coursedir: CourseDirectory, assignment: str) -> list[str]:
     folder = Path(coursedir.format_path(coursedir.source_directory, ".", assignment))
     return sorted(path.stem for path in folder.glob("*.ipynb"))
 
 
-def _intake(coursedir: CourseDirectory, assignment: str, student: str) -> Intake:
-    names = _notebooks(coursedir, assignment)
-    released = {name: originals(coursedir, assignment, name)[1] for name in names}
+def _make_intake(coursedir: CourseDirectory, assignment: str, student: str) -> Intake:
+    names = _notebook_names(coursedir, assignment)
+    released = {name: read_originals(coursedir, assignment, name)[1] for name in names}
     return nbgrader_commands.look_into(coursedir, assignment, student, released)
 
 
-def _coursedir(preprocessor: NbGraderPreprocessor) -> CourseDirectory:
+def _course_directory(preprocessor: NbGraderPreprocessor) -> CourseDirectory:
     return preprocessor.parent.parent.coursedir  # the exporter's parent is the converter
 
 
-def _names(resources: Resources) -> Key:
+def _submission_key(resources: Resources) -> Key:
     names = resources["nbgrader"]
     return names["assignment"], names["student"], names["notebook"]
 
 
-def _graded(verdict: Verdict) -> list[NotebookNode]:
+def _verdict_outputs(verdict: Verdict) -> list[NotebookNode]:
     report = Report(verdict, hints=3)
     shown = {"text/plain": repr(report), "text/html": report._repr_html_()}
     return [

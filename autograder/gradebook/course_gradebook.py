@@ -98,13 +98,15 @@ class CourseGradebook:
             trial: the same, and it works on a copy of the gradebook that is made there.
         """
         self.root = root.resolve()
-        config = _config(self.root)
+        config = _load_config(self.root)
         config.CourseDirectory.root = str(self.root)
         if place := trial or released:
             config.CourseDirectory.release_directory = str(place)
         if trial:
             url = CourseDirectory(config=config).db_url
-            config.CourseDirectory.db_url = database.copied(url, self.root, trial / "gradebook.db")
+            config.CourseDirectory.db_url = database.copy_database(
+                url, self.root, trial / "gradebook.db"
+            )
         if staged:
             config.CourseDirectory.submitted_directory = staged
             steps = config.Autograde.sanitize_preprocessors
@@ -116,7 +118,7 @@ class CourseGradebook:
         if "optimistic_validation" not in config.Exporter:
             # A notebook is compared with the format once all of a converter's steps are done.
             config.Exporter.optimistic_validation = True
-        index_page.configure(config)
+        index_page.configure_feedback(config)
         self._engines = Engines()
         self.config: Config = config
         self.coursedir = CourseDirectory(config=config)
@@ -126,7 +128,7 @@ class CourseGradebook:
     def generate_assignment(self, assignment: str) -> None:
         """Make the student version of an assignment and enter it into the gradebook."""
         options = {"force": True, "create": True}
-        self._call(self._api.generate_assignment, assignment, options=options)
+        self._call_nbgrader(self._api.generate_assignment, assignment, options=options)
 
     def autograde(self, assignment: str, student: str) -> None:
         """Enter one student's scores.
@@ -136,48 +138,50 @@ class CourseGradebook:
             GradebookUnusable: it could not enter anybody: a full disk, or a lock, say.
         """
         options = {"force": True, "create": True}
-        self._call(self._api.autograde, assignment, student, options=options, of_one_pass=True)
+        self._call_nbgrader(
+            self._api.autograde, assignment, student, options=options, of_one_pass=True
+        )
 
     def generate_feedback(self, assignment: str, student: str) -> None:
         """Write one student's feedback as HTML; raises as `autograde` does."""
         options = {"force": True}
         method = self._api.generate_feedback
-        self._call(method, assignment, student, options=options, of_one_pass=True)
+        self._call_nbgrader(method, assignment, student, options=options, of_one_pass=True)
 
-    def assignments(self) -> list[str]:
+    def assignment_names(self) -> list[str]:
         """Return the assignments that have been released into the gradebook."""
-        with self.opened() as gradebook:
+        with self.open_gradebook() as gradebook:
             return sorted(assignment.name for assignment in gradebook.assignments)
 
-    def notebooks(self, assignment: str) -> list[str]:
+    def notebook_names(self, assignment: str) -> list[str]:
         """Return the notebooks of an assignment that have been released into the gradebook."""
-        with self.opened() as gradebook:
+        with self.open_gradebook() as gradebook:
             return sorted(book.name for book in gradebook.find_assignment(assignment).notebooks)
 
-    def grades(self, assignment: str) -> list[Grade]:
+    def read_grades(self, assignment: str) -> list[Grade]:
         """Return the grades of an assignment, one a student, sorted by student."""
         asked = open_questions.of_assignment(self.root / WORK_FOLDER, assignment)
-        with self.opened() as gradebook:
+        with self.open_gradebook() as gradebook:
             submissions = gradebook.assignment_submissions(assignment)
             return sorted(
-                (_grade(s, asked.get(s.student.id, {})) for s in submissions),
+                (_make_grade(s, asked.get(s.student.id, {})) for s in submissions),
                 key=lambda grade: grade.student,
             )
 
-    def standings(self, assignment: str, student: str = "") -> dict[str, Standing]:
+    def read_standings(self, assignment: str, student: str = "") -> dict[str, Standing]:
         """Return how the students (or one) stand in the gradebook, as digests to compare."""
-        with self.opened() as gradebook:
+        with self.open_gradebook() as gradebook:
             rows = database.standing_rows(gradebook.db, assignment, student)
-        return {name: Standing(*map(_digest, both)) for name, both in rows.items()}
+        return {name: Standing(*map(_digest_rows, both)) for name, both in rows.items()}
 
     @property
-    def zone(self) -> str:
+    def time_zone(self) -> str:
         """The course's own time zone, as its configuration of the exchange has it; or empty."""
         zone = self.config.Exchange.get("timezone", "")
         return zone if isinstance(zone, str) else ""
 
     @property
-    def excluded(self) -> frozenset[str]:
+    def excluded_students(self) -> frozenset[str]:
         """The students whom nbgrader passes over, as the course's configuration says."""
         return frozenset(self.coursedir.student_id_exclude.split(",")) - {""}
 
@@ -208,52 +212,53 @@ class CourseGradebook:
         most = 1000 * course.max_dir_size
         return Limits(tuple(course.ignore), 1000 * course.max_file_size or most, most)
 
-    def roster(self) -> Roster:
+    def read_roster(self) -> Roster:
         """Return which students the gradebook knows, and whether there may be others."""
-        with self.opened() as gradebook:
+        with self.open_gradebook() as gradebook:
             people = {
                 s.id: bool(s.first_name or s.last_name or s.email) for s in gradebook.students
             }
         create = self.config.Autograde.get("create_student", True)
         return roster.of_people(people, create if isinstance(create, bool) else True)
 
-    def _call(
+    def _call_nbgrader(
         self, method: Any, *arguments: Any, options: dict[str, bool], of_one_pass: bool = False
     ) -> None:
         deadline = time.monotonic() + LOCK_PATIENCE
         while True:
-            with _quiet(), self._engines.shared(of_one_pass=of_one_pass):
+            with _quiet_logs(), self._engines.use_engines(of_one_pass=of_one_pass):
                 result = method(*arguments, **options)
             if result["success"]:
                 return
             said = f"{result.get('log', '')}\n{result.get('error') or ''}"
-            raised = self._engines.raised
+            raised = self._engines.raised_errors
             # Each try waits for the lock by itself, so this loop does not spin.
             if not database.is_locked(raised) or time.monotonic() > deadline:
                 break
         if unusable := (
-            database.full(said, self.root, self._written()) or database.unusable(raised, self.root)
+            database.disk_full_error(said, self.root, self._written_folders())
+            or database.unusable_error(raised, self.root)
         ):
             raise unusable
-        why = _why(said)
+        why = _find_cause(said)
         raise GradebookError(
             f"nbgrader's {method.__name__} failed for {' and '.join(arguments)}: {why}", why
         )
 
-    def _written(self) -> list[Path]:
+    def _written_folders(self) -> list[Path]:
         """Return the folders that nbgrader writes to, as far as they are there."""
         names = (self.coursedir.autograded_directory, self.coursedir.feedback_directory)
         folders = [self.root, *(self.root / name for name in names)]
         return [folder for folder in folders if folder.is_dir()]
 
     @contextmanager
-    def opened(self) -> Iterator[Gradebook]:
+    def open_gradebook(self) -> Iterator[Gradebook]:
         """Give nbgrader's own gradebook for the block; raises as `autograde` does."""
         try:
-            database.require_this_schema(self._engines.engine(self.coursedir.db_url), self.root)
+            database.require_this_schema(self._engines.get_engine(self.coursedir.db_url), self.root)
             with (
-                _quiet(),
-                self._engines.shared(),
+                _quiet_logs(),
+                self._engines.use_engines(),
                 Gradebook(self.coursedir.db_url, self.coursedir.course_id) as gradebook,
             ):
                 yield gradebook
@@ -263,13 +268,13 @@ class CourseGradebook:
             ) from None
         except SQLAlchemyError as error:
             said = str(getattr(error, "orig", None) or error)
-            raise database.unusable(said, self.root) or GradebookUnusable(
+            raise database.unusable_error(said, self.root) or GradebookUnusable(
                 f"The gradebook of {self.root} cannot be used ({said.splitlines()[0][:200]}): put "
                 "a copy back that was sound; submissions and outcomes are not touched."
             ) from None
 
 
-def _why(said: str) -> str:
+def _find_cause(said: str) -> str:
     """Return the line of nbgrader's log that names the cause: of a traceback, the last line."""
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     causes = [line for line in lines if re.match(r"[\w.]+(Error|Exception|Entry)\b", line)]
@@ -279,12 +284,12 @@ def _why(said: str) -> str:
     return _OWN_ERROR.sub("", (found or ["no reason given"])[-1])[:300]
 
 
-def _digest(rows: list[list[Any]]) -> str:
+def _digest_rows(rows: list[list[Any]]) -> str:
     ordered = sorted(json.dumps(row, default=str) for row in rows)
     return hashlib.sha256("\n".join(ordered).encode()).hexdigest()
 
 
-def _grade(submission: Any, asked: dict[str, Question]) -> Grade:
+def _make_grade(submission: Any, asked: dict[str, Question]) -> Grade:
     cells: dict[str, dict[str, float | None]] = {}
     for notebook in submission.notebooks:
         cells[notebook.name] = {
@@ -310,7 +315,7 @@ def _grade(submission: Any, asked: dict[str, Question]) -> Grade:
     )
 
 
-def _config(root: Path) -> Config:
+def _load_config(root: Path) -> Config:
     if not (root / CONFIG).is_file():
         raise GradebookError(
             f"There is no {CONFIG} in {root}: name the course root with --root, or start "
@@ -332,7 +337,7 @@ def _first_line(error: Exception) -> str:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def _quiet_logs() -> Iterator[None]:
     """Keep nbgrader's and SQLAlchemy's chatter off the screen.
 
     What nbgrader logs of the database, traceback and all, it raises, too.

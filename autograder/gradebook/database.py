@@ -54,7 +54,7 @@ ROOM = 8 * 1024 * 1024
 """Bytes for which there is room on a disk that is not full: far more than one student needs."""
 
 
-def full(said: str, root: Path, folders: Iterable[Path]) -> DiskFullError | None:
+def disk_full_error(said: str, root: Path, folders: Iterable[Path]) -> DiskFullError | None:
     """Return the sentence for a full disk, if something failed for want of room.
 
     Args:
@@ -64,7 +64,7 @@ def full(said: str, root: Path, folders: Iterable[Path]) -> DiskFullError | None
         folders: where was written.
     """
     failed = any(words in said for words in (*FULL, "disk I/O error"))
-    return _full(root) if failed and not all(map(_has_room, folders)) else None
+    return _full_disk_error(root) if failed and not all(map(_has_room, folders)) else None
 
 
 def _has_room(folder: Path) -> bool:
@@ -81,20 +81,20 @@ def is_locked(said: str) -> bool:
     return "database is locked" in said or "database table is locked" in said
 
 
-def unusable(said: str, root: Path) -> GradebookUnusable | None:
+def unusable_error(said: str, root: Path) -> GradebookUnusable | None:
     """Return the sentence for an error of the database that concerns everybody, if it is one.
 
     ``said`` is what the database itself raised: never a log, in which a student's words may stand.
     """
     if any(words in said for words in FULL):
-        return _full(root)
+        return _full_disk_error(root)
     if is_locked(said):
         return GradebookLockedError(
             f"Another program holds the gradebook of {root}: wait until it is done, or end it, and "
             "run the same command again; what was graded so far is kept."
         )
     if "no such column" in said or "no such table" in said:
-        return _old(root)
+        return _old_gradebook_error(root)
     if "readonly database" in said or "unable to open database file" in said:
         return GradebookUnusable(
             f"The gradebook of {root} cannot be written: make its file and folder writable for "
@@ -126,12 +126,12 @@ def require_this_schema(engine: Engine, root: Path) -> None:
             with engine.connect() as connection:
                 found = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()
         if found != _this_schema():
-            raise _old(root)
+            raise _old_gradebook_error(root)
     finally:
         engine.dispose()
 
 
-def copied(db_url: str, root: Path, copy: Path) -> str:
+def copy_database(db_url: str, root: Path, copy: Path) -> str:
     """Return the URL of a gradebook to try something with: a copy, or a new one for other kinds.
 
     Raises:
@@ -143,7 +143,7 @@ def copied(db_url: str, root: Path, copy: Path) -> str:
             with closing(sqlite3.connect(file)) as old, closing(sqlite3.connect(copy)) as new:
                 old.backup(new)
         except sqlite3.Error as error:
-            raise unusable(str(error), root) or GradebookUnusable(
+            raise unusable_error(str(error), root) or GradebookUnusable(
                 f"The gradebook of {root} cannot be read ({error}): put a copy back that was sound."
             ) from error
     return f"sqlite:///{copy}"
@@ -161,14 +161,14 @@ def _this_schema() -> str | None:
 api.get_alembic_version = _this_schema
 
 
-def _full(root: Path) -> DiskFullError:
+def _full_disk_error(root: Path) -> DiskFullError:
     return DiskFullError(
         f"The disk of {root} is full: make room there and run the same command again; what was "
         "graded so far is kept."
     )
 
 
-def _old(root: Path) -> OldGradebookError:
+def _old_gradebook_error(root: Path) -> OldGradebookError:
     return OldGradebookError(
         f"The gradebook of {root} was made by another version of nbgrader: run `nbgrader db "
         "upgrade` there, which keeps a copy of it, and then the same command again."

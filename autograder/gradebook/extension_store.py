@@ -9,7 +9,7 @@ from pathlib import Path
 
 from filelock import FileLock
 
-from autograder.assignments.intake.file_names import normal
+from autograder.assignments.intake.file_names import normalise_name
 from autograder.files import write_whole
 
 FOLDER = "extensions"
@@ -25,22 +25,22 @@ class WaitingExtensions:
         """Keep them in the engine's folder ``work``."""
         self._path = work / FOLDER / f"{assignment}.json"
 
-    def put(self, student: str, hours: float) -> None:
+    def set_hours(self, student: str, hours: float) -> None:
         """Keep one for a student, or with 0 hours none."""
-        with self._changing() as waiting:
-            waiting.pop(normal(student), None)
+        with self._open_for_change() as waiting:
+            waiting.pop(normalise_name(student), None)
             if hours:
-                waiting[normal(student)] = hours
+                waiting[normalise_name(student)] = hours
 
-    def of(self, student: str) -> float:
+    def hours_for(self, student: str) -> float:
         """Return the hours that wait for a student; 0 if none do."""
         if not self._path.exists():
             return 0.0
-        with self._changing() as waiting:
-            return waiting.get(normal(student), 0.0)
+        with self._open_for_change() as waiting:
+            return waiting.get(normalise_name(student), 0.0)
 
     @contextmanager
-    def _changing(self) -> Iterator[dict[str, float]]:
+    def _open_for_change(self) -> Iterator[dict[str, float]]:
         self._path.parent.mkdir(parents=True, exist_ok=True)
         with FileLock(self._path.with_suffix(".lock")):
             try:

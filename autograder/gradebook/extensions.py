@@ -35,7 +35,7 @@ class Due:
     waits: bool
 
 
-def extend(root: Path, assignment: str, students: list[str], hours: float) -> list[Due]:
+def grant_extensions(root: Path, assignment: str, students: list[str], hours: float) -> list[Due]:
     """Give students so many hours beyond the due date, in place of an earlier extension.
 
     Args:
@@ -53,26 +53,26 @@ def extend(root: Path, assignment: str, students: list[str], hours: float) -> li
         raise ExtensionError(f"An extension has 0 to {MAX_HOURS:g} hours, not {hours:g}.")
     course = CourseGradebook(root)
     waiting = WaitingExtensions(course.work_folder, assignment)
-    known = course.roster()
-    students = [known.student(name) for name in students]
-    with course.opened() as book:
-        due = _due(book, assignment)
+    known = course.read_roster()
+    students = [known.student_id(name) for name in students]
+    with course.open_gradebook() as book:
+        due = _due_date(book, assignment)
         _require_known(known, course.root, students)
         dues = []
         for student in students:
             try:
                 book.grant_extension(assignment, student, hours=hours)
             except MissingEntry:
-                waiting.put(student, hours)
+                waiting.set_hours(student, hours)
                 waits = True
             else:
-                waiting.put(student, 0)
+                waiting.set_hours(student, 0)
                 waits = False
             dues.append(Due(student, due + timedelta(hours=hours), waits))
     return dues
 
 
-def _due(book: Gradebook, assignment: str) -> datetime:
+def _due_date(book: Gradebook, assignment: str) -> datetime:
     try:
         due: datetime | None = book.find_assignment(assignment).duedate
     except MissingEntry:
@@ -91,7 +91,7 @@ def _due(book: Gradebook, assignment: str) -> datetime:
 def _require_known(known: Roster, root: Path, students: list[str]) -> None:
     folders = root / "submitted"
     handed_in = [path.name for path in folders.iterdir()] if folders.is_dir() else []
-    there = {*known.known, *map(known.student, handed_in)}
+    there = {*known.known, *map(known.student_id, handed_in)}
     for student in students:
         if student not in there:
             raise ExtensionError(

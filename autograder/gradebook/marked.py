@@ -22,7 +22,7 @@ from nbgrader.api import Gradebook, MissingEntry
 from autograder.assignments import questions, submission
 from autograder.assignments.questions import Asked
 from autograder.assignments.submission import SubmissionError
-from autograder.files import walk, write_whole
+from autograder.files import walk_files, write_whole
 from autograder.gradebook import staging
 
 FOLDER = "marked"
@@ -61,19 +61,23 @@ def with_copy(scores: Mapping[CellName, float | None], copy: Path) -> MarkedCell
     marked = {cell: Marked(auto) for cell, auto in scores.items()}
     for notebook in {notebook for notebook, _ in scores}:
         try:
-            found = submission.read(copy / f"{notebook}.ipynb")
+            found = submission.read_notebook(copy / f"{notebook}.ipynb")
         except SubmissionError:  # it is gone: nobody can tell
             continue
         for cell in found.cells:
             name = (notebook, submission.grade_id(cell))
-            data = submission.metadata(cell)
+            data = submission.nbgrader_metadata(cell)
             if name in marked and data.get("grade"):
-                content = _answer(cell, copy) if data.get("solution") else _program(found, copy)
+                content = (
+                    _digest_answer(cell, copy)
+                    if data.get("solution")
+                    else _digest_program(found, copy)
+                )
                 marked[name] = replace(marked[name], points=data.get("points"), content=content)
     return marked
 
 
-def changes(before: MarkedCells, after: MarkedCells, *, same: bool) -> dict[CellName, str]:
+def find_changes(before: MarkedCells, after: MarkedCells, *, same: bool) -> dict[CellName, str]:
     """Return {cell: why it must be looked at again}, for those of ``before`` that must be.
 
     ``same`` says that the whole submission is the one that was marked.
@@ -92,7 +96,7 @@ def changes(before: MarkedCells, after: MarkedCells, *, same: bool) -> dict[Cell
     return found
 
 
-def remark(asked: Mapping[str, str]) -> str:
+def describe_changes(asked: Mapping[str, str]) -> str:
     """Return the sentence that says what must be marked again, and why; empty if nothing.
 
     ``asked`` is {what the answer is called: why}.
@@ -132,17 +136,17 @@ class Marks:
             if grade.manual_score is not None and not grade.needs_manual_grade
         }
         # Of a run that was ended in between: its marks are asked for, and the copy may be gone.
-        if before := {**self.kept(student), **with_copy(scores, copy)}:
+        if before := {**self.remembered_cells(student), **with_copy(scores, copy)}:
             rows = [[*name, asdict(marked)] for name, marked in before.items()]
             data = {"version": VERSION, "student": student, "cells": rows}
-            write_whole(self._path(student), json.dumps(data))
+            write_whole(self._record_path(student), json.dumps(data))
 
     def settle(self, book: Gradebook, student: str, copy: Path, *, same: bool) -> str:
         """Take the marks of what is still the same for good again, once a student is entered.
 
         Return the sentence that says what is to be marked again, and why; empty if nothing.
         """
-        before = self.kept(student)
+        before = self.remembered_cells(student)
         if not before:
             return ""
         grades = {}
@@ -150,58 +154,58 @@ class Marks:
             with suppress(MissingEntry):  # the assignment has lost the cell since
                 grades[notebook, cell] = book.find_grade(cell, notebook, self._assignment, student)
         scores = {name: grade.auto_score for name, grade in grades.items()}
-        asked = changes(before, with_copy(scores, copy), same=same)
+        asked = find_changes(before, with_copy(scores, copy), same=same)
         for name, grade in grades.items():
             if name not in asked and grade.manual_score is not None:
                 grade.needs_manual_grade = False
         book.db.commit()
-        self._path(student).unlink(missing_ok=True)
-        return remark({
-            questions.called(self._questions, *name): why
+        self._record_path(student).unlink(missing_ok=True)
+        return describe_changes({
+            questions.describe_cell(self._questions, *name): why
             for name, why in asked.items()
         })  # fmt: skip
 
-    def kept(self, student: str) -> MarkedCells:
+    def remembered_cells(self, student: str) -> MarkedCells:
         """Return what is remembered of a student who is not entered yet."""
         try:
-            data = json.loads(self._path(student).read_text(encoding="utf-8"))
+            data = json.loads(self._record_path(student).read_text(encoding="utf-8"))
             if (data["version"], data["student"]) != (VERSION, student):
                 return {}
             return {(notebook, cell): Marked(**marked) for notebook, cell, marked in data["cells"]}
         except (OSError, ValueError, KeyError, TypeError):
             return {}
 
-    def _path(self, student: str) -> Path:
+    def _record_path(self, student: str) -> Path:
         name = hashlib.sha256(student.encode(errors="surrogateescape")).hexdigest()[:32]
         return self._folder / f"{name}.json"
 
 
-def _answer(cell: NotebookNode, folder: Path) -> str:
+def _digest_answer(cell: NotebookNode, folder: Path) -> str:
     """Return a digest of an answer: its text, and the pictures and files that it names."""
     attached = json.dumps(cell.get("attachments", {}), sort_keys=True)
     text = unquote(cell.source)
-    named = [path for path in _beside(folder) if path.name in text]
-    return _digest([cell.source.strip(), attached], named)
+    named = [path for path in _files_beside(folder) if path.name in text]
+    return _digest_contents([cell.source.strip(), attached], named)
 
 
-def _program(notebook: NotebookNode, folder: Path) -> str:
+def _digest_program(notebook: NotebookNode, folder: Path) -> str:
     """Return a digest of all that a student's code is."""
     code = [
         cell.source
         for cell in notebook.cells
         if cell.cell_type == "code" and not submission.is_locked(cell)
     ]
-    return _digest(code, _beside(folder))
+    return _digest_contents(code, _files_beside(folder))
 
 
-def _beside(folder: Path) -> list[Path]:
+def _files_beside(folder: Path) -> list[Path]:
     """Return the files beside the notebooks that are a student's work."""
     others = (staging.TIME, staging.SECRET)
-    paths = (p for p in walk(folder) if p.suffix != ".ipynb" and p.name not in others)
+    paths = (p for p in walk_files(folder) if p.suffix != ".ipynb" and p.name not in others)
     return sorted(path for path in paths if path.is_file())
 
 
-def _digest(texts: Iterable[str], files: Iterable[Path]) -> str:
+def _digest_contents(texts: Iterable[str], files: Iterable[Path]) -> str:
     state = hashlib.sha256(json.dumps(list(texts)).encode())
     for path in files:
         state.update(os.fsencode(path.name) + b"\0" + path.read_bytes())

@@ -32,17 +32,17 @@ class ShowModelAnswers(Preprocessor):
         """Put them into ``nb`` if it is the formgrader that shows it; else change nothing."""
         if not FORMGRADER_KEYS.issubset(resources):
             return nb, resources
-        asked = self._asked(str(resources["assignment_id"]), str(resources["notebook_id"]))
+        asked = self._load_questions(str(resources["assignment_id"]), str(resources["notebook_id"]))
         cells = []
         for cell in nb.cells:
             question = asked.get(submission.grade_id(cell))
             if question and question.model:
-                cells.append(new_markdown_cell(_shown(question)))  # type: ignore[no-untyped-call]
+                cells.append(new_markdown_cell(_model_answer_html(question)))  # type: ignore[no-untyped-call]
             cells.append(cell)
         nb.cells = cells
         return nb, resources
 
-    def _asked(self, assignment: str, notebook: str) -> dict[str, Question]:
+    def _load_questions(self, assignment: str, notebook: str) -> dict[str, Question]:
         coursedir = CourseDirectory(config=self.config)
         try:
             return questions.of_assignment(coursedir, assignment).get(notebook, {})
@@ -51,19 +51,21 @@ class ShowModelAnswers(Preprocessor):
             return {}
 
 
-def _shown(question: Question) -> str:
+def _model_answer_html(question: Question) -> str:
     """Return a model answer as HTML that Markdown leaves as it is: it has no empty line."""
     parts = [("Model answer", question.model), ("The points, as students read it", question.rules)]
     shown = "".join(
-        f"<strong>{heading}</strong>{_rendered(text)}" for heading, text in parts if text
+        f"<strong>{heading}</strong>{_render_markdown(text)}" for heading, text in parts if text
     )
     style = "border-left: .3rem solid #009e73; padding: .2rem .8rem; background: #f0faf6"
     shown = "\n".join(line for line in shown.splitlines() if line.strip())
     return f'<div class="model-answer" style="{style}">{shown}</div>'
 
 
-def _rendered(markdown: str) -> str:
+def _render_markdown(markdown: str) -> str:
     try:
-        return rendering.block(markdown, Path("/nonexistent"))  # these texts have no pictures
+        return rendering.render_block(
+            markdown, Path("/nonexistent")
+        )  # these texts have no pictures
     except rendering.RenderError:
         return f"<pre>{escape(markdown)}</pre>"

@@ -96,7 +96,7 @@ class FeedbackExporter(HTMLExporter):
         close the tags that were left open. What is formatted here has both already.
         """
         self._texts = Page()
-        self.filters["highlight_code"] = self._coloured
+        self.filters["highlight_code"] = self._colour_code
         with _in_place(nbconvert.exporters.html, "BeautifulSoup", _AsItIs):
             page, resources = super().from_notebook_node(nb, resources, **more)
         folder = resources.get("metadata", {}).get("path")
@@ -108,29 +108,29 @@ class FeedbackExporter(HTMLExporter):
             if cell.cell_type == "raw":
                 cell.source = html.escape(cell.source)
             elif cell.cell_type == "code" and not cell.metadata.get("nbgrader", {}).get("grade"):
-                cell.outputs = [self._screened(output) for output in cell.outputs]
-        resources["feedback"] = feedback_page.describe(nb, resources, self.parent)
+                cell.outputs = [self._screen_output(output) for output in cell.outputs]
+        resources["feedback"] = feedback_page.describe_feedback(nb, resources, self.parent)
         return nb, resources
 
     def default_filters(self) -> Iterator[tuple[str, Any]]:
         """Give nbconvert's filters, the slow ones made elsewhere and with bounds."""
         yield from super().default_filters()  # type: ignore[no-untyped-call]
-        yield "markdown2html", self._formatted
-        yield "strip_files_prefix", _same  # it is done where the rest is done
+        yield "markdown2html", self._format_markdown
+        yield "strip_files_prefix", _return_unchanged  # it is done where the rest is done
 
     @pass_context
-    def _formatted(self, context: Any, text: str) -> str:
+    def _format_markdown(self, context: Any, text: str) -> str:
         attachments = context.get("cell", {}).get("attachments", {})
-        made = self._texts.markdown(text, attachments)
+        made = self._texts.format_markdown(text, attachments)
         return _as_typed(text) if made is None else made
 
-    def _coloured(self, text: str, language: Any = None, metadata: Any = None) -> str:
+    def _colour_code(self, text: str, language: Any = None, metadata: Any = None) -> str:
         chosen = language or (metadata or {}).get("magics_language") or "ipython3"
-        made = self._texts.code(text or " ", str(chosen))
+        made = self._texts.highlight_code(text or " ", str(chosen))
         return _as_typed(text) if made is None else made
 
-    def _screened(self, output: NotebookNode) -> NotebookNode:
-        return from_dict(allowed_html.screened(output, self._texts))  # type: ignore[no-untyped-call,no-any-return]
+    def _screen_output(self, output: NotebookNode) -> NotebookNode:
+        return from_dict(allowed_html.screen_output(output, self._texts))  # type: ignore[no-untyped-call,no-any-return]
 
     def _create_environment(self) -> Environment:
         environment: Environment = super()._create_environment()  # type: ignore[no-untyped-call]
@@ -153,12 +153,12 @@ class FeedbackExporter(HTMLExporter):
             cls().from_notebook_node(notebook)
 
 
-def _same(text: str) -> str:
+def _return_unchanged(text: str) -> str:
     return text
 
 
 def _as_typed(text: str) -> str:
-    return f"<p><em>{TOO_LONG}</em></p><pre>{html.escape(allowed_html.shortened(text))}</pre>"
+    return f"<p><em>{TOO_LONG}</em></p><pre>{html.escape(allowed_html.shorten_text(text))}</pre>"
 
 
 class _AsItIs(str):
@@ -232,11 +232,11 @@ def _finds_at_once(find: Callable[..., Any], rows: Rows) -> Callable[..., Any]:
     return find_kept
 
 
-def _grades(db: Any, where: tuple[str, ...]) -> Iterable[tuple[str, Any]]:
+def _query_grades(db: Any, where: tuple[str, ...]) -> Iterable[tuple[str, Any]]:
     return _of_a_submission(db, Grade, *where)
 
 
-def _comments(db: Any, where: tuple[str, ...]) -> Iterable[tuple[str, Any]]:
+def _query_comments(db: Any, where: tuple[str, ...]) -> Iterable[tuple[str, Any]]:
     return _of_a_submission(db, Comment, *where)
 
 
@@ -270,7 +270,7 @@ def _source_cells(db: Any, where: tuple[str, ...]) -> Iterable[tuple[str, Any]]:
 
 
 FINDS = {
-    "find_grade": _grades, "find_comment": _comments, "find_source_cell": _source_cells,
+    "find_grade": _query_grades, "find_comment": _query_comments, "find_source_cell": _source_cells,
 }  # fmt: skip
 """What nbgrader asks a gradebook for, cell by cell, and what answers for all cells at once."""
 
@@ -285,20 +285,20 @@ class Engines:
         self._raised: list[str] = []
 
     @property
-    def raised(self) -> str:
+    def raised_errors(self) -> str:
         """What the database raised since nbgrader last began to use these engines."""
         return "\n".join(self._raised)
 
-    def engine(self, url: str, **options: Any) -> Any:
+    def get_engine(self, url: str, **options: Any) -> Any:
         """Return the engine for ``url``; ``options`` are those of `sqlalchemy.create_engine`."""
         if url not in self._engines:
             engine = sqlalchemy.create_engine(url, **{"future": True, **options})
-            sqlalchemy.event.listen(engine, "handle_error", self._note)
+            sqlalchemy.event.listen(engine, "handle_error", self._note_error)
             self._engines[url] = engine
         return self._engines[url]
 
     @contextmanager
-    def shared(self, *, of_one_pass: bool = False) -> Iterator[None]:
+    def use_engines(self, *, of_one_pass: bool = False) -> Iterator[None]:
         """Have nbgrader use these engines. What it closes, an engine opens again when needed.
 
         Args:
@@ -314,12 +314,12 @@ class Engines:
             course_id: str = "default_course",
             authenticator: Any = None,
         ) -> None:
-            known = self._place(db_url, course_id)
+            known = self._identify_course(db_url, course_id)
             if known is None or known not in self._found:
                 _open(gradebook, db_url, course_id, authenticator)
-                self._found.add(self._place(db_url, course_id))
+                self._found.add(self._identify_course(db_url, course_id))
                 return
-            gradebook.engine = self.engine(db_url)
+            gradebook.engine = self.get_engine(db_url)
             session = sessionmaker(
                 bind=gradebook.engine, future=True, expire_on_commit=not of_one_pass
             )
@@ -327,7 +327,7 @@ class Engines:
             gradebook.course_id, gradebook.authenticator = course_id, authenticator
 
         with (
-            _in_place(nbgrader.api, "create_engine", self.engine),
+            _in_place(nbgrader.api, "create_engine", self.get_engine),
             _in_place(Gradebook, "__init__", open_),
             _in_place(nbgraderformat.common, "jsonschema", _schemas),
             ExitStack() as finds,
@@ -337,15 +337,15 @@ class Engines:
                 finds.enter_context(_in_place(Gradebook, name, find))
             yield
 
-    def _place(self, url: str, course: str) -> tuple[object, ...] | None:
+    def _identify_course(self, url: str, course: str) -> tuple[object, ...] | None:
         """Return which course in which file is meant, if it is there: it may be replaced."""
         try:
-            status = Path(self.engine(url).url.database or "").stat()
+            status = Path(self.get_engine(url).url.database or "").stat()
         except OSError:
             return None
         return url, course, status.st_dev, status.st_ino
 
-    def _note(self, context: Any) -> None:
+    def _note_error(self, context: Any) -> None:
         # An entry that contradicts another one says nothing about the database.
         if not isinstance(context.sqlalchemy_exception, (IntegrityError, DataError)):
             self._raised.append(str(context.original_exception))

@@ -21,13 +21,13 @@ def rule_digest(config: Config) -> str:
     plugin: type[Any] = AssignLatePenalties(config=config).plugin_class
     classes = [AssignLatePenalties, *plugin.__mro__]
     settings = {kind.__name__: dict(config.get(kind.__name__, {})) for kind in classes}
-    state = hashlib.sha256(json.dumps(settings, sort_keys=True, default=_named).encode())
+    state = hashlib.sha256(json.dumps(settings, sort_keys=True, default=_qualified_name).encode())
     for kind in plugin.__mro__:
-        state.update(_named(kind).encode() + b"\0" + _code(kind) + b"\0")
+        state.update(_qualified_name(kind).encode() + b"\0" + _source_bytes(kind) + b"\0")
     return state.hexdigest()
 
 
-def lateness(seconds: float) -> str:
+def lateness_text(seconds: float) -> str:
     """Return how late something came, as people say it; empty if it was in time."""
     if seconds <= 0:
         return ""
@@ -39,7 +39,7 @@ def lateness(seconds: float) -> str:
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min"
 
 
-def _code(kind: type[Any]) -> bytes:
+def _source_bytes(kind: type[Any]) -> bytes:
     try:
         file = inspect.getsourcefile(kind)
         return Path(file).read_bytes() if file else b""
@@ -47,7 +47,7 @@ def _code(kind: type[Any]) -> bytes:
         return b""
 
 
-def _named(value: object) -> str:
+def _qualified_name(value: object) -> str:
     """Return what stands for a value that JSON does not have, the same in every process."""
     kind = value if isinstance(value, type) or callable(value) else type(value)
     return f"{getattr(kind, '__module__', '')}.{getattr(kind, '__qualname__', '')}"

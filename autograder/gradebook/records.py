@@ -50,12 +50,14 @@ class Record:
     unreadable: bool = False
 
 
-def path(work: Path, assignment: str, student: str, notebook: str) -> Path:
+def record_path(work: Path, assignment: str, student: str, notebook: str) -> Path:
     """Return where a record lies in the engine's work folder."""
     return work / FOLDER / assignment / student / f"{notebook}.json"
 
 
-def keep(work: Path, assignment: str, student: str, notebook: str, outcome: Outcome) -> None:
+def write_record(
+    work: Path, assignment: str, student: str, notebook: str, outcome: Outcome
+) -> None:
     """Write the record of an outcome in place of an earlier one; raises OSError if it cannot."""
     data = {
         "version": VERSION,
@@ -64,16 +66,18 @@ def keep(work: Path, assignment: str, student: str, notebook: str, outcome: Outc
         "seconds": outcome.seconds,
         "unreadable": outcome.unreadable,
     }
-    write_whole(path(work, assignment, student, notebook), json.dumps(data, ensure_ascii=False))
+    write_whole(
+        record_path(work, assignment, student, notebook), json.dumps(data, ensure_ascii=False)
+    )
 
 
-def load(work: Path, assignment: str, student: str, notebook: str) -> Record | None:
+def load_record(work: Path, assignment: str, student: str, notebook: str) -> Record | None:
     """Return a record, or None if there is none.
 
     Raises:
         RecordError: there is one, and it cannot be read.
     """
-    file = path(work, assignment, student, notebook)
+    file = record_path(work, assignment, student, notebook)
     try:
         if not file.is_file():
             return None

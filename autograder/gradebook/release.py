@@ -14,7 +14,7 @@ from nbformat import NotebookNode
 
 from autograder import exercise_folders
 from autograder.assignments import cells
-from autograder.assignments.submission import grade_id, metadata
+from autograder.assignments.submission import grade_id, nbgrader_metadata
 from autograder.files import NOT_COUNTED
 from course.errors import CourseError
 from course.util.files import PARTIAL
@@ -27,7 +27,7 @@ class ReleaseError(CourseError):
     """An assignment that cannot be released; the message says why and what to do."""
 
 
-def release(root: Path, assignment: str) -> Path:
+def make_release(root: Path, assignment: str) -> Path:
     """Write the student version of ``assignment`` to ``release/``; return its folder.
 
     The release holds the notebooks, the questions of closed quizzes, the exams of the course's own
@@ -56,7 +56,7 @@ def release(root: Path, assignment: str) -> Path:
         try:
             # First with a copy of the gradebook: nbgrader changes it notebook by notebook.
             CourseGradebook(root, trial=place).generate_assignment(assignment)
-            if found := leaks(source, place / assignment, beside):
+            if found := find_leaks(source, place / assignment, beside):
                 raise ReleaseError(
                     f"'{assignment}' is not released, because in the release {found[0]}: correct "
                     "the text that it is built from, then build and release again."
@@ -75,7 +75,9 @@ def release(root: Path, assignment: str) -> Path:
     return released
 
 
-def leaks(source: Path, released: Path, beside: Mapping[Path, bytes] | None = None) -> list[str]:
+def find_leaks(
+    source: Path, released: Path, beside: Mapping[Path, bytes] | None = None
+) -> list[str]:
     """Return what a released assignment gives away or lacks, one phrase each; empty if sound.
 
     Args:
@@ -96,13 +98,13 @@ def leaks(source: Path, released: Path, beside: Mapping[Path, bytes] | None = No
     found = changed + [f"it holds the file {name}" for name in sorted(files - names)]
     found += [f"{name} is missing from it" for name in sorted(names - files)]
     for name in sorted(names & files):
-        notebook = _read(released / name)
-        secret = _secret_lines(_read(source / name))
+        notebook = _read_notebook(released / name)
+        secret = _secret_lines(_read_notebook(source / name))
         found += [f"{name}, {phrase}" for phrase in _notebook_leaks(notebook, secret)]
     return found
 
 
-def _read(path: Path) -> NotebookNode:
+def _read_notebook(path: Path) -> NotebookNode:
     try:
         notebook: NotebookNode = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
@@ -130,10 +132,10 @@ def _secret_lines(source: NotebookNode) -> set[str]:
     secret: set[str] = set()
     given: set[str] = set()
     for cell in source.cells:
-        data = metadata(cell)
+        data = nbgrader_metadata(cell)
         # nbgrader replaces the whole of a solution cell that marks no region.
         whole = bool(data.get("solution")) and not cells.has_marker(cell.source)
-        for marker, line in cells.regions(cell.source):
+        for marker, line in cells.marked_lines(cell.source):
             (secret if whole or marker else given).add(line.strip())
     return secret - given - {""}
 
@@ -144,7 +146,7 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
 
     folder = root / "source" / assignment
     known = sorted({p.parent.name for p in (root / "source").glob("*/*.ipynb")})
-    authored = listing.names(root)
+    authored = listing.assignment_names(root)
     if assignment in authored and assignment not in known:
         raise ReleaseError(
             f"The assignment '{assignment}' has not been built: run `autograder build` first."
@@ -155,7 +157,7 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
             f"{', '.join(sorted(authored | set(known))) or 'none yet'}."
         )
     paths = sorted(folder.glob("*.ipynb"))
-    listed = listing.one(root, assignment) if assignment in authored else None
+    listed = listing.read_assignment(root, assignment) if assignment in authored else None
     orphans = [path for path in paths if listed is not None and path.stem not in listed.texts]
     if orphans:
         raise ReleaseError(
@@ -163,7 +165,7 @@ def _check_source(root: Path, assignment: str) -> dict[Path, bytes]:
             f"{root / listing.ASSIGNMENTS}: remove it, or list its exercise there, then build and "
             "release again."
         )
-    notebooks = [_read(path) for path in paths]
+    notebooks = [_read_notebook(path) for path in paths]
     exams = listing.exam_files(listed) if listed is not None else {}
     for name, content in exams.items():
         if cells.has_marker(content.decode(errors="replace")):

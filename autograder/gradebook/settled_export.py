@@ -15,7 +15,7 @@ from nbgrader.api import Gradebook, MissingEntry
 from nbgrader.plugins import CsvExportPlugin
 
 from autograder.assignments.intake import open_questions, roster
-from autograder.assignments.intake.file_names import listed, normal
+from autograder.assignments.intake.file_names import join_names, normalise_name
 from autograder.assignments.intake.roster import Roster
 from autograder.gradebook.bridge import WORK_FOLDER
 
@@ -26,14 +26,16 @@ class SettledExport(CsvExportPlugin):  # type: ignore[misc]  # nbgrader ships no
     def export(self, gradebook: Gradebook) -> None:
         """Write the file, and say who is left out."""
         root = Path(self.parent.coursedir.root)
-        open_ = {a.name: _open(gradebook, root, a.name) for a in gradebook.assignments}
+        open_ = {
+            a.name: _unsettled_students(gradebook, root, a.name) for a in gradebook.assignments
+        }
         super().export(_Settled(gradebook, open_))
         for assignment, students in open_.items():
             if students:
                 self.log.warning(
                     "Left out of %s: %s, of whom it is not clear what was handed in. "
                     "`autograder grade %s` says what to do.",
-                    assignment, listed(sorted(students)), assignment,
+                    assignment, join_names(sorted(students)), assignment,
                 )  # fmt: skip
 
 
@@ -53,13 +55,13 @@ class _Settled:
 
     @property
     def students(self) -> list[Any]:
-        return [s for s in self._gradebook.students if normal(s.id) not in self._left_out]
+        return [s for s in self._gradebook.students if normalise_name(s.id) not in self._left_out]
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._gradebook, name)
 
 
-def _open(gradebook: Gradebook, root: Path, assignment: str) -> set[str]:
+def _unsettled_students(gradebook: Gradebook, root: Path, assignment: str) -> set[str]:
     """Return the students of whom it is not clear what they handed in for an assignment."""
     found = set()
     for student, questions in open_questions.of_assignment(root / WORK_FOLDER, assignment).items():
@@ -77,5 +79,5 @@ def _open(gradebook: Gradebook, root: Path, assignment: str) -> set[str]:
         if open_questions.open_ones(questions, waiting):
             found.add(student)
     names = [each.name for each in gradebook.assignments]
-    _, misplaced = roster.submissions(root, assignment, Roster(), names)
-    return set(map(normal, found | misplaced.keys()))
+    _, misplaced = roster.find_submissions(root, assignment, Roster(), names)
+    return set(map(normalise_name, found | misplaced.keys()))

@@ -17,8 +17,8 @@ from pathlib import Path
 from secrets import token_hex
 
 from autograder.assignments.intake import roster
-from autograder.assignments.intake.attachments import named
-from autograder.files import walk
+from autograder.assignments.intake.attachments import summarise_names
+from autograder.files import walk_files
 from autograder.gradebook.safe_html import allowed_html
 from quizzes.record import read_plain
 
@@ -62,21 +62,25 @@ class _LeftOut:
     active: list[str] = field(default_factory=list)
     too_many: int = 0
 
-    def sentences(self) -> list[str]:
+    def as_sentences(self) -> list[str]:
         """Return what a person should know of it."""
         what = "in the graded copy and the feedback"
         found = []
         if self.links:
-            found.append(f"{named(self.links)} is missing {what}: a link is not followed.")
+            found.append(
+                f"{summarise_names(self.links)} is missing {what}: a link is not followed."
+            )
         if self.too_large:
-            found.append(f"{named(self.too_large)} is missing {what}: it is too large.")
+            found.append(f"{summarise_names(self.too_large)} is missing {what}: it is too large.")
         if self.unreadable:
             found.append(
-                f"{named(self.unreadable)} is missing {what}: make it readable, then grade again."
+                f"{summarise_names(self.unreadable)} is missing {what}: make it readable, then "
+                "grade again."
             )
         if self.active:
             found.append(
-                f"{named(self.active)} has {AS_TEXT} after its name {what}: a browser would run it."
+                f"{summarise_names(self.active)} has {AS_TEXT} after its name {what}: a browser "
+                "would run it."
             )
         if self.too_many:
             found.append(f"{self.too_many} files are missing {what}: {MAX_STAGED} are copied.")
@@ -89,16 +93,16 @@ def copy_marks(submitted: Path, staged: Path, zone: str = "") -> None:
     What came through the exchange has both, and nbgrader releases nobody's feedback if one student
     lacks either. So a time that is not clear is left empty, which nbgrader takes for unknown, and
     for a secret that is not sound there is one that nobody knows: nobody else's page is found by
-    it. ``zone`` is the course's own time zone (see `roster.timestamp`).
+    it. ``zone`` is the course's own time zone (see `roster.read_timestamp`).
     """
     if not any(os.path.lexists(submitted / name) for name in (TIME, SECRET)):
         return
-    time = roster.timestamp(submitted / TIME, zone)
+    time = roster.read_timestamp(submitted / TIME, zone)
     (staged / TIME).write_text(time or "", encoding="utf-8")
-    (staged / SECRET).write_bytes(_secret(submitted / SECRET) or token_hex().encode())
+    (staged / SECRET).write_bytes(_read_secret(submitted / SECRET) or token_hex().encode())
 
 
-def _secret(path: Path) -> bytes:
+def _read_secret(path: Path) -> bytes:
     """Return the exchange's secret; nothing if there is none that is sound."""
     try:
         secret = read_plain(path, MAX_SECRET + 1)
@@ -124,7 +128,7 @@ def copy_files(
     """
     pages = {f"{name}.html" for name in notebooks}
     left_out, room, count = _LeftOut(), limits.max_all, 0
-    for path in sorted(walk(submitted)):
+    for path in sorted(walk_files(submitted)):
         name = path.relative_to(submitted)
         if _is_passed_over(name, limits.ignored, pages):
             continue
@@ -147,7 +151,7 @@ def copy_files(
             shutil.copyfile(path, staged / name, follow_symlinks=False)
             room -= status.st_size
             count += 1
-    return left_out.sentences()
+    return left_out.as_sentences()
 
 
 def copy_around(
@@ -187,9 +191,9 @@ def _is_passed_over(name: Path, ignored: Iterable[str], pages: set[str]) -> bool
     first = name.parts[0]
     if first in (TIME, SECRET) or (first in pages and len(name.parts) > 1):
         return True
-    return any(_matches(part, (*ignored, "*.ipynb")) for part in name.parts)
+    return any(_is_match(part, (*ignored, "*.ipynb")) for part in name.parts)
 
 
-def _matches(part: str, patterns: Iterable[str]) -> bool:
+def _is_match(part: str, patterns: Iterable[str]) -> bool:
     """Whether a name is one of ``patterns``, of which none but a hidden one is for hidden names."""
     return any(fnmatch(part, p) and (part[0] != "." or p[0] == ".") for p in patterns)

@@ -94,44 +94,44 @@ def grade(
         StoreError: there is no room for what came out.
         Stopped: a signal ended the run; what was graded is kept.
     """
-    exercise_folders.use(root)
+    exercise_folders.use_course(root)
     gradebook = CourseGradebook(root, staged=STAGED)
-    names = _notebooks(gradebook, assignment)
-    known = gradebook.roster()
-    students = sorted({known.student(name) for name in students})
-    found, wrong = _students(gradebook, assignment, known, students)
+    names = _released_notebooks(gradebook, assignment)
+    known = gradebook.read_roster()
+    students = sorted({known.student_id(name) for name in students})
+    found, wrong = _submitted_students(gradebook, assignment, known, students)
     if not trust and not scheduler:
         sandbox.warm_up()
-        sandbox.require()
+        sandbox.require_sandbox()
     page_texts.warm_up()
     refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
-    refused += [Graded(s, {}, problem=EXCLUDED) for s in found if s in gradebook.excluded]
-    found = [s for s in found if s not in gradebook.excluded]
+    refused += [Graded(s, {}, problem=EXCLUDED) for s in found if s in gradebook.excluded_students]
+    found = [s for s in found if s not in gradebook.excluded_students]
     store = OutcomeStore(root / bridge.WORK_FOLDER / "outcomes", trust=trust, hidden=[root])
     with ExitStack() as stack:
-        stack.enter_context(_alone(root))
+        stack.enter_context(_lock_course(root))
         stack.callback(progress.end)
-        files.sweep()
+        files.sweep_scratch()
         files.remove_partial(root / bridge.WORK_FOLDER)
-        workers = stack.enter_context(_workers(jobs, store, trust, scheduler, root, progress))
+        workers = stack.enter_context(_make_workers(jobs, store, trust, scheduler, root, progress))
         interruption = stack.enter_context(Interruption(workers.wake))
         intake = SubmissionIntake(gradebook, assignment, names, trust=trust)
         whole = FreshRun(intake.work_folder, assignment)
         fresh_run = FreshRun(intake.work_folder, assignment, students) if students else whole
-        if fresh_run.since:
+        if fresh_run.began_ns:
             progress.say("Going on with the run with --fresh that was ended before it was through.")
         if fresh:
             fresh_run.begin()
         run = GradingRun(
             intake, store, workers, interruption, progress, feedback=feedback,
-            since=max(fresh_run.since, whole.since),
+            since=max(fresh_run.began_ns, whole.began_ns),
         )  # fmt: skip
         graded = [*refused, *run.grade(found, refused)]
         fresh_run.end()
     return sorted(graded, key=lambda item: item.student)
 
 
-def _workers(
+def _make_workers(
     count: int, store: OutcomeStore, trust: bool, scheduler: str, root: Path, progress: Progress
 ) -> Workers:
     def keep(job: Job, result: Result) -> None:
@@ -145,7 +145,7 @@ def _workers(
 
 
 @contextmanager
-def _alone(root: Path) -> Iterator[None]:
+def _lock_course(root: Path) -> Iterator[None]:
     """Hold the course for this engine; the kernel lets it go when the process ends, however."""
     path = root / LOCK
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -159,10 +159,10 @@ def _alone(root: Path) -> Iterator[None]:
         ) from None
 
 
-def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
+def _released_notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
     """Return the notebooks of a released assignment, or say what is missing."""
-    known = gradebook.assignments()
-    released = gradebook.notebooks(assignment) if assignment in known else []
+    known = gradebook.assignment_names()
+    released = gradebook.notebook_names(assignment) if assignment in known else []
     if not released:
         sources = sorted(
             path.name for path in (gradebook.root / "source").glob("*") if path.is_dir()
@@ -179,15 +179,17 @@ def _notebooks(gradebook: CourseGradebook, assignment: str) -> list[str]:
     return released
 
 
-def _students(
+def _submitted_students(
     gradebook: CourseGradebook, assignment: str, known: Roster, only: Collection[str]
 ) -> tuple[list[str], dict[str, str]]:
     """Return who has submitted, and what is wrong with the folders that cannot be graded.
 
     ``only`` are the ids of the students that are meant; all if there are none.
     """
-    students, wrong = roster.submissions(gradebook.root, assignment, known, gradebook.assignments())
-    there = {*students, *map(known.student, wrong)}
+    students, wrong = roster.find_submissions(
+        gradebook.root, assignment, known, gradebook.assignment_names()
+    )
+    there = {*students, *map(known.student_id, wrong)}
     for student in only:
         if student not in there:
             raise AssignmentError(
@@ -201,5 +203,5 @@ def _students(
         )
     if not only:
         return students, wrong
-    wrong = {name: problem for name, problem in wrong.items() if known.student(name) in only}
+    wrong = {name: problem for name, problem in wrong.items() if known.student_id(name) in only}
     return [student for student in students if student in only], wrong

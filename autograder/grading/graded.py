@@ -13,8 +13,8 @@ class Graded:
 
     Attributes:
         student: whose it is.
-        outcomes: by notebook; only what `Progress.done` is told has them, because a class's would
-            fill the memory.
+        outcomes: by notebook; only what `Progress.submission_done` is told has them, because a
+            class's would fill the memory.
         points: automatic points, of ``max_points``.
         seconds: wall time that its notebooks ran.
         problem: what is wrong with it, in sentences.

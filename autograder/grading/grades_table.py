@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping
 
 from rich.table import Table
 
-from autograder.assignments.intake.file_names import shown
+from autograder.assignments.intake.file_names import printable_name
 from autograder.gradebook.course_gradebook import Grade
-from autograder.gradebook.penalties import lateness
+from autograder.gradebook.penalties import lateness_text
 
 
-def table(grades: Iterable[Grade], problems: Mapping[str, str]) -> Table:
+def make_table(grades: Iterable[Grade], problems: Mapping[str, str]) -> Table:
     """Return a row a student; how late, and what that costs, if somebody was late.
 
     Args:
@@ -24,13 +24,16 @@ def table(grades: Iterable[Grade], problems: Mapping[str, str]) -> Table:
     made = Table("Student", "Score", *more, "Needs a person", "Remark")
     for grade in grades:
         score = "?" if grade.asked else f"{grade.score:g}"
-        cells = [shown(grade.student), f"{score} of {grade.max_score:g}"]
+        cells = [printable_name(grade.student), f"{score} of {grade.max_score:g}"]
         if late:
-            cells += [lateness(grade.seconds_late), f"-{grade.penalty:g}" if grade.penalty else ""]
+            cells += [
+                lateness_text(grade.seconds_late),
+                f"-{grade.penalty:g}" if grade.penalty else "",
+            ]
         needs = "yes" if grade.needs_manual_grade else ""
         remark = problems.get(grade.student, "") or " ".join(grade.asked.values())
         made.add_row(*cells, needs, remark)
     for student in sorted(problems.keys() - {grade.student for grade in grades}):
         empty = ["" for _ in more]
-        made.add_row(shown(student), "none", *empty, "yes", problems[student])
+        made.add_row(printable_name(student), "none", *empty, "yes", problems[student])
     return made

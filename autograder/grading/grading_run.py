@@ -21,7 +21,7 @@ from autograder.running import ledger
 from autograder.running.interruption import Interruption
 from autograder.running.ledger import Entry, Ledger, Standing
 from autograder.running.outcome_store import OutcomeStore, StoreError
-from autograder.running.resource_errors import is_full, passes
+from autograder.running.resource_errors import is_full, is_temporary
 from autograder.running.runner import Outcome
 from autograder.running.workers import Done, Workers
 from autograder.sandbox import SandboxError
@@ -57,7 +57,7 @@ class GradingRun:
             interruption: says when to stop.
             progress: is told how it goes.
             feedback: write HTML feedback, too.
-            since: take nothing from earlier runs that is older (see `FreshRun.since`).
+            since: take nothing from earlier runs that is older (see `FreshRun.began_ns`).
         """
         self._intake = intake
         self._store = store
@@ -67,7 +67,7 @@ class GradingRun:
         self._feedback, self._since = feedback, since
         self._ledger = Ledger(intake.work_folder, intake.assignment)
         self._course = ledger.of_course(
-            intake.root, intake.folders, workers.modes[0], intake.exams,
+            intake.root, intake.assignment_folders, workers.modes[0], intake.exam_names,
             intake.gradebook.late_rule,
         )  # fmt: skip
         self._running: dict[str, list[NotebookRun]] = {}
@@ -80,29 +80,29 @@ class GradingRun:
 
         ``refused`` are submissions that cannot be graded: progress is told about them, too.
         """
-        standings = self._intake.gradebook.standings(self._intake.assignment)
+        standings = self._intake.gradebook.read_standings(self._intake.assignment)
         changed: list[Work] = []
         for student in students:
-            self._interruption.check()
-            work = self._work(student)
-            if (left := self._unchanged(work, standings.get(student))) is not None:
+            self._interruption.raise_if_stopped()
+            work = self._read_work(student)
+            if (left := self._unchanged_result(work, standings.get(student))) is not None:
                 self._graded.append(left)
             else:
                 changed.append(work)
         notebooks = len(changed) * len(self._intake.notebooks)
         self._progress.begin(len(changed) + len(refused), notebooks, len(self._graded))
         for graded in refused:
-            self._progress.done(graded)
-        self._run(self._pieces(changed))
+            self._progress.submission_done(graded)
+        self._run_notebooks(self._notebook_runs(changed))
         return self._graded
 
-    def _work(self, student: str) -> Work:
+    def _read_work(self, student: str) -> Work:
         try:
-            return self._intake.work(student, self._course)
+            return self._intake.read_work(student, self._course)
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
-            return Work(student, "", failure=_reason(error))
+            return Work(student, "", failure=_failure_reason(error))
 
-    def _unchanged(self, work: Work, standing: Standing | None) -> Graded | None:
+    def _unchanged_result(self, work: Work, standing: Standing | None) -> Graded | None:
         """Return what is known of a submission that needs nothing, bar new feedback, or None."""
         entry = self._ledger.get(work.student, self._since)
         if entry is None or standing is None or entry.made_of != work.made_of:
@@ -126,73 +126,73 @@ class GradingRun:
             work.student, {}, entry.points, entry.max_points, entry.seconds, entry.problem
         )
 
-    def _pieces(self, changed: list[Work]) -> Iterator[NotebookRun]:
+    def _notebook_runs(self, changed: list[Work]) -> Iterator[NotebookRun]:
         for work in changed:
             # All of them before the first is run: then nothing of it is on its way if one fails.
             pieces: list[NotebookRun] = []
             try:
-                pieces = [] if work.failure else list(self._intake.pieces(work))
+                pieces = [] if work.failure else list(self._intake.stage_notebooks(work))
             except Exception as error:  # noqa: BLE001 - one student's data must not end the class
-                work.failure = _reason(error)
+                work.failure = _failure_reason(error)
             if work.failure:
                 for _ in self._intake.notebooks:
-                    self._progress.ran(waited=False)
-                self._settle(work, self._set_aside(work))
+                    self._progress.notebook_ran(waited=False)
+                self._report_graded(work, self._set_aside(work))
             yield from pieces
 
-    def _run(self, pieces: Iterator[NotebookRun]) -> None:
+    def _run_notebooks(self, pieces: Iterator[NotebookRun]) -> None:
         more = True
         while more or self._running:
-            while more and len(self._running) < self._workers.room():
-                self._interruption.check()
+            while more and len(self._running) < self._workers.job_capacity():
+                self._interruption.raise_if_stopped()
                 piece = next(pieces, None)
                 if piece is None:
                     more = False
                 else:
-                    self._begin(piece)
+                    self._begin_notebook(piece)
             if self._running:
                 if self._feedback and not more and len(self._running) <= (os.cpu_count() or 1):
                     self._intake.warm_up()  # a processor has little to do from here on
-                self._interruption.check()
+                self._interruption.raise_if_stopped()
                 for done in self._workers.wait():
-                    self._finish(done)
-                    self._interruption.check()
+                    self._finish_job(done)
+                    self._interruption.raise_if_stopped()
 
-    def _begin(self, piece: NotebookRun) -> None:
+    def _begin_notebook(self, piece: NotebookRun) -> None:
         """Have a notebook run, unless its outcome is known or on its way."""
         if piece.job is None:
             assert piece.outcome is not None
-            self._take(piece, piece.outcome, waited=False)
+            self._take_outcome(piece, piece.outcome, waited=False)
             return
-        keys = [piece.job.key(mode) for mode in self._workers.modes]
+        keys = [piece.job.outcome_key(mode) for mode in self._workers.modes]
         if keys[0] in self._running:
             self._running[keys[0]].append(piece)
             return
-        found = (self._store.named(key, self._since) for key in keys)
+        found = (self._store.get_by_key(key, self._since) for key in keys)
         kept = next((outcome for outcome in found if outcome is not None), None)
         if kept is not None:
-            self._take(piece, kept, waited=False)
+            self._take_outcome(piece, kept, waited=False)
         else:
             self._running[keys[0]] = [piece]
-            self._start(keys[0], piece)
+            self._submit_job(keys[0], piece)
 
-    def _start(self, key: str, piece: NotebookRun) -> None:
+    def _submit_job(self, key: str, piece: NotebookRun) -> None:
         assert piece.job is not None
         self._workers.submit(key, piece.job)
 
-    def _finish(self, done: Done) -> None:
+    def _finish_job(self, done: Done) -> None:
         again = False
-        if passes(done.error):
+        if is_temporary(done.error):
             self._refusals[done.key] += 1
             again = self._refusals[done.key] < MOST_STARTS
         elif done.result is not None and done.result.outcome.may_be_tried_again:
             self._failures[done.key] += 1
             again = self._failures[done.key] < MOST_TRIES
         if again:
-            self._start(done.key, self._running[done.key][0])
+            self._submit_job(done.key, self._running[done.key][0])
             return
         pieces = self._running.pop(done.key)
-        if passes(done.error):
+        if is_temporary(done.error):
             raise SandboxError(
                 f"{pieces[0].work.student}'s submission could not be started in {MOST_STARTS} "
                 f"tries ({done.error}): see what is wrong with `course doctor`, or run fewer at a "
@@ -211,36 +211,36 @@ class GradingRun:
                 outcome = done.result.outcome
             else:
                 reason = f"{type(done.error).__name__}: {done.error}"
-                outcome = self._intake.refused(piece, reason[:500], "grader_error")
-            self._take(piece, outcome, waited=True)
+                outcome = self._intake.refused_outcome(piece, reason[:500], "grader_error")
+            self._take_outcome(piece, outcome, waited=True)
 
-    def _take(self, piece: NotebookRun, outcome: Outcome, *, waited: bool) -> None:
+    def _take_outcome(self, piece: NotebookRun, outcome: Outcome, *, waited: bool) -> None:
         """Note a notebook's outcome; enter the student with the last of them."""
-        self._progress.ran(waited)
+        self._progress.notebook_ran(waited)
         work = piece.work
         work.outcomes[piece.notebook] = replace(
             outcome, verdicts={**outcome.verdicts, **piece.marks}
         )
         if len(work.outcomes) == len(self._intake.notebooks):
-            self._settle(work, self._enter(work))
+            self._report_graded(work, self._enter_work(work))
 
-    def _settle(self, work: Work, graded: Graded) -> None:
+    def _report_graded(self, work: Work, graded: Graded) -> None:
         work.outcomes.clear()
-        self._progress.done(graded)
+        self._progress.submission_done(graded)
         self._graded.append(replace(graded, outcomes={}))
 
-    def _enter(self, work: Work) -> Graded:
+    def _enter_work(self, work: Work) -> Graded:
         before = self._ledger.get(work.student)
         same = before is not None and before.is_of(work.made_of)
         self._ledger.remove(work.student)
         try:
-            graded = _summary(work, self._intake.notebooks)
-            entered = self._intake.enter(work, same=same)
+            graded = _summarise_work(work, self._intake.notebooks)
+            entered = self._intake.enter_outcomes(work, same=same)
             missing = self._missing_feedback(work)
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
-            work.failure = _reason(error)
+            work.failure = _failure_reason(error)
             return self._set_aside(work)
-        if not any(outcome.spoilt for outcome in work.outcomes.values()):
+        if not any(outcome.has_grader_error for outcome in work.outcomes.values()):
             self._ledger.put(
                 work.student,
                 Entry(
@@ -265,11 +265,13 @@ class GradingRun:
         self._ledger.remove(work.student)
         try:
             self._intake.set_aside(work, work.failure)
-            graded = _summary(work, self._intake.notebooks)
-            entered = self._intake.enter(work)
+            graded = _summarise_work(work, self._intake.notebooks)
+            entered = self._intake.enter_outcomes(work)
             missing = self._missing_feedback(work)
         except Exception as error:  # noqa: BLE001 - one student's data must not end the class
-            problem = " ".join(dict.fromkeys([*work.problems, work.failure, _reason(error)]))
+            problem = " ".join(
+                dict.fromkeys([*work.problems, work.failure, _failure_reason(error)])
+            )
             return Graded(work.student, {}, problem=problem, entered=False)
         return _with_remarks(graded, entered.asked, missing)
 
@@ -278,7 +280,7 @@ def _with_remarks(graded: Graded, *remarks: str) -> Graded:
     return replace(graded, problem=" ".join(filter(None, (graded.problem, *remarks))))
 
 
-def _summary(work: Work, notebooks: list[str]) -> Graded:
+def _summarise_work(work: Work, notebooks: list[str]) -> Graded:
     outcomes = {name: work.outcomes[name] for name in notebooks}
     verdicts = [v for outcome in outcomes.values() for v in outcome.verdicts.values()]
     problems = list(work.problems)
@@ -293,7 +295,7 @@ def _summary(work: Work, notebooks: list[str]) -> Graded:
     )  # fmt: skip
 
 
-def _reason(error: Exception) -> str:
+def _failure_reason(error: Exception) -> str:
     """Return why one student's submission could not be graded.
 
     What concerns everybody is raised again: a full disk, say.

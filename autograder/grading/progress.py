@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bar
 
 from autograder.grading.graded import Graded
-from autograder.terminal import visible
+from autograder.terminal import visible_text
 
 
 class Progress:
@@ -20,10 +20,10 @@ class Progress:
     def begin(self, submissions: int, notebooks: int, unchanged: int) -> None:
         """Note what there is to do, and how many submissions need nothing."""
 
-    def ran(self, waited: bool) -> None:
+    def notebook_ran(self, waited: bool) -> None:
         """Note that a notebook has its outcome; ``waited`` is False if it was kept from before."""
 
-    def done(self, graded: Graded) -> None:
+    def submission_done(self, graded: Graded) -> None:
         """Note that a submission is in the gradebook, or cannot be."""
 
     def say(self, line: str) -> None:
@@ -46,12 +46,12 @@ class Clock:
         """Start with so many notebooks to go."""
         self.left, self.run, self.started = notebooks, 0, self.now()
 
-    def ran(self, waited: bool) -> None:
+    def count_notebook(self, waited: bool) -> None:
         """Count one notebook; one that was kept takes no time and tells nothing of the others."""
         self.left = max(0, self.left - 1)
         self.run += waited
 
-    def remaining(self) -> str:
+    def time_left(self) -> str:
         """Return the time left in words, or an empty string while there is nothing to go by."""
         if not self.run or not self.left:
             return ""
@@ -77,17 +77,17 @@ class Lines(Progress):
         self._clock.begin(notebooks)
         self._all = submissions
         if unchanged:
-            self.say(_unchanged(unchanged))
+            self.say(_describe_unchanged(unchanged))
 
-    def ran(self, waited: bool) -> None:
+    def notebook_ran(self, waited: bool) -> None:
         """Count a notebook."""
-        self._clock.ran(waited)
+        self._clock.count_notebook(waited)
 
-    def done(self, graded: Graded) -> None:
+    def submission_done(self, graded: Graded) -> None:
         """Say what a submission got."""
         self._done += 1
-        left = self._clock.remaining()
-        self._tell(graded, f"; {left}" if left else "")
+        left = self._clock.time_left()
+        self._tell_result(graded, f"; {left}" if left else "")
 
     def end(self) -> None:
         """Say which checks were not examined, and why."""
@@ -96,16 +96,16 @@ class Lines(Progress):
         if len(self._unexamined) > MOST_REASONS:
             self.say("Left to a person, too: what `autograder report` lists.")
 
-    def _tell(self, graded: Graded, more: str = "") -> None:
+    def _tell_result(self, graded: Graded, more: str = "") -> None:
         """Say what a submission got, and remember what was not examined in it."""
         number = f"{self._done:>{len(str(self._all))}} of {self._all}"
-        self.say(f"  {number}  {_line(graded)}{more}")
+        self.say(f"  {number}  {_describe_graded(graded)}{more}")
         if len(self._unexamined) <= MOST_REASONS:
-            self._unexamined.update(dict.fromkeys(_unexamined(graded)))
+            self._unexamined.update(dict.fromkeys(_unexamined_checks(graded)))
 
     def say(self, line: str) -> None:
         """Print a line."""
-        self._out.print(visible(line), markup=False, highlight=False, soft_wrap=True)
+        self._out.print(visible_text(line), markup=False, highlight=False, soft_wrap=True)
 
 
 class Live(Lines):
@@ -127,15 +127,15 @@ class Live(Lines):
         self._bar.update(self._task, total=notebooks)
         self._bar.start()
 
-    def ran(self, waited: bool) -> None:
+    def notebook_ran(self, waited: bool) -> None:
         """Move the bar."""
-        super().ran(waited)
-        self._bar.update(self._task, advance=1, left=self._clock.remaining())
+        super().notebook_ran(waited)
+        self._bar.update(self._task, advance=1, left=self._clock.time_left())
 
-    def done(self, graded: Graded) -> None:
+    def submission_done(self, graded: Graded) -> None:
         """Say what a submission got, above the bar."""
         self._done += 1
-        self._tell(graded)
+        self._tell_result(graded)
 
     def end(self) -> None:
         """Take the bar away, and say which checks were not examined."""
@@ -162,7 +162,7 @@ def in_words(seconds: float) -> str:
     return f"about {minutes // 60} h {minutes % 60:02} min"
 
 
-def _unchanged(count: int) -> str:
+def _describe_unchanged(count: int) -> str:
     if count == 1:
         return "1 submission has not changed since it was graded, so it is left as it is."
     return (
@@ -170,10 +170,10 @@ def _unchanged(count: int) -> str:
     )
 
 
-def _line(graded: Graded) -> str:
+def _describe_graded(graded: Graded) -> str:
     problem = f"  {graded.problem}" if graded.problem else ""
     verdicts = [v for outcome in graded.outcomes.values() for v in outcome.verdicts.values()]
-    unexamined = sum(verdict.unexamined for verdict in verdicts)
+    unexamined = sum(verdict.unexamined_points for verdict in verdicts)
     open_points = f" ({unexamined:g} not examined)" if unexamined else ""
     return (
         f"{graded.student}: {graded.points:g} of {graded.max_points:g} automatic points"
@@ -181,7 +181,7 @@ def _line(graded: Graded) -> str:
     )
 
 
-def _unexamined(graded: Graded) -> Iterator[str]:
+def _unexamined_checks(graded: Graded) -> Iterator[str]:
     """Yield which checks could not be examined, and why; students whose reasons agree share one."""
     for notebook, outcome in graded.outcomes.items():
         for verdict in outcome.verdicts.values():
@@ -202,9 +202,9 @@ class Collecting(Progress):
         """Pass it on."""
         self._then.begin(submissions, notebooks, unchanged)
 
-    def ran(self, waited: bool) -> None:
+    def notebook_ran(self, waited: bool) -> None:
         """Pass it on."""
-        self._then.ran(waited)
+        self._then.notebook_ran(waited)
 
     def say(self, line: str) -> None:
         """Pass it on."""
@@ -214,7 +214,7 @@ class Collecting(Progress):
         """Pass it on."""
         self._then.end()
 
-    def done(self, graded: Graded) -> None:
+    def submission_done(self, graded: Graded) -> None:
         """Keep a submission."""
         self._graded[graded.student] = graded
-        self._then.done(graded)
+        self._then.submission_done(graded)

@@ -20,10 +20,10 @@ from nbgrader.api import Assignment, BaseCell, Comment, Grade, Gradebook, Notebo
 
 from autograder.assignments import questions, submission
 from autograder.assignments.intake import open_questions
-from autograder.assignments.intake.file_names import meant
+from autograder.assignments.intake.file_names import match_name
 from autograder.assignments.questions import Question
 from autograder.assignments.submission import SubmissionError
-from autograder.class_report.platforms.exports import as_csv, guarded, is_formula
+from autograder.class_report.platforms.exports import as_csv, guard_text, is_formula
 from autograder.gradebook.bridge import WORK_FOLDER
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.database import of_cells
@@ -76,7 +76,7 @@ class Answers:
     unread: tuple[str, ...] = ()
 
     @property
-    def waiting(self) -> int:
+    def waiting_count(self) -> int:
         """How many wait for a mark."""
         return sum(answer.waits for answer in self.answers)
 
@@ -109,14 +109,14 @@ class _File:
     rows: list[_Row] = field(default_factory=list)
 
 
-def written(gradebook: CourseGradebook, assignment: str) -> list[Question]:
+def written_questions(gradebook: CourseGradebook, assignment: str) -> list[Question]:
     """Return the questions of an assignment that a person marks.
 
     Raises:
         MarksError: there is no such assignment, or nothing in it is marked by a person.
     """
-    if assignment not in gradebook.assignments():
-        known = ", ".join(gradebook.assignments()) or "none yet"
+    if assignment not in gradebook.assignment_names():
+        known = ", ".join(gradebook.assignment_names()) or "none yet"
         raise MarksError(
             f"There is no assignment '{assignment}' in the gradebook: there are {known}."
         )
@@ -130,13 +130,13 @@ def written(gradebook: CourseGradebook, assignment: str) -> list[Question]:
     return found
 
 
-def find(gradebook: CourseGradebook, assignment: str, wanted: str) -> Question:
+def find_question(gradebook: CourseGradebook, assignment: str, wanted: str) -> Question:
     """Return the question that is meant: by its grade id, its title, or a part that one alone has.
 
     Raises:
         MarksError: none or several are.
     """
-    known = written(gradebook, assignment)
+    known = written_questions(gradebook, assignment)
     low = wanted.casefold()
     for matches in (
         [q for q in known if q.grade_id == wanted],
@@ -152,16 +152,16 @@ def find(gradebook: CourseGradebook, assignment: str, wanted: str) -> Question:
     raise MarksError(f"There is no question '{wanted}' in '{assignment}': there are {names}.")
 
 
-def collect(gradebook: CourseGradebook, assignment: str, question: Question) -> Answers:
+def collect_answers(gradebook: CourseGradebook, assignment: str, question: Question) -> Answers:
     """Return all answers to a question, from the graded copies and the gradebook."""
-    with gradebook.opened() as book:
-        grades = _grades(book, assignment, question)
+    with gradebook.open_gradebook() as book:
+        grades = _read_grades(book, assignment, question)
         names = {s.id: " ".join(filter(None, (s.first_name, s.last_name))) for s in book.students}
     asked = open_questions.of_assignment(gradebook.root / WORK_FOLDER, assignment)
     answers: list[Answer] = []
     empty, unread = [], []
     for student, row in sorted(grades.items()):
-        text = _text(gradebook, assignment, question, student)
+        text = _read_answer(gradebook, assignment, question, student)
         unclear = asked.get(student, {}).get(question.notebook)
         asked_about = unclear is not None and question.grade_id in unclear.cells
         # If either, what stands in the graded copy is ours, in place of what was handed in.
@@ -172,7 +172,7 @@ def collect(gradebook: CourseGradebook, assignment: str, question: Question) -> 
         else:
             answers.append(Answer(
                 student, names.get(student) or student, text, row["manual_score"], row["comment"],
-                row["needs_manual_grade"], _state(text, row),
+                row["needs_manual_grade"], _digest_state(text, row),
             ))  # fmt: skip
     answers.sort(key=lambda answer: (not answer.waits, answer.student))
     return Answers(assignment, question, tuple(answers), tuple(empty), tuple(unread))
@@ -191,41 +191,41 @@ def as_file(found: Answers) -> str:
             found.assignment, question.notebook, question.grade_id, answer.student, answer.name,
             answer.text, points, answer.comment, answer.state,
         )  # fmt: skip
-        rows.append(tuple(map(guarded, cells)))
+        rows.append(tuple(map(guard_text, cells)))
     return as_csv(rows)
 
 
-def enter(gradebook: CourseGradebook, path: Path) -> Entered:
+def enter_marks(gradebook: CourseGradebook, path: Path) -> Entered:
     """Enter a file of marks into the gradebook; a cell that is empty changes nothing.
 
     Raises:
         MarksError: the file cannot be read or has faults: then nothing of it was entered.
     """
-    file = _parse(path)
-    question = find(gradebook, file.assignment, file.grade_id)
+    file = _parse_marks(path)
+    question = find_question(gradebook, file.assignment, file.grade_id)
     if question.notebook != file.notebook:
         raise MarksError(f"{path.name}: {file.grade_id} is not in the notebook '{file.notebook}'.")
     done: dict[str, list[str]] = {"marked": [], "already": [], "blank": [], "changed": []}
-    with gradebook.opened() as book:
-        grades = _grades(book, file.assignment, question)
-        file.rows = [replace(row, student=meant(row.student, grades)) for row in file.rows]
-        faults = list(_faults(file, grades, question))
+    with gradebook.open_gradebook() as book:
+        grades = _read_grades(book, file.assignment, question)
+        file.rows = [replace(row, student=match_name(row.student, grades)) for row in file.rows]
+        faults = list(_find_faults(file, grades, question))
         if faults:
             shown = " ".join(faults[:MOST_FAULTS])
             more = f" And {len(faults) - MOST_FAULTS} more." if len(faults) > MOST_FAULTS else ""
             raise MarksError(f"Nothing of {path.name} was entered. {shown}{more}")
         for row in file.rows:
             current = grades[row.student]
-            text = _text(gradebook, file.assignment, question, row.student)
-            what = _what(row, current, _state(text or "", current))
+            text = _read_answer(gradebook, file.assignment, question, row.student)
+            what = _decide_row(row, current, _digest_state(text or "", current))
             done[what].append(row.student)
             if what == "marked":
-                _enter(book, file.assignment, question, row)
+                _enter_row(book, file.assignment, question, row)
         book.db.commit()
     return Entered(question.title, **{what: tuple(who) for what, who in done.items()})
 
 
-def _what(row: _Row, current: Mapping[str, Any], state: str) -> str:
+def _decide_row(row: _Row, current: Mapping[str, Any], state: str) -> str:
     """Return what is to be done with a row."""
     comment = row.comment not in ("", current["comment"])
     points = row.points is not None and (
@@ -238,7 +238,7 @@ def _what(row: _Row, current: Mapping[str, Any], state: str) -> str:
     return "blank" if row.points is None else "already"
 
 
-def _enter(book: Gradebook, assignment: str, question: Question, row: _Row) -> None:
+def _enter_row(book: Gradebook, assignment: str, question: Question, row: _Row) -> None:
     where = (question.grade_id, question.notebook, assignment, row.student)
     if row.points is not None:
         grade = book.find_grade(*where)
@@ -247,7 +247,7 @@ def _enter(book: Gradebook, assignment: str, question: Question, row: _Row) -> N
         book.find_comment(*where).manual_comment = row.comment
 
 
-def _grades(book: Gradebook, assignment: str, question: Question) -> dict[str, dict[str, Any]]:
+def _read_grades(book: Gradebook, assignment: str, question: Question) -> dict[str, dict[str, Any]]:
     def chosen(query: Any) -> Any:
         return query.filter(
             Assignment.name == assignment, Notebook.name == question.notebook,
@@ -266,49 +266,62 @@ def _grades(book: Gradebook, assignment: str, question: Question) -> dict[str, d
     return found
 
 
-def _text(
+def _read_answer(
     gradebook: CourseGradebook, assignment: str, question: Question, student: str
 ) -> str | None:
     """Return an answer as it stands in the graded copy, which formgrader shows; None if in none."""
     coursedir = gradebook.coursedir
     folder = coursedir.format_path(coursedir.autograded_directory, student, assignment)
     try:
-        notebook = submission.read(Path(folder) / f"{question.notebook}.ipynb")
+        notebook = submission.read_notebook(Path(folder) / f"{question.notebook}.ipynb")
     except SubmissionError:
         return None
     cells = (c for c in notebook.cells if submission.grade_id(c) == question.grade_id)
     return next((str(cell.source) for cell in cells), None)
 
 
-def _state(text: str, row: Mapping[str, Any]) -> str:
+def _digest_state(text: str, row: Mapping[str, Any]) -> str:
     content = json.dumps([text, row["manual_score"], row["needs_manual_grade"], row["comment"]])
     return hashlib.sha256(content.encode()).hexdigest()[:12]
 
 
-def _parse(path: Path) -> _File:
-    rows = csv.DictReader(io.StringIO(_content(path), newline=""), dialect=_dialect(path))
+def _parse_marks(path: Path) -> _File:
+    rows = csv.DictReader(
+        io.StringIO(_read_content(path), newline=""), dialect=_guess_dialect(path)
+    )
     missing = [name for name in COLUMNS if name not in (rows.fieldnames or ()) and name != "answer"]
     if missing:
         raise MarksError(
-            f"{path.name} is no file of marks: it lacks the {_columns(missing)}. Make one with "
+            f"{path.name} is no file of marks: it lacks the {_name_columns(missing)}. Make one "
+            "with "
             "`autograder marks export`."
         )
     file = _File()
     faults: list[str] = []
     for row in rows:
-        where = tuple(_plain(row[name]) for name in ("assignment", "notebook", "question"))
+        where = tuple(
+            _without_apostrophe(row[name]) for name in ("assignment", "notebook", "question")
+        )
         if not file.rows:
             file.assignment, file.notebook, file.grade_id = where
         elif where != (file.assignment, file.notebook, file.grade_id):
             faults.append(f"Line {rows.line_num} is of another question.")
         try:
-            points = _number(_plain(row["points"]))
+            points = _parse_number(_without_apostrophe(row["points"]))
         except ValueError:
-            faults.append(f"Line {rows.line_num}: '{_plain(row['points'])[:40]}' is no number.")
+            faults.append(
+                f"Line {rows.line_num}: '{_without_apostrophe(row['points'])[:40]}' is no number."
+            )
             points = None
-        comment = _plain(row["comment"]).strip()
+        comment = _without_apostrophe(row["comment"]).strip()
         file.rows.append(
-            _Row(rows.line_num, _plain(row["student"]), points, comment, _plain(row["state"]))
+            _Row(
+                rows.line_num,
+                _without_apostrophe(row["student"]),
+                points,
+                comment,
+                _without_apostrophe(row["state"]),
+            )
         )
     if faults:
         raise MarksError(f"Nothing of {path.name} was entered. {' '.join(faults[:MOST_FAULTS])}")
@@ -317,7 +330,7 @@ def _parse(path: Path) -> _File:
     return file
 
 
-def _content(path: Path) -> str:
+def _read_content(path: Path) -> str:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise MarksError(f"{path.name} has more than {MAX_BYTES // 2**20} MB.")
@@ -330,8 +343,8 @@ def _content(path: Path) -> str:
         raise MarksError(f"{path} cannot be read ({error.strerror or error}).") from None
 
 
-def _dialect(path: Path) -> type[csv.Dialect]:
-    head = _content(path).partition("\n")[0]
+def _guess_dialect(path: Path) -> type[csv.Dialect]:
+    head = _read_content(path).partition("\n")[0]
 
     class Dialect(csv.excel):
         """A spreadsheet in a language with decimal commas separates cells by semicolons."""
@@ -341,7 +354,7 @@ def _dialect(path: Path) -> type[csv.Dialect]:
     return Dialect
 
 
-def _number(text: str) -> float | None:
+def _parse_number(text: str) -> float | None:
     if not text.strip():
         return None
     number = float(text.strip().replace(",", "."))
@@ -350,13 +363,13 @@ def _number(text: str) -> float | None:
     return number
 
 
-def _plain(text: str | None) -> str:
+def _without_apostrophe(text: str | None) -> str:
     """Return a cell without the apostrophe that kept a spreadsheet from running it."""
     text = text or ""
     return text[1:] if text.startswith("'") and is_formula(text[1:]) else text
 
 
-def _faults(
+def _find_faults(
     file: _File, grades: Mapping[str, Mapping[str, Any]], question: Question
 ) -> Iterator[str]:
     seen: set[str] = set()
@@ -373,5 +386,5 @@ def _faults(
             )
 
 
-def _columns(names: list[str]) -> str:
+def _name_columns(names: list[str]) -> str:
     return f"column{'s' if len(names) > 1 else ''} {', '.join(names)}"

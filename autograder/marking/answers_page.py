@@ -13,7 +13,7 @@ from html import escape
 from pathlib import Path
 
 from autograder.marking.answers import COLUMNS, Answer, Answers
-from course.messages.yaml_text import counted
+from course.messages.yaml_text import format_count
 from quizzes import rendering
 
 _STYLE = """
@@ -95,32 +95,34 @@ show();
 """
 
 
-def page(found: Answers, file: str) -> str:
+def render_page(found: Answers, file: str) -> str:
     """Return the page; ``file`` is the name under which a browser saves the marks."""
     question = found.question
-    title = f"{question.title}: {counted(len(found.answers), 'answer')}"
-    policy = f"default-src 'none'; style-src 'unsafe-inline'; script-src '{_digest(_SCRIPT)}'"
+    title = f"{question.title}: {format_count(len(found.answers), 'answer')}"
+    policy = (
+        f"default-src 'none'; style-src 'unsafe-inline'; script-src '{_script_digest(_SCRIPT)}'"
+    )
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n"
-        f"<body>{_aside(found, title, file)}<main>{_left_out(found)}"
-        f"{''.join(_article(answer, question.max_points) for answer in found.answers)}</main>"
-        f'<script type="application/json" id="data">{_data(found, file)}</script>'
+        f"<body>{_render_aside(found, title, file)}<main>{_left_out(found)}"
+        f"{''.join(_render_article(answer, question.max_points) for answer in found.answers)}"
+        f'</main><script type="application/json" id="data">{_page_data(found, file)}</script>'
         f"<script>{_SCRIPT}</script></body></html>\n"
     )
 
 
-def _aside(found: Answers, title: str, file: str) -> str:
+def _render_aside(found: Answers, title: str, file: str) -> str:
     question = found.question
     parts = [
         f"<aside><h1>{escape(title)}</h1>",
         f"<p>{escape(found.assignment)}, {escape(question.notebook)}. "
-        f"{counted(found.waiting, 'answer')} waiting.</p>",
-        _part("The question", question.text),
-        _part("Model answer", question.model, "model"),
-        _part("What students read about the points", question.rules),
+        f"{format_count(found.waiting_count, 'answer')} waiting.</p>",
+        _render_part("The question", question.text),
+        _render_part("Model answer", question.model, "model"),
+        _render_part("What students read about the points", question.rules),
         '<p><button type="button" id="save">Save the marks</button> <span id="done" role="status">'
         "</span></p>",
         f"<p>Saved as {escape(file)}; then run <code>autograder marks import</code> with it. "
@@ -129,20 +131,22 @@ def _aside(found: Answers, title: str, file: str) -> str:
     return "".join(parts)
 
 
-def _part(heading: str, markdown: str, kind: str = "") -> str:
+def _render_part(heading: str, markdown: str, kind: str = "") -> str:
     if not markdown:
         return ""
-    return f'<h2>{heading}</h2><div class="{kind}">{_rendered(markdown)}</div>'
+    return f'<h2>{heading}</h2><div class="{kind}">{_render_markdown(markdown)}</div>'
 
 
-def _rendered(markdown: str) -> str:
+def _render_markdown(markdown: str) -> str:
     try:
-        return rendering.block(markdown, Path("/nonexistent"))  # these texts have no pictures
+        return rendering.render_block(
+            markdown, Path("/nonexistent")
+        )  # these texts have no pictures
     except rendering.RenderError:
         return f'<div class="answer">{escape(markdown)}</div>'
 
 
-def _article(answer: Answer, most: float) -> str:
+def _render_article(answer: Answer, most: float) -> str:
     shown = escape(answer.name)
     who = f"{shown} ({escape(answer.student)})" if answer.name != answer.student else shown
     points = "" if answer.waits or answer.points is None else f"{answer.points:g}"
@@ -166,13 +170,13 @@ def _article(answer: Answer, most: float) -> str:
 def _left_out(found: Answers) -> str:
     said = []
     if found.empty:
-        said.append(f"{counted(len(found.empty), 'student')} left it empty and have 0 points.")
+        said.append(f"{format_count(len(found.empty), 'student')} left it empty and have 0 points.")
     if found.unread:
         said.append(f"It is not known what {escape(', '.join(found.unread))} handed in.")
     return f"<p>{' '.join(said)}</p>" if said else ""
 
 
-def _data(found: Answers, file: str) -> str:
+def _page_data(found: Answers, file: str) -> str:
     question = found.question
     common = {
         "assignment": found.assignment,
@@ -189,5 +193,5 @@ def _data(found: Answers, file: str) -> str:
     return json.dumps(data).replace("<", "\\u003c")
 
 
-def _digest(script: str) -> str:
+def _script_digest(script: str) -> str:
     return "sha256-" + base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()

@@ -54,7 +54,7 @@ def note_own(node: Node) -> None:
     _ours.add(participant_of(found[0]))
 
 
-def known(node: Node) -> set[bytes]:
+def known_participants(node: Node) -> set[bytes]:
     """Return the participants of ROS that a node has discovered, its own among them."""
     ends = node.get_publishers_info_by_topic("ros_discovery_info", no_mangle=True)
     return {participant_of(end) for end in ends}

@@ -45,16 +45,16 @@ class Patience:
         self._looked: float | None = None  # when all slept at the last look, else None
 
     @property
-    def left(self) -> float:
+    def seconds_left(self) -> float:
         """Seconds left if nobody sleeps, not below 0."""
         return max(0.0, self._end - time.monotonic())
 
     @property
-    def spent(self) -> float:
+    def seconds_spent(self) -> float:
         """Seconds since it began."""
         return time.monotonic() - self._began
 
-    def lasts(self) -> bool:
+    def has_time_left(self) -> bool:
         """Whether there is some left; to be asked again and again, as it looks who sleeps."""
         now = time.monotonic()
         asleep = self._still.all_asleep()
@@ -65,15 +65,17 @@ class Patience:
 
     def wait(self, session: Waits, condition: Callable[[], Any]) -> bool:
         """Wait until ``condition`` holds; return whether it did before the patience was over."""
-        if self.lasts() and _holds(session, condition, min(_AT_FIRST_S, self.left)):
+        if self.has_time_left() and _is_met_within(
+            session, condition, min(_AT_FIRST_S, self.seconds_left)
+        ):
             return True
-        while self.lasts():
-            if _holds(session, condition, min(_LOOK_S, self.left)):
+        while self.has_time_left():
+            if _is_met_within(session, condition, min(_LOOK_S, self.seconds_left)):
                 return True
         return bool(condition())
 
 
-def _holds(session: Waits, condition: Callable[[], Any], seconds: float) -> bool:
+def _is_met_within(session: Waits, condition: Callable[[], Any], seconds: float) -> bool:
     with suppress(WaitTimeout):
         session.until(condition, timeout=seconds, what="an observation")
         return True

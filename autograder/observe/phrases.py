@@ -8,12 +8,12 @@ ABORTED = (
 )
 
 
-def phrase(items: list[str]) -> str:
+def as_phrase(items: list[str]) -> str:
     """Return a list as a phrase: "a, b and c"."""
     return " and ".join(part for part in (", ".join(items[:-1]), *items[-1:]) if part)
 
 
-def pictures(number: int) -> str:
+def pictures_phrase(number: int) -> str:
     """Return a number of pictures as a phrase: "one picture", "3 pictures"."""
     return "one picture" if number == 1 else f"{number} pictures"
 
@@ -23,7 +23,7 @@ def with_reason(reason: str) -> str:
     return f"with the reason “{reason[:200]}”" if reason.strip() else "and without a reason"
 
 
-def ended(word: str) -> str:
+def end_phrase(word: str) -> str:
     """Return how a goal ended, in rclpy's ``word`` for it, as a phrase: "ended as aborted …"."""
     aborted = word.lower() == "aborted"
     return f"ended as {word}" + (f" ({ABORTED})" if aborted else "")
@@ -34,6 +34,6 @@ def callback_raised(error: str) -> str:
     return f"a callback raised an error, in {error.rstrip('.')}"
 
 
-def capitalized(text: str) -> str:
+def capitalize_first(text: str) -> str:
     """Return a phrase with a capital letter, to begin a sentence with."""
     return text[:1].upper() + text[1:]

@@ -20,7 +20,7 @@ from rclpy.subscription import Subscription
 
 from course.errors import WaitTimeout
 from course.runtime.executor.wait_list import WaitList
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 
 MOST_AT_ONCE = 16
 """Messages that are taken from one subscription before others have their turn: to wait for the next
@@ -31,7 +31,7 @@ _PLAIN = ("timer", "subscription")
 """Kinds of which most callbacks are, called without rclpy's coroutine around each."""
 
 
-def _nobody() -> None:
+def _wake_nobody() -> None:
     """Wake nobody: there is one thread."""
 
 
@@ -58,7 +58,7 @@ class Spinner(Executor):
     def __init__(self, context: Context) -> None:
         """Begin to spin, as yet without nodes."""
         super().__init__(context=context)
-        self._waits = WaitList(self, _nobody, keeps=True)
+        self._waits = WaitList(self, _wake_nobody, keeps=True)
         self._pulse = Pulse()
         self._take: dict[str, Callable[[Any], Any]] = {
             "waitable": self._take_waitable, "timer": _take_turn,
@@ -79,7 +79,7 @@ class Spinner(Executor):
         Raises:
             WaitTimeout: it was not true in time.
         """
-        value = poll(condition, timeout, self._pulse if often else Pulse())
+        value = poll_condition(condition, timeout, self._pulse if often else Pulse())
         if value is None:
             raise WaitTimeout(f"Waited {timeout:g} s in vain for {what}.")
         return value
@@ -106,16 +106,16 @@ class Spinner(Executor):
                 for owned in self._waits.wait(self.get_nodes(), -1.0):
                     if owned.kind == "subscription":
                         for _ in range(MOST_AT_ONCE):
-                            if not self._run(owned.entity, owned.kind):
+                            if not self._run_callback(owned.entity, owned.kind):
                                 break
                     elif owned.may_begin():
-                        self._run(owned.entity, owned.kind)
+                        self._run_callback(owned.entity, owned.kind)
             except InvalidHandle:
                 continue  # destroyed just now
             except (ShutdownException, ExternalShutdownException):
                 return
 
-    def _run(self, entity: Any, kind: str) -> bool:
+    def _run_callback(self, entity: Any, kind: str) -> bool:
         """Take what is ready, and run the callback; return whether there was anything."""
         try:
             if (call := self._take[kind](entity)) is None:

@@ -16,10 +16,10 @@ class Stillness:
         self._outside = outside
         outside.ask("watch")
 
-    def reached(self, restless: float = RESTLESS, timeout: float = HANGS) -> bool:
+    def wait_for_rest(self, restless: float = RESTLESS, timeout: float = HANGS) -> bool:
         """Return once both are at rest, or prove to be restless; say which it was.
 
-        See `autograder.processes.outside.stillness.Stillness.reached`.
+        See `autograder.processes.outside.stillness.Stillness.wait_for_rest`.
         """
         return bool(self._outside.ask("rest", restless=restless, timeout=timeout))
 

@@ -30,7 +30,7 @@ class ChannelTimeout(Exception):  # noqa: N818
     """The other side did not answer before the deadline."""
 
 
-def parse(line: bytes) -> Any:
+def parse_line(line: bytes) -> Any:
     """Return what is in a line of JSON, in UTF-8.
 
     Half of a surrogate pair is replaced, as `Channel.send` does: it is legal in JSON, but nothing
@@ -91,7 +91,7 @@ class Channel:
             self._fill(deadline)
         line, self._buffer = self._buffer.split(b"\n", 1)
         try:
-            message = parse(line)
+            message = parse_line(line)
         except (ValueError, RecursionError) as error:
             raise ChannelBroken("a message that is not JSON was sent") from error
         if not isinstance(message, dict):
@@ -106,9 +106,9 @@ class Channel:
         deadline = FairDeadline(timeout, delay)
         while True:
             try:
-                return self.receive(deadline.left)
+                return self.receive(deadline.seconds_left)
             except ChannelTimeout:
-                if not deadline.left:
+                if not deadline.seconds_left:
                     raise
 
     def _fill(self, deadline: float | None) -> None:
@@ -129,7 +129,7 @@ class Channel:
             raise ChannelClosed("end of stream")
         self._buffer += chunk
 
-    def leftovers(self, patience: float, silence: float) -> bytes:
+    def read_leftovers(self, patience: float, silence: float) -> bytes:
         """Return what comes that need be no message, up to the largest size of one.
 
         It waits for ``patience`` seconds at most, and no longer than ``silence`` seconds once

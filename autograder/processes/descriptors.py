@@ -19,7 +19,9 @@ class HasDescriptor(Protocol):
         """Return its descriptor."""
 
 
-def readable(streams: Iterable[HasDescriptor | int], timeout: float | None) -> list[int]:
+def readable_descriptors(
+    streams: Iterable[HasDescriptor | int], timeout: float | None
+) -> list[int]:
     """Return the descriptors, of those streams, that can be read or are at their end.
 
     Waits for the first at most ``timeout`` seconds; None: as long as it takes. Unlike `select`,

@@ -26,7 +26,7 @@ class RunDelay(Protocol):
     def mark(self) -> float:
         """Return what stands for this moment."""
 
-    def since(self, mark: float) -> float:
+    def delay_since(self, mark: float) -> float:
         """Return for how many s it was kept since a moment, not below 0."""
 
 
@@ -41,7 +41,7 @@ class SeenDelay:
         ``spent`` tells of whoever counts what they all have computed, in s, with those that have
         ended and that nobody has waited for: the kernel forgets these.
         """
-        self._processes, self._main, self._spent = processes, processes.of(pid), spent
+        self._processes, self._main, self._spent = processes, processes.folder_of(pid), spent
 
     def mark(self) -> float:
         """Return for how many s it was kept up to now, less what its others have computed."""
@@ -49,10 +49,10 @@ class SeenDelay:
             worked, kept = run_times(self._main)
         except (OSError, ValueError):  # it has ended, or the kernel does not count
             return 0.0
-        computed = max(self._spent(), sum(map(_computed, self._processes.folders())))
+        computed = max(self._spent(), sum(map(_processor_seconds, self._processes.list_folders())))
         return kept - max(0.0, computed - worked)
 
-    def since(self, mark: float) -> float:
+    def delay_since(self, mark: float) -> float:
         """Return for how many s it was kept since `mark` was asked."""
         return max(0.0, self.mark() - mark)
 
@@ -62,7 +62,7 @@ def of_process(pid: int) -> SeenDelay:
     return SeenDelay(Single(pid), pid)
 
 
-def _computed(process: str) -> float:
+def _processor_seconds(process: str) -> float:
     """Return the processor time of a process, and of its children that have ended, in s."""
     with suppress(OSError):
         file = os.open(f"{process}/stat", os.O_RDONLY)
@@ -101,9 +101,9 @@ class FairDeadline:
         self._begun, self._mark = time.monotonic(), delay.mark()
 
     @property
-    def left(self) -> float:
+    def seconds_left(self) -> float:
         """Seconds left, not below 0."""
         left = self._timeout - (time.monotonic() - self._begun)
         if left <= 0:
-            left += min(self._delay.since(self._mark), _LONGEST * self._timeout)
+            left += min(self._delay.delay_since(self._mark), _LONGEST * self._timeout)
         return max(0.0, left)

@@ -12,10 +12,10 @@ from typing import Protocol
 class Processes(Protocol):
     """Some processes, each known by its folder in a /proc."""
 
-    def folders(self) -> list[str]:
+    def list_folders(self) -> list[str]:
         """Return the folders of those that are there."""
 
-    def of(self, pid: int) -> str:
+    def folder_of(self, pid: int) -> str:
         """Return the folder of one, by the number that it has for itself."""
 
 
@@ -26,11 +26,11 @@ class Single:
         """Look at the process ``pid``."""
         self._folder = f"/proc/{pid}"
 
-    def folders(self) -> list[str]:
+    def list_folders(self) -> list[str]:
         """Return its folder."""
         return [self._folder]
 
-    def of(self, pid: int) -> str:
+    def folder_of(self, pid: int) -> str:
         """Return the folder of the process, whatever number it is asked for by."""
         return self._folder
 
@@ -59,26 +59,26 @@ class Sandboxed:
         if hasattr(self, "_proc"):
             os.close(self._proc)
 
-    def inside(self) -> list[int]:
+    def inner_pids(self) -> list[int]:
         """Return the numbers in the sandbox of all that count."""
         names = os.listdir(self._proc)  # noqa: PTH208 - the names alone, and very often
         return [n for name in names if name.isdecimal() and (n := int(name)) not in self._ours]
 
-    def folders(self) -> list[str]:
+    def list_folders(self) -> list[str]:
         """Return the folders of all that count."""
-        return [self.of(number) for number in self.inside()]
+        return [self.folder_of(number) for number in self.inner_pids()]
 
-    def of(self, pid: int) -> str:
+    def folder_of(self, pid: int) -> str:
         """Return the folder of one, by the number that it has in the sandbox."""
         return f"/proc/self/fd/{self._proc}/{pid}"
 
-    def outside(self) -> list[int]:
+    def outer_pids(self) -> list[int]:
         """Return the numbers here of all that count: what a signal or a tracer needs."""
-        counting = set(self.inside())
-        return [pid for pid in sharing(self.init) if number_inside(pid) in counting]
+        counting = set(self.inner_pids())
+        return [pid for pid in namespace_pids(self.init) if number_inside(pid) in counting]
 
 
-def sharing(pid: int) -> Iterator[int]:
+def namespace_pids(pid: int) -> Iterator[int]:
     """Yield the processes, by their numbers here, that are in the process namespace of ``pid``."""
     with suppress(OSError):
         namespace = os.stat(f"/proc/{pid}/ns/pid").st_ino  # noqa: PTH116 - pathlib takes longer

@@ -22,9 +22,9 @@ def same_attempts(
     """
     contents = {}
     for student in students:
-        folder = roster.folder(root, student) / assignment
+        folder = roster.student_folder(root, student) / assignment
         try:
-            found = attempts.find(folder, quiz, student, root)
+            found = attempts.find_attempts(folder, quiz, student, root)
         except OSError:
             continue  # its grade says that it cannot be read
         if found.content is not None:

@@ -20,7 +20,7 @@ from urllib.parse import urlsplit
 from autograder import exercise_folders
 from autograder.running import jobs
 from autograder.running.jobs import Job, Result
-from autograder.running.resource_errors import passes
+from autograder.running.resource_errors import is_temporary
 from autograder.running.workers import Done, Keep, Queue
 from autograder.sandbox import Abilities
 from course.errors import CourseError
@@ -47,7 +47,7 @@ class ClusterError(CourseError):
     """The cluster cannot be used; the message says why and what to do."""
 
 
-def perform(text: str, hidden: list[str]) -> str:
+def perform_job(text: str, hidden: list[str]) -> str:
     """Run a job on a worker; returns its result as JSON, or says why there is none.
 
     Args:
@@ -65,7 +65,7 @@ def perform(text: str, hidden: list[str]) -> str:
     try:
         result = jobs.run(Job.from_json(text), [Path(folder) for folder in hidden])
     except CourseError as error:
-        if passes(error):
+        if is_temporary(error):
             raise
         return json.dumps({"problem": str(error), "where": socket.gethostname()})
     if get_worker().status not in (Status.running, Status.paused):
@@ -108,14 +108,14 @@ class Cluster:
         self._jobs: dict[str, Job] = {}
         self._lonely = False
         self._numbers = itertools.count()
-        self._client = _connect(address)
+        self._client = _connect_client(address)
         self.wake = self._queue.wake
-        possible = [Abilities(loss=True).mode(trust=trust), Abilities().mode(trust=trust)]
+        possible = [Abilities(loss=True).mode_name(trust=trust), Abilities().mode_name(trust=trust)]
         self.modes = tuple(dict.fromkeys(possible))
 
-    def room(self) -> int:
+    def job_capacity(self) -> int:
         """Return how many jobs may be with the scheduler: some wait, so that no worker does."""
-        return 2 * self._threads() + 4
+        return 2 * self._count_threads() + 4
 
     def submit(self, key: str, job: Job) -> None:
         """Send a job.
@@ -123,7 +123,7 @@ class Cluster:
         Raises:
             ClusterError: the scheduler is gone, or the job has an exam that only this machine has.
         """
-        if own := exercise_folders.current().own.intersection(job.exams):
+        if own := exercise_folders.current_exercises().own.intersection(job.exam_names):
             raise ClusterError(
                 f"The exercise '{min(own)}' is the course's own, and workers have only those of "
                 "ros2-course: grade without --scheduler."
@@ -131,16 +131,16 @@ class Cluster:
         try:
             # Again if a worker is closed in the middle; Dask sees to those that die.
             future = self._client.submit(
-                perform,
+                perform_job,
                 job.to_json(),
                 self._hidden,
                 pure=False,
                 retries=RETRIES,
                 # Dask takes a job of a name that it has met for that one, done as it may be.
-                key=f"{'-'.join(job.exams)}-{key}-{next(self._numbers)}",
+                key=f"{'-'.join(job.exam_names)}-{key}-{next(self._numbers)}",
             )
         except Exception as error:
-            raise self._lost() from error
+            raise self._scheduler_lost() from error
         self._futures[key], self._jobs[key] = future, job
         future.add_done_callback(lambda _: self._queue.put(Done(key)))
 
@@ -150,24 +150,24 @@ class Cluster:
         Raises:
             ClusterError: the scheduler is gone, or a worker cannot do the work.
         """
-        done = [self._take(item.key) for item in self._queue.wait()]
+        done = [self._take_result(item.key) for item in self._queue.wait()]
         if not done:
             if self._client.status != "running":
-                raise self._lost()
+                raise self._scheduler_lost()
             self._note_workers()
         return done
 
-    def _take(self, key: str) -> Done:
+    def _take_result(self, key: str) -> Done:
         future, job = self._futures.pop(key), self._jobs.pop(key)
         if future.cancelled():
-            raise self._lost()
+            raise self._scheduler_lost()
         if (error := future.exception()) is not None:
             return Done(key, error=error)
-        result = self._read(future.result())
+        result = self._read_result(future.result())
         self._keep(job, result)
         return Done(key, result)
 
-    def _read(self, text: Any) -> Result:
+    def _read_result(self, text: Any) -> Result:
         if not isinstance(text, str) or len(text) > MAX_RESULT:
             raise ClusterError(f"A worker of {self._address} sent no result of bounded size.")
         data = json.loads(text)
@@ -178,13 +178,13 @@ class Cluster:
             )
         return Result.from_json(data["result"])
 
-    def _threads(self) -> int:
+    def _count_threads(self) -> int:
         with suppress(Exception):
             return sum(self._client.nthreads().values())
-        raise self._lost()
+        raise self._scheduler_lost()
 
     def _note_workers(self) -> None:
-        lonely = self._threads() == 0
+        lonely = self._count_threads() == 0
         if lonely and not self._lonely:
             self._say(
                 f"The scheduler at {self._address} has no worker yet: start some with "
@@ -192,7 +192,7 @@ class Cluster:
             )
         self._lonely = lonely
 
-    def _lost(self) -> ClusterError:
+    def _scheduler_lost(self) -> ClusterError:
         return ClusterError(
             f"The scheduler at {self._address} went away: start it again and run the same command "
             "again; what was graded so far is kept."
@@ -210,16 +210,16 @@ class Cluster:
             self._client.close(timeout=CLOSE_TIMEOUT)
 
 
-def _connect(address: str) -> Any:
+def _connect_client(address: str) -> Any:
     try:
         from distributed import Client
     except ImportError:
         raise ClusterError(
             f"--scheduler needs Dask, which is not installed here: install it with `{EXTRA}`."
         ) from None
-    _silence()
+    _silence_logs()
     try:
-        _reach(address)
+        _reach_scheduler(address)
         return Client(  # type: ignore[no-untyped-call]
             address,
             timeout=CONNECT_TIMEOUT,
@@ -234,14 +234,14 @@ def _connect(address: str) -> Any:
         ) from None
 
 
-def _silence() -> None:
+def _silence_logs() -> None:
     """Keep Dask's own log off the screen: what matters of it is said in a sentence."""
     for name in ["distributed", *logging.root.manager.loggerDict]:
         if name.split(".")[0] == "distributed":  # several have a level of their own
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
 
 
-def _reach(address: str) -> None:
+def _reach_scheduler(address: str) -> None:
     """Connect once by ourselves: Dask goes on trying for long where nobody listens.
 
     Raises:

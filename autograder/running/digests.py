@@ -49,17 +49,19 @@ def of_exams(names: tuple[str, ...], root: Path | None = None) -> str:
         names: sorted names of exams; none for a program that sits no exam.
         root: a folder with copies of the packages; the installed ones if left out.
     """
-    return _of_exams(names, root, exercise_folders.current())
+    return _of_exams(names, root, exercise_folders.current_exercises())
 
 
 @lru_cache(maxsize=64)
 def _of_exams(names: tuple[str, ...], root: Path | None, exercises: Exercises) -> str:
-    worth = {name: points.read(file).parts for name, file in _tables(names, root, exercises)}
+    worth = {
+        name: points.read_points(file).parts for name, file in _points_files(names, root, exercises)
+    }
     more = json.dumps(worth, sort_keys=True)
-    return _Code(root, exercises).digest(_of_run(names, exercises), RUN_DATA, more)
+    return _Code(root, exercises).modules_digest(_of_run(names, exercises), RUN_DATA, more)
 
 
-def _tables(
+def _points_files(
     names: Iterable[str], root: Path | None, exercises: Exercises
 ) -> Iterator[tuple[str, Path]]:
     """Yield (exam, its table of points) for those of these exams that have one."""
@@ -79,10 +81,10 @@ def of_grading(names: tuple[str, ...], root: Path | None = None) -> str:
 
 @cache
 def _of_grading(root: Path | None) -> str:
-    return _Code(root).digest(GRADING, GRADING_DATA)
+    return _Code(root).modules_digest(GRADING, GRADING_DATA)
 
 
-def forget() -> None:
+def forget_code() -> None:
     """Read the code again for the next digest."""
     _of_exams.cache_clear()
     _of_grading.cache_clear()
@@ -90,8 +92,8 @@ def forget() -> None:
 
 def modules_of_exams(names: Iterable[str]) -> set[str]:
     """Return the modules that decide the verdicts of these exams."""
-    exercises = exercise_folders.current()
-    return _Code(None, exercises).closure(_of_run(names, exercises))
+    exercises = exercise_folders.current_exercises()
+    return _Code(None, exercises).import_closure(_of_run(names, exercises))
 
 
 def _of_run(names: Iterable[str], exercises: Exercises) -> list[str]:
@@ -121,20 +123,20 @@ class _Code:
         self._files: dict[str, Traversable] = {}
         self._data: list[Traversable] = []
         for name in PACKAGES:
-            self._walk(name, root / name if root else resources.files(name))
+            self._walk_package(name, root / name if root else resources.files(name))
         for name in exercises.own if exercises else ():
             self._files.update(_own_modules(name, exercises))  # type: ignore[arg-type]
 
-    def digest(self, modules: Iterable[str], data: tuple[str, ...], more: str = "") -> str:
+    def modules_digest(self, modules: Iterable[str], data: tuple[str, ...], more: str = "") -> str:
         """Return a digest of these modules, of all that they import, of data, and of ``more``."""
         state = hashlib.sha256(more.encode())
-        for name in sorted(self.closure(modules)):
+        for name in sorted(self.import_closure(modules)):
             state.update(name.encode() + b"\0" + self._files[name].read_bytes())
         for file in (file for file in self._data if file.name.endswith(data)):
             state.update(file.name.encode() + b"\0" + file.read_bytes())
         return state.hexdigest()
 
-    def closure(self, modules: Iterable[str]) -> set[str]:
+    def import_closure(self, modules: Iterable[str]) -> set[str]:
         """Return these modules and all that they import, directly or not."""
         found: set[str] = set()
         waiting = list(modules)
@@ -144,19 +146,19 @@ class _Code:
                 continue
             if name in self._files:
                 found.add(name)
-                waiting += _imports(name, self._files[name].read_bytes())
+                waiting += _imported_modules(name, self._files[name].read_bytes())
                 continue
             package = name.rpartition(".")[0]
             if package in self._files:
                 waiting += _on_demand(package, self._files[package].read_bytes()).get(name, ())
         return found
 
-    def _walk(self, package: str, folder: Traversable) -> None:
+    def _walk_package(self, package: str, folder: Traversable) -> None:
         for entry in sorted(folder.iterdir(), key=lambda entry: entry.name):
             if entry.is_dir():
                 if entry.name == exercise_folders.CORPUS and package.startswith(_EXERCISES):
                     continue
-                self._walk(f"{package}.{entry.name}", entry)
+                self._walk_package(f"{package}.{entry.name}", entry)
             elif entry.name == "__init__.py":
                 self._files[package] = entry
             elif entry.name.endswith(".py"):
@@ -174,7 +176,7 @@ _GETATTR = re.compile(rf"^def __getattr__\({_BLOCK}", re.MULTILINE)
 
 
 @cache
-def _imports(name: str, source: bytes) -> frozenset[str]:
+def _imported_modules(name: str, source: bytes) -> frozenset[str]:
     """Return what a module may import, its own packages included; too many names do no harm.
 
     Read from its lines: a syntax tree would keep each `autograder grade` from starting for longer.
@@ -185,7 +187,7 @@ def _imports(name: str, source: bytes) -> frozenset[str]:
         found |= {package, *(f"{package}.{imported}" for imported in _NAME.findall(names))}
     for names in _IMPORT.findall(text):
         found |= set(_NAME.findall(names))
-    return frozenset(found | {parent for module in found for parent in _parents(module)})
+    return frozenset(found | {parent for module in found for parent in _parent_packages(module)})
 
 
 @cache
@@ -203,7 +205,7 @@ def _on_demand(package: str, source: bytes) -> dict[str, tuple[str, ...]]:
     }
 
 
-def _parents(name: str) -> Iterator[str]:
+def _parent_packages(name: str) -> Iterator[str]:
     while "." in name:
         name = name.rpartition(".")[0]
         yield name

@@ -53,7 +53,7 @@ def sit(
     subject.delay = outside.delay
     try:
         bench = Bench(session, subject, outside, int(request["seed"]), programs, ends)
-        exam = exercises.load(request["exam"])
+        exam = exercises.load_exam(request["exam"])
         for verdict in exam.sit([Part(name, key) for name, key in request["parts"]], bench):
             yield replace(verdict, seed=bench.draws.seed)
     finally:
@@ -61,7 +61,7 @@ def sit(
             subject.release()
 
 
-def serve(
+def serve_requests(
     requests: TextIO,
     answers: TextIO,
     session: CoreSession,
@@ -86,9 +86,9 @@ def preload() -> None:
     from autograder.sandbox.prefork import modules
 
     modules.import_all()
-    for name in exercises.names():
+    for name in exercises.exercise_names():
         with suppress(CourseError):  # one that is being written keeps nobody from the others
-            exercises.load(name)
+            exercises.load_exam(name)
     with suppress(CourseError):
         points.table()  # read once, and not in each fork
 
@@ -102,7 +102,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--course", type=Path, help="a course root with exams of its own")
     options = parser.parse_args(arguments)
     if options.course is not None:
-        exercise_folders.use(options.course)
+        exercise_folders.use_course(options.course)
     # Verdicts go out over a private copy of standard output: whatever a library prints must not
     # end up among them.
     verdicts = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
@@ -114,7 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         outside = Afar(socket.socket(fileno=options.outside))
     with CoreSession(domain_id=options.domain) as session:
         session.explains = False  # it asks whether something comes, and says itself what it means
-        serve(sys.stdin, verdicts, session, subject, outside)
+        serve_requests(sys.stdin, verdicts, session, subject, outside)
         if outside is not None:
             os._exit(0)  # in its sandbox nobody is left who would have to hear that it goes
     return 0

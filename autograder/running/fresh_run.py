@@ -27,7 +27,7 @@ class FreshRun:
         self._path = work / FOLDER / f"{assignment}{some}"
 
     @property
-    def since(self) -> int:
+    def began_ns(self) -> int:
         """When the run that grades anew began, as nanoseconds of a file's date; 0 if there is none.
 
         The file system's own clock, which is not always this machine's.
@@ -39,7 +39,7 @@ class FreshRun:
 
     def begin(self) -> None:
         """Begin such a run; one that was ended before it was through goes on."""
-        if not self.since:
+        if not self.began_ns:
             write_whole(self._path, "")
 
     def end(self) -> None:

@@ -37,7 +37,7 @@ class Interruption:
         self._signum = 0
         self._before: dict[int, Any] = {}
 
-    def check(self) -> None:
+    def raise_if_stopped(self) -> None:
         """Raise `Stopped` if a signal came."""
         if self._signum:
             raise Stopped(self._signum)
@@ -47,7 +47,7 @@ class Interruption:
         if threading.current_thread() is threading.main_thread():
             for signum in SIGNALS:
                 if signal.getsignal(signum) is not signal.SIG_IGN:  # as nohup wants it
-                    self._before[signum] = signal.signal(signum, self._note)
+                    self._before[signum] = signal.signal(signum, self._note_signal)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -56,7 +56,7 @@ class Interruption:
             signal.signal(signum, handler)
         self._before.clear()
 
-    def _note(self, signum: int, _frame: FrameType | None) -> None:
+    def _note_signal(self, signum: int, _frame: FrameType | None) -> None:
         if self._signum:
             signal.signal(signum, signal.SIG_DFL)
             os.kill(os.getpid(), signum)

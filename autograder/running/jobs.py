@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from autograder import sandbox
-from autograder.examination.program import Cell, Program, digest
+from autograder.examination.program import Cell, Program, program_digest
 from autograder.examination.subject import outputs
 from autograder.processes import descriptors
 from autograder.running import digests, runner
@@ -43,24 +43,26 @@ class Job:
     trust: bool = False
 
     @property
-    def exams(self) -> tuple[str, ...]:
+    def exam_names(self) -> tuple[str, ...]:
         """The exams that the program sits."""
         return tuple(sorted({cell.exam for cell in self.program if cell.exam}))
 
     @property
-    def salt(self) -> str:
+    def code_digest(self) -> str:
         """A digest of the code that decides its verdicts."""
-        return digests.of_exams(self.exams)
+        return digests.of_exams(self.exam_names)
 
-    def key(self, mode: str) -> str:
+    def outcome_key(self, mode: str) -> str:
         """Return the name of its outcome: equal jobs run in one ``mode`` come to the same."""
-        return digest(self.program, self.files, f"{self.salt} {mode}")
+        return program_digest(self.program, self.files, f"{self.code_digest} {mode}")
 
     def to_json(self) -> str:
         """Return the job as JSON."""
         files = {name: base64.b64encode(content).decode() for name, content in self.files.items()}
         cells = [vars(cell) for cell in self.program]
-        return json.dumps({"cells": cells, "files": files, "trust": self.trust, "salt": self.salt})
+        return json.dumps(
+            {"cells": cells, "files": files, "trust": self.trust, "salt": self.code_digest}
+        )
 
     @classmethod
     def from_json(cls, text: str) -> Job:
@@ -72,7 +74,7 @@ class Job:
         data = json.loads(text)
         files = {name: base64.b64decode(content) for name, content in data["files"].items()}
         job = cls(tuple(Cell(**cell) for cell in data["cells"]), files, data["trust"])
-        if job.salt != data["salt"]:
+        if job.code_digest != data["salt"]:
             raise JobError(
                 "it has another version of ros2-course than the engine: install the same one on "
                 "every machine"
@@ -105,12 +107,12 @@ def run(job: Job, hidden: Iterable[Path] = ()) -> Result:
         SandboxError: the submission is not trusted, and there is no working sandbox here.
     """
     descriptors.allow_many()
-    mode = sandbox.abilities().mode(trust=job.trust)
+    mode = sandbox.abilities().mode_name(trust=job.trust)
     outcome = runner.run(job.program, job.files, trust=job.trust, hidden=hidden)
-    return Result(bounded(outcome), mode)
+    return Result(bounded_outcome(outcome), mode)
 
 
-def bounded(outcome: Outcome) -> Outcome:
+def bounded_outcome(outcome: Outcome) -> Outcome:
     """Return an outcome that is small enough to keep and to send: verdicts before outputs."""
     if len(outcome.to_json()) <= MAX_OUTCOME:
         return outcome

@@ -66,7 +66,7 @@ class Ledger:
 
     def get(self, student: str, since: int = 0) -> Entry | None:
         """Return a student's record, or None if there is no sound one from after ``since``."""
-        path = self._path(student)
+        path = self._record_path(student)
         try:
             if not is_since(path, since):
                 return None
@@ -80,13 +80,13 @@ class Ledger:
     def put(self, student: str, entry: Entry) -> None:
         """Keep a student's record; raises OSError if it cannot be written."""
         data = {"version": VERSION, "student": student, **asdict(entry)}
-        write_whole(self._path(student), json.dumps(data))
+        write_whole(self._record_path(student), json.dumps(data))
 
     def remove(self, student: str) -> None:
         """Forget a student's record."""
-        self._path(student).unlink(missing_ok=True)
+        self._record_path(student).unlink(missing_ok=True)
 
-    def _path(self, student: str) -> Path:
+    def _record_path(self, student: str) -> Path:
         name = hashlib.sha256(student.encode(errors="surrogateescape")).hexdigest()[:32]
         return self._folder / f"{name}.json"
 

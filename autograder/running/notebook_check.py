@@ -52,15 +52,17 @@ def check(
     namespace = _caller_globals()
     if SUBJECT_ENV in os.environ:
         return 0.0  # the real examiner is at work outside this process
-    if exam not in exercise_folders.packaged():
-        exercise_folders.use(Path.cwd())  # it may have changed, or be another folder's by now
-    exercises.load(exam).part(part)
-    verdict = examine(exam, part, namespace, key)
-    _show(Report(_noted(verdict), hints=hint))
-    return float(verdict.score + verdict.unexamined)
+    if exam not in exercise_folders.packaged_names():
+        exercise_folders.use_course(
+            Path.cwd()
+        )  # it may have changed, or be another folder's by now
+    exercises.load_exam(exam).part(part)
+    verdict = examine_part(exam, part, namespace, key)
+    _show_report(Report(_note_checks(verdict), hints=hint))
+    return float(verdict.score + verdict.unexamined_points)
 
 
-def examine(
+def examine_part(
     exam: str, part: str, namespace: Mapping[str, Any], key: Mapping[str, Any] | None = None
 ) -> Verdict:
     """Sit one part of an exam on the classes of ``namespace``, in sessions made for it.
@@ -77,7 +79,7 @@ def examine(
 
     try:
         ours, theirs = socket.socketpair()
-        course = exercise_folders.current().root
+        course = exercise_folders.current_exercises().root
         with ours, ExaminerProcess(theirs, lease.domain_id, course=course) as examiner:
             channel = Channel(ours)
             examiner.request(exam, [(part, key or {})], pid=os.getpid())
@@ -86,7 +88,7 @@ def examine(
                 sitting.serve(SubjectServer(open_session, namespace), channel)
             finally:
                 channel.close()
-            return sitting.verdict()
+            return sitting.await_verdict()
     finally:
         lease.release()
 
@@ -104,7 +106,7 @@ class _Sitting:
         self._error: CourseError | None = None
         self._served = threading.Event()
         self._lock = threading.Lock()
-        self._waiter = threading.Thread(target=self._wait, daemon=True)
+        self._waiter = threading.Thread(target=self._watch_examiner, daemon=True)
 
     def serve(self, harness: SubjectServer, channel: Channel) -> None:
         self._waiter.start()
@@ -116,14 +118,14 @@ class _Sitting:
             if self._verdict is None and self._error is None:
                 raise
 
-    def verdict(self) -> Verdict:
+    def await_verdict(self) -> Verdict:
         self._waiter.join()
         if self._verdict is None:
             assert self._error is not None
             raise self._error
         return self._verdict
 
-    def _wait(self) -> None:
+    def _watch_examiner(self) -> None:
         try:
             self._verdict = self._examiner.verdict()
         except CourseError as error:
@@ -131,16 +133,16 @@ class _Sitting:
         if not self._served.wait(STUCK):
             with self._lock:
                 if not self._served.is_set():
-                    self._interrupt()
+                    self._interrupt_main()
 
-    def _interrupt(self) -> None:
+    def _interrupt_main(self) -> None:
         """Interrupt the main thread, which is still busy with the student's code."""
         main = threading.main_thread().ident
         assert main is not None
         signal.pthread_kill(main, signal.SIGINT)
 
 
-def _noted(verdict: Verdict) -> Verdict:
+def _note_checks(verdict: Verdict) -> Verdict:
     """Note a student's visible checks in the journal of the working copy, if this is in one."""
     journal = journal_here()
     if journal is None or verdict.part != "visible":
@@ -148,7 +150,7 @@ def _noted(verdict: Verdict) -> Verdict:
     passed = [check.title for check in verdict.checks if check.passed]
     left = [c.title for c in verdict.checks if not c.passed and c.status != "not_examined"]
     try:
-        journal.checked(verdict.exam, verdict.score, verdict.max_score, passed, left)
+        journal.record_checks(verdict.exam, verdict.score, verdict.max_score, passed, left)
     except JournalError as error:
         return replace(verdict, notes=(*verdict.notes, str(error)))
     return verdict
@@ -163,7 +165,7 @@ def _caller_globals() -> Mapping[str, Any]:
     return frame.f_back.f_back.f_globals
 
 
-def _show(report: Report) -> None:
+def _show_report(report: Report) -> None:
     try:
         from IPython.core.getipython import get_ipython
     except ImportError:

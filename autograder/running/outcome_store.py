@@ -30,7 +30,7 @@ class OutcomeStore:
         self._folder = folder
         self._trust, self._hidden = trust, tuple(hidden)
 
-    def outcome(self, program: Program, files: Mapping[str, bytes]) -> Outcome:
+    def get_or_run(self, program: Program, files: Mapping[str, bytes]) -> Outcome:
         """Return a program's outcome: the one that is kept, or else a new one.
 
         Raises:
@@ -49,11 +49,11 @@ class OutcomeStore:
 
         ``mode`` is the one in which it was run; that of this machine if left out.
         """
-        return self.named(self.key(program, files, mode))
+        return self.get_by_key(self.outcome_key(program, files, mode))
 
-    def named(self, key: str, since: int = 0) -> Outcome | None:
+    def get_by_key(self, key: str, since: int = 0) -> Outcome | None:
         """Return the outcome whose key is ``key``, if there is a sound one from after ``since``."""
-        path = self._path(key)
+        path = self._outcome_path(key)
         try:
             if not is_since(path, since):
                 return None
@@ -69,9 +69,9 @@ class OutcomeStore:
         Raises:
             StoreError: the folder cannot be written (a full disk, say).
         """
-        if outcome.spoilt:
+        if outcome.has_grader_error:
             return
-        path = self._path(self.key(program, files, mode))
+        path = self._outcome_path(self.outcome_key(program, files, mode))
         try:
             write_whole(path, outcome.to_json())
         except OSError as error:
@@ -81,11 +81,11 @@ class OutcomeStore:
                 "graded so far is kept."
             ) from error
 
-    def key(self, program: Program, files: Mapping[str, bytes], mode: str = "") -> str:
+    def outcome_key(self, program: Program, files: Mapping[str, bytes], mode: str = "") -> str:
         """Return the name under which a program's outcome is kept."""
         # What a sandbox or its lossy network finds is not found without.
-        mode = mode or sandbox.abilities().mode(trust=self._trust)
-        return Job(program, files, self._trust).key(mode)
+        mode = mode or sandbox.abilities().mode_name(trust=self._trust)
+        return Job(program, files, self._trust).outcome_key(mode)
 
-    def _path(self, key: str) -> Path:
+    def _outcome_path(self, key: str) -> Path:
         return self._folder / f"{key}.json"

@@ -42,7 +42,7 @@ class ProgramHost:
         self._program: RunningSubject | None = None
         self._left = ALL_UP_S
 
-    def answer(self, request: dict[str, Any]) -> dict[str, Any]:
+    def answer_request(self, request: dict[str, Any]) -> dict[str, Any]:
         """Return the answer to a request of the examiner's; an ``"error"`` says why there is none.
 
         ``{"wants": "program", "nodes": [[class, arguments], ...], "then": [{"nodes", "tried"},
@@ -53,20 +53,20 @@ class ProgramHost:
         """
         match request.get("wants"):
             case "program":
-                return self._begin(request)
+                return self._begin_program(request)
             case "interrupt" if self._program is not None:
                 with suppress(ProcessLookupError):
                     os.kill(self._program.pid, signal.SIGINT)
                 return {}
             case "end":
-                self._end()
+                self._end_program()
                 return {}
         return {"error": "there is no such request"}
 
-    def _begin(self, request: dict[str, Any]) -> dict[str, Any]:
-        self._end()
+    def _begin_program(self, request: dict[str, Any]) -> dict[str, Any]:
+        self._end_program()
         try:
-            wanted, domain = _wanted(request)
+            wanted, domain = _parse_request(request)
         except (LookupError, OverflowError, TypeError, ValueError):
             return {"error": "this is no program"}
         if self._left <= 0:
@@ -108,7 +108,7 @@ class ProgramHost:
             program = self._start(command, [engine.fileno(), unused.fileno()])
         return self._held.enter_context(program)
 
-    def _end(self) -> None:
+    def _end_program(self) -> None:
         if self._program is not None:
             self._program = None
             self._subject.tell_warden()
@@ -123,11 +123,14 @@ class ProgramHost:
         self._held.close()
 
 
-def _wanted(request: dict[str, Any]) -> tuple[dict[str, Any], int]:
-    """Return what a program is to be, and its domain; raises what `answer` takes for no program."""
-    nodes = _nodes(request["nodes"])
+def _parse_request(request: dict[str, Any]) -> tuple[dict[str, Any], int]:
+    """Return what a program is to be, and its domain.
+
+    It raises what `answer_request` takes for no program.
+    """
+    nodes = _parse_nodes(request["nodes"])
     then = [
-        {"nodes": _nodes(life["nodes"]), "tried": _nodes(life["tried"])}
+        {"nodes": _parse_nodes(life["nodes"]), "tried": _parse_nodes(life["tried"])}
         for life in request["then"][:MOST_LIVES]
     ]
     threads, domain = int(request["threads"]), int(request["domain"])
@@ -138,8 +141,11 @@ def _wanted(request: dict[str, Any]) -> tuple[dict[str, Any], int]:
     return {"nodes": nodes, "then": then, "threads": threads, **how}, domain
 
 
-def _nodes(wanted: Any) -> list[Any]:
-    """Return classes and texts that their constructors are given; raises what `_wanted` does."""
+def _parse_nodes(wanted: Any) -> list[Any]:
+    """Return classes and texts that their constructors are given.
+
+    It raises what `_parse_request` does.
+    """
     nodes = []
     for name, arguments in wanted[:MOST_NODES]:
         texts = [argument for argument in arguments[:MOST_ARGUMENTS] if isinstance(argument, str)]

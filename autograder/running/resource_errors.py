@@ -11,7 +11,7 @@ _PASSING = {errno.EAGAIN, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.ENOBUF
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 
 
-def passes(error: BaseException | None) -> bool:
+def is_temporary(error: BaseException | None) -> bool:
     """Whether an error may be over a moment later: no process, no memory to spare just now."""
     if isinstance(error, (BoxError, ZygoteError, MemoryError)):
         return True

@@ -67,14 +67,14 @@ class Outcome:
     begun: bool = False
 
     @property
-    def spoilt(self) -> bool:
+    def has_grader_error(self) -> bool:
         """Whether the grader itself failed somewhere."""
-        return any(verdict.spoilt for verdict in self.verdicts.values())
+        return any(verdict.has_grader_error for verdict in self.verdicts.values())
 
     @property
     def may_be_tried_again(self) -> bool:
         """Whether the grader failed before anything of the program could have had it fail."""
-        return self.spoilt and not self.begun
+        return self.has_grader_error and not self.begun
 
     def to_json(self) -> str:
         """Return the outcome as JSON."""
@@ -114,12 +114,12 @@ def run(
     Raises:
         SandboxError: the program is not trusted, and there is no working sandbox here.
     """
-    own_interfaces.build()
+    own_interfaces.build_interfaces()
     started = time.monotonic()
     outcome = Outcome(outputs=[[] for _ in program])
     with ExitStack() as stack:
         exams = exercise_folders.own_exam_files(cell.exam for cell in program)
-        place = stack.enter_context(sandbox.place(trust=trust, hidden=hidden, exams=exams))
+        place = stack.enter_context(sandbox.choose_place(trust=trust, hidden=hidden, exams=exams))
         # The lower number is the engine's: what writes to every descriptor in turn must find this
         # one, which is being read, before the examiner's, which is not until an exam begins.
         pairs = sorted((socket.socketpair() for _ in range(2)), key=lambda pair: pair[1].fileno())
@@ -130,20 +130,22 @@ def run(
         examiner = stack.enter_context(
             ExaminerProcess(control, place.domain_id, spawn=place.spawn, course=place.course)
         )
-        subject = stack.enter_context(_start(place, subject_engine, subject_control, files))
+        subject = stack.enter_context(_start_subject(place, subject_engine, subject_control, files))
 
         def start(command: Sequence[str], fds: Sequence[int]) -> RunningSubject:
             return place.start_subject(command, files, fds)
 
         seed = fresh_seed() if seed is None else seed
-        _follow(program, channel, examiner, subject, outcome, cell_timeout, seed, start)
-        if (excess := subject.excess()) and _ended(excess) not in outcome.notes:
-            outcome.notes.append(_ended(excess))  # an examiner sees no more than that it is gone
+        _follow_program(program, channel, examiner, subject, outcome, cell_timeout, seed, start)
+        if (excess := subject.describe_excess()) and _describe_end(excess) not in outcome.notes:
+            outcome.notes.append(
+                _describe_end(excess)
+            )  # an examiner sees no more than that it is gone
     outcome.seconds = round(time.monotonic() - started, 2)
     return outcome
 
 
-def _start(
+def _start_subject(
     place: Place, engine: socket.socket, control: socket.socket, files: Mapping[str, bytes]
 ) -> RunningSubject:
     fds = [engine.fileno(), control.fileno()]
@@ -152,7 +154,7 @@ def _start(
         return place.start_subject(command, files, fds)
 
 
-def _follow(
+def _follow_program(
     program: Program,
     channel: Channel,
     examiner: ExaminerProcess,
@@ -166,9 +168,9 @@ def _follow(
     status: Status
     number, shown = 0, outputs.Notebook(outcome.outputs)
     try:
-        _await(channel, subject)
+        _await_start(channel, subject)
         outcome.begun = True
-        channel.send({"cells": [_shown(program, number) for number in range(len(program))]})
+        channel.send({"cells": [_cell_message(program, number) for number in range(len(program))]})
         for number, cell in enumerate(program):
             was_cut = shown.cut
             _await_cell(channel, subject, program, number, shown, cell_timeout)
@@ -176,7 +178,7 @@ def _follow(
                 outcome.notes.append(TOO_MUCH)
             if not cell.exam:
                 _note_error(outcome, number)
-            elif parts := _sitting(program, number):
+            elif parts := _parts_from(program, number):
                 last = number + len(parts) == len(program)
                 examiner.request(
                     cell.exam, [(part.part, part.key) for part in parts],
@@ -185,7 +187,9 @@ def _follow(
                 done = [c.source for c in program[:number] if not c.exam]
                 with ProgramHost(start, subject, done) as host:
                     for part in parts:
-                        outcome.verdicts[part.grade_id] = examiner.verdict(answer_with=host.answer)
+                        outcome.verdicts[part.grade_id] = examiner.verdict(
+                            answer_with=host.answer_request
+                        )
                         if examiner.hangs:
                             # It has waited long enough: it would find the same in every part.
                             _give_up(program, outcome, examiner.hangs, reached=number)
@@ -194,8 +198,8 @@ def _follow(
                     return
                 _await_cell(channel, subject, program, number, shown, cell_timeout, over=True)
     except ChannelTimeout:
-        frames = hang_report.ask(subject.pid, channel)
-        reason = _stuck(program, number, cell_timeout, frames)
+        frames = hang_report.ask_frames(subject.pid, channel)
+        reason = _describe_hang(program, number, cell_timeout, frames)
         _give_up(program, outcome, reason, reached=number)
     except ChannelBroken as error:
         _give_up(
@@ -205,29 +209,31 @@ def _follow(
             reached=number,
         )
     except ChannelClosed:
-        fate = subject.fate()
+        fate = subject.describe_end()
         status = "grader_error" if subject.unwatched else "not_checked"
-        _give_up(program, outcome, _ended(fate), status, reached=number)
+        _give_up(program, outcome, _describe_end(fate), status, reached=number)
     except ExaminerFloodedError as error:
         _give_up(program, outcome, str(error), reached=number)
     except ExaminerError as error:
         # What there is too much of in a network fails an examiner, too, and is the subject's.
-        excess = subject.excess(EXCESS_TIMEOUT)
-        reason = _ended(excess) if excess else str(error)
+        excess = subject.describe_excess(EXCESS_TIMEOUT)
+        reason = _describe_end(excess) if excess else str(error)
         status = "not_checked" if excess else "grader_error"
         _give_up(program, outcome, reason, status, reached=number)
 
 
-def _ended(fate: str) -> str:
+def _describe_end(fate: str) -> str:
     return f"The notebook's process ended: {fate}."
 
 
-def _stuck(program: Program, number: int, seconds: float, frames: list[hang_report.Frame]) -> str:
+def _describe_hang(
+    program: Program, number: int, seconds: float, frames: list[hang_report.Frame]
+) -> str:
     """Return what a program is stuck in that has not answered for ``number``.
 
     ``frames`` are where it says that it is, if it does: an explanation, never evidence.
     """
-    theirs = hang_report.students(frames)
+    theirs = hang_report.student_frame(frames)
     where = f" ({hang_report.line_of(theirs, program)})" if theirs else ""
     if not program[number].exam:
         return (
@@ -237,23 +243,25 @@ def _stuck(program: Program, number: int, seconds: float, frames: list[hang_repo
         )
     # No cell of the student's: what it waits for is the end of the last examination.
     if frames and not theirs:
-        where = f" (in {hang_report.told(frames)})"
+        where = f" (in {hang_report.describe_frames(frames)})"
     return (
         f"Your nodes were still being taken down {seconds:.0f} s after an examination{where}, so "
         "nothing after it was examined: does a destroy_node() of yours wait for ever?"
     )
 
 
-def _await(channel: Channel, subject: RunningSubject) -> None:
+def _await_start(channel: Channel, subject: RunningSubject) -> None:
     """Wait until the subject has started: nothing of the student's has run by then."""
     try:
         channel.receive(START_TIMEOUT)
     except (ChannelTimeout, ChannelClosed):
-        raise ExaminerError(f"The notebook's process did not start: {subject.failed()}.") from None
+        raise ExaminerError(
+            f"The notebook's process did not start: {subject.explain_failure()}."
+        ) from None
     subject.ready()
 
 
-def _sitting(program: Program, number: int) -> Program:
+def _parts_from(program: Program, number: int) -> Program:
     """Return the parts of an exam that are examined together at a cell: those from there on.
 
     Empty if it has been one of them before, or is no part of an exam.
@@ -264,9 +272,9 @@ def _sitting(program: Program, number: int) -> Program:
     return tuple(takewhile(lambda cell: cell.exam == exam, program[number:] if exam else ()))
 
 
-def _shown(program: Program, number: int) -> dict[str, str]:
+def _cell_message(program: Program, number: int) -> dict[str, str]:
     """Return what a subject is told of a cell: never an answer key, nor which parts come."""
-    if parts := _sitting(program, number):
+    if parts := _parts_from(program, number):
         return {"source": "", "exam": parts[0].exam}
     return {"source": "" if program[number].exam else program[number].source, "exam": ""}
 
@@ -288,7 +296,7 @@ def _await_cell(
     What a cell shows can change later: a display is updated, a task goes on. But what nbgrader
     takes for a score is what a test showed when it ran.
     """
-    reached = {"exam" if _sitting(program, number) and not over else "ran": number}
+    reached = {"exam" if _parts_from(program, number) and not over else "ran": number}
     seen: set[int] = set()
     while (message := channel.receive_fairly(timeout, subject.delay)) != reached:
         match message:
@@ -299,7 +307,7 @@ def _await_cell(
                     raise ChannelBroken("what it says of a cell's outputs is none")
                 seen.add(place)
                 if place == number or not program[place].grade_id:
-                    shown.put(place, given)
+                    shown.put_outputs(place, given)
             case _:
                 raise ChannelBroken("it is no answer to what was asked")
 
@@ -321,18 +329,18 @@ def _give_up(
 ) -> None:
     # They bring rclpy, for which no other notebook need wait that is run from this process.
     from autograder import exercises
-    from autograder.examination.exam import unexamined
+    from autograder.examination.exam import unexamined_verdict
 
     outcome.notes.append(reason)
     for number, cell in enumerate(program):
         if number >= reached and cell.grade_id and not cell.exam:
             outcome.outputs[number] = [dict(NOT_RUN)]
         if cell.exam and cell.grade_id not in outcome.verdicts:
-            exam = exercises.load(cell.exam)
-            outcome.verdicts[cell.grade_id] = unexamined(exam, cell.part, reason, status)
+            exam = exercises.load_exam(cell.exam)
+            outcome.verdicts[cell.grade_id] = unexamined_verdict(exam, cell.part, reason, status)
 
 
-def refuse(program: Program, reason: str, status: Status = "not_checked") -> Outcome:
+def refused_outcome(program: Program, reason: str, status: Status = "not_checked") -> Outcome:
     """Return the outcome of a program that is not run at all, for ``reason``."""
     outcome = Outcome(outputs=[[] for _ in program], unreadable=True)
     _give_up(program, outcome, reason, status)

@@ -19,8 +19,8 @@ from autograder.examination.draws import fresh_seed
 from autograder.examination.subject import hang_report
 from autograder.examination.verdict import Verdict, VerdictError
 from autograder.processes import python_module
-from autograder.processes.channel import parse
-from autograder.processes.descriptors import readable
+from autograder.processes.channel import parse_line
+from autograder.processes.descriptors import readable_descriptors
 from autograder.processes.fair_deadline import FairDeadline, of_process
 from course.errors import CourseError
 from course.runtime.waiting import Deadline
@@ -124,7 +124,7 @@ class ExaminerProcess:
             last: nothing of the notebook runs after it, so in a sandbox nothing is taken down.
         """
         self._asked = deque((exam, part) for part, _ in parts)
-        self._send(
+        self._send_message(
             {
                 "exam": exam,
                 "parts": [[part, dict(key)] for part, key in parts],
@@ -147,9 +147,9 @@ class ExaminerProcess:
         """
         deadline = FairDeadline(timeout, of_process(self._process.pid))
         for _ in range(MOST_REQUESTS):
-            line = self._line(deadline, timeout)
+            line = self._read_line(deadline, timeout)
             try:
-                answer = parse(line)
+                answer = parse_line(line)
                 if not isinstance(answer, dict):
                     raise TypeError("it is no JSON object")
                 if answer_with is None or "wants" not in answer:
@@ -157,30 +157,32 @@ class ExaminerProcess:
             except (ValueError, LookupError, TypeError, RecursionError, VerdictError) as error:
                 said = str(error)[:LAST_LINE]
                 raise ExaminerError(f"What the examiner wrote is no verdict: {said}") from None
-            self._send(answer_with(answer))
-            if not deadline.left:
-                raise self._late(timeout)
+            self._send_message(answer_with(answer))
+            if not deadline.seconds_left:
+                raise self._late_error(timeout)
         raise ExaminerError(f"The examiner asked {MOST_REQUESTS} times, and gave no verdict.")
 
-    def _line(self, deadline: FairDeadline, timeout: float) -> bytes:
+    def _read_line(self, deadline: FairDeadline, timeout: float) -> bytes:
         assert self._process.stdout is not None
         stream = self._process.stdout.fileno()
         while b"\n" not in self._buffer:
-            if self._buffer and not deadline.left:
-                raise self._late(timeout)
-            if stream not in self._wait(deadline.left):
-                if deadline.left:
+            if self._buffer and not deadline.seconds_left:
+                raise self._late_error(timeout)
+            if stream not in self._wait_readable(deadline.seconds_left):
+                if deadline.seconds_left:
                     continue
-                raise self._late(timeout)
+                raise self._late_error(timeout)
             chunk = os.read(stream, 65536)
             if not chunk or len(self._buffer) > MAX_ANSWER:
-                raise self._ended("The examiner ended without a verdict")
+                raise self._ended_error("The examiner ended without a verdict")
             self._buffer += chunk
         line, self._buffer = self._buffer.split(b"\n", 1)
         return line
 
-    def _late(self, timeout: float) -> ExaminerError:
-        return ExaminerError(f"The examiner gave no verdict within {timeout:.0f} s{self._place()}.")
+    def _late_error(self, timeout: float) -> ExaminerError:
+        return ExaminerError(
+            f"The examiner gave no verdict within {timeout:.0f} s{self._describe_place()}."
+        )
 
     def _verdict_of(self, answer: dict[str, Any]) -> Verdict:
         self.hangs = str(answer["hangs"])[:MAX_HANGS]
@@ -189,15 +191,15 @@ class ExaminerProcess:
         verdict.require_asked(*asked, points.of_part(*asked))
         return verdict
 
-    def _send(self, message: dict[str, Any]) -> None:
+    def _send_message(self, message: dict[str, Any]) -> None:
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps(message).encode() + b"\n")
             self._process.stdin.flush()
         except BrokenPipeError:
-            raise self._ended("The examiner ended at once") from None
+            raise self._ended_error("The examiner ended at once") from None
 
-    def _wait(self, timeout: float) -> list[int]:
+    def _wait_readable(self, timeout: float) -> list[int]:
         """Return which of its streams can be read, and take what is said on standard error.
 
         A student's nodes can have its libraries warn for ever; it must not wait for a reader.
@@ -205,14 +207,14 @@ class ExaminerProcess:
         assert self._process.stdout is not None
         assert self._process.stderr is not None
         errors_too = [] if self._mute else [self._process.stderr]
-        ready = readable([self._process.stdout, *errors_too], timeout)
+        ready = readable_descriptors([self._process.stdout, *errors_too], timeout)
         if (errors := self._process.stderr.fileno()) in ready:
             said = os.read(errors, 65536)
             self._mute = not said
             self._said = (self._said + said)[-LAST_WORDS:]
         return ready
 
-    def _place(self) -> str:
+    def _describe_place(self) -> str:
         """Return where it is stuck, for whoever looks for the mistake; empty if it does not say."""
         self._said = b""
         with suppress(ProcessLookupError, PermissionError):
@@ -220,18 +222,18 @@ class ExaminerProcess:
         assert self._process.stdout is not None
         deadline = Deadline(hang_report.PATIENCE)
         frames: list[hang_report.Frame] = []
-        while not frames and not self._mute and deadline.left:
-            if self._process.stdout.fileno() in self._wait(deadline.left):
+        while not frames and not self._mute and deadline.seconds_left:
+            if self._process.stdout.fileno() in self._wait_readable(deadline.seconds_left):
                 break  # it is not stuck any more, or has ended: it says no more
             frames = hang_report.of_first_thread(
                 self._said.decode(errors="replace"), hang_report.EXAMINER
             )
-        return f" ({hang_report.told(frames)})" if frames else ""
+        return f" ({hang_report.describe_frames(frames)})" if frames else ""
 
-    def _ended(self, when: str) -> ExaminerError:
-        self._kill()
+    def _ended_error(self, when: str) -> ExaminerError:
+        self._kill_process()
         assert self._process.stderr is not None
-        while self._process.stderr.fileno() in self._wait(0.0):
+        while self._process.stderr.fileno() in self._wait_readable(0.0):
             pass
         if b"bad_alloc" in self._said or b"MemoryError" in self._said:
             return ExaminerFloodedError(
@@ -244,7 +246,7 @@ class ExaminerProcess:
         lines = self._said.decode(errors="replace").strip().splitlines()
         return lines[-1][:LAST_LINE] if lines else f"exit code {self._process.returncode}"
 
-    def _kill(self) -> None:
+    def _kill_process(self) -> None:
         if self._process.poll() is None:
             # One that has only just been forked does not lead a group yet, nor has it any members.
             with suppress(ProcessLookupError):
@@ -268,7 +270,7 @@ class ExaminerProcess:
             self._process.stdin.close()
             self._process.wait(timeout=5 if error is None else 0)
         except (subprocess.TimeoutExpired, BrokenPipeError):
-            self._kill()
+            self._kill_process()
         for stream in (self._process.stdout, self._process.stderr):
             if stream is not None:
                 stream.close()

@@ -39,9 +39,9 @@ class Workers(Protocol):
 
     @property
     def modes(self) -> tuple[str, ...]:
-        """The modes in which jobs may be run (see `Abilities.mode`), the best one first."""
+        """The modes in which jobs may be run (see `Abilities.mode_name`), the best one first."""
 
-    def room(self) -> int:
+    def job_capacity(self) -> int:
         """Return how many jobs may be in their hands, so that none of them has to wait for one."""
 
     def submit(self, key: str, job: Job) -> None:
@@ -113,21 +113,21 @@ class LocalWorkers:
         self._threads: list[int] = []
         self._running: set[Future[None]] = set()
         self._pool = ThreadPoolExecutor(count, "grading", self._note_thread)
-        self.modes = (sandbox.abilities().mode(trust=trust),)
+        self.modes = (sandbox.abilities().mode_name(trust=trust),)
         self.wake = self._queue.wake
         self.wait = self._queue.wait
 
-    def room(self) -> int:
+    def job_capacity(self) -> int:
         """Return how many jobs may be here: some wait, so that no thread does."""
         return 2 * self._count + 2
 
     def submit(self, key: str, job: Job) -> None:
         """Queue a job."""
-        future = self._pool.submit(self._run, key, job)
+        future = self._pool.submit(self._run_job, key, job)
         self._running.add(future)
         future.add_done_callback(self._running.discard)
 
-    def _run(self, key: str, job: Job) -> None:
+    def _run_job(self, key: str, job: Job) -> None:
         try:
             result = jobs.run(job, self._hidden)
             # What is killed in the middle must not look like a submission that died.
@@ -150,18 +150,18 @@ class LocalWorkers:
         self._pool.shutdown(wait=False, cancel_futures=True)
         rounds = int(STOP_TIMEOUT / 0.1)
         while rounds and self._running:
-            for process in self._children():
+            for process in self._child_processes():
                 with suppress(ProcessLookupError):
                     os.kill(process, signal.SIGKILL)
             prefork.shared.kill_forked()
             wait(set(self._running), timeout=0.1)
             rounds -= 1
 
-    def _children(self) -> list[int]:
+    def _child_processes(self) -> list[int]:
         """Return the processes that the threads have started, but for the zygotes."""
         found: list[int] = []
         for thread in self._threads:
             with suppress(OSError):
                 children = Path(f"/proc/self/task/{thread}/children").read_text()
                 found += map(int, children.split())
-        return [process for process in found if process not in prefork.shared.started]
+        return [process for process in found if process not in prefork.shared.started_pids]

@@ -10,12 +10,12 @@ from autograder.sandbox.probe import (
     Abilities,
     SandboxError,
     abilities,
-    place,
-    require,
+    choose_place,
+    require_sandbox,
     warm_up,
 )
 
 __all__ = [
-    "Abilities", "BoxError", "Place", "RunningSubject", "SandboxError", "abilities", "place",
-    "require", "subject_command", "warm_up",
+    "Abilities", "BoxError", "Place", "RunningSubject", "SandboxError", "abilities", "choose_place",
+    "require_sandbox", "subject_command", "warm_up",
 ]  # fmt: skip

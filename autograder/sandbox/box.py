@@ -22,8 +22,8 @@ from typing import Any, NamedTuple, Self
 from autograder.files import scratch_folder
 from autograder.processes import python_module
 from autograder.sandbox import environment, network, seccomp, view, warmth
-from autograder.sandbox.boxed import BoxedSubject, Warden, WarmSubject, end
-from autograder.sandbox.host import tethered, write_files
+from autograder.sandbox.boxed import BoxedSubject, Warden, WarmSubject, end_process
+from autograder.sandbox.host import tether_command, write_files
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.place import Process
 from course.domains.leases import MAX_DOMAIN
@@ -89,26 +89,26 @@ class Box:
         self._warden = warden
         return examiner
 
-    def join(self, command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+    def run_in_network(self, command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
         """Run a command of ours in the network, and else as everything of ours runs.
 
         Raises:
             BoxError: there is no such network to be had.
         """
         self._make_network()
-        joined = [*network.joining(self._namespaces), *tethered(command)]
-        return network.start(joined, **options)
+        joined = [*network.join_prefix(self._namespaces), *tether_command(command)]
+        return network.start_tool(joined, **options)
 
     def _make_network(self) -> None:
         if not self._namespaces:
-            owner = warmth.subjects().pid if self._warm else None
-            self._namespaces = network.make(owner)
+            owner = warmth.subject_zygote().pid if self._warm else None
+            self._namespaces = network.make_network(owner)
 
     def _start_warden(self, asked: socket.socket) -> Process:
         arguments = ["--examiner", str(asked.fileno())]
         if self._warm:
-            return warmth.warden(arguments, [asked.fileno()], self._namespaces)
-        return self.join(
+            return warmth.fork_warden(arguments, [asked.fileno()], self._namespaces)
+        return self.run_in_network(
             [*python_module.command(warmth.WARDEN), *arguments], pass_fds=[asked.fileno()],
             stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
@@ -121,26 +121,26 @@ class Box:
         arguments = warmth.arguments_of(command, warmth.EXAMINER) if self._warm else None
         bounds = [f"--{name}={most}" for name, most in limits.of_processes().items()]
         with ExitStack() as stack:
-            user, holder = _user(), _user()
+            user, holder = _choose_user(), _choose_user()
             exams = {view.COURSE: self._exams} if self._exams else {}
-            sandbox = _Sandbox(limits, environment.examiner(), exams)
+            sandbox = _Sandbox(limits, environment.examiner_environment(), exams)
             if arguments is None:
                 streams = {name: options.get(name) for name in ("stdin", "stdout", "stderr")}
                 command = ["prlimit", *bounds, "--", *command]
-                process, init = self._enclose(
+                process, init = self._start_enclosed(
                     command, user, user, sandbox, stack, fds, **streams
                 )  # fmt: skip
                 self._held.push(BoxedSubject(process, init, limits, stack.pop_all()))
                 return process, init
-            process, init = self._enclose(
+            process, init = self._start_enclosed(
                 EXAMINERS_HOLDER, user, holder, sandbox, stack, (), stdout=subprocess.PIPE
             )
             enclosed = BoxedSubject(process, init, limits, stack.pop_all())
             self._held.push(enclosed)
             enclosed.require_holder()
             as_user = user if network.is_root() else None
-            examiner = warmth.examiner(arguments, fds, enclosed.handle, as_user, limits)
-            self._held.callback(end, examiner)
+            examiner = warmth.fork_examiner(arguments, fds, enclosed.handle, as_user, limits)
+            self._held.callback(end_process, examiner)
             return examiner, init
 
     def start_subject(
@@ -153,7 +153,7 @@ class Box:
         """
         command = [*command, "--limits", self._limits.to_json(), "--files", str(view.HANDED_IN)]
         if self._warm and (arguments := warmth.arguments_of(command, warmth.SUBJECT)) is not None:
-            return self._fork(arguments, files, fds)
+            return self._fork_subject(arguments, files, fds)
         return self.start(command, files, fds)
 
     def start(
@@ -161,21 +161,33 @@ class Box:
     ) -> BoxedSubject:
         """Start any command as `start_subject` does, without options for a subject."""
         with ExitStack() as stack:
-            user = _user()
-            process, init = self._enclose(
-                command, user, user, self._subjects(files), stack, fds, stdout=subprocess.DEVNULL
+            user = _choose_user()
+            process, init = self._start_enclosed(
+                command,
+                user,
+                user,
+                self._subject_sandbox(files),
+                stack,
+                fds,
+                stdout=subprocess.DEVNULL,
             )
             return BoxedSubject(process, init, self._limits, stack.pop_all(), self._warden)
 
-    def _fork(
+    def _fork_subject(
         self, arguments: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
     ) -> WarmSubject:
         """Make the sandbox around a process that only waits, and fork the subject into it."""
         with ExitStack() as stack:
-            user = _user()
+            user = _choose_user()
             # Root's subject is another user than what holds its sandbox, and cannot touch that.
-            process, init = self._enclose(
-                HOLDER, user, _user(), self._subjects(files), stack, (), stdout=subprocess.PIPE
+            process, init = self._start_enclosed(
+                HOLDER,
+                user,
+                _choose_user(),
+                self._subject_sandbox(files),
+                stack,
+                (),
+                stdout=subprocess.PIPE,
             )
             subject = WarmSubject(process, init, self._limits, stack.pop_all(), self._warden)
             stack.push(subject)
@@ -183,10 +195,10 @@ class Box:
             stack.pop_all()
             return subject
 
-    def _subjects(self, files: Mapping[str, bytes]) -> _Sandbox:
-        return _Sandbox(self._limits, environment.submission(), {view.HANDED_IN: files})
+    def _subject_sandbox(self, files: Mapping[str, bytes]) -> _Sandbox:
+        return _Sandbox(self._limits, environment.submission_environment(), {view.HANDED_IN: files})
 
-    def _enclose(
+    def _start_enclosed(
         self,
         command: Sequence[str],
         named: int,
@@ -205,13 +217,13 @@ class Box:
         """
         given = _Given(stack)
         # Through a descriptor, so that the sandbox's process 1 does not tell them.
-        arguments = given.file("\0".join(self._arguments(given, named, sandbox)).encode())
+        arguments = given.add_file("\0".join(self._bwrap_arguments(given, named, sandbox)).encode())
         info, info_end = os.pipe()
         bwrap = ["bwrap", "--args", arguments, "--info-fd", str(info_end), "--"]
         command = [*bwrap, *(_as_user(user) if network.is_root() else []), *command]
         try:
-            process = network.start(
-                [*network.joining(self._namespaces), *command],
+            process = network.start_tool(
+                [*network.join_prefix(self._namespaces), *command],
                 env={"PATH": os.environ.get("PATH", os.defpath)}, start_new_session=True,
                 pass_fds=[*given.descriptors, info_end, *fds],
                 stdin=stdin, stdout=stdout, stderr=stderr,
@@ -220,19 +232,19 @@ class Box:
             os.close(info_end)
         return process, network.child(info, process)
 
-    def _arguments(self, given: _Given, user: int, sandbox: _Sandbox) -> Iterator[str]:
+    def _bwrap_arguments(self, given: _Given, user: int, sandbox: _Sandbox) -> Iterator[str]:
         """Yield bwrap's arguments."""
         yield from network.own_user(USER)
         yield from ("--unshare-pid", "--unshare-ipc", "--unshare-uts", "--unshare-cgroup-try")
         yield from ("--hostname", "robot", "--die-with-parent", "--new-session")
         yield from ("--perms", "0755", "--dir", "/etc")
-        for path, text in view.written(user).items():
-            yield from ("--perms", "0644", "--ro-bind-data", given.file(text.encode()), path)
-        folders = {place: given.folder(files) for place, files in sandbox.files.items()}
-        yield from view.arguments(sandbox.limits, folders, self._hidden)
+        for path, text in view.sandbox_files(user).items():
+            yield from ("--perms", "0644", "--ro-bind-data", given.add_file(text.encode()), path)
+        folders = {place: given.add_folder(files) for place, files in sandbox.files.items()}
+        yield from view.bwrap_arguments(sandbox.limits, folders, self._hidden)
         for name, value in sandbox.variables.items():
             yield from ("--setenv", name, value)
-        yield from ("--seccomp", given.file(seccomp.program()))
+        yield from ("--seccomp", given.add_file(seccomp.filter_program()))
 
     def __enter__(self) -> Self:
         """Return itself."""
@@ -260,7 +272,7 @@ class _Given:
         self._stack = stack
         self.descriptors: list[int] = []
 
-    def file(self, content: bytes) -> str:
+    def add_file(self, content: bytes) -> str:
         """Return the number of a descriptor to read ``content`` from."""
         descriptor = os.memfd_create("sandbox", os.MFD_CLOEXEC)
         self._stack.callback(os.close, descriptor)
@@ -269,7 +281,7 @@ class _Given:
         self.descriptors.append(descriptor)
         return str(descriptor)
 
-    def folder(self, files: Mapping[str, bytes]) -> Path:
+    def add_folder(self, files: Mapping[str, bytes]) -> Path:
         """Return a folder with ``files`` that every user can read."""
         folder = self._stack.enter_context(scratch_folder())
         write_files(folder, files)
@@ -278,7 +290,7 @@ class _Given:
         return folder
 
 
-def _user() -> int:
+def _choose_user() -> int:
     return secrets.choice(network.UIDS) if network.is_root() else USER
 
 

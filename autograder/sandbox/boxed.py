@@ -11,7 +11,7 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Self
 
-from autograder.processes.descriptors import readable
+from autograder.processes.descriptors import readable_descriptors
 from autograder.processes.fair_deadline import RunDelay, SeenDelay, of_process
 from autograder.processes.process_folders import Sandboxed, number_inside
 from autograder.sandbox import cgroups, network, warmth
@@ -26,7 +26,7 @@ KILL_TIMEOUT = 10.0
 """Seconds until a killed subject must have ended: the kernel takes a moment for its memory."""
 
 
-def end(process: Process) -> None:
+def end_process(process: Process) -> None:
     """End a process if it has not ended.
 
     The first process of a sandbox cannot go before everybody has, and been taken note of.
@@ -46,7 +46,7 @@ class Warden:
         """Take the process, and end it with this."""
         self._process, self.examiner = process, 0
 
-    def tell(self, init: int, pid: int, ours: list[int]) -> None:
+    def announce_subject(self, init: int, pid: int, ours: list[int]) -> None:
         """Tell it whom to look at.
 
         Args:
@@ -66,7 +66,7 @@ class Warden:
 
     def __exit__(self, *_: object) -> None:
         """End it."""
-        end(self._process)
+        end_process(self._process)
         for stream in (self._process.stdin, self._process.stdout, self._process.stderr):
             if stream is not None:
                 with suppress(BrokenPipeError):  # it was told something, and had gone
@@ -102,12 +102,12 @@ class BoxedSubject:
         """Whether it was ended because the watch over it failed."""
         return self._watch.failed
 
-    def excess(self, timeout: float = 0.0) -> str:
+    def describe_excess(self, timeout: float = 0.0) -> str:
         """Return in words what it was ended for using too much of; empty if it was not.
 
         If it still runs, it has ``timeout`` seconds to be ended.
         """
-        readable([self.handle], timeout)
+        readable_descriptors([self.handle], timeout)
         return "" if self._watch.failed else self._watch.reason
 
     def ready(self) -> None:
@@ -119,19 +119,19 @@ class BoxedSubject:
             # If the machine runs out of memory all the same, this process goes first, and what it
             # starts: it cannot change that where its /proc is read-only.
             Path(f"/proc/{self.pid}/oom_score_adj").write_text("1000")
-        if (group := cgroups.enclose(self.pid, self._limits)) is not None:
+        if (group := cgroups.enclose_process(self.pid, self._limits)) is not None:
             self._held.callback(group.close)
         pid = number_inside(self.pid)
         # Nothing of the student's runs yet: the others hold the sandbox.
-        ours = [number for number in Sandboxed(self._init).inside() if number != pid]
-        self.delay = SeenDelay(Sandboxed(self._init, ours), pid, self._watch.spent)
+        ours = [number for number in Sandboxed(self._init).inner_pids() if number != pid]
+        self.delay = SeenDelay(Sandboxed(self._init, ours), pid, self._watch.cpu_seconds)
         self._numbers = pid, ours
         self.tell_warden()
 
     def tell_warden(self) -> None:
         """Have the warden look at this subject."""
         if self._warden is not None:
-            self._warden.tell(self._init, *self._numbers)
+            self._warden.announce_subject(self._init, *self._numbers)
 
     def require_holder(self) -> None:
         """Wait until what holds the sandbox says that it is there.
@@ -142,9 +142,9 @@ class BoxedSubject:
         assert self._process.stdout is not None
         network.require_word(self._process.stdout, self._process)
         if not self._process.stdout.readline():
-            raise BoxError(self.failed())
+            raise BoxError(self.explain_failure())
 
-    def fate(self, timeout: float = END_TIMEOUT) -> str:
+    def describe_end(self, timeout: float = END_TIMEOUT) -> str:
         """Return in words how the process ended, or that it has not within ``timeout`` seconds."""
         try:
             code = self._process.wait(timeout)
@@ -156,9 +156,9 @@ class BoxedSubject:
         is_signal = code > 128 and code - 128 in set(signal.Signals)
         return fate_of(128 - code if is_signal else code)
 
-    def failed(self) -> str:
+    def explain_failure(self) -> str:
         """Return why it did not start, in words: how it ended, and what it last said."""
-        fate = self.fate()
+        fate = self.describe_end()
         if self._process.poll() is None:
             return fate
         assert self._process.stderr is not None
@@ -204,21 +204,21 @@ class WarmSubject(BoxedSubject):
             raise
         self.pid = self._forked.pid
 
-    def fate(self, timeout: float = END_TIMEOUT) -> str:
+    def describe_end(self, timeout: float = END_TIMEOUT) -> str:
         """Return in words how the process ended, or that it has not within ``timeout`` seconds."""
         if self._forked is None:
-            return super().fate(timeout)
+            return super().describe_end(timeout)
         try:
             code = self._forked.wait(timeout)
         except subprocess.TimeoutExpired:
             return "it closed its connection to the grader"
         return self._watch.reason or fate_of(code)
 
-    def failed(self) -> str:
+    def explain_failure(self) -> str:
         """Return why it did not start, in words: how it ended, and what it last said."""
         if self._forked is None:
-            return super().failed()
-        fate = self.fate()
+            return super().explain_failure()
+        fate = self.describe_end()
         if self._forked.returncode is None:
             return fate
         assert self._forked.stderr is not None

@@ -19,15 +19,15 @@ _dividing = threading.Lock()
 _divided: dict[int, Path | None] = {}  # by the process that has done it
 
 
-def parent() -> Path | None:
+def parent_group() -> Path | None:
     """Return the group in which those of submissions are made; None if there is none."""
     with _dividing:
         if os.getpid() not in _divided:
-            _divided[os.getpid()] = divide(cgroups.delegated())
+            _divided[os.getpid()] = enable_controllers(cgroups.delegated_group())
         return _divided[os.getpid()]
 
 
-def divide(group: Path | None) -> Path | None:
+def enable_controllers(group: Path | None) -> Path | None:
     """Have a group's controllers count for each group in it; return it, None if that fails."""
     if group is None:
         return None
@@ -58,7 +58,7 @@ class Group:
         for name, bound in bounds.items():
             (self._path / name).write_text(str(bound))
 
-    def add(self, pid: int) -> None:
+    def add_process(self, pid: int) -> None:
         """Put a process into it, and so all that it starts from now on.
 
         Raises:
@@ -72,9 +72,9 @@ class Group:
             self._path.rmdir()
 
 
-def enclose(pid: int, limits: Limits) -> Group | None:
+def enclose_process(pid: int, limits: Limits) -> Group | None:
     """Put a process into a group of its own where there can be one; the Watch counts anyway."""
-    above = parent()
+    above = parent_group()
     if above is None:
         return None
     try:
@@ -82,5 +82,5 @@ def enclose(pid: int, limits: Limits) -> Group | None:
     except OSError:
         return None
     with suppress(OSError):
-        group.add(pid)
+        group.add_process(pid)
     return group

@@ -24,7 +24,7 @@ KEPT = ("LANG", "LC_ALL", "LC_CTYPE", "TZ", "LD_LIBRARY_PATH", "_ROS_WHEELS_BOOT
 """What a subject gets of the grader's environment: no token, no path of the course."""
 
 
-def submission() -> dict[str, str]:
+def submission_environment() -> dict[str, str]:
     """Return a submission's whole environment."""
     kept = {name: os.environ[name] for name in KEPT if name in os.environ}
     programs = f"{Path(sys.executable).parent}:/usr/local/bin:/usr/bin:/bin"
@@ -38,7 +38,7 @@ def submission() -> dict[str, str]:
     }  # fmt: skip
 
 
-def examiner() -> dict[str, str]:
+def examiner_environment() -> dict[str, str]:
     """Return an examiner's whole environment: it has no secret of the grader's to give away."""
     # Its own messages are made of the right types: to look at each field again takes its time.
-    return {**submission(), "ROS_PYTHON_CHECK_FIELDS": "0"}
+    return {**submission_environment(), "ROS_PYTHON_CHECK_FIELDS": "0"}

@@ -34,7 +34,7 @@ class Host:
 
     def spawn(self, command: Sequence[str], **options: Any) -> Process:
         """Start the examiner."""
-        return subprocess.Popen(tethered(command), **options)
+        return subprocess.Popen(tether_command(command), **options)
 
     def start_subject(
         self, command: Sequence[str], files: Mapping[str, bytes], fds: Sequence[int]
@@ -69,13 +69,13 @@ class HostSubject:
             "ROS_LOG_DIR": f"{home}/log", "MPLBACKEND": INLINE,
         }  # fmt: skip
         self._process = subprocess.Popen(
-            tethered(command), cwd=home, env=env, start_new_session=True, pass_fds=fds,
+            tether_command(command), cwd=home, env=env, start_new_session=True, pass_fds=fds,
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )  # fmt: skip
         self.pid = self._process.pid
         self.delay: RunDelay = of_process(self.pid)
 
-    def excess(self, timeout: float = 0.0) -> str:
+    def describe_excess(self, timeout: float = 0.0) -> str:
         """Return nothing: nobody watches what it uses."""
         return ""
 
@@ -85,11 +85,11 @@ class HostSubject:
     def tell_warden(self) -> None:
         """Tell nobody: there is no warden."""
 
-    def failed(self) -> str:
+    def explain_failure(self) -> str:
         """Return why it did not start, in words."""
-        return self.fate()
+        return self.describe_end()
 
-    def fate(self, timeout: float = END_TIMEOUT) -> str:
+    def describe_end(self, timeout: float = END_TIMEOUT) -> str:
         """Return in words how the process ended, or that it has not within ``timeout`` seconds."""
         with suppress(subprocess.TimeoutExpired):
             return fate_of(self._process.wait(timeout))
@@ -111,7 +111,7 @@ class HostSubject:
         self._held.close()
 
 
-def tethered(command: Sequence[str]) -> list[str]:
+def tether_command(command: Sequence[str]) -> list[str]:
     """Return a command that is killed when whoever starts it dies, by ``kill -9`` too.
 
     It dies with the thread that starts it: one that sees the whole run through.

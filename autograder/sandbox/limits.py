@@ -96,16 +96,16 @@ class Limits:
         }  # fmt: skip
         bounds = {}
         for name, bound in wanted.items():
-            _, hard = resource.getrlimit(_number(name))
+            _, hard = resource.getrlimit(_resource_number(name))
             bounds[name] = bound if hard == resource.RLIM_INFINITY else min(bound, hard)
         return bounds
 
     def apply(self) -> None:
         """Limit this process and all that it starts, for good."""
         for name, most in self.of_processes().items():
-            resource.setrlimit(_number(name), (most, most))
+            resource.setrlimit(_resource_number(name), (most, most))
 
 
-def _number(name: str) -> int:
+def _resource_number(name: str) -> int:
     number: int = getattr(resource, f"RLIMIT_{name.upper()}")
     return number

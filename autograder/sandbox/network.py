@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
-from autograder.processes.descriptors import readable
+from autograder.processes.descriptors import readable_descriptors
 from course.errors import CourseError
 
 Namespaces = dict[str, int]
@@ -36,7 +36,7 @@ class BoxError(CourseError):
     """A sandbox could not be made; the message is what its tools said."""
 
 
-def make(owner: int | None = None) -> Namespaces:
+def make_network(owner: int | None = None) -> Namespaces:
     """Make a network namespace; it lasts as long as a process is in it or a descriptor is open.
 
     Who is not root owns it by a user namespace, which bubblewrap makes: where a system restricts
@@ -52,28 +52,31 @@ def make(owner: int | None = None) -> Namespaces:
     command = ["unshare", "--net", "--", "sh", "-c", _SET_UP]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     if owner is not None and not is_root():
-        command = [*entering(owner), *command]
+        command = [*enter_prefix(owner), *command]
     elif not is_root():
-        command = [*owning("--die-with-parent", "--dev-bind", "/", "/"), *command]
-    with start(command, **pipes) as holder:
+        command = [*privileged_prefix("--die-with-parent", "--dev-bind", "/", "/"), *command]
+    with start_tool(command, **pipes) as holder:
         assert holder.stdout is not None
         require_word(holder.stdout, holder)
         said = holder.stdout.readline().split()
         if len(said) != 2:
-            raise BoxError(_said(holder) or "no network namespace can be set up")
-        made = {kind: os.open(f"/proc/{int(said[1])}/ns/{kind}", os.O_RDONLY) for kind in _kinds()}
+            raise BoxError(_collect_stderr(holder) or "no network namespace can be set up")
+        made = {
+            kind: os.open(f"/proc/{int(said[1])}/ns/{kind}", os.O_RDONLY)
+            for kind in _namespace_kinds()
+        }
         holder.communicate(b"\n")
     return made
 
 
-def joining(namespaces: Mapping[str, int]) -> list[str]:
+def join_prefix(namespaces: Mapping[str, int]) -> list[str]:
     """Return what goes before a command to run it in ``namespaces``, of this process's."""
     # Not by inheritance: a submission must not find these descriptors among its own.
     kinds = [f"--{kind}=/proc/{os.getpid()}/fd/{fd}" for kind, fd in namespaces.items()]
     return ["nsenter", *kinds, *([] if is_root() else ["--preserve-credentials"]), "--"]
 
 
-def entering(owner: int) -> list[str]:
+def enter_prefix(owner: int) -> list[str]:
     """Return what goes before a command to run it in the user namespace of a process."""
     return ["nsenter", f"--user=/proc/{owner}/ns/user", "--preserve-credentials", "--"]
 
@@ -96,7 +99,7 @@ def own_user(uid: int) -> list[str]:
     return [] if is_root() else ["--unshare-user", "--uid", str(uid), "--gid", str(uid)]
 
 
-def owning(*options: str) -> list[str]:
+def privileged_prefix(*options: str) -> list[str]:
     """Return what goes before a command to run it with every right in a user namespace.
 
     ``options`` are bwrap's for the files that the command sees. Root needs no such namespace.
@@ -104,11 +107,11 @@ def owning(*options: str) -> list[str]:
     return [] if is_root() else ["bwrap", *own_user(0), *options, "--cap-add", "ALL", "--"]
 
 
-def _kinds() -> tuple[str, ...]:
+def _namespace_kinds() -> tuple[str, ...]:
     return ("net",) if is_root() else ("user", "net")
 
 
-def start(command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
+def start_tool(command: Sequence[str], **options: Any) -> subprocess.Popen[bytes]:
     """Start one of the sandbox's tools.
 
     Raises:
@@ -130,7 +133,9 @@ def child(info: int, process: subprocess.Popen[bytes]) -> int:
         require_word(stream, process)
         text = stream.read()
     if not text:
-        raise BoxError(_said(process) or f"bwrap ended with exit code {process.returncode}")
+        raise BoxError(
+            _collect_stderr(process) or f"bwrap ended with exit code {process.returncode}"
+        )
     return int(json.loads(text)["child-pid"])
 
 
@@ -140,12 +145,12 @@ def require_word(stream: IO[Any], process: subprocess.Popen[bytes]) -> None:
     Raises:
         BoxError: it does neither; it is killed.
     """
-    if not readable([stream], TOOL_TIMEOUT):
+    if not readable_descriptors([stream], TOOL_TIMEOUT):
         process.kill()
         raise BoxError(f"it was not there after {TOOL_TIMEOUT:.0f} s")
 
 
-def _said(process: subprocess.Popen[bytes]) -> str:
+def _collect_stderr(process: subprocess.Popen[bytes]) -> str:
     """Return what a process that ends left on standard error.
 
     One of bwrap's that is killed while it makes its namespaces leaves a child, which waits for it

@@ -61,7 +61,7 @@ class RunningSubject(Protocol):
     def unwatched(self) -> bool:
         """Whether it was ended because the grader failed to watch over it."""
 
-    def excess(self, timeout: float = 0.0) -> str:
+    def describe_excess(self, timeout: float = 0.0) -> str:
         """Return in words what it was ended for using too much of; empty if it was not.
 
         If it still runs, it has ``timeout`` seconds to be ended.
@@ -73,10 +73,10 @@ class RunningSubject(Protocol):
     def tell_warden(self) -> None:
         """Have the warden, if there is one, look at this subject from now on."""
 
-    def failed(self) -> str:
+    def explain_failure(self) -> str:
         """Return why it did not start, in words."""
 
-    def fate(self, timeout: float = END_TIMEOUT) -> str:
+    def describe_end(self, timeout: float = END_TIMEOUT) -> str:
         """Return in words how the process ended, or that it has not within ``timeout`` seconds."""
 
     def __enter__(self) -> Self:

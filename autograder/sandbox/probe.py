@@ -50,7 +50,7 @@ class Abilities:
     loss: bool = False
     warm: bool = False
 
-    def mode(self, *, trust: bool) -> str:
+    def mode_name(self, *, trust: bool) -> str:
         """Return in a word how submissions are run: outcomes of two modes may differ."""
         if trust:
             return "trusted"
@@ -63,11 +63,11 @@ _trying = threading.Lock()
 def abilities() -> Abilities:
     """Try a sandbox, once a process, and return what works."""
     with _trying:
-        return _abilities()
+        return _probe_abilities()
 
 
 @cache
-def _abilities() -> Abilities:
+def _probe_abilities() -> Abilities:
     missing = list(dict.fromkeys(TOOLS[tool] for tool in TOOLS if shutil.which(tool) is None))
     if missing:
         packages = " ".join(sorted({*missing, "bubblewrap", "iproute2", "nftables"}))
@@ -77,11 +77,11 @@ def _abilities() -> Abilities:
             f"run `sudo apt install {packages}`, {TRUST}."
         )
     with ThreadPoolExecutor() as pool:  # each mostly waits for one process
-        loss, warm = pool.submit(_try), pool.submit(_try_warm)
+        loss, warm = pool.submit(_try_sandbox), pool.submit(_try_warm)
         try:
             return Abilities(loss=loss.result(), warm=warm.result())
         except BoxError as error:
-            return Abilities(_advice(str(error)))
+            return Abilities(_failure_advice(str(error)))
 
 
 def warm_up() -> None:
@@ -92,14 +92,14 @@ def warm_up() -> None:
 
     def begin() -> None:
         # One after the other: of two processors, one is left to whoever goes on meanwhile.
-        for step in (abilities, warmth.examiners):
+        for step in (abilities, warmth.examiner_zygote):
             with suppress(Exception):
                 step()
 
     threading.Thread(target=begin).start()
 
 
-def place(
+def choose_place(
     *,
     trust: bool = False,
     hidden: Iterable[Path] = (),
@@ -117,27 +117,27 @@ def place(
     """
     if trust:
         return Host(exams)
-    require()
+    require_sandbox()
     return Box(hidden=hidden, exams=exams, warm=abilities().warm)
 
 
-def require() -> None:
+def require_sandbox() -> None:
     """Raise SandboxError unless submissions can be sandboxed here."""
     if problem := abilities().problem:
         raise SandboxError(problem)
 
 
-def _try() -> bool:
+def _try_sandbox() -> bool:
     """Run this Python in a sandbox; return whether its network can lose packets."""
     with Box() as box:
-        tool = executables.find("nft")
+        tool = executables.find_tool("nft")
         nft = f"{shlex.quote(tool)} add table inet probe" if tool else "false"
         with (
             _in_the_network(box, f"{nft} && echo yes; read -r _") as said,
             box.start([sys.executable, "-c", "import rclpy"], {}, ()) as subject,
         ):
-            if subject.fate(TOOL_TIMEOUT) != "exit code 0":
-                raise BoxError(subject.failed())
+            if subject.describe_end(TOOL_TIMEOUT) != "exit code 0":
+                raise BoxError(subject.explain_failure())
     return said == [b"yes"]
 
 
@@ -152,7 +152,7 @@ def _try_warm() -> bool:
             command = subject_command(engine, control, box.domain_id)
             subject = stack.enter_context(box.start_subject(command, {}, fds))
             ours.close()
-            return subject.fate(TOOL_TIMEOUT) == "exit code 1"
+            return subject.describe_end(TOOL_TIMEOUT) == "exit code 1"
     except (BoxError, ZygoteError):
         return False
 
@@ -161,7 +161,7 @@ def _try_warm() -> bool:
 def _in_the_network(box: Box, script: str) -> Iterator[list[bytes]]:
     """Make a box's network and run a script in it until the end; yield what it says by then."""
     said: list[bytes] = []
-    outer = box.join(
+    outer = box.run_in_network(
         ["sh", "-c", script],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )  # fmt: skip
@@ -171,7 +171,7 @@ def _in_the_network(box: Box, script: str) -> Iterator[list[bytes]]:
         said += outer.communicate(b"\n", timeout=60)[0].split()
 
 
-def _advice(said: str) -> str:
+def _failure_advice(said: str) -> str:
     """Return one sentence about why bwrap failed and what helps."""
     reason = said.splitlines()[-1] if said else "it said nothing"
     if _reads(_APPARMOR) == "1":

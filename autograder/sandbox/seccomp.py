@@ -42,35 +42,40 @@ FAMILIES = (socket.AF_UNIX, socket.AF_INET, socket.AF_INET6, socket.AF_NETLINK)
 """Kinds of sockets that remain; DDS looks network interfaces up over netlink."""
 
 
-def _step(code: int, value: int, if_true: int = 0, if_false: int = 0) -> bytes:
+def _pack_step(code: int, value: int, if_true: int = 0, if_false: int = 0) -> bytes:
     return struct.pack("<HBBI", code, if_true, if_false, value)
 
 
-def _refuse(error: int) -> bytes:
-    return _step(_RETURN, _ERRNO | error)
+def _refuse_call(error: int) -> bytes:
+    return _pack_step(_RETURN, _ERRNO | error)
 
 
-def program() -> bytes:
+def filter_program() -> bytes:
     """Return the filter."""
     steps = [
-        _step(_LOAD, _ARCHITECTURE), _step(_EQUAL, _X86_64, 1, 0), _step(_RETURN, _KILL),
-        _step(_LOAD, _NUMBER), _step(_GREATER_EQUAL, _X32, 0, 1), _refuse(errno.ENOSYS),
+        _pack_step(_LOAD, _ARCHITECTURE), _pack_step(_EQUAL, _X86_64, 1, 0),
+        _pack_step(_RETURN, _KILL),
+        _pack_step(_LOAD, _NUMBER), _pack_step(_GREATER_EQUAL, _X32, 0, 1),
+        _refuse_call(errno.ENOSYS),
         # Its flags are in memory, where no filter can look: without it the C library uses clone.
-        _step(_EQUAL, _CLONE3, 0, 1), _refuse(errno.ENOSYS),
+        _pack_step(_EQUAL, _CLONE3, 0, 1), _refuse_call(errno.ENOSYS),
     ]  # fmt: skip
     for number in REFUSED.values():
-        steps += [_step(_EQUAL, number, 0, 1), _refuse(errno.EPERM)]
+        steps += [_pack_step(_EQUAL, number, 0, 1), _refuse_call(errno.EPERM)]
     steps += [
-        _step(_EQUAL, _MMAP, 0, 5), _step(_LOAD, _ARGUMENT_3), _step(_ANY_BIT, _ANONYMOUS, 0, 2),
-        _step(_ANY_BIT, _SHARED, 0, 1), _refuse(errno.EPERM), _step(_RETURN, _ALLOW),
-        _step(_EQUAL, _FCNTL, 0, 3 + len(_COMMANDS)), _step(_LOAD, _ARGUMENT_1),
-        *(_step(_EQUAL, command, len(_COMMANDS) - place, 0)
+        _pack_step(_EQUAL, _MMAP, 0, 5), _pack_step(_LOAD, _ARGUMENT_3),
+        _pack_step(_ANY_BIT, _ANONYMOUS, 0, 2),
+        _pack_step(_ANY_BIT, _SHARED, 0, 1), _refuse_call(errno.EPERM), _pack_step(_RETURN, _ALLOW),
+        _pack_step(_EQUAL, _FCNTL, 0, 3 + len(_COMMANDS)), _pack_step(_LOAD, _ARGUMENT_1),
+        *(_pack_step(_EQUAL, command, len(_COMMANDS) - place, 0)
           for place, command in enumerate(_COMMANDS.values())),
-        _step(_RETURN, _ALLOW), _refuse(errno.EPERM),
-        _step(_EQUAL, _CLONE, 0, 4), _step(_LOAD, _ARGUMENT_0),
-        _step(_ANY_BIT, _NEW_USER_NAMESPACE, 0, 1), _refuse(errno.EPERM), _step(_RETURN, _ALLOW),
-        _step(_EQUAL, _SOCKET, 0, 2 + len(FAMILIES)), _step(_LOAD, _ARGUMENT_0),
-        *(_step(_EQUAL, family, len(FAMILIES) - place, 0) for place, family in enumerate(FAMILIES)),
-        _refuse(errno.EAFNOSUPPORT), _step(_RETURN, _ALLOW),
+        _pack_step(_RETURN, _ALLOW), _refuse_call(errno.EPERM),
+        _pack_step(_EQUAL, _CLONE, 0, 4), _pack_step(_LOAD, _ARGUMENT_0),
+        _pack_step(_ANY_BIT, _NEW_USER_NAMESPACE, 0, 1), _refuse_call(errno.EPERM),
+        _pack_step(_RETURN, _ALLOW),
+        _pack_step(_EQUAL, _SOCKET, 0, 2 + len(FAMILIES)), _pack_step(_LOAD, _ARGUMENT_0),
+        *(_pack_step(_EQUAL, family, len(FAMILIES) - place, 0)
+          for place, family in enumerate(FAMILIES)),
+        _refuse_call(errno.EAFNOSUPPORT), _pack_step(_RETURN, _ALLOW),
     ]  # fmt: skip
     return b"".join(steps)

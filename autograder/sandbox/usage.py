@@ -35,46 +35,46 @@ class Process:
     own: float
     cpu: float
 
-    def busy(self) -> int:
+    def count_busy_threads(self) -> int:
         """Return how many of its threads run or wait for a processor."""
-        return sum(state == b"R" for _, state in _threads(self.folder))
+        return sum(state == b"R" for _, state in _list_threads(self.folder))
 
 
-def process(folder: str) -> Process | None:
+def read_process(folder: str) -> Process | None:
     """Return the process whose folder in /proc this is; None if there is nothing left of it."""
     with suppress(OSError):
-        state, *numbers = _stat(folder)
+        state, *numbers = _read_stat(folder)
         own, cpu = (sum(map(int, numbers[10:last])) / _TICK for last in (12, 14))
         if state not in _ENDED:
             return Process(folder, folder, own, cpu)
-        for thread, of_thread in _threads(folder):
+        for thread, of_thread in _list_threads(folder):
             if of_thread not in _ENDED:
                 return Process(folder, thread, own, cpu)
     return None
 
 
-def _threads(folder: str) -> Iterator[tuple[str, bytes]]:
+def _list_threads(folder: str) -> Iterator[tuple[str, bytes]]:
     with suppress(OSError):
         for name in os.listdir(f"{folder}/task"):  # noqa: PTH208 - the names alone, of many
             thread = f"{folder}/task/{name}"
             with suppress(OSError):
-                yield thread, _stat(thread)[0]
+                yield thread, _read_stat(thread)[0]
 
 
-def descriptors(process: Process) -> int:
+def count_descriptors(process: Process) -> int:
     """Return the number of open file descriptors."""
     with suppress(OSError):
         return len(os.listdir(f"{process.alive}/fd"))  # noqa: PTH208
     return 0
 
 
-def memory(process: Process) -> tuple[int, int]:
+def measure_memory(process: Process) -> tuple[int, int]:
     """Return the bytes of memory that belong to no file, and those of the tables of its addresses.
 
     The latter are not in what it holds otherwise.
     """
     with suppress(OSError, IndexError):
-        status = content(f"{process.alive}/status")
+        status = read_content(f"{process.alive}/status")
         anonymous, tables = (
             int(status.partition(name)[2].split(maxsplit=1)[0]) * 1024
             for name in (b"\nRssAnon:", b"\nVmPTE:")
@@ -83,10 +83,10 @@ def memory(process: Process) -> tuple[int, int]:
     return 0, 0
 
 
-def rows(table: str) -> list[bytes]:
+def read_rows(table: str) -> list[bytes]:
     """Return the rows of a table in /proc/PID/net, without its heading."""
     with suppress(OSError):
-        return content(table).splitlines()[1:]
+        return read_content(table).splitlines()[1:]
     return []
 
 
@@ -97,7 +97,7 @@ def locked_devices(table: str) -> list[tuple[int, int]]:
     """
     found = []
     with suppress(OSError):
-        for row in content(table).splitlines():
+        for row in read_content(table).splitlines():
             with suppress(ValueError, IndexError):
                 # 1: POSIX  ADVISORY  WRITE 7 00:4f:5 0 EOF; who waits for one has a -> behind 1:
                 owner, place = row.replace(b" -> ", b" ").split()[4:6]
@@ -114,12 +114,15 @@ def has_connections(net: str) -> bool:
     how many there are it knows. Where it does not say, there may be some.
     """
     with suppress(OSError):
-        counts = _TCP.search(content(f"{net}/sockstat")), _TCP6.search(content(f"{net}/sockstat6"))
+        counts = (
+            _TCP.search(read_content(f"{net}/sockstat")),
+            _TCP6.search(read_content(f"{net}/sockstat6")),
+        )
         return any(found is None or any(map(int, found.groups())) for found in counts)
     return True
 
 
-def queued(row: bytes) -> int:
+def queued_bytes(row: bytes) -> int:
     """Return the bytes that wait in an internet socket, by its row in /proc/net."""
     with suppress(IndexError, ValueError):
         out, _, into = row.split()[4].partition(b":")
@@ -127,16 +130,16 @@ def queued(row: bytes) -> int:
     return 0
 
 
-def share(process: Process) -> int:
+def memory_share(process: Process) -> int:
     """Return the fair share of the memory that it uses: what is shared counts in parts."""
     with suppress(OSError):
-        for line in content(f"{process.alive}/smaps_rollup").splitlines():
+        for line in read_content(f"{process.alive}/smaps_rollup").splitlines():
             if line.startswith(b"Pss_Anon:"):
                 return int(line.split()[1]) * 1024
     return 0
 
 
-def content(path: str) -> bytes:
+def read_content(path: str) -> bytes:
     """Return what stands in a file of /proc.
 
     Raises:
@@ -151,6 +154,6 @@ def content(path: str) -> bytes:
     return b"".join(parts)
 
 
-def _stat(task: str) -> list[bytes]:
+def _read_stat(task: str) -> list[bytes]:
     """Return what follows the name, which can hold anything, in a task's ``stat``."""
-    return content(f"{task}/stat").rpartition(b")")[2].split()
+    return read_content(f"{task}/stat").rpartition(b")")[2].split()

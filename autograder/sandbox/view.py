@@ -34,7 +34,9 @@ _ETC = (
 )  # fmt: skip
 
 
-def arguments(limits: Limits, given: Mapping[Path, Path], hidden: Iterable[Path]) -> Iterator[str]:
+def bwrap_arguments(
+    limits: Limits, given: Mapping[Path, Path], hidden: Iterable[Path]
+) -> Iterator[str]:
     """Yield bwrap's arguments for the files.
 
     Args:
@@ -42,7 +44,7 @@ def arguments(limits: Limits, given: Mapping[Path, Path], hidden: Iterable[Path]
         given: {where it is seen: the folder}, such as one with the submission's other files.
         hidden: folders that must not be seen even if they lie within something that is.
     """
-    yield from _system()
+    yield from _system_mounts()
     for scratch in SCRATCH:
         yield from _way_to(scratch)
         yield from ("--perms", "1777", "--size", str(limits.scratch), "--tmpfs", str(scratch))
@@ -54,16 +56,16 @@ def arguments(limits: Limits, given: Mapping[Path, Path], hidden: Iterable[Path]
     for place, folder in given.items():
         yield from _way_to(place)
         yield from ("--ro-bind", str(folder), str(place))
-    for path in (*hidden, *_bundled()):
+    for path in (*hidden, *_bundled_folders()):
         if _is_within(path, [Path("/usr"), *shown]):
-            yield from _masked(path)
+            yield from _mask_path(path)
     # In /proc a process could have the machine spare it when memory runs out, or write to others.
     for mount in ("/proc", "/dev", "/"):
         yield from ("--remount-ro", mount)
     yield from ("--chdir", str(HOME))
 
 
-def _masked(path: Path) -> Iterator[str]:
+def _mask_path(path: Path) -> Iterator[str]:
     """Yield what puts something empty in the place of a file or folder, if it is there."""
     if path.is_dir():
         yield from ("--tmpfs", str(path), "--remount-ro", str(path))
@@ -77,7 +79,7 @@ def _way_to(folder: Path) -> Iterator[str]:
         yield from ("--perms", "0755", "--dir", str(above))
 
 
-def _system() -> Iterator[str]:
+def _system_mounts() -> Iterator[str]:
     yield from ("--ro-bind", "/usr", "/usr")
     for name in _MERGED:
         folder = Path("/", name)
@@ -98,7 +100,7 @@ def python_folders() -> Iterator[Path]:
     named = [sys.base_prefix, sys.base_exec_prefix, sys.prefix, sys.exec_prefix]
     if site.ENABLE_USER_SITE:
         named.append(site.getusersitepackages())
-    packages = [Path(place) for name in PACKAGES for place in _places(name)]
+    packages = [Path(place) for name in PACKAGES for place in _package_folders(name)]
     wanted = [*(Path(os.path.abspath(name)) for name in named), *packages]  # noqa: PTH100 - links
     for folder in [variant for path in wanted for variant in (path, path.resolve())]:
         if folder.is_dir() and not _is_within(folder, seen):
@@ -106,13 +108,13 @@ def python_folders() -> Iterator[Path]:
             yield folder
 
 
-def _places(package: str) -> Sequence[str]:
+def _package_folders(package: str) -> Sequence[str]:
     """Return the folders of a package without importing it: a subject has no time for that."""
     found = importlib.util.find_spec(package)
     return (found and found.submodule_search_locations) or []
 
 
-def _bundled() -> Iterator[Path]:
+def _bundled_folders() -> Iterator[Path]:
     """Yield where notebooks, solutions and corpora may lie among installed packages.
 
     An editable installation has its notebooks beside the other packages, not beside its modules.
@@ -128,7 +130,7 @@ def _is_within(folder: Path, others: Sequence[Path]) -> bool:
     return any(folder.is_relative_to(other) for other in others)
 
 
-def written(uid: int) -> dict[str, str]:
+def sandbox_files(uid: int) -> dict[str, str]:
     """Return {path: text} of the few files that are the sandbox's own: who is who in it."""
     return {
         "/etc/passwd": f"student:x:{uid}:{uid}:Student:{HOME}:/bin/sh\n",

@@ -23,16 +23,18 @@ WARDEN = "autograder.processes.outside.warden"
 _READ_ONLY = ("--ro-bind", "/", "/", "--dev-bind", "/dev", "/dev")
 
 
-def subjects() -> Zygote:
+def subject_zygote() -> Zygote:
     """Return what subjects are forked from.
 
     Raises:
         ZygoteError: it does not start.
     """
-    return shared.zygote(SUBJECT, environment.submission(), network.owning(*_READ_ONLY))
+    return shared.get_zygote(
+        SUBJECT, environment.submission_environment(), network.privileged_prefix(*_READ_ONLY)
+    )
 
 
-def examiners() -> Zygote:
+def examiner_zygote() -> Zygote:
     """Return what examiners are forked from.
 
     Raises:
@@ -40,8 +42,15 @@ def examiners() -> Zygote:
     """
     before: list[str] = []
     if not network.is_root():
-        before = [*network.entering(subjects().pid), "bwrap", *_READ_ONLY, "--cap-add", "ALL", "--"]
-    return shared.zygote(EXAMINER, environment.examiner(), before)
+        before = [
+            *network.enter_prefix(subject_zygote().pid),
+            "bwrap",
+            *_READ_ONLY,
+            "--cap-add",
+            "ALL",
+            "--",
+        ]
+    return shared.get_zygote(EXAMINER, environment.examiner_environment(), before)
 
 
 def arguments_of(command: Sequence[str], module: str) -> Sequence[str] | None:
@@ -63,12 +72,12 @@ def subject(
     """
     task = Task(
         SUBJECT, list(arguments), [0, 1, 2, *fds], process=True, user=user,
-        calls=seccomp.program().hex(), folder=str(view.HOME),
+        calls=seccomp.filter_program().hex(), folder=str(view.HOME),
     )  # fmt: skip
     nowhere = os.open(os.devnull, os.O_RDWR)
     errors, stderr = pipe_out()
     try:
-        forked = subjects().fork(task, [process, nowhere, nowhere, errors, *fds])
+        forked = subject_zygote().fork(task, [process, nowhere, nowhere, errors, *fds])
     except BaseException:
         stderr.close()
         raise
@@ -79,7 +88,7 @@ def subject(
     return forked
 
 
-def examiner(
+def fork_examiner(
     arguments: Sequence[str], fds: Sequence[int], process: int, user: int | None, limits: Limits
 ) -> ForkedProcess:
     """Fork an examiner into the namespaces of a process, with pipes to its standard streams.
@@ -93,12 +102,12 @@ def examiner(
     """
     task = Task(
         EXAMINER, list(arguments), [0, 1, 2, *fds], process=True, user=user,
-        limits=limits.to_json(), calls=seccomp.program().hex(), folder=str(view.HOME),
+        limits=limits.to_json(), calls=seccomp.filter_program().hex(), folder=str(view.HOME),
     )  # fmt: skip
     return _with_streams(task, [process], fds)
 
 
-def warden(
+def fork_warden(
     arguments: Sequence[str], fds: Sequence[int], namespaces: Mapping[str, int]
 ) -> ForkedProcess:
     """Fork a warden into a network, by descriptors of the ``namespaces`` that it joins."""
@@ -112,7 +121,7 @@ def warden(
 def _with_streams(task: Task, joined: Sequence[int], fds: Sequence[int]) -> ForkedProcess:
     (reads, stdin), (writes, stdout), (errors, stderr) = pipe_in(), pipe_out(), pipe_out()
     try:
-        forked = examiners().fork(task, [*joined, reads, writes, errors, *fds])
+        forked = examiner_zygote().fork(task, [*joined, reads, writes, errors, *fds])
     except BaseException:
         for stream in (stdin, stdout, stderr):
             stream.close()

@@ -8,7 +8,7 @@ import threading
 import time
 from contextlib import suppress
 
-from autograder.processes.descriptors import readable
+from autograder.processes.descriptors import readable_descriptors
 from autograder.sandbox import usage, view
 from autograder.sandbox.limits import MIB, Limits
 from autograder.sandbox.usage import Process
@@ -34,7 +34,7 @@ class Crowd:
         self.most, self._longest = most, longest
         self.seconds = 0.0
 
-    def lasts(self, number: int, passed: float) -> bool:
+    def has_lasted(self, number: int, passed: float) -> bool:
         """Count that there were ``number`` for ``passed`` s; return if it has been too long."""
         self.seconds = max(0.0, self.seconds + (passed if number > self.most else -passed))
         return self.seconds > self._longest
@@ -63,7 +63,9 @@ class Watch:
         self._blind_since: float | None = None
         self.reason = ""
         self.failed = False  # what was wrong was the watch, not what it saw
-        self._thread = threading.Thread(target=self._run, name="sandbox watch", daemon=True)
+        self._thread = threading.Thread(
+            target=self._watch_sandbox, name="sandbox watch", daemon=True
+        )
         self._thread.start()
 
     def stop(self) -> None:
@@ -71,16 +73,16 @@ class Watch:
         self._over.set()
         self._thread.join()
 
-    def spent(self) -> float:
+    def cpu_seconds(self) -> float:
         """Return the processor time, in s, of all that were there when it looked."""
         return self._used
 
-    def _run(self) -> None:
-        while not self._over.wait(PERIOD) and not self._ended():
+    def _watch_sandbox(self) -> None:
+        while not self._over.wait(PERIOD) and not self._has_ended():
             try:
                 self.reason = self._excess()
             except Exception as error:  # noqa: BLE001 - whatever it is, nothing runs unwatched
-                self._note(error)
+                self._note_error(error)
             else:
                 self._blind_since = None
             if self.reason:
@@ -88,17 +90,17 @@ class Watch:
                     signal.pidfd_send_signal(self._handle, signal.SIGKILL)
                 return
 
-    def _ended(self) -> bool:
-        return bool(readable([self._handle], 0))
+    def _has_ended(self) -> bool:
+        return bool(readable_descriptors([self._handle], 0))
 
-    def _note(self, error: Exception) -> None:
+    def _note_error(self, error: Exception) -> None:
         """End a sandbox that cannot be looked into: at once, or if files of it stay unreadable."""
         now = time.monotonic()
         self._blind_since = self._blind_since or now
         # While a sandbox is made or ends, files are missing or another's for a moment.
         if isinstance(error, OSError) and now - self._blind_since < BLIND_TIMEOUT:
             return
-        if not self._ended():
+        if not self._has_ended():
             self.failed = True
             self.reason = f"the grader could not see what it used ({type(error).__name__}: {error})"
 
@@ -109,13 +111,15 @@ class Watch:
         with suppress(FileNotFoundError):
             os.stat(f"{self._proc}/self")  # noqa: PTH116
             return ""  # whoever is here has no number in there; so this is still the machine's own
-        processes = self._folders()
+        processes = self._process_folders()
         if len(processes) > self._limits.processes:
             return self._too_many
-        found = [process for entry in processes if (process := usage.process(entry)) is not None]
-        return self._worked(found) or self._held(found)
+        found = [
+            process for entry in processes if (process := usage.read_process(entry)) is not None
+        ]
+        return self._work_excess(found) or self._held(found)
 
-    def _folders(self) -> list[str]:
+    def _process_folders(self) -> list[str]:
         names = os.listdir(self._proc)  # noqa: PTH208
         return [f"{self._proc}/{name}" for name in names if name.isdecimal()]
 
@@ -123,8 +127,8 @@ class Watch:
     def _too_many(self) -> str:
         return f"it started more than {self._limits.processes} processes"
 
-    def _worked(self, processes: list[Process]) -> str:
-        used = self._spent(processes)
+    def _work_excess(self, processes: list[Process]) -> str:
+        used = self._count_cpu_seconds(processes)
         grew, self._used = used - self._used, used
         now = time.monotonic()
         passed, self._looked = min(now - self._looked, LONGEST), now
@@ -134,14 +138,18 @@ class Watch:
         # Counting costs a little: one that hardly works, as most do, has seldom a crowd.
         crowded = self._busy.seconds > 0 or self._busy_processes.seconds > 0
         worth = grew > passed / 2 or crowded or self._looks % COUNTED == 0
-        busy = [number for process in processes if (number := process.busy())] if worth else []
-        if self._busy.lasts(sum(busy), passed):
+        busy = (
+            [number for process in processes if (number := process.count_busy_threads())]
+            if worth
+            else []
+        )
+        if self._busy.has_lasted(sum(busy), passed):
             return f"it kept more than {self._busy.most} processes and threads busy at a time"
-        if self._busy_processes.lasts(len(busy), passed):
+        if self._busy_processes.has_lasted(len(busy), passed):
             return f"it kept more than {self._busy_processes.most} processes busy at a time"
         return ""
 
-    def _spent(self, processes: list[Process]) -> float:
+    def _count_cpu_seconds(self, processes: list[Process]) -> float:
         """Return the processor time of all that are there and of all that have ended.
 
         What a child has used is its parent's once that has waited for it. Of one that nobody waits
@@ -156,11 +164,11 @@ class Watch:
         return max(self._used, by_parents, sum(own.values()) + self._gone)
 
     def _held(self, processes: list[Process]) -> str:
-        if sum(map(usage.descriptors, processes)) > self._limits.all_files:
+        if sum(map(usage.count_descriptors, processes)) > self._limits.all_files:
             return f"its processes had more than {self._limits.all_files} files open"
         if self._looks % COUNTED == 0 and (reason := self._kept_by_kernel()):
             return reason
-        memory = [usage.memory(process) for process in processes]
+        memory = [usage.measure_memory(process) for process in processes]
         kernel = self._queued + sum(tables for _, tables in memory)
         # Cheap first: this counts what forked processes share once for each of them.
         if kernel + sum(anonymous for anonymous, _ in memory) <= self._limits.memory:
@@ -168,8 +176,8 @@ class Watch:
         held = kernel
         for process in processes:
             # One that forks all the time keeps whoever looks waiting, while others become many.
-            held += usage.share(process)
-            if len(self._folders()) > self._limits.processes:
+            held += usage.memory_share(process)
+            if len(self._process_folders()) > self._limits.processes:
                 return self._too_many
         if held > self._limits.memory:
             return f"it held more than {self._limits.memory // MIB} MB of memory"
@@ -194,8 +202,8 @@ class Watch:
 
     def _in_network(self, most: int) -> str:
         tables = (*TCP, *UDP) if usage.has_connections(self._net) else UDP
-        rows = [row for name in tables for row in usage.rows(f"{self._net}/{name}")]
-        self._queued = sum(map(usage.queued, rows))
-        if len(rows) + len(usage.rows(f"{self._net}/unix")) > most:
+        rows = [row for name in tables for row in usage.read_rows(f"{self._net}/{name}")]
+        self._queued = sum(map(usage.queued_bytes, rows))
+        if len(rows) + len(usage.read_rows(f"{self._net}/unix")) > most:
             return f"there were more than {most} sockets in its network"
         return ""

@@ -15,7 +15,7 @@ from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
 from course.design import drawing, findings
-from course.design.endpoints import DesignError, Endpoint, Role, endpoint, reason
+from course.design.endpoints import DesignError, Endpoint, Role, make_endpoint, rclpy_reason
 from course.design.node import DesignNode
 from course.runtime.core_session import CoreSession
 
@@ -39,30 +39,30 @@ class NodeDeclaration:
 
     def publishes(self, topic: str, msg_type: Any, qos: QoSProfile | int | None = None) -> Self:
         """Publish on a topic; without `qos`, reliable and volatile with depth 10."""
-        return self._add(Role.PUBLISHES, topic, msg_type, qos)
+        return self._add_endpoint(Role.PUBLISHES, topic, msg_type, qos)
 
     def subscribes(self, topic: str, msg_type: Any, qos: QoSProfile | int | None = None) -> Self:
         """Subscribe to a topic; without `qos`, reliable and volatile with depth 10."""
-        return self._add(Role.SUBSCRIBES, topic, msg_type, qos)
+        return self._add_endpoint(Role.SUBSCRIBES, topic, msg_type, qos)
 
     def serves(self, service: str, srv_type: Any, qos: QoSProfile | None = None) -> Self:
         """Answer the requests of a service."""
-        return self._add(Role.SERVES, service, srv_type, qos)
+        return self._add_endpoint(Role.SERVES, service, srv_type, qos)
 
     def calls(self, service: str, srv_type: Any, qos: QoSProfile | None = None) -> Self:
         """Call a service."""
-        return self._add(Role.CALLS, service, srv_type, qos)
+        return self._add_endpoint(Role.CALLS, service, srv_type, qos)
 
     def action_server(self, action: str, action_type: Any) -> Self:
         """Carry out the goals of an action."""
-        return self._add(Role.ACTION_SERVER, action, action_type)
+        return self._add_endpoint(Role.ACTION_SERVER, action, action_type)
 
     def action_client(self, action: str, action_type: Any) -> Self:
         """Send goals of an action."""
-        return self._add(Role.ACTION_CLIENT, action, action_type)
+        return self._add_endpoint(Role.ACTION_CLIENT, action, action_type)
 
-    def _add(self, role: Role, name: str, ros_type: Any, qos: Any = None) -> Self:
-        new = endpoint(role, self.name, self.namespace, name, ros_type, qos)
+    def _add_endpoint(self, role: Role, name: str, ros_type: Any, qos: Any = None) -> Self:
+        new = make_endpoint(role, self.name, self.namespace, name, ros_type, qos)
         for old in self.endpoints:
             if (old.role, old.full_name) == (role, new.full_name):
                 raise DesignError(f"{self.label} {role} {new.full_name} twice: once is enough.")
@@ -125,7 +125,7 @@ class Design:
                 for entry in entries:
                     if isinstance(entry, str) or not 2 <= len(entry) <= 3:
                         raise DesignError(f"{name}.{role}: {entry!r} is not [name, type, qos].")
-                    node._add(Role(role), *entry)
+                    node._add_endpoint(Role(role), *entry)
         return design
 
     def node(
@@ -155,7 +155,9 @@ class Design:
             validate_node_name(name)
             validate_namespace("/" + namespace.strip("/"))
         except (InvalidNodeNameException, InvalidNamespaceException) as error:
-            raise DesignError(f"{name!r} is not a name for a node: {reason(error)}.") from None
+            raise DesignError(
+                f"{name!r} is not a name for a node: {rclpy_reason(error)}."
+            ) from None
         if factory is not None and not callable(factory):
             raise DesignError(f"{name}: factory is a node class or a function, not {factory!r}.")
         known = self.nodes.setdefault(new.label, new)
@@ -168,7 +170,7 @@ class Design:
 
         Only what is declared is looked at, so nodes of your own count with what you declare.
         """
-        return findings.of(self.nodes.values(), self.outside)
+        return findings.list_findings(self.nodes.values(), self.outside)
 
     def node_factories(self) -> dict[str, Callable[[], Node]]:
         """Return {label: a function that makes the node}, for whoever runs them.
@@ -211,7 +213,10 @@ class Design:
 
     def __repr__(self) -> str:
         """Return the design as text: nodes, links, and what is worth another look."""
-        return drawing.text(self)
+        return drawing.describe_design(self)
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
-        return {"text/vnd.mermaid": drawing.mermaid(self), "text/plain": drawing.text(self)}
+        return {
+            "text/vnd.mermaid": drawing.draw_mermaid(self),
+            "text/plain": drawing.describe_design(self),
+        }

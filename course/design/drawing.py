@@ -8,7 +8,7 @@ from typing import Protocol
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from course.design.endpoints import Endpoint
-from course.design.findings import Declared, Link, links
+from course.design.findings import Declared, Link, find_links
 
 _SHAPES = {"msg": ('(["', '"])'), "srv": ('{{"', '"}}'), "action": ('[["', '"]]')}
 _WORDS = {"msg": "topic", "srv": "service", "action": "action"}
@@ -29,19 +29,19 @@ class Drawn(Protocol):
         """Return what is worth another look, a sentence each."""
 
 
-def mermaid(design: Drawn) -> str:
+def draw_mermaid(design: Drawn) -> str:
     """Return the graph: nodes are boxes, topics round, services hexagons, actions framed."""
     nodes = {label: f"n{number}" for number, label in enumerate(design.nodes)}
     lines = ["flowchart LR"]
     lines += [f'  {key}["<b>{label}</b>"]' for label, key in nodes.items()]
-    for number, link in enumerate(links(design.nodes.values())):
-        lines += _drawn(link, f"l{number}", nodes, link.name in design.outside)
+    for number, link in enumerate(find_links(design.nodes.values())):
+        lines += _draw_link(link, f"l{number}", nodes, link.name in design.outside)
     return "\n".join(lines)
 
 
-def _drawn(link: Link, key: str, nodes: dict[str, str], outside: bool) -> Iterator[str]:
+def _draw_link(link: Link, key: str, nodes: dict[str, str], outside: bool) -> Iterator[str]:
     begin, end = _SHAPES[link.kind]
-    types = ", ".join(dict.fromkeys(e.type_name.split("/")[-1] for _, e in link.ends))
+    types = ", ".join(dict.fromkeys(e.type_name.split("/")[-1] for _, e in link.all_ends))
     yield f"  {key}{begin}{link.name}<br/><small>{types}</small>{end}"
     arrow = "-->" if link.kind == "msg" else "-.->"
     yield from (f"  {nodes[label]} {arrow} {key}" for label, _ in link.writers)
@@ -53,11 +53,11 @@ def _drawn(link: Link, key: str, nodes: dict[str, str], outside: bool) -> Iterat
             yield f"  {key} {arrow} o{key}((outside))"
 
 
-def text(design: Drawn) -> str:
+def describe_design(design: Drawn) -> str:
     """Return the same as text: nodes, links, and what is worth another look."""
     if not design.nodes:
         return "A design without nodes: begin with design.node('name')."
-    connections = links(design.nodes.values())
+    connections = find_links(design.nodes.values())
     lines = [f"A design of {len(design.nodes)} nodes and {len(connections)} links", "", "Nodes"]
     for node in design.nodes.values():
         lines += [f"  {line}" for line in node_lines(node)]
@@ -76,7 +76,7 @@ def node_lines(node: Declared) -> list[str]:
 
 def _end_in_words(end: Endpoint) -> str:
     what = f"{end.role.replace('_', ' ')} {end.full_name} ({end.type_name}"
-    return f"{what}; {qos_in_words(end.qos)})" if end.role.kind == "msg" else f"{what})"
+    return f"{what}; {qos_in_words(end.qos)})" if end.role.type_kind == "msg" else f"{what})"
 
 
 def qos_in_words(qos: QoSProfile) -> str:

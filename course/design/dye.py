@@ -61,7 +61,7 @@ def mark(message: Any, *tags: int) -> set[int]:
     for tag in tags:
         if tag not in TAGS:
             raise ValueError(f"A tag is a number from {TAGS.start} to {TAGS.stop - 1}, not {tag}.")
-    places = list(_places(message))
+    places = list(_find_places(message))
     best = min((place.rank for place in places), default=None)
     suited = [place for place in places if place.rank == best]
     written: set[int] = set()
@@ -72,14 +72,14 @@ def mark(message: Any, *tags: int) -> set[int]:
     return written
 
 
-def read(message: Any) -> int | None:
+def read_tag(message: Any) -> int | None:
     """Return the tag that a message carries, the first if there are several, or None."""
     return next(iter(read_all(message)), None)
 
 
 def read_all(message: Any) -> list[int]:
     """Return every tag that a message carries."""
-    places = list(_places(message))
+    places = list(_find_places(message))
     if any(place.rank != _STAMP for place in places):
         # The time of a real reading can look like a tag; it bears one only where nothing else can.
         places = [place for place in places if place.rank != _STAMP]
@@ -108,18 +108,18 @@ def has_room(msg_type: Any) -> bool:
     return bool(mark(msg_type(), TAGS.start))
 
 
-def _places(message: Any) -> Iterator[_Place]:
+def _find_places(message: Any) -> Iterator[_Place]:
     in_time = type(message).__module__.startswith("builtin_interfaces.")
     for name, kind in zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True):
         if isinstance(kind, NamespacedType):
-            yield from _places(getattr(message, name))
+            yield from _find_places(getattr(message, name))
         elif isinstance(kind, AbstractNestedType):
             yield from _in_list(message, name, kind)
         elif _holds_tag(kind):
-            yield _field(message, name, kind, _STAMP if in_time else _rank(name, kind))
+            yield _field_place(message, name, kind, _STAMP if in_time else _rank_field(name, kind))
 
 
-def _rank(name: str, kind: Any) -> int:
+def _rank_field(name: str, kind: Any) -> int:
     if isinstance(kind, BasicType):
         return _NUMBER
     return _FRAME if name == "frame_id" else _OTHER_TEXT
@@ -131,21 +131,21 @@ def _holds_tag(kind: Any) -> bool:
     return isinstance(kind, BasicType) and kind.typename in _WIDE
 
 
-def _field(message: Any, name: str, kind: Any, rank: int) -> _Place:
+def _field_place(message: Any, name: str, kind: Any, rank: int) -> _Place:
     def put(tags: list[int]) -> set[int]:
-        fitting = tags[: _room(kind)]
-        setattr(message, name, _encoded(fitting, kind))
+        fitting = tags[: _field_capacity(kind)]
+        setattr(message, name, _encode_tags(fitting, kind))
         return set(fitting)
 
-    return _Place(rank, put, lambda: _decoded(getattr(message, name)))
+    return _Place(rank, put, lambda: _decode_tags(getattr(message, name)))
 
 
-def _room(kind: Any) -> int:
+def _field_capacity(kind: Any) -> int:
     """Return how many tags a text or number holds."""
-    return 1 if isinstance(kind, BasicType) else _fitting(getattr(kind, "maximum_size", None))
+    return 1 if isinstance(kind, BasicType) else _text_capacity(getattr(kind, "maximum_size", None))
 
 
-def _fitting(length: int | None) -> int:
+def _text_capacity(length: int | None) -> int:
     """Return how many tags a text of at most ``length`` characters holds."""
     return _MOST if length is None else min(_MOST, (length + 1) // (_LONGEST + 1))
 
@@ -156,23 +156,23 @@ def _in_list(message: Any, name: str, kind: Any) -> Iterator[_Place]:
     if isinstance(element, BasicType) and element.typename in _BYTES:
         yield from _in_bytes(message, name, kind)
     elif isinstance(kind, Array) and isinstance(element, NamespacedType):
-        yield from _places(values[0])
+        yield from _find_places(values[0])
     elif isinstance(element, NamespacedType):
         yield from _in_messages(message, name, element)
     elif _holds_tag(element):
 
         def put(tags: list[int]) -> set[int]:
-            fitting = tags[: _room(element)]
-            setattr(message, name, [_encoded(fitting, element), *list(values)[1:]])
+            fitting = tags[: _field_capacity(element)]
+            setattr(message, name, [_encode_tags(fitting, element), *list(values)[1:]])
             return set(fitting)
 
-        yield _Place(_LIST, put, lambda: _decoded(values[0]) if len(values) else [])
+        yield _Place(_LIST, put, lambda: _decode_tags(values[0]) if len(values) else [])
 
 
 def _in_messages(message: Any, name: str, element: Any) -> Iterator[_Place]:
     values = getattr(message, name)
-    first = values[0] if len(values) else _load(element)()
-    places = list(_places(first))
+    first = values[0] if len(values) else _load_element(element)()
+    places = list(_find_places(first))
     if places:
 
         def put(tags: list[int]) -> set[int]:
@@ -185,13 +185,13 @@ def _in_messages(message: Any, name: str, element: Any) -> Iterator[_Place]:
 
 def _in_bytes(message: Any, name: str, kind: Any) -> Iterator[_Place]:
     room = kind.size if isinstance(kind, Array) else getattr(kind, "maximum_size", None)
-    if not _fitting(room):
+    if not _text_capacity(room):
         return
     octets = kind.value_type.typename == "octet"
 
     def put(tags: list[int]) -> set[int]:
-        fitting = tags[: _fitting(room)]
-        text = _text(fitting).encode()
+        fitting = tags[: _text_capacity(room)]
+        text = _format_tags(fitting).encode()
         if not isinstance(kind, AbstractSequence):
             text = text.ljust(kind.size, b"\0")
         setattr(message, name, [bytes([b]) for b in text] if octets else list(text))
@@ -200,26 +200,26 @@ def _in_bytes(message: Any, name: str, kind: Any) -> Iterator[_Place]:
     def get() -> list[int]:
         first = list(getattr(message, name)[: _MOST * (_LONGEST + 1)])
         text = b"".join(first) if octets else bytes(int(value) % 256 for value in first)
-        return _decoded(text.decode(errors="replace"))
+        return _decode_tags(text.decode(errors="replace"))
 
     yield _Place(_LIST, put, get)
 
 
-def _load(element: Any) -> Any:
+def _load_element(element: Any) -> Any:
     return getattr(importlib.import_module(".".join(element.namespaces)), element.name)
 
 
-def _text(tags: list[int]) -> str:
+def _format_tags(tags: list[int]) -> str:
     return " ".join(f"dye-{tag}" for tag in tags)
 
 
-def _encoded(tags: list[int], kind: Any) -> str | int | float:
+def _encode_tags(tags: list[int], kind: Any) -> str | int | float:
     if not isinstance(kind, BasicType):
-        return _text(tags)
+        return _format_tags(tags)
     return float(tags[0]) if kind.typename in ("float", "double") else tags[0]
 
 
-def _decoded(value: Any) -> list[int]:
+def _decode_tags(value: Any) -> list[int]:
     if isinstance(value, str):
         found = [int(digits) for digits in _TEXT.findall(value)[:_MOST]]
         return [tag for tag in found if tag in TAGS]

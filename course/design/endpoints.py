@@ -31,14 +31,14 @@ class Role(StrEnum):
     ACTION_CLIENT = "action_client"
 
     @property
-    def kind(self) -> str:
+    def type_kind(self) -> str:
         """``"msg"``, ``"srv"`` or ``"action"``: the kind of its type."""
         if self in (Role.PUBLISHES, Role.SUBSCRIBES):
             return "msg"
         return "srv" if self in (Role.SERVES, Role.CALLS) else "action"
 
     @property
-    def writes(self) -> bool:
+    def is_writer(self) -> bool:
         """Whether it is the side that publishes, calls or sends goals."""
         return self in (Role.PUBLISHES, Role.CALLS, Role.ACTION_CLIENT)
 
@@ -66,7 +66,7 @@ class Endpoint:
         return type_name(self.type)
 
 
-def endpoint(
+def make_endpoint(
     role: Role, node: str, namespace: str, name: object, ros_type: object, qos: object
 ) -> Endpoint:
     """Return the endpoint that a node declares.
@@ -74,19 +74,19 @@ def endpoint(
     Raises:
         DesignError: the name, the type or the QoS is none.
     """
-    where = f"{node}.{role}({_shown(name)}, …)"
+    where = f"{node}.{role}({_short_repr(name)}, …)"
     if not isinstance(name, str):
         raise DesignError(f"{where}: the name comes first and is a text, then the type.")
     return Endpoint(
         role,
         name,
         _full_name(where, node, namespace, name),
-        _type(where, role, ros_type),
-        _qos(where, role, qos),
+        _check_type(where, role, ros_type),
+        _check_qos(where, role, qos),
     )
 
 
-def reason(error: Exception) -> str:
+def rclpy_reason(error: Exception) -> str:
     """Return what rclpy says about a name, without the place in its own source."""
     first = str(error).splitlines()[0].partition(", at /")[0]
     return (first.partition(": ")[2] or first).rstrip(": ")
@@ -98,24 +98,24 @@ def _full_name(where: str, node: str, namespace: str, name: str) -> str:
         validate_full_topic_name(full)
     except (InvalidTopicNameException, InvalidServiceNameException, ValueError) as error:
         raise DesignError(
-            f"{where}: {name!r} is not a name on the ROS graph: {reason(error)}."
+            f"{where}: {name!r} is not a name on the ROS graph: {rclpy_reason(error)}."
         ) from None
     return full
 
 
-def _type(where: str, role: Role, ros_type: object) -> Any:
-    mark, wanted = _KINDS[role.kind]
+def _check_type(where: str, role: Role, ros_type: object) -> Any:
+    mark, wanted = _KINDS[role.type_kind]
     if isinstance(ros_type, str):
-        ros_type = _load(where, ros_type)
+        ros_type = _load_type(where, ros_type)
     if not isinstance(ros_type, type) and hasattr(ros_type, "get_fields_and_field_types"):
         name = type(ros_type).__name__
         raise DesignError(f"{where}: write the type {name}, not the message {name}().")
     if not isinstance(ros_type, type) or not hasattr(ros_type, mark):
-        raise DesignError(f"{where} needs {wanted}, not {_shown(ros_type)}.")
+        raise DesignError(f"{where} needs {wanted}, not {_short_repr(ros_type)}.")
     return ros_type
 
 
-def _load(where: str, name: str) -> Any:
+def _load_type(where: str, name: str) -> Any:
     try:
         return types.load_named(name)
     except types.UnknownTypeError:
@@ -125,15 +125,17 @@ def _load(where: str, name: str) -> Any:
         ) from None
 
 
-def _qos(where: str, role: Role, qos: object) -> QoSProfile:
+def _check_qos(where: str, role: Role, qos: object) -> QoSProfile:
     if isinstance(qos, QoSProfile):
         return qos
     if qos is None:
-        return qos_profile_services_default if role.kind == "srv" else QoSProfile(depth=10)
+        return qos_profile_services_default if role.type_kind == "srv" else QoSProfile(depth=10)
     if isinstance(qos, int) and not isinstance(qos, bool) and qos > 0:
         return QoSProfile(depth=qos)
-    raise DesignError(f"{where}: qos is a QoSProfile or a depth of 1 or more, not {_shown(qos)}.")
+    raise DesignError(
+        f"{where}: qos is a QoSProfile or a depth of 1 or more, not {_short_repr(qos)}."
+    )
 
 
-def _shown(value: object) -> str:
+def _short_repr(value: object) -> str:
     return value.__name__ if isinstance(value, type) else repr(value)[:60]

@@ -32,7 +32,7 @@ class Link:
     readers: list[tuple[str, Endpoint]] = field(default_factory=list)
 
     @property
-    def ends(self) -> list[tuple[str, Endpoint]]:
+    def all_ends(self) -> list[tuple[str, Endpoint]]:
         """Every (node, endpoint) of it."""
         return [*self.writers, *self.readers]
 
@@ -45,57 +45,60 @@ MISSING = {  # kind: what to say if nobody writes, and if nobody reads
 }  # fmt: skip
 
 
-def links(nodes: Iterable[Declared]) -> list[Link]:
+def find_links(nodes: Iterable[Declared]) -> list[Link]:
     """Return the topics, services and actions of declared nodes, in order of declaration."""
     found: dict[tuple[str, str], Link] = {}
     for node in nodes:
         for end in node.endpoints:
             link = found.setdefault(
-                (end.full_name, end.role.kind), Link(end.full_name, end.role.kind)
+                (end.full_name, end.role.type_kind), Link(end.full_name, end.role.type_kind)
             )
-            (link.writers if end.role.writes else link.readers).append((node.label, end))
+            (link.writers if end.role.is_writer else link.readers).append((node.label, end))
     return list(found.values())
 
 
-def of(nodes: Iterable[Declared], outside: frozenset[str]) -> list[str]:
+def list_findings(nodes: Iterable[Declared], outside: frozenset[str]) -> list[str]:
     """Return what is worth another look, a sentence each."""
-    return [sentence for link in links(nodes) for sentence in _about(link, outside)]
+    return [sentence for link in find_links(nodes) for sentence in _check_link(link, outside)]
 
 
 def type_clash(nodes: Iterable[Declared]) -> str:
     """Return what is wrong if two endpoints of one name have different types, else ""."""
-    return next((clash for link in links(nodes) if (clash := _clash(link))), "")
+    return next((clash for link in find_links(nodes) if (clash := _describe_clash(link))), "")
 
 
-def _about(link: Link, outside: frozenset[str]) -> Iterator[str]:
-    if clash := _clash(link):
+def _check_link(link: Link, outside: frozenset[str]) -> Iterator[str]:
+    if clash := _describe_clash(link):
         yield clash
         return
     no_writer, no_reader = MISSING[link.kind]
     if link.name not in outside:
         if not link.writers and no_writer:
-            yield no_writer.format(names=_names(link.readers), link=link.name)
+            yield no_writer.format(names=_join_names(link.readers), link=link.name)
         if not link.readers:
-            yield no_reader.format(names=_names(link.writers), link=link.name)
+            yield no_reader.format(names=_join_names(link.writers), link=link.name)
     if link.kind != "msg" and len(link.readers) > 1:
-        yield f"{link.name} has {len(link.readers)} servers ({_names(link.readers)}): one is right."
+        yield (
+            f"{link.name} has {len(link.readers)} servers ({_join_names(link.readers)}): one is "
+            "right."
+        )
     for writer, offered in link.writers:
         for reader, requested in link.readers:
-            if link.kind != "action" and (reason := _refusal(offered, requested)):
+            if link.kind != "action" and (reason := _describe_refusal(offered, requested)):
                 yield f"{writer} and {reader} do not connect on {link.name}: {reason}."
 
 
-def _clash(link: Link) -> str:
+def _describe_clash(link: Link) -> str:
     types: dict[str, list[tuple[str, Endpoint]]] = {}
-    for label, end in link.ends:
+    for label, end in link.all_ends:
         types.setdefault(end.type_name, []).append((label, end))
     if len(types) < 2:
         return ""
-    uses = ", ".join(f"{name} in {_names(ends)}" for name, ends in types.items())
+    uses = ", ".join(f"{name} in {_join_names(ends)}" for name, ends in types.items())
     return f"{link.name} has more than one type: {uses}."
 
 
-def _refusal(offered: Endpoint, requested: Endpoint) -> str:
+def _describe_refusal(offered: Endpoint, requested: Endpoint) -> str:
     verdict, reason = qos_check_compatible(offered.qos, requested.qos)
     if verdict != QoSCompatibility.ERROR:  # two default profiles give a warning
         return ""
@@ -103,5 +106,5 @@ def _refusal(offered: Endpoint, requested: Endpoint) -> str:
     return ", ".join(p.removeprefix("ERROR: ") for p in parts if p.startswith("ERROR:")) or reason
 
 
-def _names(ends: list[tuple[str, Endpoint]]) -> str:
+def _join_names(ends: list[tuple[str, Endpoint]]) -> str:
     return " and ".join(dict.fromkeys(label for label, _ in ends))

@@ -41,7 +41,7 @@ _DEEPEST = 8
 _FLOATS = ("float", "double")
 
 
-def lifelike(msg_type: Any, ahead: float = AHEAD) -> Any:
+def lifelike_message(msg_type: Any, ahead: float = AHEAD) -> Any:
     """Return a message with content.
 
     Args:
@@ -49,17 +49,17 @@ def lifelike(msg_type: Any, ahead: float = AHEAD) -> Any:
         ahead: metres straight on to every place that it names.
     """
     message = msg_type()
-    _fill(message, ahead, 0)
+    _fill_message(message, ahead, 0)
     return message
 
 
-def _fill(message: Any, ahead: float, depth: int) -> None:
+def _fill_message(message: Any, ahead: float, depth: int) -> None:
     for name, kind in zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True):
         if isinstance(kind, NamespacedType):
-            _fill(getattr(message, name), ahead, depth)
+            _fill_message(getattr(message, name), ahead, depth)
         elif isinstance(kind, AbstractSequence) and depth < _DEEPEST:
             _fill_list(message, name, kind, ahead, depth)
-    if (finish := _KNOWN.get(_name(message))) is not None:
+    if (finish := _KNOWN.get(_type_name(message))) is not None:
         finish(message, ahead)
 
 
@@ -68,7 +68,7 @@ def _fill_list(message: Any, name: str, kind: Any, ahead: float, depth: int) -> 
     element = kind.value_type
     if isinstance(element, NamespacedType) and element.namespaces[0] in _PACKAGES:
         first = getattr(importlib.import_module(".".join(element.namespaces)), element.name)()
-        _fill(first, ahead, depth + 1)
+        _fill_message(first, ahead, depth + 1)
         setattr(message, name, [first])
     elif isinstance(element, BasicType) and element.typename in _FLOATS:
         room = kind.maximum_size if isinstance(kind, BoundedSequence) else 2
@@ -79,22 +79,22 @@ _PACKAGES = ("geometry_msgs", "nav_msgs", "visualization_msgs", "vision_msgs")
 """Packages whose lists name places: goals, poses, boxes."""
 
 
-def _name(message: Any) -> str:
+def _type_name(message: Any) -> str:
     cls = type(message)
     return f"{cls.__module__.split('.')[0]}/{cls.__name__}"
 
 
-def _now(message: Any, _: float) -> None:
+def _set_now(message: Any, _: float) -> None:
     message.sec, message.nanosec = divmod(time.time_ns(), 10**9)
     if message.nanosec in dye.TAGS:
         message.nanosec = 0  # a time must not look like a mark
 
 
-def _ahead(message: Any, ahead: float) -> None:
+def _set_ahead(message: Any, ahead: float) -> None:
     message.x = ahead
 
 
-def _upright(message: Any, _: float) -> None:
+def _set_upright(message: Any, _: float) -> None:
     message.w = 1.0
 
 
@@ -103,7 +103,7 @@ def _at_the_start(message: Any, _: float) -> None:
     message.pose.pose.position.x = 0.0
 
 
-def _scan(message: Any, ahead: float) -> None:
+def _fill_scan(message: Any, ahead: float) -> None:
     message.header.frame_id = "laser"
     message.angle_min, message.angle_max = -math.pi / 2, math.pi / 2
     message.angle_increment = math.pi / (BEAMS - 1)
@@ -114,14 +114,14 @@ def _scan(message: Any, ahead: float) -> None:
     message.intensities = [1.0] * BEAMS
 
 
-def _image(message: Any, _: float) -> None:
+def _fill_image(message: Any, _: float) -> None:
     message.header.frame_id = "camera"
     message.height, message.width, message.encoding = 12, 16, "rgb8"
     message.step = 3 * message.width
     message.data = array("B", [90, 120, 150] * (message.height * message.width))
 
 
-def _cloud(message: Any, ahead: float) -> None:
+def _fill_cloud(message: Any, ahead: float) -> None:
     message.header.frame_id = "laser"
     message.height, message.width, message.is_dense = 1, 1, True
     message.fields = [
@@ -132,7 +132,7 @@ def _cloud(message: Any, ahead: float) -> None:
     message.data = array("B", struct.pack("<3f", ahead, 0.0, 0.2))
 
 
-def _grid(message: Any, ahead: float) -> None:
+def _fill_grid(message: Any, ahead: float) -> None:
     message.header.frame_id = "map"
     width, height = (round(metres / CELL) for metres in ROOM)
     message.info.resolution, message.info.width, message.info.height = CELL, width, height
@@ -143,13 +143,13 @@ def _grid(message: Any, ahead: float) -> None:
 
 
 _KNOWN: dict[str, Callable[[Any, float], None]] = {
-    "builtin_interfaces/Time": _now,
-    "geometry_msgs/Point": _ahead,
-    "geometry_msgs/Point32": _ahead,
-    "geometry_msgs/Quaternion": _upright,
-    "nav_msgs/OccupancyGrid": _grid,
+    "builtin_interfaces/Time": _set_now,
+    "geometry_msgs/Point": _set_ahead,
+    "geometry_msgs/Point32": _set_ahead,
+    "geometry_msgs/Quaternion": _set_upright,
+    "nav_msgs/OccupancyGrid": _fill_grid,
     "nav_msgs/Odometry": _at_the_start,
-    "sensor_msgs/Image": _image,
-    "sensor_msgs/LaserScan": _scan,
-    "sensor_msgs/PointCloud2": _cloud,
+    "sensor_msgs/Image": _fill_image,
+    "sensor_msgs/LaserScan": _fill_scan,
+    "sensor_msgs/PointCloud2": _fill_cloud,
 }

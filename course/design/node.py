@@ -20,7 +20,7 @@ from sensor_msgs.msg import Imu
 
 from course.design import dye
 from course.design.endpoints import Endpoint, Role
-from course.design.lifelike import lifelike
+from course.design.lifelike import lifelike_message
 
 REMEMBERED = 1000
 """How many tags a node knows again; so many can be on their way at a time."""
@@ -47,15 +47,15 @@ class DesignNode(Node):
         self._outlets: list[Callable[[int], None]] = []
         self._unanswered: list[deque[int]] = []
         self._is_source = not any(end.role is Role.SUBSCRIBES for end in endpoints)
-        for end in sorted(endpoints, key=lambda end: not end.role.writes):
+        for end in sorted(endpoints, key=lambda end: not end.role.is_writer):
             _MAKERS[end.role](self, end)
 
-    def take(self, message: Any) -> None:
+    def take_message(self, message: Any) -> None:
         """Pass on what a message is marked with, unless it has been here before."""
         for tag in dye.read_all(message):
-            self._take(tag)
+            self._take_tag(tag)
 
-    def _take(self, tag: int) -> None:
+    def _take_tag(self, tag: int) -> None:
         with self._lock:
             if tag in self._known:
                 return
@@ -67,45 +67,45 @@ class DesignNode(Node):
 
     # Topics.
 
-    def _publish(self, end: Endpoint) -> None:
+    def _publish_topic(self, end: Endpoint) -> None:
         publisher = self.create_publisher(end.type, end.full_name, end.qos)
         self._outlets.append(partial(self._send_message, publisher, end.type))
         if self._is_source and end.type in OF_ITSELF:
-            self.create_timer(PERIOD, lambda: publisher.publish(lifelike(end.type)))
+            self.create_timer(PERIOD, lambda: publisher.publish(lifelike_message(end.type)))
 
     def _send_message(self, publisher: Publisher, msg_type: Any, tag: int) -> None:
-        message = lifelike(msg_type)
+        message = lifelike_message(msg_type)
         if dye.mark(message, tag):
             publisher.publish(message)
 
-    def _subscribe(self, end: Endpoint) -> None:
-        self.create_subscription(end.type, end.full_name, self.take, end.qos)
+    def _subscribe_topic(self, end: Endpoint) -> None:
+        self.create_subscription(end.type, end.full_name, self.take_message, end.qos)
 
     # Services.
 
-    def _call(self, end: Endpoint) -> None:
+    def _call_service(self, end: Endpoint) -> None:
         client = self.create_client(end.type, end.full_name, qos_profile=end.qos)
         self._outlets.append(partial(self._send_request, client, end.type))
 
     def _send_request(self, client: Client, srv_type: Any, tag: int) -> None:
         if client.service_is_ready():
-            request = lifelike(srv_type.Request)
+            request = lifelike_message(srv_type.Request)
             dye.mark(request, tag)
             client.call_async(request).add_done_callback(self._take_outcome)
 
     def _take_outcome(self, future: Future) -> None:
         if not future.cancelled() and future.exception() is None:
-            self.take(future.result())
+            self.take_message(future.result())
 
-    def _serve(self, end: Endpoint) -> None:
+    def _serve_requests(self, end: Endpoint) -> None:
         unanswered: deque[int] = deque(maxlen=REMEMBERED)
         self._unanswered.append(unanswered)
 
         turns = cycle((False, True))
 
         def answer(request: Any, _: Any) -> Any:
-            self.take(request)
-            response = lifelike(end.type.Response)
+            self.take_message(request)
+            response = lifelike_message(end.type.Response)
             asked = dye.read_all(request)
             with self._lock:
                 others = [tag for tag in unanswered if tag not in asked]
@@ -126,10 +126,10 @@ class DesignNode(Node):
         self._outlets.append(partial(self._send_goal, client, end.type))
 
     def _send_goal(self, client: ActionClient, action_type: Any, tag: int) -> None:
-        goal = lifelike(action_type.Goal)
+        goal = lifelike_message(action_type.Goal)
         if client.server_is_ready() and dye.mark(goal, tag):
             client.send_goal_async(
-                goal, feedback_callback=lambda message: self.take(message.feedback)
+                goal, feedback_callback=lambda message: self.take_message(message.feedback)
             ).add_done_callback(self._follow_goal)
 
     def _follow_goal(self, future: Future) -> None:
@@ -139,14 +139,17 @@ class DesignNode(Node):
 
     def _take_result(self, future: Future) -> None:
         if future.exception() is None and (answer := future.result()) is not None:
-            self.take(answer.result)
+            self.take_message(answer.result)
 
     def _carry_out_goals(self, end: Endpoint) -> None:
-        ActionServer(self, end.type, end.full_name, partial(self._execute, end.type))
+        ActionServer(self, end.type, end.full_name, partial(self._execute_goal, end.type))
 
-    def _execute(self, action_type: Any, goal: ServerGoalHandle) -> Any:
-        self.take(goal.request)
-        feedback, result = lifelike(action_type.Feedback), lifelike(action_type.Result)
+    def _execute_goal(self, action_type: Any, goal: ServerGoalHandle) -> Any:
+        self.take_message(goal.request)
+        feedback, result = (
+            lifelike_message(action_type.Feedback),
+            lifelike_message(action_type.Result),
+        )
         if dye.carry(goal.request, feedback):
             goal.publish_feedback(feedback)
         dye.carry(goal.request, result)
@@ -155,10 +158,10 @@ class DesignNode(Node):
 
 
 _MAKERS: dict[Role, Callable[[DesignNode, Endpoint], None]] = {
-    Role.PUBLISHES: DesignNode._publish,
-    Role.SUBSCRIBES: DesignNode._subscribe,
-    Role.CALLS: DesignNode._call,
-    Role.SERVES: DesignNode._serve,
+    Role.PUBLISHES: DesignNode._publish_topic,
+    Role.SUBSCRIBES: DesignNode._subscribe_topic,
+    Role.CALLS: DesignNode._call_service,
+    Role.SERVES: DesignNode._serve_requests,
     Role.ACTION_CLIENT: DesignNode._send_goals,
     Role.ACTION_SERVER: DesignNode._carry_out_goals,
 }

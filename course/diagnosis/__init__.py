@@ -10,7 +10,7 @@ from course.diagnosis import domains, graph, lifecycle, nodes
 from course.doctor.finding import Finding
 from course.runtime.core_session import CoreSession
 
-__all__ = ["Diagnosis", "diagnose", "likely", "quick"]
+__all__ = ["Diagnosis", "diagnose", "find_quickly", "likely_reasons"]
 
 
 class Diagnosis(Sequence[Finding]):
@@ -40,7 +40,7 @@ class Diagnosis(Sequence[Finding]):
         """Return the findings as text."""
         if not self.findings:
             return "Nothing is wrong that can be seen from here."
-        return "\n".join(finding.text() for finding in self.findings)
+        return "\n".join(finding.as_text() for finding in self.findings)
 
     def _repr_html_(self) -> str:
         if not self.findings:
@@ -59,16 +59,18 @@ def diagnose(session: CoreSession) -> Diagnosis:
     Nodes of other processes are asked whether they answer, and other notebooks' sessions whether
     they have what is missed here; it takes up to three seconds.
     """
-    asked = (domains.next_door, nodes.silent, lifecycle.others)
-    return Diagnosis([*quick(session), *(found for check in asked for found in check(session))])
+    asked = (domains.next_door, nodes.find_silent, lifecycle.check_other_nodes)
+    return Diagnosis(
+        [*find_quickly(session), *(found for check in asked for found in check(session))]
+    )
 
 
-def quick(session: CoreSession) -> list[Finding]:
+def find_quickly(session: CoreSession) -> list[Finding]:
     """Return what can be found without waiting for anybody."""
-    return [*nodes.stuck(session), *nodes.moved(session), *_calm(session)]
+    return [*nodes.find_stuck(session), *nodes.find_moved(session), *_further_findings(session)]
 
 
-def likely(session: CoreSession, *, vague: bool, sought: str = "") -> list[Finding]:
+def likely_reasons(session: CoreSession, *, vague: bool, sought: str = "") -> list[Finding]:
     """Return what may be why a wait of the session was in vain, the likeliest first.
 
     Stuck callbacks and nodes in other executors are left out: a wait tells of them by itself. Nodes
@@ -80,26 +82,26 @@ def likely(session: CoreSession, *, vague: bool, sought: str = "") -> list[Findi
             may be the reason.
         sought: the topic or service that was waited for, as the graph spells it, or "".
     """
-    found = [f for f in _calm(session) if vague or f.name not in _LONELY]
+    found = [f for f in _further_findings(session) if vague or f.name not in _LONELY]
     if vague or sought:
         found += domains.next_door(session, sought)
     if not any(finding.status == "problem" for finding in found):
-        found += [*nodes.silent(session), *lifecycle.others(session)]
-    return sorted(found, key=_rank)
+        found += [*nodes.find_silent(session), *lifecycle.check_other_nodes(session)]
+    return sorted(found, key=_rank_finding)
 
 
 _LONELY = ("topic", "service", "action")
 
 
-def _calm(session: CoreSession) -> list[Finding]:
+def _further_findings(session: CoreSession) -> list[Finding]:
     checks = (
-        nodes.stolen, nodes.paused, nodes.half_made, nodes.unspun, lifecycle.own,
-        domains.on_another_domain, graph.check,
+        nodes.find_stolen, nodes.find_paused, nodes.half_made, nodes.find_unspun,
+        lifecycle.check_own_nodes, domains.on_another_domain, graph.check_graph,
     )  # fmt: skip
     return [finding for check in checks for finding in check(session)]
 
 
-def _rank(finding: Finding) -> int:
+def _rank_finding(finding: Finding) -> int:
     if finding.status == "problem":
         return 0
     if finding.name == "pause" or graph.NEARLY in finding.message:

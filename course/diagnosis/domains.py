@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 
-from course.diagnosis.graph import lonely
-from course.doctor.finding import Finding, problem, warning
+from course.diagnosis.graph import unoffered_names
+from course.doctor.finding import Finding, make_problem, make_warning
 from course.domains import neighbours
 from course.graph import reader
 from course.runtime.context import closing
@@ -18,12 +18,12 @@ def on_another_domain(session: CoreSession) -> Iterator[Finding]:
     """Find sessions of this process that cannot hear each other, and a domain set in vain."""
     others = [
         other
-        for other in closing.known()
+        for other in closing.known_sessions()
         if isinstance(other, CoreSession) and not other.closed and other.nodes
     ]
     for other in others:
         if other.domain_id != session.domain_id:
-            yield warning(
+            yield make_warning(
                 "domain", f"This session is on domain {session.domain_id}; another one of this "
                 f"kernel, with {', '.join(other.nodes)}, is on {other.domain_id}, and DDS domains "
                 "never hear each other.",
@@ -31,7 +31,7 @@ def on_another_domain(session: CoreSession) -> Iterator[Finding]:
             )  # fmt: skip
     asked = os.environ.get("ROS_DOMAIN_ID", "")
     if asked and asked != str(session.domain_id):
-        yield warning(
+        yield make_warning(
             "domain", f"ROS_DOMAIN_ID is {asked}, but a session leases a domain of its own: this "
             f"one is on {session.domain_id}, so it does not hear nodes on {asked}.",
             f"Join that domain with course.session(domain_id={asked}).",
@@ -46,14 +46,14 @@ def next_door(session: CoreSession, sought: str = "") -> Iterator[Finding]:
         sought: a topic or service that the session itself has waited for, or "".
     """
     own = session.nodes
-    graph = reader.read(session.observer, own=list(own.values()))
-    missed = [*lonely(graph, set(own)), *([sought] if sought else [])]
+    graph = reader.read_graph(session.observer, own=list(own.values()))
+    missed = [*unoffered_names(graph, set(own)), *([sought] if sought else [])]
     here = session.offered(missed)
     missed = [name for name in missed if name not in here]
-    for neighbour in neighbours.ask(missed) if missed else []:
+    for neighbour in neighbours.ask_neighbours(missed) if missed else []:
         for name, nodes in neighbour.offers.items():
             action = name.removesuffix(SEND_GOAL)
-            yield problem(
+            yield make_problem(
                 "domain", f"{action} is offered by {', '.join(nodes)} on domain "
                 f"{neighbour.domain_id}, in {neighbour.program}; this session is on domain "
                 f"{session.domain_id}, and DDS domains never hear each other.",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from course.doctor.finding import Finding, problem, warning
+from course.doctor.finding import Finding, make_problem, make_warning
 from course.graph import reader, words
 from course.graph.model import Graph
 from course.runtime.core_session import CoreSession
@@ -23,29 +23,29 @@ _MENDS = {
 }
 
 
-def check(session: CoreSession) -> Iterator[Finding]:
+def check_graph(session: CoreSession) -> Iterator[Finding]:
     """Find what one look at the graph shows."""
     own = session.nodes
-    graph = reader.read(session.observer, own=list(own.values()))
-    yield from mismatches(graph)
-    yield from twins(graph, set(own))
+    graph = reader.read_graph(session.observer, own=list(own.values()))
+    yield from find_mismatches(graph)
+    yield from find_twins(graph, set(own))
     yield from lonely_topics(graph, set(own))
     yield from lonely_clients(graph, set(own))
 
 
-def mismatches(graph: Graph) -> Iterator[Finding]:
+def find_mismatches(graph: Graph) -> Iterator[Finding]:
     """Find publishers and subscriptions that DDS does not connect."""
     for topic, pair in graph.mismatches:
         mends = [_MENDS[policy] for policy in pair.policies if policy in _MENDS]
         what = "type" if "TYPE" in pair.policies else "QoS"
-        yield problem(what, words.mismatch(topic, pair), " ".join(mends))
+        yield make_problem(what, words.describe_mismatch(topic, pair), " ".join(mends))
 
 
-def twins(graph: Graph, own: set[str]) -> Iterator[Finding]:
+def find_twins(graph: Graph, own: set[str]) -> Iterator[Finding]:
     """Find names that several nodes bear: one may be a ghost of an earlier run."""
-    for name in graph.twins:
+    for name in graph.duplicate_names:
         where = "One is in this session" if name in own else "None is in this session"
-        yield problem(
+        yield make_problem(
             "name", f"Several nodes are called {name}. {where}; another may be left from an "
             "earlier run, of a cell that made it with rclpy or of another program.",
             "Rename one, or end the other: restart the kernel that made it, or destroy_node() it.",
@@ -60,12 +60,13 @@ def lonely_topics(graph: Graph, own: set[str]) -> Iterator[Finding]:
         readers = sorted({end.node for end in topic.subscriptions} & own)
         writers = sorted({end.node for end in topic.publishers} & own)
         if readers and not topic.publishers:
-            yield warning(
+            yield make_warning(
                 "topic", f"{', '.join(readers)} reads {topic.name}, and nobody publishes on it"
-                f"{_alike(topic.name, published)}.", "Start the publisher, or correct the name.",
+                f"{_suggest_name(topic.name, published)}.",
+                "Start the publisher, or correct the name.",
             )  # fmt: skip
-        elif writers and not topic.subscriptions and (near := _alike(topic.name, read)):
-            yield warning(
+        elif writers and not topic.subscriptions and (near := _suggest_name(topic.name, read)):
+            yield make_warning(
                 "topic", f"{', '.join(writers)} publishes on {topic.name}, and nobody reads it"
                 f"{near}.", "Correct the name on one side.",
             )  # fmt: skip
@@ -80,20 +81,20 @@ def lonely_clients(graph: Graph, own: set[str]) -> Iterator[Finding]:
             if not clients or exchange.servers:
                 continue
             if (other := offered.get(exchange.name)) is not None:
-                yield problem(
+                yield make_problem(
                     "type", f"{clients} uses the {kind} {exchange.name} as {exchange.type}, and "
                     f"{', '.join(other.servers)} offers it as {other.type}: DDS never connects "
                     "them.", f"One {kind} has one type: correct the type or the name on one side.",
                 )  # fmt: skip
             else:
-                yield warning(
+                yield make_warning(
                     kind, f"{clients} uses the {kind} {exchange.name}, and nobody offers it"
-                    f"{_alike(exchange.name, list(offered))}.",
+                    f"{_suggest_name(exchange.name, list(offered))}.",
                     "Start its server, or correct the name.",
                 )  # fmt: skip
 
 
-def lonely(graph: Graph, own: set[str]) -> list[str]:
+def unoffered_names(graph: Graph, own: set[str]) -> list[str]:
     """Return the topics and services that nodes of the session use, and that nobody offers.
 
     An action is named by the service that takes its goals.
@@ -112,6 +113,6 @@ def lonely(graph: Graph, own: set[str]) -> list[str]:
     return topics + exchanges
 
 
-def _alike(name: str, names: list[str]) -> str:
+def _suggest_name(name: str, names: list[str]) -> str:
     close = close_match(name, [other for other in names if other != name])
     return f"{NEARLY}{close}?)" if close else ""

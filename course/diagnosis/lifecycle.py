@@ -10,9 +10,9 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.lifecycle import LifecycleNodeMixin, LifecyclePublisher
 from rclpy.node import Node
 
-from course.diagnosis.graph import lonely
+from course.diagnosis.graph import unoffered_names
 from course.diagnosis.nodes import ANSWER, MOST_ASKED
-from course.doctor.finding import Finding, problem, warning
+from course.doctor.finding import Finding, make_problem, make_warning
 from course.graph import reader
 from course.runtime.callbacks import transitions
 from course.runtime.core_session import CoreSession
@@ -27,21 +27,21 @@ _MENDS = {
 }  # fmt: skip
 
 
-def own(session: CoreSession) -> Iterator[Finding]:
+def check_own_nodes(session: CoreSession) -> Iterator[Finding]:
     """Find what keeps managed nodes of the session from working."""
     for name, node in session.nodes.items():
         if not isinstance(node, LifecycleNodeMixin):
             continue
         with contextlib.suppress(InvalidHandle):  # destroyed just now
-            told = transitions.failed(node)
+            told = transitions.failed_transitions(node)
             for failure in told:
-                made = warning if failure.kind in ("returned", "refused") else problem
+                made = make_warning if failure.kind in ("returned", "refused") else make_problem
                 state = f" It is {transitions.state_of(node)} now."
                 yield made("lifecycle", failure.what + state, _MENDS[failure.kind])
-            yield from _state(session, name, node)
+            yield from _check_state(session, name, node)
 
 
-def others(session: CoreSession) -> Iterator[Finding]:
+def check_other_nodes(session: CoreSession) -> Iterator[Finding]:
     """Find managed nodes of other programs that are not active: all are asked at once."""
     services = [
         name
@@ -52,53 +52,55 @@ def others(session: CoreSession) -> Iterator[Finding]:
     for service, answer in session.answers(GetState, asked[:MOST_ASKED], ANSWER).items():
         name, state = service.removesuffix(_GET_STATE), answer.current_state.label
         if state == "unconfigured":
-            yield warning("lifecycle", _unconfigured(session, name), _by_service(name, state))
+            yield make_warning(
+                "lifecycle", _describe_unconfigured(session, name), _by_service(name, state)
+            )
         elif state == "inactive":
-            yield warning(
+            yield make_warning(
                 "lifecycle", f"{name} is inactive: a managed node publishes nothing until it is "
                 "active.", _by_service(name, state),
             )  # fmt: skip
         elif state == "finalized":
-            yield warning(
+            yield make_warning(
                 "lifecycle", f"{name} is finalized: no transition leads out of it.",
                 "Start its program again.",
             )  # fmt: skip
 
 
-def _state(session: CoreSession, name: str, node: Node) -> Iterator[Finding]:
+def _check_state(session: CoreSession, name: str, node: Node) -> Iterator[Finding]:
     assert isinstance(node, LifecycleNodeMixin)
     state = transitions.state_of(node)
     if state == "unconfigured":
-        yield warning(
-            "lifecycle", _unconfigured(session, name),
+        yield make_warning(
+            "lifecycle", _describe_unconfigured(session, name),
             "Configure and activate it: node.trigger_configure(), then node.trigger_activate().",
         )  # fmt: skip
     elif state == "inactive":
-        topics = _topics(node)
+        topics = _topic_names(node)
         what = f"what it publishes on {topics} goes nowhere" if topics else "it publishes nothing"
-        yield warning(
+        yield make_warning(
             "lifecycle", f"{name} is inactive: {what}, without a word, and what its on_activate() "
             "starts does not run.", "Activate it: node.trigger_activate().",
         )  # fmt: skip
     elif state == "active":
-        yield from _asleep(name, node)
+        yield from _check_active(name, node)
     elif state == "finalized":
-        yield problem(
+        yield make_problem(
             "lifecycle", f"{name} is finalized: no transition leads out of it.",
             "Run its cell again, which makes a new node.",
         )  # fmt: skip
 
 
-def _asleep(name: str, node: Node) -> Iterator[Finding]:
+def _check_active(name: str, node: Node) -> Iterator[Finding]:
     """Find what is off in a node that is active."""
     assert isinstance(node, LifecycleNodeMixin)
     off = [one for one in node._managed_entities if getattr(one, "is_activated", True) is False]
     if off:
-        topics = _topics(node, only=off)
+        topics = _topic_names(node, only=off)
         what = (
             f"its publisher on {topics} is not and publishes" if topics else "a part of it is not"
         )
-        yield problem(
+        yield make_problem(
             "lifecycle", f"{name} is active, but {what}{' nothing' if topics else ''}: its "
             "on_activate() does not call super().on_activate(state), or that part was made later.",
             "End on_activate() with `return super().on_activate(state)`, and make publishers in "
@@ -108,14 +110,14 @@ def _asleep(name: str, node: Node) -> Iterator[Finding]:
         if timer.is_canceled():
             callback = getattr(timer.callback, "__qualname__", "its callback")
             period = f"{timer.timer_period_ns / 1e9:g} s"
-            yield warning(
+            yield make_warning(
                 "lifecycle", f"{name} is active, but its timer of {period} is cancelled: "
                 f"{callback.replace('<locals>.', '')} is never called.",
                 "Call timer.reset() in on_activate(), if cancel() in on_deactivate() stopped it.",
             )  # fmt: skip
 
 
-def _topics(node: Node, only: Sequence[object] | None = None) -> str:
+def _topic_names(node: Node, only: Sequence[object] | None = None) -> str:
     names = [
         publisher.topic_name
         for publisher in node.publishers
@@ -124,9 +126,9 @@ def _topics(node: Node, only: Sequence[object] | None = None) -> str:
     return ", ".join(sorted(names))
 
 
-def _unconfigured(session: CoreSession, name: str) -> str:
-    graph = reader.read(session.observer, own=list(session.nodes.values()))
-    missed = lonely(graph, set(session.nodes))
+def _describe_unconfigured(session: CoreSession, name: str) -> str:
+    graph = reader.read_graph(session.observer, own=list(session.nodes.values()))
+    missed = unoffered_names(graph, set(session.nodes))
     may_be = f", {', '.join(missed)} perhaps, which nobody offers" if missed else ""
     return f"{name} is unconfigured: what its on_configure() makes is not there yet{may_be}."
 

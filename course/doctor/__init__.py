@@ -7,25 +7,25 @@ import sys
 from collections.abc import Iterator, Sequence
 
 from course.doctor import environment, machine, ros, software
-from course.doctor.finding import Finding, problem
+from course.doctor.finding import Finding, make_problem
 from course.errors import CourseError
 
-__all__ = ["Finding", "examine", "exit_code", "summary"]
+__all__ = ["Finding", "examine_all", "exit_code", "summary_line"]
 
 
-def examine() -> Iterator[Finding]:
+def examine_all() -> Iterator[Finding]:
     """Yield what is found on this machine, each as soon as it is known. Takes about 3 s."""
     parts = (
-        software.examine,
-        lambda: environment.examine(os.environ, sys.prefix),
-        machine.examine,
-        ros.examine,
+        software.examine_software,
+        lambda: environment.examine_environment(os.environ, sys.prefix),
+        machine.examine_machine,
+        ros.examine_ros,
     )
     for part in parts:
         try:
             yield from part()
         except (CourseError, OSError) as error:
-            yield problem("doctor", f"A check could not be finished: {error}")
+            yield make_problem("doctor", f"A check could not be finished: {error}")
 
 
 def exit_code(findings: Sequence[Finding]) -> int:
@@ -33,7 +33,7 @@ def exit_code(findings: Sequence[Finding]) -> int:
     return int(any(finding.status == "problem" for finding in findings))
 
 
-def summary(findings: Sequence[Finding]) -> str:
+def summary_line(findings: Sequence[Finding]) -> str:
     """Return the last line: how many problems and warnings there are."""
     problems = sum(finding.status == "problem" for finding in findings)
     warnings = sum(finding.status == "warning" for finding in findings)

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from course.doctor.finding import Finding, ok, problem, warning
+from course.doctor.finding import Finding, make_ok, make_problem, make_warning
 from course.domains.leases import MAX_DOMAIN, MIN_DOMAIN
 
 RMW = "rmw_fastrtps_cpp"
@@ -20,7 +20,7 @@ _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
 Environment = Mapping[str, str]
 
 
-def examine(environment: Environment, prefix: str) -> Iterator[Finding]:
+def examine_environment(environment: Environment, prefix: str) -> Iterator[Finding]:
     """Yield what the variables of ``environment`` do to ROS 2.
 
     Args:
@@ -28,14 +28,14 @@ def examine(environment: Environment, prefix: str) -> Iterator[Finding]:
         prefix: root of the Python environment (``sys.prefix``).
     """
     found = [finding for check in _CHECKS for finding in check(environment)]
-    found += _bootstrap(environment, prefix)
+    found += _check_bootstrap(environment, prefix)
     if found:
         yield from found
     else:
-        yield ok("environment", "No variable is set that disturbs ROS 2.")
+        yield make_ok("environment", "No variable is set that disturbs ROS 2.")
 
 
-def _domain(environment: Environment) -> Iterator[Finding]:
+def _check_domain(environment: Environment) -> Iterator[Finding]:
     name, text = "ROS_DOMAIN_ID", environment.get("ROS_DOMAIN_ID", "")
     if not text:
         return
@@ -43,63 +43,63 @@ def _domain(environment: Environment) -> Iterator[Finding]:
     note = "The course does not use it, but other ROS programs in this shell will not start well."
     mend = f"Run `unset {name}`, or set it to a number from {MIN_DOMAIN} to {MAX_DOMAIN}."
     if not text.strip().isdecimal():
-        yield warning(name, f"{text!r} is not a whole number. {note}", mend)
+        yield make_warning(name, f"{text!r} is not a whole number. {note}", mend)
     elif int(text) >= _ENDS_THE_PROCESS:
-        yield warning(name, f"{text} is too large. {note}", mend)
+        yield make_warning(name, f"{text} is too large. {note}", mend)
     elif int(text) > MAX_DOMAIN:
-        yield warning(name, f"{text} can collide with other programs' ports on Linux.", mend)
+        yield make_warning(name, f"{text} can collide with other programs' ports on Linux.", mend)
 
 
-def _middleware(environment: Environment) -> Iterator[Finding]:
+def _check_middleware(environment: Environment) -> Iterator[Finding]:
     name, chosen = "RMW_IMPLEMENTATION", environment.get("RMW_IMPLEMENTATION", "")
     if chosen and chosen != RMW:
-        yield problem(
+        yield make_problem(
             name, f"It asks for {chosen}, but only {RMW} is installed.", f"Run `unset {name}`."
         )
 
 
-def _discovery(environment: Environment) -> Iterator[Finding]:
+def _check_discovery(environment: Environment) -> Iterator[Finding]:
     name, chosen = (
         "ROS_AUTOMATIC_DISCOVERY_RANGE",
         environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", ""),
     )
     if chosen and chosen not in _RANGES:
         known = ", ".join(sorted(_RANGES))
-        yield warning(name, f"{chosen!r} is none of {known}.", f"Run `unset {name}`.")
+        yield make_warning(name, f"{chosen!r} is none of {known}.", f"Run `unset {name}`.")
     elif chosen == "OFF":
-        yield warning(
+        yield make_warning(
             name, "OFF keeps ROS programs outside of the course apart.", f"Run `unset {name}`."
         )
     if environment.get("ROS_LOCALHOST_ONLY", "0") not in ("", "0"):
-        yield warning(
+        yield make_warning(
             "ROS_LOCALHOST_ONLY",
             "It is deprecated, and overrules how far a session looks for other nodes.",
             "Run `unset ROS_LOCALHOST_ONLY`.",
         )
 
 
-def _security(environment: Environment) -> Iterator[Finding]:
+def _check_security(environment: Environment) -> Iterator[Finding]:
     if environment.get("ROS_SECURITY_ENABLE", "").lower() == "true":
-        yield problem(
+        yield make_problem(
             "ROS_SECURITY_ENABLE",
             "ROS security is on, and nodes without a key of their own do not start.",
             "Run `unset ROS_SECURITY_ENABLE`.",
         )
 
 
-def _profiles(environment: Environment) -> Iterator[Finding]:
+def _check_profiles(environment: Environment) -> Iterator[Finding]:
     for name in _PROFILES:
         path = environment.get(name, "")
         if path and not Path(path).is_file():
-            yield problem(name, f"There is no file {path}.", f"Run `unset {name}`.")
+            yield make_problem(name, f"There is no file {path}.", f"Run `unset {name}`.")
         elif path:
-            yield warning(
+            yield make_warning(
                 name,
                 f"DDS follows the profiles in {path}; checks and measurements may differ.",
                 f"Run `unset {name}` unless you mean it.",
             )
     if transports := environment.get("FASTDDS_BUILTIN_TRANSPORTS", ""):
-        yield warning(
+        yield make_warning(
             "FASTDDS_BUILTIN_TRANSPORTS",
             f"DDS uses {transports} in place of its usual transports.",
             "Run `unset FASTDDS_BUILTIN_TRANSPORTS` unless you mean it.",
@@ -115,7 +115,7 @@ def _system_ros(environment: Environment) -> Iterator[Finding]:
     ]
     if places:
         distribution = places[0].split("/")[3]
-        yield warning(
+        yield make_warning(
             "sourced ROS",
             f"A ROS installation ({distribution}) is sourced in this shell, and its libraries can "
             "mix with the course's own.",
@@ -123,11 +123,11 @@ def _system_ros(environment: Environment) -> Iterator[Finding]:
         )
 
 
-def _bootstrap(environment: Environment, prefix: str) -> Iterator[Finding]:
+def _check_bootstrap(environment: Environment, prefix: str) -> Iterator[Finding]:
     """The wheels set `_MARK` when they have set LD_LIBRARY_PATH; alone it was inherited."""
     paths = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)
     if environment.get(_MARK) and str(Path(prefix) / "lib") not in paths:
-        yield problem(
+        yield make_problem(
             _MARK,
             "It was inherited from another Python environment, so the ROS 2 wheels do not find "
             "their libraries here.",
@@ -136,10 +136,10 @@ def _bootstrap(environment: Environment, prefix: str) -> Iterator[Finding]:
 
 
 _CHECKS: tuple[Callable[[Environment], Iterator[Finding]], ...] = (
-    _domain,
-    _middleware,
-    _discovery,
-    _security,
-    _profiles,
+    _check_domain,
+    _check_middleware,
+    _check_discovery,
+    _check_security,
+    _check_profiles,
     _system_ros,
 )

@@ -25,7 +25,7 @@ class Finding:
     message: str
     mend: str = ""
 
-    def text(self) -> str:
+    def as_text(self) -> str:
         """Return the lines for a terminal."""
         line = f"{self.status:<{_WIDTH}}  {self.name}: {self.message}"
         return f"{line}\n{'':<{_WIDTH}}  -> {self.mend}" if self.mend else line
@@ -35,16 +35,16 @@ class Finding:
         return asdict(self)
 
 
-def ok(name: str, message: str) -> Finding:
+def make_ok(name: str, message: str) -> Finding:
     """Return a finding that all is well."""
     return Finding(name, "ok", message)
 
 
-def warning(name: str, message: str, mend: str = "") -> Finding:
+def make_warning(name: str, message: str, mend: str = "") -> Finding:
     """Return a finding that something works less well than it could."""
     return Finding(name, "warning", message, mend)
 
 
-def problem(name: str, message: str, mend: str = "") -> Finding:
+def make_problem(name: str, message: str, mend: str = "") -> Finding:
     """Return a finding that keeps the course from running."""
     return Finding(name, "problem", message, mend)

@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from course.doctor.finding import Finding, ok, problem, warning
+from course.doctor.finding import Finding, make_ok, make_problem, make_warning
 from course.util import cgroups
 
 MIN_DISK, LOW_DISK = 50, 500  # MB: below, a build fails; below, a class's submissions may
@@ -18,38 +18,38 @@ LOW_SHM = 32  # MB. A participant takes about 1 MB, and Docker gives 64 by defau
 SHM = Path("/dev/shm")
 
 
-def examine() -> Iterator[Finding]:
+def examine_machine() -> Iterator[Finding]:
     """Yield what there is to say about disk, shared memory, log folder and clock."""
-    yield disk(Path.cwd())
+    yield check_disk(Path.cwd())
     yield temporary_folder()
     yield shared_memory(SHM)
     yield stale_segments(SHM, Path("/proc/locks"))
     yield log_folder(os.environ.get("ROS_LOG_DIR"), os.environ.get("ROS_HOME"))
-    yield clock(time.time(), Path(__file__).stat().st_mtime)
-    yield counting(cgroups.delegated())
+    yield check_clock(time.time(), Path(__file__).stat().st_mtime)
+    yield check_counting(cgroups.delegated_group())
 
 
-def counting(group: Path | None) -> Finding:
+def check_counting(group: Path | None) -> Finding:
     """Say how it is counted what a submission uses that is graded here."""
     name = "submissions' limits"
     if group is not None:
-        return ok(name, f"the kernel counts what a submission uses (cgroups v2, in {group})")
-    return ok(
+        return make_ok(name, f"the kernel counts what a submission uses (cgroups v2, in {group})")
+    return make_ok(
         name,
         "the grader counts what a submission uses, ten times a second; the kernel would where "
         "systemd delegates a control group (systemd-run --user --scope -p Delegate=yes …)",
     )
 
 
-def disk(folder: Path, free: int | None = None) -> Finding:
+def check_disk(folder: Path, free: int | None = None) -> Finding:
     """Look at the space where notebooks are saved; ``free`` is in MB, measured if left out."""
     free = shutil.disk_usage(folder).free >> 20 if free is None else free
     text, mend = f"{free} MB are free in {folder}", "Make room there."
     if free < MIN_DISK:
-        return problem("disk", f"{text}: notebooks and grades cannot be saved.", mend)
+        return make_problem("disk", f"{text}: notebooks and grades cannot be saved.", mend)
     if free < LOW_DISK:
-        return warning("disk", f"{text}, which is little.", mend)
-    return ok("disk", text)
+        return make_warning("disk", f"{text}, which is little.", mend)
+    return make_ok("disk", text)
 
 
 def temporary_folder() -> Finding:
@@ -58,9 +58,9 @@ def temporary_folder() -> Finding:
         with tempfile.TemporaryFile() as file:
             file.write(b"x" * 4096)
             file.flush()
-            return ok("temporary files", f"{tempfile.gettempdir()} can be written")
+            return make_ok("temporary files", f"{tempfile.gettempdir()} can be written")
     except OSError as error:
-        return problem(
+        return make_problem(
             "temporary files",
             f"They cannot be written ({error.strerror or error}).",
             "Make room in /tmp, or set TMPDIR to a folder of your own.",
@@ -71,19 +71,19 @@ def shared_memory(folder: Path, free: int | None = None) -> Finding:
     """Look at DDS's fast path between processes; ``free`` is in MB, measured if left out."""
     name = "shared memory"
     if not (folder.is_dir() and os.access(folder, os.W_OK)):
-        return warning(
+        return make_warning(
             name,
             f"{folder} cannot be written, so DDS uses slower UDP.",
             "In a container: mount a tmpfs there.",
         )
     free = shutil.disk_usage(folder).free >> 20 if free is None else free
     if free < LOW_SHM:
-        return warning(
+        return make_warning(
             name,
             f"Only {free} MB are free in {folder}; with many nodes DDS falls back to slower UDP.",
             "In a container: start it with --shm-size=256m.",
         )
-    return ok(name, f"{free} MB are free in {folder}")
+    return make_ok(name, f"{free} MB are free in {folder}")
 
 
 def stale_segments(folder: Path, locks: Path) -> Finding:
@@ -96,15 +96,15 @@ def stale_segments(folder: Path, locks: Path) -> Finding:
     try:
         held = {line.split()[5].rpartition(":")[2] for line in _lock_lines(locks)}
     except OSError as error:
-        return ok(name, f"They could not be counted ({error.strerror or error})")
+        return make_ok(name, f"They could not be counted ({error.strerror or error})")
     files = [path for path in folder.glob("fastrtps_*_el") if "port" not in path.name]
-    inodes = {path: str(found.st_ino) for path in files if (found := _stat(path))}
+    inodes = {path: str(found.st_ino) for path in files if (found := _stat_file(path))}
     stale = [path for path, inode in inodes.items() if inode not in held]
-    parts = [_stat(part) for path in stale for part in folder.glob(f"{path.name[:-3]}*")]
+    parts = [_stat_file(part) for path in stale for part in folder.glob(f"{path.name[:-3]}*")]
     size = sum(found.st_size for found in parts if found) >> 20
     if not stale:
-        return ok(name, "none")
-    return warning(
+        return make_ok(name, "none")
+    return make_warning(
         name,
         f"{len(stale)} shared-memory locks or segments ({size} MB) were left in {folder} by ROS "
         "programs that were killed.",
@@ -112,7 +112,7 @@ def stale_segments(folder: Path, locks: Path) -> Finding:
     )
 
 
-def _stat(path: Path) -> os.stat_result | None:
+def _stat_file(path: Path) -> os.stat_result | None:
     """Look at a file, which its program may have removed in the meantime."""
     try:
         return path.stat()
@@ -132,9 +132,9 @@ def log_folder(chosen: str | None, ros_home: str | None) -> Finding:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=folder):
-            return ok("log folder", f"{folder} can be written")
+            return make_ok("log folder", f"{folder} can be written")
     except OSError as error:
-        return warning(
+        return make_warning(
             "log folder",
             f"{folder} cannot be written ({error.strerror or error}), and plain rclpy does not "
             "start then. Sessions of the course log to a temporary folder instead.",
@@ -142,14 +142,14 @@ def log_folder(chosen: str | None, ros_home: str | None) -> Finding:
         )
 
 
-def clock(now: float, installed: float) -> Finding:
+def check_clock(now: float, installed: float) -> Finding:
     """Compare the clock (s since 1970) with when this file was installed."""
     shown = datetime.datetime.fromtimestamp(now).astimezone().isoformat(" ", "seconds")
     if now < installed - 60:
-        return warning(
+        return make_warning(
             "clock",
             f"It says {shown}, which is before the course was installed: time stamps of messages "
             "and submissions will be wrong.",
             "Set the machine's clock.",
         )
-    return ok("clock", shown)
+    return make_ok("clock", shown)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 TIMEOUT = 20.0  # s
 
 
-def imports() -> dict[str, object]:
+def import_ros() -> dict[str, object]:
     """Load rclpy and the middleware."""
     start = time.monotonic()
     import rclpy  # noqa: F401 - to see whether it loads
@@ -29,7 +29,7 @@ def imports() -> dict[str, object]:
     return {"seconds": time.monotonic() - start, "rmw": rmw}
 
 
-def echo(session: CoreSession) -> None:
+def run_echo(session: CoreSession) -> None:
     """Run a node that sends back what it is sent."""
     from rclpy.node import Node
     from std_msgs.msg import String
@@ -43,7 +43,7 @@ def echo(session: CoreSession) -> None:
     session.run(Echo)
 
 
-def ping(session: CoreSession) -> dict[str, object]:
+def measure_ping(session: CoreSession) -> dict[str, object]:
     """Send until something comes back; return after how many seconds that was."""
     from rclpy.node import Node
     from std_msgs.msg import String
@@ -63,17 +63,17 @@ def ping(session: CoreSession) -> dict[str, object]:
     return {"seconds": time.monotonic() - start}
 
 
-def play(role: str, domain_id: int | None) -> dict[str, object]:
+def play_role(role: str, domain_id: int | None) -> dict[str, object]:
     """Play one role: "imports", "both" nodes at once, "echo" until stdin ends, or "ping"."""
     if role == "imports":
-        return imports()
+        return import_ros()
     from course.runtime.core_session import CoreSession
 
     with CoreSession(domain_id=domain_id) as session:
         if role in ("both", "echo"):
-            echo(session)
+            run_echo(session)
         if role in ("both", "ping"):
-            return ping(session)
+            return measure_ping(session)
         sys.stdin.read()
     return {}
 
@@ -82,7 +82,7 @@ def main() -> None:
     """Play the role of the command line, and print what was seen."""
     role, *rest = sys.argv[1:]
     try:
-        seen = play(role, int(rest[0]) if rest else None)
+        seen = play_role(role, int(rest[0]) if rest else None)
     except CourseError as error:
         seen = {"error": str(error)}
     except Exception as error:  # noqa: BLE001 - whatever a broken machine raises is the finding

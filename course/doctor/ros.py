@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 
-from course.doctor.finding import Finding, ok, problem, warning
+from course.doctor.finding import Finding, make_ok, make_problem, make_warning
 from course.domains.leases import MAX_DOMAIN, MIN_DOMAIN, domains_in_use, lease_domain
 from course.errors import DomainError
 from course.util.platform_check import WHEELS_ANEW, WHEELS_TORN
@@ -21,38 +21,38 @@ FEW_DOMAINS = 10
 _MULTICAST = ("239.255.0.1", 0)  # the group of DDSI-RTPS 9.6.1.4, on any free port
 
 
-def examine() -> Iterator[Finding]:
+def examine_ros() -> Iterator[Finding]:
     """Yield what there is to say about the wheels, DDS and the domains."""
-    yield domains(domains_in_use())
-    yield multicast()
+    yield check_domains(domains_in_use())
+    yield check_multicast()
     if importlib.util.find_spec("rclpy") is None:
-        yield problem("ROS 2 wheels", WHEELS_TORN, WHEELS_ANEW)
+        yield make_problem("ROS 2 wheels", WHEELS_TORN, WHEELS_ANEW)
         return
-    imports = probe("imports")
+    imports = run_probe("imports")
     if "error" in imports:
-        yield problem(
+        yield make_problem(
             "ROS 2 wheels",
             f"rclpy cannot be imported: {imports['error']}",
             "Mend what stands above. If all is well there, install the course again.",
         )
         return
-    yield ok("ROS 2 wheels", f"rclpy and {imports['rmw']} load in {imports['seconds']:.1f} s")
+    yield make_ok("ROS 2 wheels", f"rclpy and {imports['rmw']} load in {imports['seconds']:.1f} s")
     yield in_one_process()
     yield between_processes()
 
 
-def domains(in_use: set[int]) -> Finding:
+def check_domains(in_use: set[int]) -> Finding:
     """Look how many domains are left for sessions, given those with open ports."""
     free = len(set(range(MIN_DOMAIN + 1, MAX_DOMAIN + 1)) - in_use)
     mend = "Shut down notebooks and ROS programs that are no longer used."
     if not free:
-        return problem("domains", "No ROS domain is free.", mend)
+        return make_problem("domains", "No ROS domain is free.", mend)
     if free < FEW_DOMAINS:
-        return warning("domains", f"Only {free} ROS domains are free.", mend)
-    return ok("domains", f"{free} ROS domains are free")
+        return make_warning("domains", f"Only {free} ROS domains are free.", mend)
+    return make_ok("domains", f"{free} ROS domains are free")
 
 
-def multicast() -> Finding:
+def check_multicast() -> Finding:
     """Send one datagram to DDS's discovery group over the loopback, and receive it."""
     message = b"course doctor"
     with (
@@ -69,11 +69,11 @@ def multicast() -> Finding:
             sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, loopback)
             sender.sendto(message, receiver.getsockname())
             if receiver.recv(64) == message:
-                return ok("multicast", "DDS discovery datagrams arrive on the loopback")
+                return make_ok("multicast", "DDS discovery datagrams arrive on the loopback")
             reason = "another datagram arrived"
         except OSError as error:
             reason = error.strerror or str(error)
-    return warning(
+    return make_warning(
         "multicast",
         f"DDS discovery datagrams do not arrive on the loopback ({reason}). Nodes of one session "
         "still find each other; nodes of other programs may not.",
@@ -84,7 +84,7 @@ def multicast() -> Finding:
 
 def in_one_process() -> Finding:
     """Send a message to another node and back, in one process."""
-    return _round_trip("round trip in one process", probe("both"))
+    return _round_trip("round trip in one process", run_probe("both"))
 
 
 def between_processes() -> Finding:
@@ -93,24 +93,24 @@ def between_processes() -> Finding:
     try:
         lease = lease_domain()
     except DomainError as error:
-        return problem(name, str(error))
+        return make_problem(name, str(error))
     with ExitStack() as stack:
         stack.callback(lease.release)
         echo = subprocess.Popen(
-            _command("echo", lease.domain_id),
+            _probe_command("echo", lease.domain_id),
             stdin=subprocess.PIPE,  # closed, it tells the echo to end
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-        stack.callback(_end, echo)
-        return _round_trip(name, probe("ping", lease.domain_id))
+        stack.callback(_end_process, echo)
+        return _round_trip(name, run_probe("ping", lease.domain_id))
 
 
-def probe(*arguments: object) -> dict[str, object]:
+def run_probe(*arguments: object) -> dict[str, object]:
     """Run a probe to its end; return what it saw, or {"error": a sentence}."""
     try:
         done = subprocess.run(
-            _command(*arguments),
+            _probe_command(*arguments),
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
@@ -132,19 +132,19 @@ def probe(*arguments: object) -> dict[str, object]:
 
 def _round_trip(name: str, seen: dict[str, object]) -> Finding:
     if "error" in seen:
-        return problem(
+        return make_problem(
             name,
             f"No message came back: {seen['error']}",
             "Mend what stands above. If all is well there, a firewall on 127.0.0.1 is likely.",
         )
-    return ok(name, f"a message went there and back {seen['seconds']:.2f} s after the start")
+    return make_ok(name, f"a message went there and back {seen['seconds']:.2f} s after the start")
 
 
-def _command(*arguments: object) -> list[str]:
+def _probe_command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "course.doctor.probe", *(str(value) for value in arguments)]
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def _end_process(process: subprocess.Popen[bytes]) -> None:
     assert process.stdin is not None
     process.stdin.close()
     try:

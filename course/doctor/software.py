@@ -11,38 +11,40 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-from course.doctor.finding import Finding, ok, problem, warning
-from course.util.platform_check import problem as platform_problem
+from course.doctor.finding import Finding, make_ok, make_problem, make_warning
+from course.util.platform_check import find_problem as platform_problem
 
 DISTRIBUTION = "ros2-course"
 _SHOWN = ("ros-jazzy-rclpy", "jupyterlab", "nbgrader", "ipykernel")
 _REINSTALL = "In the course's folder run `uv sync`, or `pip install .` in this environment."
 
 
-def examine() -> Iterator[Finding]:
+def examine_software() -> Iterator[Finding]:
     """Yield what there is to say about Python, packages, compiler and kernel."""
-    yield python()
-    yield packages()
-    yield kernel()
-    yield compiler()
+    yield check_python()
+    yield check_packages()
+    yield check_kernel()
+    yield check_compiler()
 
 
-def python(sentence: str | None = None) -> Finding:
+def check_python(sentence: str | None = None) -> Finding:
     """Look at Python and the platform; ``sentence`` says what is wrong with them, if known."""
     sentence = sentence or platform_problem()
     if sentence:
-        return problem("Python", sentence)
+        return make_problem("Python", sentence)
     here = f"{platform.python_implementation()} {platform.python_version()}"
-    return ok("Python", f"{here} on {platform.system()} {platform.machine()}, {sys.prefix}")
+    return make_ok("Python", f"{here} on {platform.system()} {platform.machine()}, {sys.prefix}")
 
 
-def packages(distribution: str = DISTRIBUTION) -> Finding:
+def check_packages(distribution: str = DISTRIBUTION) -> Finding:
     """Compare every package that ``distribution`` requires with what is installed."""
     name = "packages"
     try:
         required = [Requirement(text) for text in metadata.requires(distribution) or ()]
     except metadata.PackageNotFoundError:
-        return problem(name, f"{distribution} is not installed in this environment.", _REINSTALL)
+        return make_problem(
+            name, f"{distribution} is not installed in this environment.", _REINSTALL
+        )
     versions, wrong = {}, []
     for requirement in required:
         if requirement.marker and not requirement.marker.evaluate({"extra": ""}):
@@ -55,12 +57,12 @@ def packages(distribution: str = DISTRIBUTION) -> Finding:
         if not requirement.specifier.contains(version, prereleases=True):
             wrong.append(f"{requirement.name} {version} is not {requirement.specifier}")
     if wrong:
-        return problem(name, f"{'; '.join(wrong)}.", _REINSTALL)
+        return make_problem(name, f"{'; '.join(wrong)}.", _REINSTALL)
     shown = ", ".join(f"{key} {versions[key]}" for key in _SHOWN if key in versions)
-    return ok(name, f"{shown}; all {len(versions)} in their tested range")
+    return make_ok(name, f"{shown}; all {len(versions)} in their tested range")
 
 
-def kernel() -> Finding:
+def check_kernel() -> Finding:
     """Look whether JupyterLab's Python kernel is this Python, and not another one's."""
     from jupyter_client.kernelspec import KernelSpecManager, NoSuchKernel
 
@@ -68,29 +70,29 @@ def kernel() -> Finding:
     try:
         spec = KernelSpecManager().get_kernel_spec("python3")
     except NoSuchKernel:
-        return problem(name, "JupyterLab has no Python kernel here.", _REINSTALL)
+        return make_problem(name, "JupyterLab has no Python kernel here.", _REINSTALL)
     program = shutil.which(spec.argv[0]) if spec.argv[0] != "python" else sys.executable
     # Not resolved: two virtual environments link to one and the same interpreter.
     if program is None or Path(program).parent.absolute() != Path(sys.executable).parent.absolute():
-        return problem(
+        return make_problem(
             name,
             f"JupyterLab's Python kernel starts {spec.argv[0]}, another Python than this one, and "
             "it knows nothing of the course.",
             f"Remove the folder {spec.resource_dir}.",
         )
-    return ok(name, "JupyterLab's Python kernel is this Python")
+    return make_ok(name, "JupyterLab's Python kernel is this Python")
 
 
-def compiler() -> Finding:
+def check_compiler() -> Finding:
     """Look for what building ROS interfaces needs."""
     from course.interfaces.toolchain import compiler_problem
 
     sentence = compiler_problem()
     if sentence is None:
-        return ok(
+        return make_ok(
             "compiler", "C, C++ and Python's headers are there: interfaces are built for real"
         )
-    return warning(
+    return make_warning(
         "compiler",
         "example_interfaces cannot be built, so installed types of the same shape stand in for it, "
         "and %%interface does not work.",

@@ -56,7 +56,7 @@ class DomainLease:
         self.socket.close()
 
 
-def address(domain_id: int) -> str:
+def lease_address(domain_id: int) -> str:
     """Return the address of the socket that is this domain's lease, while it is leased."""
     return f"\0ros2-course/domain/{domain_id}"
 
@@ -71,13 +71,13 @@ def lease_domain() -> DomainLease:
     Raises:
         DomainError: every domain is taken.
     """
-    port_files.clear()
+    port_files.remove_abandoned()
     in_use = domains_in_use()
     candidates = list(range(MIN_DOMAIN + 1, MAX_DOMAIN + 1))
     # A random order: a class of kernels that start at once must not race for the same first id.
     random.SystemRandom().shuffle(candidates)
     for domain_id in candidates:
-        if domain_id not in in_use and (sock := _claim(domain_id)) is not None:
+        if domain_id not in in_use and (sock := _claim_domain(domain_id)) is not None:
             return DomainLease(domain_id, sock)
     raise DomainError(
         f"All ROS domains from {MIN_DOMAIN + 1} to {MAX_DOMAIN} on this machine are taken: "
@@ -87,7 +87,7 @@ def lease_domain() -> DomainLease:
 
 def reserve_domain(domain_id: int) -> DomainLease | None:
     """Lease this one domain id, so that `lease_domain` gives it to nobody; None if it is leased."""
-    sock = _claim(check_domain_id(domain_id))
+    sock = _claim_domain(check_domain_id(domain_id))
     return None if sock is None else DomainLease(domain_id, sock)
 
 
@@ -105,10 +105,10 @@ def domains_in_use() -> set[int]:
     return domains
 
 
-def _claim(domain_id: int) -> socket.socket | None:
+def _claim_domain(domain_id: int) -> socket.socket | None:
     sock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC)
     try:
-        sock.bind(address(domain_id))
+        sock.bind(lease_address(domain_id))
     except OSError:
         sock.close()
         return None

@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from course.domains.leases import MAX_DOMAIN, MIN_DOMAIN, DomainLease, address
+from course.domains.leases import MAX_DOMAIN, MIN_DOMAIN, DomainLease, lease_address
 
 ANSWER = 0.5
 """Seconds within which a session answers, unless its process is stopped."""
@@ -50,7 +50,7 @@ class Answering:
         self._offers = offers
         self._stopping = False
         name = f"ROS neighbours of domain {lease.domain_id}"
-        self._thread = threading.Thread(target=self._answer, name=name, daemon=True)
+        self._thread = threading.Thread(target=self._answer_questions, name=name, daemon=True)
         self._thread.start()
 
     def stop(self) -> None:
@@ -60,7 +60,7 @@ class Answering:
             self._lease.socket.shutdown(socket.SHUT_RD)
         self._thread.join(1.0)
 
-    def _answer(self) -> None:
+    def _answer_questions(self) -> None:
         sock = self._lease.socket
         while not self._stopping:
             try:
@@ -68,21 +68,25 @@ class Answering:
             except OSError:
                 return
             with suppress(Exception):  # no question, an asker that has gone, nodes that go
-                sock.sendto(self._reply(question), socket.MSG_DONTWAIT, sender)
+                sock.sendto(self._make_reply(question), socket.MSG_DONTWAIT, sender)
 
-    def _reply(self, question: bytes) -> bytes:
+    def _make_reply(self, question: bytes) -> bytes:
         names = [name for name in json.loads(question) if isinstance(name, str)]
-        found = Neighbour(self._lease.domain_id, _program(), dict(self._offers(names[:MOST_NAMES])))
+        found = Neighbour(
+            self._lease.domain_id, _program_name(), dict(self._offers(names[:MOST_NAMES]))
+        )
         return json.dumps({**found._asdict(), "pid": os.getpid()}).encode()[:_MOST_BYTES]
 
 
-def ask(names: Iterable[str], timeout: float = ANSWER) -> list[Neighbour]:
+def ask_neighbours(names: Iterable[str], timeout: float = ANSWER) -> list[Neighbour]:
     """Return the sessions of other processes that offer any of ``names``, by domain."""
     wanted = sorted(set(names))[:MOST_NAMES]
     found = []
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC) as sock:
         sock.bind("")  # the kernel chooses an address, for the answers
-        waiting = sum(_sent(sock, json.dumps(wanted).encode(), domain) for domain in DOMAINS)
+        waiting = sum(
+            _send_question(sock, json.dumps(wanted).encode(), domain) for domain in DOMAINS
+        )
         deadline = time.monotonic() + timeout
         while waiting and (left := deadline - time.monotonic()) > 0:
             sock.settimeout(left)
@@ -92,19 +96,19 @@ def ask(names: Iterable[str], timeout: float = ANSWER) -> list[Neighbour]:
                 break
             waiting -= 1
             with suppress(ValueError, TypeError, KeyError, AttributeError):  # somebody else's bytes
-                found += _neighbours(json.loads(answer), wanted)
+                found += _parse_answer(json.loads(answer), wanted)
     return sorted(found)
 
 
-def _sent(sock: socket.socket, question: bytes, domain_id: int) -> bool:
+def _send_question(sock: socket.socket, question: bytes, domain_id: int) -> bool:
     try:
-        sock.sendto(question, socket.MSG_DONTWAIT, address(domain_id))
+        sock.sendto(question, socket.MSG_DONTWAIT, lease_address(domain_id))
     except OSError:  # nobody has leased it, or nobody reads there
         return False
     return True
 
 
-def _neighbours(answer: dict[str, Any], wanted: list[str]) -> list[Neighbour]:
+def _parse_answer(answer: dict[str, Any], wanted: list[str]) -> list[Neighbour]:
     offers = {
         name: [str(node) for node in answer["offers"][name]]
         for name in wanted
@@ -115,7 +119,7 @@ def _neighbours(answer: dict[str, Any], wanted: list[str]) -> list[Neighbour]:
     return [Neighbour(int(answer["domain_id"]), str(answer["program"]), offers)]
 
 
-def _program() -> str:
+def _program_name() -> str:
     """Return what people know this program by: its notebook, or its file."""
     notebook = os.environ.get("JPY_SESSION_NAME", "")  # as Jupyter's server tells its kernels
     return Path(notebook or sys.argv[0] or "Python").name

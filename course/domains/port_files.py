@@ -21,26 +21,26 @@ _INITIALISED = (2).to_bytes(4, "little")
 _LOOK_AGAIN = 0.01
 
 
-def clear(folder: Path = FOLDER) -> None:
+def remove_abandoned(folder: Path = FOLDER) -> None:
     """Remove the ports that were left half made; wait for one that may still be in the making.
 
     Another user's stay: DDS may not open them and goes on without.
     """
     for path in folder.glob("fastrtps_port*[0-9]"):
         with suppress(OSError):  # its maker has removed it, or is another user
-            if _abandoned(path):
+            if _is_abandoned(path):
                 path.unlink()
 
 
-def _abandoned(path: Path) -> bool:
+def _is_abandoned(path: Path) -> bool:
     never = threading.Event()
-    while not _initialised(path):
+    while not _is_initialised(path):
         if not 0 <= time.time() - path.stat().st_mtime < MAKING:
             return True
         never.wait(_LOOK_AGAIN)
     return False
 
 
-def _initialised(path: Path) -> bool:
+def _is_initialised(path: Path) -> bool:
     with path.open("rb") as file:
         return file.read(len(_INITIALISED)) == _INITIALISED

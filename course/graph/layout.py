@@ -67,8 +67,8 @@ class _Thing:
     bad: bool = False
 
     @property
-    def width(self) -> float:
-        longest = max(len(_short(self.name)), len(_short(self.note)) * 0.85)
+    def box_width(self) -> float:
+        longest = max(len(_shorten_label(self.name)), len(_shorten_label(self.note)) * 0.85)
         return max(_LEAST_WIDTH, longest * _CHARACTER + 24)
 
 
@@ -82,24 +82,24 @@ class _Link:
     label: str = ""
 
 
-def count(graph: Graph) -> int:
+def count_boxes(graph: Graph) -> int:
     """Return how many boxes a drawing of ``graph`` has; no place is worked out for them."""
-    return sum(1 for _ in _things(graph))
+    return sum(1 for _ in _list_things(graph))
 
 
-def draw(graph: Graph) -> Drawing:
+def draw_graph(graph: Graph) -> Drawing:
     """Return a drawing of ``graph`` with its arrows from publisher to subscription."""
-    things = {(thing.kind, thing.name): thing for thing in _things(graph)}
+    things = {(thing.kind, thing.name): thing for thing in _list_things(graph)}
     if not things:
         return Drawing((), (), 0, 0)
-    links = [link for link in _links(graph) if link.source in things and link.target in things]
+    links = [link for link in _list_links(graph) if link.source in things and link.target in things]
     keys = list(things)
-    places = _places(things, keys, links)
-    boxes = tuple(_box(things[key], *places[key]) for key in keys)
+    places = _place_things(things, keys, links)
+    boxes = tuple(_make_box(things[key], *places[key]) for key in keys)
     by_key = dict(zip(keys, boxes, strict=True))
-    ends = _ends(links, by_key)
+    ends = _arrow_ends(links, by_key)
     lines = tuple(
-        _line(link, by_key[link.source], by_key[link.target], end)
+        _draw_line(link, by_key[link.source], by_key[link.target], end)
         for link, end in zip(links, ends, strict=True)
     )
     return Drawing(
@@ -109,17 +109,17 @@ def draw(graph: Graph) -> Drawing:
     )  # fmt: skip
 
 
-def _things(graph: Graph) -> Iterator[_Thing]:
+def _list_things(graph: Graph) -> Iterator[_Thing]:
     mentioned = {end.node for t in graph.topics for end in (*t.publishers, *t.subscriptions)}
     mentioned |= {n for x in (*graph.services, *graph.actions) for n in (*x.servers, *x.clients)}
     for name in sorted(mentioned | set(graph.nodes)):
-        twins = name in graph.twins
+        twins = name in graph.duplicate_names
         tip = f"Two nodes are called {name}: rename one." if twins else f"node {name}"
         yield _Thing("node", name, "", tip, twins)
     for topic in graph.topics:
-        ends = [f"published by {end.node} [{words.qos(end)}]" for end in topic.publishers]
-        ends += [f"read by {end.node} [{words.qos(end)}]" for end in topic.subscriptions]
-        note = ", ".join(_last(type_) for type_ in topic.types)
+        ends = [f"published by {end.node} [{words.describe_qos(end)}]" for end in topic.publishers]
+        ends += [f"read by {end.node} [{words.describe_qos(end)}]" for end in topic.subscriptions]
+        note = ", ".join(_short_type(type_) for type_ in topic.types)
         yield _Thing(
             "topic", topic.name, note, "\n".join([f"topic {topic.name}", *topic.types, *ends]),
             bad=bool(topic.mismatches),
@@ -127,10 +127,10 @@ def _things(graph: Graph) -> Iterator[_Thing]:
     for kind, exchanges in (("service", graph.services), ("action", graph.actions)):
         for exchange in exchanges:
             tip = f"{kind} {exchange.name}\n{exchange.type}"
-            yield _Thing(kind, exchange.name, f"{kind} {_last(exchange.type)}", tip)
+            yield _Thing(kind, exchange.name, f"{kind} {_short_type(exchange.type)}", tip)
 
 
-def _links(graph: Graph) -> Iterator[_Link]:
+def _list_links(graph: Graph) -> Iterator[_Link]:
     for topic in graph.topics:
         yield from _topic_links(topic)
     for kind, exchanges in (("service", graph.services), ("action", graph.actions)):
@@ -140,26 +140,26 @@ def _links(graph: Graph) -> Iterator[_Link]:
 
 def _topic_links(topic: Topic) -> Iterator[_Link]:
     here = ("topic", topic.name)
-    sent, heard = topic.broken
-    for node, tip in _tips(topic, topic.publishers, "offers", sent).items():
+    sent, heard = topic.broken_pairs
+    for node, tip in _endpoint_tips(topic, topic.publishers, "offers", sent).items():
         pairs = sent.get(node, [])
         # What both arrows of a pair would say is said once, where it arrives.
         untold = [pair for pair in pairs if pair not in heard.get(pair.subscription, [])]
-        yield _Link(("node", node), here, "topic", tip, bool(pairs), words.policies(untold))
-    for node, tip in _tips(topic, topic.subscriptions, "requests", heard).items():
+        yield _Link(("node", node), here, "topic", tip, bool(pairs), words.join_policies(untold))
+    for node, tip in _endpoint_tips(topic, topic.subscriptions, "requests", heard).items():
         pairs = heard.get(node, [])
-        yield _Link(here, ("node", node), "topic", tip, bool(pairs), words.policies(pairs))
+        yield _Link(here, ("node", node), "topic", tip, bool(pairs), words.join_policies(pairs))
 
 
-def _tips(
+def _endpoint_tips(
     topic: Topic, ends: Iterable[Endpoint], does: str, broken: Mapping[str, list[Mismatch]]
 ) -> dict[str, str]:
     """Return {node: what its endpoints on a topic offer or request, and what breaks them}."""
     lines: dict[str, list[str]] = {}
     for end in ends:
-        lines.setdefault(end.node, []).append(f"{end.node} {does} {words.qos(end)}")
+        lines.setdefault(end.node, []).append(f"{end.node} {does} {words.describe_qos(end)}")
     for node, said in lines.items():
-        said += [words.mismatch(topic.name, pair) for pair in broken.get(node, [])]
+        said += [words.describe_mismatch(topic.name, pair) for pair in broken.get(node, [])]
     return {node: "\n".join(dict.fromkeys(said)) for node, said in lines.items()}
 
 
@@ -171,7 +171,7 @@ def _exchange_links(kind: str, exchange: Exchange) -> Iterator[_Link]:
         yield _Link(here, ("node", node), kind, f"{node} serves {exchange.name}")
 
 
-def _places(
+def _place_things(
     things: dict[tuple[str, str], _Thing], keys: list[tuple[str, str]], links: list[_Link]
 ) -> dict[tuple[str, str], tuple[float, float]]:
     """Return {thing: left upper corner}; columns are as wide as their widest box."""
@@ -186,22 +186,22 @@ def _places(
     left, place = float(_MARGIN), {}
     for column in columns:
         inside = [n for n, spot in enumerate(spots) if round(spot[1]) == column]
-        width = max(things[keys[n]].width for n in inside)
-        place.update({n: left + (width - things[keys[n]].width) / 2 for n in inside})
+        width = max(things[keys[n]].box_width for n in inside)
+        place.update({n: left + (width - things[keys[n]].box_width) / 2 for n in inside})
         left += width + max(_COLUMN_GAP, words_wide)
     top = min(spot[0] for spot in spots)
     row = BOX_HEIGHT + _ROW_GAP
     return {key: (place[n], _MARGIN + (spots[n][0] - top) * row) for n, key in enumerate(keys)}
 
 
-def _box(thing: _Thing, x: float, y: float) -> Box:
+def _make_box(thing: _Thing, x: float, y: float) -> Box:
     return Box(
-        thing.kind, _short(thing.name), _short(thing.note), thing.tip, thing.bad,
-        round(x, 1), round(y, 1), round(thing.width, 1),
+        thing.kind, _shorten_label(thing.name), _shorten_label(thing.note), thing.tip, thing.bad,
+        round(x, 1), round(y, 1), round(thing.box_width, 1),
     )  # fmt: skip
 
 
-def _ends(links: list[_Link], boxes: dict[tuple[str, str], Box]) -> list[float]:
+def _arrow_ends(links: list[_Link], boxes: dict[tuple[str, str], Box]) -> list[float]:
     """Return how far below the middle of its target's side each arrow ends: beside its fellows."""
     arriving: dict[tuple[str, str], list[int]] = {}
     for number, link in enumerate(links):
@@ -215,7 +215,7 @@ def _ends(links: list[_Link], boxes: dict[tuple[str, str], Box]) -> list[float]:
     return ends
 
 
-def _line(link: _Link, source: Box, target: Box, end: float) -> Line:
+def _draw_line(link: _Link, source: Box, target: Box, end: float) -> Line:
     """Return a curve from the right side of ``source`` to the left of ``target``, or back.
 
     It ends ``end`` pixels below the middle of the side.
@@ -243,9 +243,9 @@ def _line(link: _Link, source: Box, target: Box, end: float) -> Line:
     )
 
 
-def _short(label: str) -> str:
+def _shorten_label(label: str) -> str:
     return label if len(label) <= _LONGEST_LABEL else f"{label[: _LONGEST_LABEL - 1]}…"
 
 
-def _last(type_: str) -> str:
+def _short_type(type_: str) -> str:
     return type_.rpartition("/")[2]

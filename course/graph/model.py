@@ -69,7 +69,7 @@ class Topic:
     mismatches: tuple[Mismatch, ...] = ()
 
     @property
-    def broken(self) -> tuple[dict[str, list[Mismatch]], dict[str, list[Mismatch]]]:
+    def broken_pairs(self) -> tuple[dict[str, list[Mismatch]], dict[str, list[Mismatch]]]:
         """The pairs that a drawing tells at each publisher's arrow, and at each subscription's.
 
         An arrow through which nothing passes tells all its pairs; another one, only a pair that
@@ -123,6 +123,6 @@ class Graph:
         return tuple((topic.name, pair) for topic in self.topics for pair in topic.mismatches)
 
     @property
-    def twins(self) -> tuple[str, ...]:
+    def duplicate_names(self) -> tuple[str, ...]:
         """Names that more than one node bears."""
         return tuple(sorted({name for name in self.nodes if self.nodes.count(name) > 1}))

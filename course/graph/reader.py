@@ -41,7 +41,7 @@ class Own(NamedTuple):
     broken: dict[End, set[str]]
 
 
-def read(
+def read_graph(
     node: Node,
     *,
     everything: bool = False,
@@ -56,22 +56,22 @@ def read(
         own: nodes of this process: their history and depth are shown, too, which DDS never tells,
             and what DDS's own events have reported to them.
     """
-    known = _known(own)
+    known = _own_endpoints(own)
     names = [
         (name, namespace)
         for name, namespace in node.get_node_names_and_namespaces()
-        if everything or not _hidden(name)
+        if everything or not _is_hidden(name)
     ]
-    services, actions = _exchanges(node, names, everything)
+    services, actions = _read_exchanges(node, names, everything)
     return Graph(
         nodes=tuple(sorted(full_name(name, namespace) for name, namespace in names)),
-        topics=tuple(_topics(node, everything, known)),
+        topics=tuple(_read_topics(node, everything, known)),
         services=services,
         actions=actions,
     )
 
 
-def _known(nodes: Iterable[Node]) -> Own:
+def _own_endpoints(nodes: Iterable[Node]) -> Own:
     own = Own({}, defaultdict(set))
     for node in nodes:
         with contextlib.suppress(InvalidHandle):  # what is destroyed just now has no more to tell
@@ -81,19 +81,19 @@ def _known(nodes: Iterable[Node]) -> Own:
             for role, end in ends:
                 where = (name, end.topic_name, role)
                 own.queues[where] = end.qos_profile
-                own.broken[where] |= incompatible_qos_events.policies(end)
+                own.broken[where] |= incompatible_qos_events.incompatible_policies(end)
     return own
 
 
-def _topics(node: Node, everything: bool, own: Own) -> Iterable[Topic]:
+def _read_topics(node: Node, everything: bool, own: Own) -> Iterable[Topic]:
     for name, _ in sorted(node.get_topic_names_and_types()):
-        if not everything and (name in _PLUMBING or _hidden(name)):
+        if not everything and (name in _PLUMBING or _is_hidden(name)):
             continue
         pairs = [
             [
-                (info, _endpoint(info, role, name, own.queues))
+                (info, _make_endpoint(info, role, name, own.queues))
                 for info in infos
-                if everything or not _hidden(info.node_name)
+                if everything or not _is_hidden(info.node_name)
             ]
             for role, infos in (
                 ("publisher", node.get_publishers_info_by_topic(name)),
@@ -106,11 +106,11 @@ def _topics(node: Node, everything: bool, own: Own) -> Iterable[Topic]:
                 name,
                 tuple(sorted(end for _, end in publishers)),
                 tuple(sorted(end for _, end in subscriptions)),
-                tuple(_mismatches(name, publishers, subscriptions, own.broken)),
+                tuple(_find_mismatches(name, publishers, subscriptions, own.broken)),
             )
 
 
-def _mismatches(
+def _find_mismatches(
     topic: str,
     publishers: list[tuple[TopicEndpointInfo, Endpoint]],
     subscriptions: list[tuple[TopicEndpointInfo, Endpoint]],
@@ -122,7 +122,7 @@ def _mismatches(
                 reason = f"carries {writer.type}, reads {reader.type}"
                 yield Mismatch(writer.node, reader.node, (reason,), ("TYPE",))
                 continue
-            reasons = incompatibilities(offered.qos_profile, requested.qos_profile)
+            reasons = find_incompatibilities(offered.qos_profile, requested.qos_profile)
             if reasons:
                 policies = tuple(reasons)
                 named = broken.get((writer.node, topic, "publisher"), set()) | broken.get(
@@ -134,7 +134,7 @@ def _mismatches(
                 )  # fmt: skip
 
 
-def incompatibilities(offered: QoSProfile, requested: QoSProfile) -> dict[str, str]:
+def find_incompatibilities(offered: QoSProfile, requested: QoSProfile) -> dict[str, str]:
     """Return {policy: what does not fit} of a pair of profiles; empty if DDS connects them.
 
     The rules are DDS 1.4, section 2.2.3, as `qos_check_compatible` applies them.
@@ -142,11 +142,13 @@ def incompatibilities(offered: QoSProfile, requested: QoSProfile) -> dict[str, s
     verdict, _ = qos_check_compatible(offered, requested)
     if verdict != QoSCompatibility.ERROR:  # what is left unsaid gives a warning, and may well fit
         return {}
-    ours, theirs = _words(offered), _words(requested)
+    ours, theirs = _describe_profile(offered), _describe_profile(requested)
     found = {
         policy.upper(): f"offers {ours[policy]}, requests {theirs[policy]}"
         for policy, changed in _CHANGES.items()
-        if qos_check_compatible(*(_only(profile, changed) for profile in (offered, requested)))[0]
+        if qos_check_compatible(
+            *(_keep_policies(profile, changed) for profile in (offered, requested))
+        )[0]
         == QoSCompatibility.ERROR
     }
     return found or {"QOS": "offers less than is requested"}
@@ -160,43 +162,45 @@ _CHANGES = {
 }
 
 
-def _only(profile: QoSProfile, policies: tuple[str, ...]) -> QoSProfile:
+def _keep_policies(profile: QoSProfile, policies: tuple[str, ...]) -> QoSProfile:
     """Return a default profile with only these policies of ``profile``."""
     return QoSProfile(depth=1, **{policy: getattr(profile, policy) for policy in policies})
 
 
-def _endpoint(
+def _make_endpoint(
     info: TopicEndpointInfo, role: Any, topic: str, queues: dict[End, QoSProfile]
 ) -> Endpoint:
     node = full_name(info.node_name, info.node_namespace)
-    words = _words(info.qos_profile) | _queue(queues.get((node, topic, role), info.qos_profile))
+    words = _describe_profile(info.qos_profile) | _describe_queue(
+        queues.get((node, topic, role), info.qos_profile)
+    )
     qos = {policy: words[policy] for policy in QOS_POLICIES if policy in words}
     return Endpoint(node, role, info.topic_type, qos, bytes(info.endpoint_gid).hex())
 
 
-def _words(profile: QoSProfile) -> dict[str, str]:
+def _describe_profile(profile: QoSProfile) -> dict[str, str]:
     """Return a profile in words; what is unknown or not set is left out."""
     return {
         "reliability": profile.reliability.name,
         "durability": profile.durability.name,
         "liveliness": profile.liveliness.name,
-        "deadline": _span(profile.deadline),
-        "lifespan": _span(profile.lifespan),
+        "deadline": _format_duration(profile.deadline),
+        "lifespan": _format_duration(profile.lifespan),
     }
 
 
-def _queue(profile: QoSProfile) -> dict[str, str]:
+def _describe_queue(profile: QoSProfile) -> dict[str, str]:
     if profile.history == HistoryPolicy.KEEP_LAST:
         return {"history": "KEEP_LAST", "depth": str(profile.depth)}
     return {"history": "KEEP_ALL"} if profile.history == HistoryPolicy.KEEP_ALL else {}
 
 
-def _span(duration: Duration) -> str:
+def _format_duration(duration: Duration) -> str:
     seconds = duration.nanoseconds / 1e9
     return "none" if seconds <= 0 or seconds > 1e9 else f"{seconds:g} s"
 
 
-def _exchanges(
+def _read_exchanges(
     node: Node, names: list[tuple[str, str]], everything: bool
 ) -> tuple[tuple[Exchange, ...], tuple[Exchange, ...]]:
     found: dict[str, dict[tuple[str, str], tuple[set[str], set[str]]]] = {
@@ -215,7 +219,7 @@ def _exchanges(
             except Exception:  # noqa: BLE001 - the node has gone since: rclpy has no one error
                 continue
             for exchange, types in answers:
-                if everything or not _plumbing(exchange, types[0]):
+                if everything or not _is_plumbing(exchange, types[0]):
                     found[kind][exchange, types[0]][side].add(full_name(name, namespace))
     return tuple(
         tuple(
@@ -226,9 +230,9 @@ def _exchanges(
     )  # type: ignore[return-value]
 
 
-def _plumbing(exchange: str, type_: str) -> bool:
-    return type_.startswith(_PLUMBING_TYPES) or _hidden(exchange)
+def _is_plumbing(exchange: str, type_: str) -> bool:
+    return type_.startswith(_PLUMBING_TYPES) or _is_hidden(exchange)
 
 
-def _hidden(name: str) -> bool:
+def _is_hidden(name: str) -> bool:
     return any(part.startswith("_") for part in name.split("/"))

@@ -5,24 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from course.graph.model import Endpoint, Exchange, Graph, Mismatch, Topic
-from course.messages.yaml_text import counted
+from course.messages.yaml_text import format_count
 
 
-def describe(graph: Graph) -> str:
+def describe_graph(graph: Graph) -> str:
     """Return the whole graph as text, a paragraph a topic, service and action."""
     if not graph.nodes:
         return "No nodes."
-    lines = [f"{counted(len(graph.nodes), 'node')}: {', '.join(graph.nodes)}"]
-    lines += [f"  Two nodes are called {name}: rename one." for name in graph.twins]
+    lines = [f"{format_count(len(graph.nodes), 'node')}: {', '.join(graph.nodes)}"]
+    lines += [f"  Two nodes are called {name}: rename one." for name in graph.duplicate_names]
     for topic in graph.topics:
-        lines += _topic(topic)
+        lines += _topic_lines(topic)
     for kind, exchanges in (("service", graph.services), ("action", graph.actions)):
         for exchange in exchanges:
-            lines += _exchange(kind, exchange)
+            lines += _exchange_lines(kind, exchange)
     return "\n".join(lines)
 
 
-def qos(endpoint: Endpoint) -> str:
+def describe_qos(endpoint: Endpoint) -> str:
     """Return an endpoint's QoS in one line, without what is at its default."""
     parts: list[str] = []
     for policy, value in endpoint.qos.items():
@@ -35,7 +35,7 @@ def qos(endpoint: Endpoint) -> str:
     return ", ".join(parts)
 
 
-def mismatch(topic: str, pair: Mismatch) -> str:
+def describe_mismatch(topic: str, pair: Mismatch) -> str:
     """Return one sentence about a pair that DDS does not connect."""
     source = "DDS reports it" if pair.from_event else "DDS does not connect them"
     return (
@@ -45,23 +45,23 @@ def mismatch(topic: str, pair: Mismatch) -> str:
     )
 
 
-def policies(pairs: Iterable[Mismatch]) -> str:
+def join_policies(pairs: Iterable[Mismatch]) -> str:
     """Return the policies that break pairs, each once."""
     return ", ".join(dict.fromkeys(name.lower() for pair in pairs for name in pair.policies))
 
 
-def _topic(topic: Topic) -> Iterable[str]:
+def _topic_lines(topic: Topic) -> Iterable[str]:
     yield f"topic {topic.name} ({', '.join(topic.types)})"
     for verb, ends in (("published by", topic.publishers), ("read by", topic.subscriptions)):
         for end in ends:
-            yield f"  {verb} {end.node} [{qos(end)}]"
+            yield f"  {verb} {end.node} [{describe_qos(end)}]"
         if not ends:
             yield f"  {verb} nobody"
     for pair in topic.mismatches:
-        yield f"  ! {mismatch(topic.name, pair)}"
+        yield f"  ! {describe_mismatch(topic.name, pair)}"
 
 
-def _exchange(kind: str, exchange: Exchange) -> Iterable[str]:
+def _exchange_lines(kind: str, exchange: Exchange) -> Iterable[str]:
     yield f"{kind} {exchange.name} ({exchange.type})"
     yield f"  served by {', '.join(exchange.servers) or 'nobody'}"
     if exchange.clients:

@@ -49,14 +49,14 @@ class Unit:
     needs: tuple[tuple[Unit, Path], ...] = ()
 
     @property
-    def types(self) -> tuple[TypeName, ...]:
+    def type_names(self) -> tuple[TypeName, ...]:
         """The names of the interfaces in this unit."""
         return tuple(d.type_name for d in self.definitions)
 
     @property
     def label(self) -> str:
         """A name for folders and messages: the package, or the only type."""
-        return str(self.types[0]) if len(self.types) == 1 else self.package
+        return str(self.type_names[0]) if len(self.type_names) == 1 else self.package
 
     @property
     def digest(self) -> str:
@@ -66,26 +66,26 @@ class Unit:
         return hashlib.sha256(content.encode()).hexdigest()[:16]
 
     @property
-    def native(self) -> str:
+    def native_name(self) -> str:
         """The name of the extension module, which no other unit shares."""
         return f"_native_{self.digest}"
 
     @property
-    def closure(self) -> tuple[tuple[Unit, Path], ...]:
+    def all_needs(self) -> tuple[tuple[Unit, Path], ...]:
         """The units needed, directly or by others."""
-        further = (pair for unit, _ in self.needs for pair in unit.closure)
+        further = (pair for unit, _ in self.needs for pair in unit.all_needs)
         return tuple({u.digest: (u, folder) for u, folder in (*self.needs, *further)}.values())
 
     @property
-    def packages(self) -> tuple[str, ...]:
+    def used_packages(self) -> tuple[str, ...]:
         """The installed packages whose types are used, theirs included."""
         names = {p for d in self.definitions for p in d.packages}
         names |= {p for d in self.definitions for p in ALWAYS[d.type_name.kind]}
-        names |= {p for unit, _ in self.needs for p in unit.packages}
+        names |= {p for unit, _ in self.needs for p in unit.used_packages}
         return tuple(sorted(names))
 
 
-def build(unit: Unit, folder: Path) -> None:
+def build_unit(unit: Unit, folder: Path) -> None:
     """Build ``unit`` into the empty ``folder``.
 
     Raises ``CompilerMissingError``, ``BuildError``, or ``OSError`` if files cannot be written.
@@ -94,28 +94,28 @@ def build(unit: Unit, folder: Path) -> None:
     scratch = folder / "scratch"
     scratch.mkdir()
     sources = scratch / "sources" / unit.package
-    generate(unit, scratch, sources)
+    generate_sources(unit, scratch, sources)
     objects = compile_sources(unit, tools, scratch, sources)
-    link(unit, tools, scratch, objects, folder)
-    keep(unit, sources, scratch / "introspection", folder)
+    link_library(unit, tools, scratch, objects, folder)
+    keep_results(unit, sources, scratch / "introspection", folder)
     shutil.rmtree(scratch)
 
 
-def generate(unit: Unit, scratch: Path, sources: Path) -> None:
+def generate_sources(unit: Unit, scratch: Path, sources: Path) -> None:
     """Run the generators in a process of their own (generate.py says why)."""
     texts = scratch / "texts" / unit.package
     for definition in unit.definitions:
-        file = texts / definition.type_name.file
+        file = texts / definition.type_name.relative_path
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(definition.text, encoding="utf-8")
-    for _, built in unit.closure:
+    for _, built in unit.all_needs:
         # The type descriptions of this package's other types are looked up among the sources.
         shutil.copytree(built / "include" / unit.package, sources, dirs_exist_ok=True)
-    shares = [installed.prefix_of(p) / "share" / p for p in unit.packages]
+    shares = [installed.prefix_of(p) / "share" / p for p in unit.used_packages]
     request = {
         "package": unit.package,
         "texts": str(texts),
-        "files": [t.file for t in unit.types],
+        "files": [t.relative_path for t in unit.type_names],
         "includes": [str(share) for share in shares],
         "sources": str(sources),
         "introspection": str(scratch / "introspection" / unit.package),
@@ -123,7 +123,7 @@ def generate(unit: Unit, scratch: Path, sources: Path) -> None:
     (scratch / "request.json").write_text(json.dumps(request), encoding="utf-8")
     # -P: the folder of generate.py must not become a place that modules are imported from.
     command = [sys.executable, "-P", "-W", "ignore", str(HERE / "generate.py"), "request.json"]
-    toolchain.run([command], scratch, unit.label)
+    toolchain.run_commands([command], scratch, unit.label)
 
 
 def compile_sources(
@@ -134,18 +134,18 @@ def compile_sources(
     flags = [*toolchain.FLAGS, *DISPATCH, *includes]
     # The entry point of the extension gets this unit's own name.
     module = f"PyInit_{unit.package}_s__rosidl_typesupport_c"
-    flags.append(f"-D{module}=PyInit_{unit.native}")
+    flags.append(f"-D{module}=PyInit_{unit.native_name}")
     c_files, cxx_files, alone = [HERE / "dispatch.c"], [], []
-    for t in unit.types:
+    for t in unit.type_names:
         parts = sources / t.kind / "detail"
-        c_files += [parts / f"{t.stem}__functions.c", parts / f"{t.stem}__type_support.c"]
-        c_files += [sources / t.kind / f"_{t.stem}_s.c"]
-        cxx_files += [parts / f"{t.stem}__type_support_c.cpp"]
-        cxx_files += [sources / t.kind / f"{t.stem}__type_support.cpp"]
+        c_files += [parts / f"{t.file_stem}__functions.c", parts / f"{t.file_stem}__type_support.c"]
+        c_files += [sources / t.kind / f"_{t.file_stem}_s.c"]
+        cxx_files += [parts / f"{t.file_stem}__type_support_c.cpp"]
+        cxx_files += [sources / t.kind / f"{t.file_stem}__type_support.cpp"]
         # These have static names in common with those of other types.
-        alone += [parts / f"{t.stem}__description.c"]
+        alone += [parts / f"{t.file_stem}__description.c"]
         alone += [scratch / "introspection" / unit.package / t.kind / "detail"
-                  / f"{t.stem}__type_support.c"]  # fmt: skip
+                  / f"{t.file_stem}__type_support.c"]  # fmt: skip
     c_files.append(sources / f"_{unit.package}_s.ep.rosidl_typesupport_c.c")
     # One compilation of many files reads the headers once: this is three times as fast.
     units = {
@@ -153,7 +153,7 @@ def compile_sources(
         "cxx": all_of(scratch / "all.cpp", cxx_files),
     }
     numbered = [all_of(scratch / f"alone_{n}.c", [f]) for n, f in enumerate(alone)]
-    toolchain.run(
+    toolchain.run_commands(
         [
             [*tools.cc, "-std=gnu11", *flags, str(units["c"]), *map(str, numbered)],
             [*tools.cxx, "-std=gnu++17", *flags, str(units["cxx"])],
@@ -170,29 +170,29 @@ def all_of(file: Path, parts: Sequence[Path]) -> Path:
     return file
 
 
-def link(
+def link_library(
     unit: Unit, tools: toolchain.Toolchain, scratch: Path, objects: list[Path], folder: Path
 ) -> None:
     """Link the objects into the unit's library, against those of the units it needs.
 
     These are found at run time by their soname: they are loaded already when this one is.
     """
-    library = f"{unit.native}.so"
-    needs = [str(built / f"{needed.native}.so") for needed, built in unit.closure]
+    library = f"{unit.native_name}.so"
+    needs = [str(built / f"{needed.native_name}.so") for needed, built in unit.all_needs]
     command = [
         *(*tools.cxx, "-shared", "-s", f"-Wl,-soname,{library}", "-o", str(folder / library)),
         *map(str, objects),
-        *(*needs, *toolchain.link_flags(unit.packages)),
+        *(*needs, *toolchain.link_flags(unit.used_packages)),
     ]
-    toolchain.run([command], scratch, unit.label)
+    toolchain.run_commands([command], scratch, unit.label)
 
 
-def keep(unit: Unit, sources: Path, introspection: Path, folder: Path) -> None:
+def keep_results(unit: Unit, sources: Path, introspection: Path, folder: Path) -> None:
     """Copy what is used after the build out of the scratch folder."""
-    for t in unit.types:
+    for t in unit.type_names:
         target = folder / "python" / t.kind
         target.mkdir(parents=True, exist_ok=True)
-        shutil.copy(sources / t.kind / f"_{t.stem}.py", target)
+        shutil.copy(sources / t.kind / f"_{t.file_stem}.py", target)
     for root in (sources.parent, introspection):
         for pattern in ("*.h", "*.json"):
             for file in root.rglob(pattern):

@@ -15,7 +15,7 @@ PACKAGES = ("example_interfaces",)
 
 
 @functools.cache
-def unit(package: str) -> Unit:
+def bundled_unit(package: str) -> Unit:
     """Return the unit of one of ``PACKAGES``: all its interfaces, built together."""
     texts: Mapping[TypeName, str] = {
         TypeName(package, file.parent.name, file.stem): file.read_text(encoding="utf-8")

@@ -22,10 +22,10 @@ import tempfile
 from pathlib import Path
 
 from course.interfaces import installed
-from course.interfaces.build import Unit, build
+from course.interfaces.build import Unit, build_unit
 from course.interfaces.errors import BuildError
 from course.interfaces.locks import locked
-from course.interfaces.pruning import MANIFEST, lock_of, prune, scratch_name, touch
+from course.interfaces.pruning import MANIFEST, lock_of, prune, scratch_name, touch_manifest
 
 VARIABLE = "COURSE_INTERFACES_CACHE"
 RECIPE = ("generate.py", "build.py", "toolchain.py", "dispatch.c")
@@ -52,14 +52,14 @@ def environment_key() -> str:
         sysconfig.get_config_var("SOABI"),
         sys.prefix,
         os.confstr("CS_GNU_LIBC_VERSION"),
-        [str(prefix) for prefix in installed.prefixes()],
+        [str(prefix) for prefix in installed.ament_prefixes()],
         [hashlib.sha256((Path(__file__).parent / f).read_bytes()).hexdigest() for f in RECIPE],
-        versions(),
+        wheel_versions(),
     ]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
 
 
-def versions() -> list[str]:
+def wheel_versions() -> list[str]:
     """Return the versions of all ROS wheels, and of numpy, whose C interface is compiled in."""
     folders = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
     names = [entry.name for folder in folders for entry in Path(folder).iterdir()]
@@ -69,16 +69,16 @@ def versions() -> list[str]:
 
 def folder_of(unit: Unit, base: Path) -> Path:
     """Return the folder that ``unit`` has in the cache at ``base``."""
-    name = f"{unit.types[0].name}-" if len(unit.types) == 1 else ""
+    name = f"{unit.type_names[0].name}-" if len(unit.type_names) == 1 else ""
     return base / environment_key() / unit.package / f"{name}{unit.digest}"
 
 
-def find(unit: Unit) -> Path | None:
+def find_built(unit: Unit) -> Path | None:
     """Return the folder of ``unit`` if it is built and whole, else None."""
     folders = [folder_of(unit, base) for base in (root(), *_private)]
     found = next((folder for folder in folders if is_whole(folder)), None)
     if found is not None:
-        touch(found)
+        touch_manifest(found)
     return found
 
 
@@ -86,13 +86,13 @@ def is_whole(folder: Path) -> bool:
     """Say whether every file of a built unit is there, with the content it was built with."""
     try:
         manifest = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
-        whole = all(checksum(folder / name) == digest for name, digest in manifest.items())
+        whole = all(file_checksum(folder / name) == digest for name, digest in manifest.items())
         return whole and bool(manifest)
     except (OSError, ValueError, AttributeError):
         return False
 
 
-def checksum(file: Path) -> str:
+def file_checksum(file: Path) -> str:
     """Return the SHA-256 of ``file``."""
     return hashlib.sha256(file.read_bytes()).hexdigest()
 
@@ -109,14 +109,14 @@ def defined_before(package: str) -> list[str]:
     return [f"{package}/{kind}/{name}" for kind, name in sorted(found)]
 
 
-def ensure(unit: Unit, *, rebuild: bool = False) -> Path:
+def ensure_built(unit: Unit, *, rebuild: bool = False) -> Path:
     """Return the folder of ``unit``, building it if need be.
 
     ``rebuild`` throws away what is there: it looked whole and could not be loaded. A cache that
     cannot be written is replaced by a private folder for the life of this process. Raises
     ``CompilerMissingError`` or ``BuildError``.
     """
-    found = None if rebuild else find(unit)
+    found = None if rebuild else find_built(unit)
     if found:
         return found
     try:
@@ -157,11 +157,11 @@ def build_in(base: Path, unit: Unit, *, rebuild: bool) -> Path:
     with locked(lock_of(folder)):
         if not rebuild and is_whole(folder):
             return folder
-        clear(folder)
+        clear_folder(folder)
         temporary = scratch_name(folder)
         try:
             temporary.mkdir()
-            build(unit, temporary)
+            build_unit(unit, temporary)
             write_manifest(temporary)
             temporary.rename(folder)
         finally:
@@ -171,7 +171,7 @@ def build_in(base: Path, unit: Unit, *, rebuild: bool) -> Path:
     return folder
 
 
-def clear(folder: Path) -> None:
+def clear_folder(folder: Path) -> None:
     """Remove a damaged ``folder`` and what dead builders left; the lock is held.
 
     The compilers of a dead builder may still be writing, so what cannot be removed now is left to
@@ -186,5 +186,5 @@ def clear(folder: Path) -> None:
 def write_manifest(folder: Path) -> None:
     """Write the checksum of every file in ``folder``."""
     files = sorted(f for f in folder.rglob("*") if f.is_file())
-    manifest = {f.relative_to(folder).as_posix(): checksum(f) for f in files}
+    manifest = {f.relative_to(folder).as_posix(): file_checksum(f) for f in files}
     (folder / MANIFEST).write_text(json.dumps(manifest, indent=1), encoding="utf-8")

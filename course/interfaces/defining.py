@@ -38,10 +38,10 @@ def define(name: str, text: str) -> type:
     definition = define_text(type_name, text, [t.name for t in own if t.kind == "msg"])
     unit = unit_of(definition)
     if type_name not in packages.loaded:
-        finder.obtain(unit)
+        finder.obtain_unit(unit)
     in_use = packages.loaded[type_name]
     if in_use.unit.digest != unit.digest:
-        cache.ensure(unit)
+        cache.ensure_built(unit)
         raise RestartNeededError(
             f"{type_name} has changed, and the new definition is built, but this kernel has the "
             "old one loaded: restart the kernel and run the cells again to use the new one."
@@ -58,7 +58,7 @@ def ensure_definition(name: str, text: str) -> None:
     finder.install()
     type_name = parse_name(name)
     check_package(type_name)
-    cache.ensure(unit_of(define_text(type_name, text, [])))
+    cache.ensure_built(unit_of(define_text(type_name, text, [])))
 
 
 def unit_of(definition: Definition) -> Unit:
@@ -66,14 +66,14 @@ def unit_of(definition: Definition) -> Unit:
     package = definition.type_name.package
     needs = [packages.loaded[TypeName(package, "msg", name)].unit for name in definition.own]
     # ensure: somebody may have emptied the cache since they were loaded.
-    return Unit(package, (definition,), tuple((unit, cache.ensure(unit)) for unit in needs))
+    return Unit(package, (definition,), tuple((unit, cache.ensure_built(unit)) for unit in needs))
 
 
 def check_package(type_name: TypeName) -> None:
     """Check that the package is the learner's to define."""
     package = type_name.package
     better = f"choose another package name, such as my_{package}/{type_name.kind}/{type_name.name}"
-    if package in installed.interfaces() or package in bundled.PACKAGES:
+    if package in installed.read_index() or package in bundled.PACKAGES:
         raise DefinitionError(
             f"{package} is an existing ROS package, and redefining its types would break every "
             f"node that uses them: {better}."
@@ -85,9 +85,12 @@ def check_package(type_name: TypeName) -> None:
 def check_stem(type_name: TypeName, others: list[TypeName]) -> None:
     """Check that no other type has the same file name (HTTPGet and HttpGet do)."""
     for other in others:
-        if other != type_name and (other.kind, other.stem) == (type_name.kind, type_name.stem):
+        if other != type_name and (other.kind, other.file_stem) == (
+            type_name.kind,
+            type_name.file_stem,
+        ):
             raise DefinitionError(
-                f"{type_name} and {other} would share the file name {other.stem}: "
+                f"{type_name} and {other} would share the file name {other.file_stem}: "
                 "choose a name that differs in more than its capitals."
             )
 
@@ -105,22 +108,22 @@ def ensure(package: str) -> Source:
         )
     if finder.installed_elsewhere(package):
         return Source.ROS
-    cache.ensure(bundled.unit(package))
+    cache.ensure_built(bundled.bundled_unit(package))
     return Source.BUILT
 
 
 def status() -> dict[str, Source]:
     """Return where each package comes from: the bundled ones, and those defined here."""
     found = {t.package: Source.BUILT for t in sorted(packages.loaded)}
-    return {package: source(package) for package in bundled.PACKAGES} | found
+    return {package: package_source(package) for package in bundled.PACKAGES} | found
 
 
-def source(package: str) -> Source:
+def package_source(package: str) -> Source:
     """Return where a bundled package comes from, or would come from if it were imported now."""
     if finder.installed_elsewhere(package):
         return Source.ROS
     if package in standins.reasons:
         return Source.STAND_IN
-    if cache.find(bundled.unit(package)):
+    if cache.find_built(bundled.bundled_unit(package)):
         return Source.BUILT
     return Source.STAND_IN if compiler_problem() else Source.UNBUILT

@@ -74,7 +74,7 @@ def parse_line(line: str, package: str, own: Collection[str]) -> Entry:
         raise LineError("expected a type and then a name, as in `int32 order`")
     element, size = split_type(type_text)
     if "=" in rest:
-        return constant(type_text, rest)
+        return parse_constant(type_text, rest)
     name, _, default = rest.partition(" ")
     default = default.strip()
     reference = check_type(element, name, package, own)
@@ -117,15 +117,17 @@ def check_type(text: str, name: str, package: str, own: Collection[str]) -> tupl
     if len(parts) > 2 or not all(parts):
         raise LineError(f"{text} is not a type: a message is written package/Name")
     owner, message = parts if len(parts) == 2 else (package, parts[0])
-    if message not in (own if owner == package else installed.messages(owner)):
-        raise LineError(unknown(text, owner, message, package, own))
+    if message not in (own if owner == package else installed.message_names(owner)):
+        raise LineError(describe_unknown(text, owner, message, package, own))
     return owner, message
 
 
-def unknown(text: str, owner: str, message: str, package: str, own: Collection[str]) -> str:
+def describe_unknown(
+    text: str, owner: str, message: str, package: str, own: Collection[str]
+) -> str:
     """Say that there is no such type, and which ones are near."""
     for kind, what in (("srv", "a service"), ("action", "an action")):
-        if f"{kind}/{message}" in installed.interfaces().get(owner, ()):
+        if f"{kind}/{message}" in installed.read_index().get(owner, ()):
             return f"{text} is {what}; a field needs a message or a basic type"
     near: list[str] = []
     if "/" not in text:
@@ -137,7 +139,7 @@ def unknown(text: str, owner: str, message: str, package: str, own: Collection[s
         return f"{sentence}; did you mean {' or '.join(near[:3])}?"
     if owner == package:
         return f"{sentence}; define {owner}/msg/{message} in a cell above, or use a basic type"
-    if owner in installed.interfaces():
+    if owner in installed.read_index():
         return f"{sentence} in the package {owner}"
     return f"{sentence}: no package {owner} with messages is installed"
 
@@ -176,7 +178,7 @@ def check_default(
     read_value(type_text, name, default, constant=False)
 
 
-def constant(type_text: str, rest: str) -> Entry:
+def parse_constant(type_text: str, rest: str) -> Entry:
     """Read ``NAME=value``."""
     name, _, value = (part.strip() for part in rest.partition("="))
     if type_text not in PRIMITIVES:

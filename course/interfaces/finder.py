@@ -57,13 +57,13 @@ class BundledLoader(packages.MadeHere):
     def exec_module(self, module: ModuleType) -> None:
         """Fill the modules of the package, unless a reload asks for it again."""
         package = module.__name__
-        unit = bundled.unit(package)
-        if package in standins.reasons or unit.types[0] in packages.loaded:
+        unit = bundled.bundled_unit(package)
+        if package in standins.reasons or unit.type_names[0] in packages.loaded:
             return
         try:
-            obtain(unit)
+            obtain_unit(unit)
         except BuildError as error:
-            standins.load(package, str(error))
+            standins.load_standins(package, str(error))
 
 
 class NotYetLoader(packages.MadeHere):
@@ -86,20 +86,20 @@ class NotYetLoader(packages.MadeHere):
         )
 
 
-def obtain(unit: Unit) -> None:
+def obtain_unit(unit: Unit) -> None:
     """Build ``unit`` if it is not in the cache, and load it.
 
     Raises ``BuildError``.
     """
     try:
-        packages.load(unit, cache.ensure(unit))
+        packages.load_unit(unit, cache.ensure_built(unit))
     except BuildError:
         raise
     except ImportError:
         # It is whole but does not fit: libraries were moved, or replaced by others.
-        folder = cache.ensure(unit, rebuild=True)
+        folder = cache.ensure_built(unit, rebuild=True)
         try:
-            packages.load(unit, folder)
+            packages.load_unit(unit, folder)
         except ImportError as error:
             raise BuildError(
                 f"{unit.label} was built and cannot be loaded: {error}. "

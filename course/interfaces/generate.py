@@ -133,7 +133,7 @@ def other_half(request: Request, idl: list[str]) -> None:
     )
 
 
-def generate(request: Request) -> None:
+def write_sources(request: Request) -> None:
     """Write all sources for ``request``."""
     parse_once()
     texts = Path(request["texts"])
@@ -152,4 +152,4 @@ def generate(request: Request) -> None:
 
 if __name__ == "__main__":
     die_with_parent()
-    generate(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))
+    write_sources(json.loads(Path(sys.argv[1]).read_text(encoding="utf-8")))

@@ -43,7 +43,7 @@ def locked(file: Path, deadline: float | None = None) -> Iterator[None]:
         descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
         _locks.add(descriptor)
         try:
-            if _take(descriptor) and _is_still(file, descriptor):
+            if _take_lock(descriptor) and _is_still(file, descriptor):
                 yield
                 return
         finally:
@@ -54,7 +54,7 @@ def locked(file: Path, deadline: float | None = None) -> Iterator[None]:
         pause.wait(0.05)
 
 
-def _take(descriptor: int) -> bool:
+def _take_lock(descriptor: int) -> bool:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

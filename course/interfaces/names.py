@@ -34,24 +34,24 @@ class TypeName:
         return f"{self.package}/{self.kind}/{self.name}"
 
     @property
-    def module(self) -> str:
+    def module_name(self) -> str:
         """The Python module that the type is imported from: ``robot_msgs.srv``."""
         return f"{self.package}.{self.kind}"
 
     @property
-    def file(self) -> str:
+    def relative_path(self) -> str:
         """The path of its text within the package: ``srv/GetPose.srv``."""
         return f"{self.kind}/{self.name}.{self.kind}"
 
     @property
-    def stem(self) -> str:
+    def file_stem(self) -> str:
         """The stem of the generated file names, as rosidl spells it: ``get_pose``."""
         return lower_case(self.name)
 
     @property
     def import_line(self) -> str:
         """The statement that imports the type."""
-        return f"from {self.module} import {self.name}"
+        return f"from {self.module_name} import {self.name}"
 
 
 def lower_case(name: str) -> str:

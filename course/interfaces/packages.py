@@ -73,7 +73,7 @@ def is_ours(package: str) -> bool:
     return isinstance(getattr(spec, "loader", None), MadeHere)
 
 
-def module(name: str) -> ModuleType:
+def ensure_module(name: str) -> ModuleType:
     """Return the module ``name``, made and attached to its parent if it does not exist."""
     if name not in sys.modules:
         made = importlib.util.module_from_spec(package_spec(name))
@@ -82,7 +82,7 @@ def module(name: str) -> ModuleType:
         sys.modules[name] = made
         parent, _, child = name.rpartition(".")
         if parent:
-            setattr(module(parent), child, made)
+            setattr(ensure_module(parent), child, made)
     return sys.modules[name]
 
 
@@ -98,48 +98,54 @@ def _once_loaded(made: ModuleType, name: str) -> Any:
     raise AttributeError(f"module {made.__name__!r} has no attribute {name!r}")
 
 
-def load(unit: Unit, folder: Path) -> None:
+def load_unit(unit: Unit, folder: Path) -> None:
     """Make the types of a built unit importable; do nothing if another thread just did.
 
     Raises ``ImportError`` if the library does not load; nothing is left half imported then.
     """
     with lock:
-        if all(t in loaded for t in unit.types):
+        if all(t in loaded for t in unit.type_names):
             return
         before = set(sys.modules)
         try:
             support = load_native(unit, folder)
-            table = module(f"{unit.package}.{unit.package}_s__rosidl_typesupport_c")
+            table = ensure_module(f"{unit.package}.{unit.package}_s__rosidl_typesupport_c")
             vars(table).update({k: v for k, v in vars(support).items() if not k.startswith("__")})
-            classes = {t: load_classes(t, folder) for t in unit.types}
+            classes = {t: load_classes(t, folder) for t in unit.type_names}
         except BaseException:
             for name in set(sys.modules) - before:
                 if name.startswith(f"{unit.package}."):
                     del sys.modules[name]
             raise
-        for t in unit.types:
+        for t in unit.type_names:
             for suffix in EXPORTS[t.kind]:
-                setattr(module(t.module), t.name + suffix, getattr(classes[t], t.name + suffix))
+                setattr(
+                    ensure_module(t.module_name),
+                    t.name + suffix,
+                    getattr(classes[t], t.name + suffix),
+                )
             made = getattr(classes[t], t.name)
             loaded[t] = Loaded(unit, folder, made)
 
 
 def load_native(unit: Unit, folder: Path) -> ModuleType:
     """Load the unit's extension module."""
-    name, path = f"{unit.package}.{unit.native}", str(folder / f"{unit.native}.so")
+    name, path = f"{unit.package}.{unit.native_name}", str(folder / f"{unit.native_name}.so")
     loader = importlib.machinery.ExtensionFileLoader(name, path)
-    return execute(importlib.util.spec_from_file_location(name, path, loader=loader))
+    return execute_spec(importlib.util.spec_from_file_location(name, path, loader=loader))
 
 
 def load_classes(t: TypeName, folder: Path) -> ModuleType:
     """Load the generated Python module of one interface, as ``robot_msgs.srv._get_pose``."""
-    parent, path = module(t.module), folder / "python" / t.kind / f"_{t.stem}.py"
-    made = execute(importlib.util.spec_from_file_location(f"{t.module}._{t.stem}", path))
-    setattr(parent, f"_{t.stem}", made)
+    parent, path = ensure_module(t.module_name), folder / "python" / t.kind / f"_{t.file_stem}.py"
+    made = execute_spec(
+        importlib.util.spec_from_file_location(f"{t.module_name}._{t.file_stem}", path)
+    )
+    setattr(parent, f"_{t.file_stem}", made)
     return made
 
 
-def execute(spec: importlib.machinery.ModuleSpec | None) -> ModuleType:
+def execute_spec(spec: importlib.machinery.ModuleSpec | None) -> ModuleType:
     """Create and run the module of ``spec``, which may import itself meanwhile."""
     if spec is None or spec.loader is None:
         raise BuildError("Python does not know how to load a built interface.")

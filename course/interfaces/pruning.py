@@ -21,7 +21,7 @@ IN_USE_FOR = 86400.0  # s after its last use in which a unit never goes: somebod
 MOST = 200  # units; about 0.3 MB each
 
 
-def touch(folder: Path) -> None:
+def touch_manifest(folder: Path) -> None:
     """Note that the unit in ``folder`` is used; a cache that is read-only keeps no such notes."""
     with contextlib.suppress(OSError):
         os.utime(folder / MANIFEST)
@@ -34,13 +34,13 @@ def prune(base: Path) -> list[Path]:
     its name by one rename, as it came.
     """
     now = time.time()
-    units = sorted(_units(base), reverse=True)
+    units = sorted(_list_units(base), reverse=True)
     old = [
         folder
         for rank, (used, folder) in enumerate(units)
         if now - used > (UNUSED_FOR if rank < MOST else IN_USE_FOR)
     ]
-    return [folder for folder in old if _remove(folder, now)]
+    return [folder for folder in old if _remove_unit(folder, now)]
 
 
 def scratch_name(folder: Path) -> Path:
@@ -53,14 +53,14 @@ def lock_of(folder: Path) -> Path:
     return folder.parent / f".{folder.name}.lock"
 
 
-def _units(base: Path) -> Iterator[tuple[float, Path]]:
+def _list_units(base: Path) -> Iterator[tuple[float, Path]]:
     for manifest in base.glob(f"*/*/*/{MANIFEST}"):
         if not manifest.parent.name.startswith("."):
             with contextlib.suppress(OSError):  # another process prunes too
                 yield manifest.stat().st_mtime, manifest.parent
 
 
-def _remove(folder: Path, now: float) -> bool:
+def _remove_unit(folder: Path, now: float) -> bool:
     try:
         with locked(lock_of(folder), deadline=0.0):
             if now - (folder / MANIFEST).stat().st_mtime <= IN_USE_FOR:

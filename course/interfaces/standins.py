@@ -23,23 +23,25 @@ SAME_SHAPE = {
 reasons: dict[str, str] = {}  # package -> why its types are stand-ins in this process
 
 
-def load(package: str, reason: str) -> None:
+def load_standins(package: str, reason: str) -> None:
     """Fill the modules of ``package`` with stand-ins, and say so once on standard output."""
     for wanted, installed in SAME_SHAPE.items():
         if wanted.package == package:
-            source = importlib.import_module(installed.module)
-            target = packages.module(wanted.module)
+            source = importlib.import_module(installed.module_name)
+            target = packages.ensure_module(wanted.module_name)
             for suffix in packages.EXPORTS[wanted.kind]:
                 setattr(target, wanted.name + suffix, getattr(source, wanted.name + suffix))
-    for kind in {t.kind for t in bundled.unit(package).types}:
-        vars(packages.module(f"{package}.{kind}"))["__getattr__"] = missing(package, kind, reason)
+    for kind in {t.kind for t in bundled.bundled_unit(package).type_names}:
+        vars(packages.ensure_module(f"{package}.{kind}"))["__getattr__"] = make_getattr(
+            package, kind, reason
+        )
     if package not in reasons:
         reasons[package] = reason
         if sys.stdout is not None:
-            sys.stdout.write(notice(package, reason) + "\n")
+            sys.stdout.write(standin_notice(package, reason) + "\n")
 
 
-def notice(package: str, reason: str) -> str:
+def standin_notice(package: str, reason: str) -> str:
     """Say what stands in, what that costs, and what would mend it."""
     pairs = [(w, s) for w, s in SAME_SHAPE.items() if w.package == package]
     names = ", ".join(str(standin) for _, standin in pairs)
@@ -53,9 +55,9 @@ def notice(package: str, reason: str) -> str:
     )
 
 
-def missing(package: str, kind: str, reason: str) -> Callable[[str], Any]:
+def make_getattr(package: str, kind: str, reason: str) -> Callable[[str], Any]:
     """Return the ``__getattr__`` of a module of stand-ins: it explains the types it lacks."""
-    lacking = {t.name for t in bundled.unit(package).types if t.kind == kind}
+    lacking = {t.name for t in bundled.bundled_unit(package).type_names if t.kind == kind}
 
     def __getattr__(name: str) -> Any:  # noqa: N807  Python looks for this name in a module
         if name.partition("_")[0] in lacking:

@@ -69,7 +69,10 @@ def find_toolchain() -> Toolchain:
 
     Raises ``CompilerMissingError`` naming everything that is missing.
     """
-    cc, cxx = find("CC", ("gcc", "cc", "clang")), find("CXX", ("g++", "c++", "clang++"))
+    cc, cxx = (
+        find_command("CC", ("gcc", "cc", "clang")),
+        find_command("CXX", ("g++", "c++", "clang++")),
+    )
     missing = [
         what
         for what, found in (
@@ -86,7 +89,7 @@ def find_toolchain() -> Toolchain:
     return Toolchain(cc, cxx)
 
 
-def find(variable: str, names: Sequence[str]) -> tuple[str, ...]:
+def find_command(variable: str, names: Sequence[str]) -> tuple[str, ...]:
     """Return the command that ``variable`` names, or the first of ``names`` on the path."""
     chosen = shlex.split(os.environ.get(variable, ""))
     for command in [chosen] if chosen else [[name] for name in names]:
@@ -106,7 +109,7 @@ def python_headers() -> list[str]:
 def build_environment(scratch: Path) -> dict[str, str]:
     """Return the environment of a build: plain English, and all scratch files in ``scratch``."""
     environment = {**os.environ, "LC_ALL": "C", "PYTHONUTF8": "1", "TMPDIR": str(scratch)}
-    environment["AMENT_PREFIX_PATH"] = os.pathsep.join(map(str, installed.prefixes()))
+    environment["AMENT_PREFIX_PATH"] = os.pathsep.join(map(str, installed.ament_prefixes()))
     # The wheels put folders with libraries of their own on the library path; a compiler must not
     # load those in place of the system's.
     ours = str(Path(sys.prefix).resolve())
@@ -125,7 +128,7 @@ def include_flags(folders: Iterable[Path]) -> list[str]:
     import numpy as np
 
     system = [np.get_include(), *python_headers()]
-    for prefix in installed.prefixes():
+    for prefix in installed.ament_prefixes():
         # Each ROS package keeps its headers in include/<package>/<package>/, and a message pulls
         # in those of all that it holds.
         system += sorted(str(f) for f in (prefix / "include").glob("*") if f.is_dir())
@@ -135,7 +138,7 @@ def include_flags(folders: Iterable[Path]) -> list[str]:
 
 def link_flags(packages: Iterable[str]) -> list[str]:
     """Return the libraries of ``packages`` and of the runtime, and where to find them."""
-    folders = [prefix / "lib" for prefix in installed.prefixes() if (prefix / "lib").is_dir()]
+    folders = [prefix / "lib" for prefix in installed.ament_prefixes() if (prefix / "lib").is_dir()]
     flags = [f"-L{folder}" for folder in folders]
     flags += [f"-Wl,-rpath,{folder},-rpath-link,{folder}" for folder in folders]
     flags.append("-Wl,--as-needed")
@@ -143,7 +146,7 @@ def link_flags(packages: Iterable[str]) -> list[str]:
     return flags + [f"-l{library}" for library in RUNTIME]
 
 
-def run(commands: Sequence[Sequence[str]], folder: Path, what: str) -> None:
+def run_commands(commands: Sequence[Sequence[str]], folder: Path, what: str) -> None:
     """Run ``commands`` at once in ``folder`` and wait for all.
 
     Raises ``BuildError`` with the first error line of the first that fails, and ``OSError`` if
@@ -168,7 +171,7 @@ def run(commands: Sequence[Sequence[str]], folder: Path, what: str) -> None:
         for command, process, log in processes:
             if process.wait(DEADLINE):
                 output = log.read_text(encoding="utf-8", errors="replace")
-                raise failure(what, Path(command[0]).name, process.returncode, output)
+                raise command_error(what, Path(command[0]).name, process.returncode, output)
     except subprocess.TimeoutExpired as error:
         raise BuildError(
             f"Building {what} took longer than {DEADLINE:.0f} s and was stopped: "
@@ -181,7 +184,7 @@ def run(commands: Sequence[Sequence[str]], folder: Path, what: str) -> None:
             process.wait()
 
 
-def failure(what: str, command: str, code: int, output: str) -> Exception:
+def command_error(what: str, command: str, code: int, output: str) -> Exception:
     """Turn the output of a failed command into an error for a person."""
     lines = [line.strip() for line in output.splitlines() if line.strip()]
     for number in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):

@@ -53,7 +53,7 @@ class Notebook:
     problem: str = ""
 
 
-def read(folder: Path, path: Path) -> Notebook:
+def read_notebook(folder: Path, path: Path) -> Notebook:
     """Read the notebook ``folder / path``; one that cannot be read says why."""
     try:
         file = folder / path
@@ -70,8 +70,8 @@ def read(folder: Path, path: Path) -> Notebook:
     titles = [title for cell in cells for _, title in cell.headings]
     answers = [cell.source for cell in cells if cell.by_hand and not cell.code]
     return Notebook(
-        path, titles[0] if titles else path.stem, _sections(cells),
-        _first(_CHECK, code), _first(_QUIZ, code),
+        path, titles[0] if titles else path.stem, _find_sections(cells),
+        _first_match(_CHECK, code), _first_match(_QUIZ, code),
         sum(bool(answer.strip()) and STUB not in answer for answer in answers), len(answers),
     )  # fmt: skip
 
@@ -90,7 +90,7 @@ class _Cell:
             self.headings = [(len(match[1]), match[2]) for match in found if match]
 
 
-def _sections(cells: list[_Cell]) -> tuple[Section, ...]:
+def _find_sections(cells: list[_Cell]) -> tuple[Section, ...]:
     sections: list[tuple[str, list[str]]] = []
     path = {1: "", 2: "", 3: ""}
     for cell in cells:
@@ -105,6 +105,6 @@ def _sections(cells: list[_Cell]) -> tuple[Section, ...]:
     return tuple(Section(title, tuple(ids)) for title, ids in sections if ids)
 
 
-def _first(pattern: re.Pattern[str], text: str) -> str:
+def _first_match(pattern: re.Pattern[str], text: str) -> str:
     match = pattern.search(text)
     return match[1] if match else ""

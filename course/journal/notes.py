@@ -15,7 +15,7 @@ class CellNotes:
         self._noted: set[str] = set()
         self._told = False
 
-    def after(self, result: Any) -> str:
+    def note_cell(self, result: Any) -> str:
         """Note a cell by IPython's result of it; return a sentence, once, if that cannot be done.
 
         Outside of a working copy, and for code that is no cell of a notebook, nothing is noted.
@@ -27,7 +27,7 @@ class CellNotes:
         if journal is None:
             return ""
         try:
-            journal.ran(cell)
+            journal.record_run(cell)
         except JournalError as error:
             told, self._told = self._told, True
             return "" if told else str(error)

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from course.journal import page
-from course.journal.notebooks import Notebook, read
+from course.journal.notebooks import Notebook, read_notebook
 from course.journal.store import (
     MANIFEST,
     Entries,
@@ -16,7 +16,7 @@ from course.journal.store import (
     journal_here,
 )
 from course.journal.work import Chapter, Exercise, QuizTaken, WorkDone
-from quizzes.record import MAX_FILE, filename, parse
+from quizzes.record import MAX_FILE, attempts_filename, parse_attempts
 
 WELCOME = Path("start-here.ipynb")
 """The notebook that `course lab` opens first; it is not a chapter."""
@@ -27,10 +27,10 @@ class Progress(WorkDone):
 
     def __repr__(self) -> str:
         """Return it as text."""
-        return page.text(self)
+        return page.render_text(self)
 
     def _repr_markdown_(self) -> str:
-        return page.markdown(self, Path.cwd())
+        return page.render_markdown(self, Path.cwd())
 
 
 def progress(folder: Path | str | None = None) -> Progress:
@@ -54,20 +54,21 @@ def progress(folder: Path | str | None = None) -> Progress:
 def progress_of(journal: Journal) -> Progress:
     """Return what is done and left in the working copy of ``journal``."""
     entries = journal.read()
-    notebooks = [read(journal.folder, path) for path in handed_out(journal.folder)]
+    notebooks = [read_notebook(journal.folder, path) for path in handed_out(journal.folder)]
     notices = [entries.notice] if entries.notice else []
     notices += [f"{n.path} cannot be read: {n.problem}." for n in notebooks if n.problem]
     sound = [notebook for notebook in notebooks if not notebook.problem]
-    quizzes = tuple(_quiz(journal.folder, n) for n in sound if n.quiz)
+    quizzes = tuple(_quiz_progress(journal.folder, n) for n in sound if n.quiz)
     notices += [
-        f"{filename(quiz.notebook.quiz)} has {quiz.damaged} damaged lines: run the quiz again, "
+        f"{attempts_filename(quiz.notebook.quiz)} has {quiz.damaged} damaged lines: run the quiz "
+        "again, "
         "which keeps them aside."
         for quiz in quizzes if quiz.damaged
     ]  # fmt: skip
     return Progress(
         journal.folder,
         datetime.datetime.now().astimezone(),
-        tuple(_chapter(n, entries) for n in sound if not (n.exam or n.quiz)),
+        tuple(_chapter_progress(n, entries) for n in sound if not (n.exam or n.quiz)),
         tuple(
             Exercise(n, entries.checks.get(n.exam))
             for n in sorted(sound, key=lambda notebook: notebook.title)
@@ -93,20 +94,20 @@ def handed_out(folder: Path) -> list[Path]:
     return sorted(mine, key=lambda path: (len(path.parts), path))
 
 
-def _chapter(notebook: Notebook, entries: Entries) -> Chapter:
+def _chapter_progress(notebook: Notebook, entries: Entries) -> Chapter:
     return Chapter(
         notebook,
         tuple(sum(cell in entries.cells for cell in s.cells) for s in notebook.sections),
     )
 
 
-def _quiz(folder: Path, notebook: Notebook) -> QuizTaken:
-    file = folder / notebook.path.parent / filename(notebook.quiz)
+def _quiz_progress(folder: Path, notebook: Notebook) -> QuizTaken:
+    file = folder / notebook.path.parent / attempts_filename(notebook.quiz)
     try:
         if not file.is_file():
             return QuizTaken(notebook, ())
         with file.open("rb") as opened:
-            attempts, damaged = parse(opened.read(MAX_FILE + 1))
+            attempts, damaged = parse_attempts(opened.read(MAX_FILE + 1))
     except OSError:
         return QuizTaken(notebook, (), 1)
     mine = tuple(attempt for attempt in attempts if attempt.quiz == notebook.quiz)

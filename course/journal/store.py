@@ -77,7 +77,7 @@ class Journal:
     def read(self) -> Entries:
         """Return what is remembered; a damaged file is kept aside, and the journal begins anew."""
         try:
-            return _parse(self._content())
+            return _parse_entries(self._read_content())
         except FileNotFoundError:
             return Entries()
         except OSError as error:
@@ -85,7 +85,7 @@ class Journal:
         except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return Entries(notice=self._put_aside())
 
-    def ran(self, cell: str) -> None:
+    def record_run(self, cell: str) -> None:
         """Remember that a cell ran without an error.
 
         Raises:
@@ -94,13 +94,13 @@ class Journal:
 
         def add(entries: Entries) -> None:
             entries.cells.pop(cell, None)  # to the end: the dictionary is in the order of time
-            entries.cells[cell[:MAX_TEXT]] = _now()
+            entries.cells[cell[:MAX_TEXT]] = _utc_now()
             for oldest in list(entries.cells)[:-MAX_CELLS]:
                 del entries.cells[oldest]
 
-        self._change(add)
+        self._change_entries(add)
 
-    def checked(
+    def record_checks(
         self, exam: str, score: float, max_score: float, passed: Iterable[str], left: Iterable[str]
     ) -> None:
         """Remember what an exam's visible checks found: points, and the titles of the checks.
@@ -113,14 +113,14 @@ class Journal:
             before = entries.checks.pop(exam, None)
             best = max(score, before.best if before and before.max_score == max_score else 0.0)
             entries.checks[exam] = Checked(
-                _now(), score, max_score, best, _titles(passed), _titles(left)
+                _utc_now(), score, max_score, best, _limit_titles(passed), _limit_titles(left)
             )
             for oldest in list(entries.checks)[:-MAX_EXAMS]:
                 del entries.checks[oldest]
 
-        self._change(add)
+        self._change_entries(add)
 
-    def _change(self, change: Callable[[Entries], None]) -> None:
+    def _change_entries(self, change: Callable[[Entries], None]) -> None:
         lock = self.path.with_name(f".{FILE}.lock")
         try:
             # Where no file can be made, say so at once: the library would wait or make folders.
@@ -128,7 +128,7 @@ class Journal:
             with FileLock(lock, timeout=LOCK_TIMEOUT):
                 entries = self.read()
                 change(entries)
-                write_text(self.path, _text(entries))
+                write_text(self.path, _format_entries(entries))
         except Timeout:
             raise JournalError(
                 f"Your progress was not noted: another program has held {self.path} for "
@@ -141,7 +141,7 @@ class Journal:
                 "make the folder writable. Your work itself is not affected."
             ) from None
 
-    def _content(self) -> str:
+    def _read_content(self) -> str:
         if self.path.exists() and not self.path.is_file():
             raise OSError(0, "it is not a file")
         with self.path.open("rb") as file:
@@ -176,45 +176,50 @@ def journal_here(folder: Path | None = None) -> Journal | None:
     return None
 
 
-def _parse(text: str) -> Entries:
+def _parse_entries(text: str) -> Entries:
     data = json.loads(text)
     if data["version"] != VERSION:
         raise ValueError("another version")
-    cells = {_word(cell): _moment(when) for cell, when in data["cells"].items()}
-    checks = {_word(exam): _checked(found) for exam, found in data["checks"].items()}
+    cells = {_check_word(cell): _check_moment(when) for cell, when in data["cells"].items()}
+    checks = {_check_word(exam): _parse_checked(found) for exam, found in data["checks"].items()}
     return Entries(cells, checks)
 
 
-def _checked(found: dict[str, Any]) -> Checked:
+def _parse_checked(found: dict[str, Any]) -> Checked:
     score, most, best = (float(found[name]) for name in ("score", "max_score", "best"))
     if not (0 <= score <= best <= most < 1e6):
         raise ValueError("impossible points")
     return Checked(
-        _moment(found["when"]), score, most, best, _titles(found["passed"]), _titles(found["open"])
+        _check_moment(found["when"]),
+        score,
+        most,
+        best,
+        _limit_titles(found["passed"]),
+        _limit_titles(found["open"]),
     )
 
 
-def _titles(titles: Iterable[str]) -> tuple[str, ...]:
-    return tuple(_word(title[:MAX_TEXT]) for title in list(titles)[:MAX_TITLES])
+def _limit_titles(titles: Iterable[str]) -> tuple[str, ...]:
+    return tuple(_check_word(title[:MAX_TEXT]) for title in list(titles)[:MAX_TITLES])
 
 
-def _word(value: Any) -> str:
+def _check_word(value: Any) -> str:
     if not isinstance(value, str) or not 0 < len(value) <= MAX_TEXT:
         raise ValueError("a text of the wrong kind")
     return value
 
 
-def _moment(value: Any) -> str:
-    if datetime.datetime.fromisoformat(_word(value)).tzinfo is None:
+def _check_moment(value: Any) -> str:
+    if datetime.datetime.fromisoformat(_check_word(value)).tzinfo is None:
         raise ValueError("a time without a zone")
     return str(value)
 
 
-def _now() -> str:
+def _utc_now() -> str:
     return datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
 
 
-def _text(entries: Entries) -> str:
+def _format_entries(entries: Entries) -> str:
     checks = {exam: asdict(found) for exam, found in entries.checks.items()}
     data = {"version": VERSION, "cells": entries.cells, "checks": checks}
     return json.dumps(data, ensure_ascii=False, indent=1) + "\n"

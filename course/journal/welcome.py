@@ -15,7 +15,7 @@ TAG = "progress"
 """Tag of the cell whose output is the student's progress."""
 
 
-def refresh(folder: Path) -> bool:
+def refresh_progress(folder: Path) -> bool:
     """Put today's progress into the first notebook of a working copy; return whether it is there.
 
     Nothing but the outputs of the cell tagged `TAG` is changed, and a notebook that cannot be read
@@ -33,7 +33,7 @@ def refresh(folder: Path) -> bool:
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return False  # JupyterLab says what is wrong with it
     if cells:
-        outputs = [_output(progress_of(Journal(folder)), folder)]
+        outputs = [_progress_output(progress_of(Journal(folder)), folder)]
         for cell in cells:
             cell["outputs"], cell["execution_count"] = outputs, None
         write_text(path, json.dumps(notebook, ensure_ascii=False, indent=1) + "\n")
@@ -44,6 +44,6 @@ def _is_ours(cell: dict[str, Any]) -> bool:
     return cell["cell_type"] == "code" and TAG in cell.get("metadata", {}).get("tags", [])
 
 
-def _output(progress: Progress, folder: Path) -> dict[str, Any]:
-    data = {"text/markdown": page.markdown(progress, folder), "text/plain": repr(progress)}
+def _progress_output(progress: Progress, folder: Path) -> dict[str, Any]:
+    data = {"text/markdown": page.render_markdown(progress, folder), "text/plain": repr(progress)}
     return {"output_type": "display_data", "data": data, "metadata": {}}

@@ -29,7 +29,7 @@ class Chapter:
         return sum(len(section.cells) for section in self.notebook.sections)
 
     @property
-    def left(self) -> tuple[Section, ...]:
+    def unfinished_sections(self) -> tuple[Section, ...]:
         """The sections with cells that have not run."""
         pairs = zip(self.notebook.sections, self.ran, strict=True)
         return tuple(section for section, ran in pairs if ran < len(section.cells))
@@ -43,7 +43,7 @@ class Exercise:
     checked: Checked | None
 
     @property
-    def done(self) -> bool:
+    def is_done(self) -> bool:
         """Whether nothing is left that a student can do."""
         passed = self.checked is not None and not self.checked.open
         return passed and self.notebook.written == self.notebook.to_write
@@ -58,12 +58,12 @@ class QuizTaken:
     damaged: int = 0
 
     @property
-    def best(self) -> Attempt | None:
+    def best_attempt(self) -> Attempt | None:
         """The attempt with the best score, the earliest of equal ones."""
         return max(self.attempts, key=lambda a: (a.score, -a.attempt), default=None)
 
     @property
-    def passed(self) -> bool:
+    def is_passed(self) -> bool:
         """Whether an attempt was passed when it was submitted."""
         return any(attempt.passed for attempt in self.attempts)
 

@@ -15,7 +15,7 @@ from course.errors import CourseError
 from course.messages import values
 from course.messages.types import type_name
 from course.util import arguments
-from course.util.files import replacing
+from course.util.files import replace_file
 
 _RULE = "=" * 80
 
@@ -24,7 +24,7 @@ class RecordingError(CourseError):
     """A recording that cannot be written; the message says where, and what to do."""
 
 
-def write(
+def write_recordings(
     path: str | Path, recordings: Mapping[str, tuple[Any, Sequence[tuple[int, Any]]]]
 ) -> Path:
     """Write recordings to an MCAP file of profile "ros2"; return its path.
@@ -39,13 +39,13 @@ def write(
         SessionError: the path is no path.
     """
     if not isinstance(path, Path):
-        path = Path(arguments.text(path, "The path", "scan.mcap"))
+        path = Path(arguments.check_text(path, "The path", "scan.mcap"))
     try:
         if path.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         path = path if path.suffix else path.with_suffix(".mcap")
-        with replacing(path) as file:
-            _write(file, recordings)
+        with replace_file(path) as file:
+            _write_messages(file, recordings)
     except (OSError, ValueError) as error:  # an empty name, or one with a NUL, is a ValueError
         reason = getattr(error, "strerror", None) or str(error)
         raise RecordingError(
@@ -55,16 +55,16 @@ def write(
     return path
 
 
-def definition(msg_type: Any) -> str:
+def definition_text(msg_type: Any) -> str:
     """Return the text of a message definition, the messages that it contains below it."""
     parts: dict[str, str] = {}
-    _collect(msg_type, parts)
+    _collect_definitions(msg_type, parts)
     first, *rest = parts.items()
     texts = [first[1], *(f"{_RULE}\nMSG: {name}\n{text}" for name, text in rest)]
     return "\n".join(texts)
 
 
-def _write(
+def _write_messages(
     file: IO[bytes], recordings: Mapping[str, tuple[Any, Sequence[tuple[int, Any]]]]
 ) -> None:
     writer = Writer(file)
@@ -74,7 +74,9 @@ def _write(
     for topic, (msg_type, _) in recordings.items():
         name = type_name(msg_type)
         if name not in schemas:
-            schemas[name] = writer.register_schema(name, "ros2msg", definition(msg_type).encode())
+            schemas[name] = writer.register_schema(
+                name, "ros2msg", definition_text(msg_type).encode()
+            )
         channels[topic] = writer.register_channel(topic, "cdr", schemas[name])
     for number, (stamp, topic, message) in enumerate(_in_order(recordings)):
         writer.add_message(
@@ -95,7 +97,7 @@ def _in_order(
     return iter(sorted(rows, key=lambda row: row[0]))
 
 
-def _collect(msg_type: Any, parts: dict[str, str]) -> None:
+def _collect_definitions(msg_type: Any, parts: dict[str, str]) -> None:
     package, _, name = type_name(msg_type).split("/")
     key = f"{package}/{name}"
     if key in parts:
@@ -106,5 +108,5 @@ def _collect(msg_type: Any, parts: dict[str, str]) -> None:
         lines.append(f"{values.in_words(slot)} {field}")
         inner = getattr(slot, "value_type", slot)
         if hasattr(inner, "namespaces"):
-            _collect(values.class_of(inner), parts)
+            _collect_definitions(values.class_of(inner), parts)
     parts[key] = "\n".join(lines) + "\n"

@@ -39,7 +39,7 @@ class UnknownTypeError(LookupError):
     """A name that is of no type known here."""
 
 
-def load(package: str, kind: str, name: str) -> Any:
+def load_class(package: str, kind: str, name: str) -> Any:
     """Return the class of an interface.
 
     Raises:
@@ -48,7 +48,7 @@ def load(package: str, kind: str, name: str) -> Any:
     """
     if kind in _KINDS and _MEMBER.fullmatch(name) and is_of_interfaces(package):
         try:
-            found = _member(importlib.import_module(f"{package}.{kind}"), name)
+            found = _find_member(importlib.import_module(f"{package}.{kind}"), name)
         except (ImportError, AttributeError, ValueError):
             found = None
         if any(hasattr(found, part) for part in _PARTS):
@@ -66,7 +66,7 @@ def load_named(text: str) -> Any:
     parts = text.split("/")
     if len(parts) != 3:
         raise UnknownTypeError(text)
-    return load(*parts)
+    return load_class(*parts)
 
 
 def is_type_name(text: str) -> bool:
@@ -89,14 +89,15 @@ def load_type(name: str, who: str = "", kind: str = "") -> Any:
     found = _TYPE_NAME.fullmatch(name)
     if found is None:
         raise SessionError(
-            f"{yaml_text.shown(name)} is not the name of an interface: write package/kind/Name, as "
+            f"{yaml_text.short_repr(name)} is not the name of an interface: write "
+            "package/kind/Name, as "
             f"in {_EXAMPLES[kind or 'msg']}."
         )
     package, actual, cls = found["package"], found["kind"] or kind or "msg", found["name"]
     if kind and actual != kind:
         raise SessionError(f"{name} is no {kind} type: name one such as {_EXAMPLES[kind]}.")
     with suppress(UnknownTypeError):
-        return load(package, actual, cls)
+        return load_class(package, actual, cls)
     why = (
         f"{who} carries {name}, which is not installed here" if who else f"There is no {name} here"
     )
@@ -115,7 +116,7 @@ def is_of_interfaces(package: str) -> bool:
     """Return whether a package is known to be made of interfaces; it is not imported."""
     if not LOWER_CASE.fullmatch(package):
         return False
-    if package in installed.interfaces():
+    if package in installed.read_index():
         return True
     try:
         spec = importlib.util.find_spec(package)
@@ -124,7 +125,7 @@ def is_of_interfaces(package: str) -> bool:
     return spec is not None and isinstance(spec.loader, packages.MadeHere)
 
 
-def _member(module: Any, name: str) -> Any:
+def _find_member(module: Any, name: str) -> Any:
     found = getattr(module, name, None)
     if found is not None:
         return found

@@ -52,7 +52,9 @@ def to_data(message: Any, longest: int | None = LONGEST) -> dict[str, Any]:
         longest: keep so many elements of each sequence, and say how many more there are in a
             last element, and cut texts; None keeps all.
     """
-    return {name: to_plain(getattr(message, name), longest) for name, _ in fields(type(message))}
+    return {
+        name: to_plain(getattr(message, name), longest) for name, _ in message_fields(type(message))
+    }
 
 
 def to_plain(value: Any, longest: int | None = LONGEST) -> Any:
@@ -79,21 +81,21 @@ def from_text(msg_type: Any, text: str) -> Any:
     Raises:
         MisfitError: it is no YAML, or a value does not fit; says which field, and what it takes.
     """
-    return from_data(msg_type, read(msg_type, text))
+    return from_data(msg_type, parse_text(msg_type, text))
 
 
-def read(msg_type: Any, text: str) -> Any:
+def parse_text(msg_type: Any, text: str) -> Any:
     """Return the plain data of YAML or JSON that is to be a message of ``msg_type``.
 
     Raises:
         MisfitError: it is neither.
     """
     try:
-        return yaml_text.read(text) if text.strip() else {}
+        return yaml_text.parse_yaml(text) if text.strip() else {}
     except ValueError as error:
         raise MisfitError(
-            f"{yaml_text.shown(text)} is not YAML ({error}): write the fields as in "
-            f"{example(msg_type)}."
+            f"{yaml_text.short_repr(text)} is not YAML ({error}): write the fields as in "
+            f"{example_line(msg_type)}."
         ) from None
 
 
@@ -105,10 +107,10 @@ def from_data(msg_type: Any, data: Any) -> Any:
     Raises:
         MisfitError: an unknown field, or a value that does not fit its field.
     """
-    return _message(msg_type, data, "")
+    return _to_message(msg_type, data, "")
 
 
-def fields(msg_type: Any) -> Iterator[tuple[str, AbstractType]]:
+def message_fields(msg_type: Any) -> Iterator[tuple[str, AbstractType]]:
     """Yield (name, type) of each field, in the order of the definition."""
     for name, slot in all_fields(msg_type):
         if name != "structure_needs_at_least_one_member":
@@ -120,14 +122,14 @@ def all_fields(msg_type: Any) -> Iterator[tuple[str, AbstractType]]:
     yield from zip(msg_type.get_fields_and_field_types(), msg_type.SLOT_TYPES, strict=True)
 
 
-def example(msg_type: Any) -> str:
+def example_line(msg_type: Any) -> str:
     """Return a message of ``msg_type`` with its defaults, as one line of YAML."""
     return yaml_text.one_line(to_data(msg_type()))
 
 
 def class_of(slot: NamespacedType) -> Any:
     """Return the message class of a field that is a message itself."""
-    return _class("/".join((*slot.namespaces, slot.name)))
+    return _load_class("/".join((*slot.namespaces, slot.name)))
 
 
 def in_words(slot: AbstractType) -> str:
@@ -151,23 +153,24 @@ def in_words(slot: AbstractType) -> str:
 
 
 @cache
-def _class(name: str) -> Any:
+def _load_class(name: str) -> Any:
     from course.messages.types import load_type
 
     return load_type(name)
 
 
-def _message(msg_type: Any, data: Any, where: str) -> Any:
+def _to_message(msg_type: Any, data: Any, where: str) -> Any:
     if not isinstance(data, Mapping):
         raise MisfitError(
-            f"{_named(where, type_name(msg_type))} takes fields, as in {example(msg_type)}, not "
-            f"{yaml_text.shown(data)}."
+            f"{_describe_place(where, type_name(msg_type))} takes fields, as in "
+            f"{example_line(msg_type)}, not "
+            f"{yaml_text.short_repr(data)}."
         )
-    slots = dict(fields(msg_type))
+    slots = dict(message_fields(msg_type))
     for name in data:
         if name not in slots:
             raise MisfitError(
-                f"{type_name(msg_type)} has no field {yaml_text.shown(name)}: it has "
+                f"{type_name(msg_type)} has no field {yaml_text.short_repr(name)}: it has "
                 f"{', '.join(slots) or 'none'}."
             )
     message = msg_type()
@@ -177,7 +180,7 @@ def _message(msg_type: Any, data: Any, where: str) -> Any:
         try:
             setattr(message, name, fits)
         except (AssertionError, TypeError, ValueError, OverflowError):  # rosidl's own rules
-            raise _misfit(place, slots[name], given) from None
+            raise _misfit_error(place, slots[name], given) from None
     return message
 
 
@@ -188,18 +191,18 @@ def to_field(slot: AbstractType, value: Any, where: str) -> Any:
         MisfitError: it does not fit; the message calls the field ``where``.
     """
     if isinstance(slot, NamespacedType):
-        return _message(class_of(slot), value, where)
+        return _to_message(class_of(slot), value, where)
     if isinstance(slot, Array | AbstractSequence):
-        return _sequence(slot, value, where)
+        return _to_sequence(slot, value, where)
     if isinstance(slot, AbstractString | AbstractWString):
-        return _string(slot, value, where)
+        return _to_string(slot, value, where)
     assert isinstance(slot, BasicType)
-    return _basic(slot, value, where)
+    return _to_basic(slot, value, where)
 
 
-def _sequence(slot: Any, value: Any, where: str) -> Any:
+def _to_sequence(slot: Any, value: Any, where: str) -> Any:
     if not isinstance(value, list | tuple | bytes | array.array):
-        raise _misfit(where, slot, value)
+        raise _misfit_error(where, slot, value)
     size, bound = getattr(slot, "size", None), getattr(slot, "maximum_size", None)
     if size is not None and len(value) != size:
         raise MisfitError(f"{where} takes exactly {size} elements, not {len(value)}.")
@@ -208,9 +211,9 @@ def _sequence(slot: Any, value: Any, where: str) -> Any:
     return [to_field(slot.value_type, item, f"{where}[{n}]") for n, item in enumerate(value)]
 
 
-def _string(slot: Any, value: Any, where: str) -> str:
+def _to_string(slot: Any, value: Any, where: str) -> str:
     if not isinstance(value, str):
-        raise _misfit(where, slot, value)
+        raise _misfit_error(where, slot, value)
     bound = getattr(slot, "maximum_size", None)
     if bound and len(value) > bound:
         raise MisfitError(f"{where} takes at most {bound} characters, not {len(value)}.")
@@ -218,12 +221,12 @@ def _string(slot: Any, value: Any, where: str) -> str:
         # DDS would end the text at a NUL, and has no way to write half a character.
         raise MisfitError(
             f"{where} takes text without NUL and surrogate characters, not "
-            f"{yaml_text.shown(value)}."
+            f"{yaml_text.short_repr(value)}."
         )
     return value
 
 
-def _basic(slot: BasicType, value: Any, where: str) -> Any:
+def _to_basic(slot: BasicType, value: Any, where: str) -> Any:
     name = slot.typename
     if name == "boolean":
         if isinstance(value, bool):
@@ -233,22 +236,26 @@ def _basic(slot: BasicType, value: Any, where: str) -> Any:
             least, most = _INTEGERS[name]
             if least <= value <= most:
                 return bytes([value]) if name == "octet" else value
-            raise MisfitError(f"{where} takes {least} to {most}, not {yaml_text.shown(value)}.")
+            raise MisfitError(
+                f"{where} takes {least} to {most}, not {yaml_text.short_repr(value)}."
+            )
         if name == "octet" and isinstance(value, bytes) and len(value) == 1:
             return value
     elif isinstance(value, int | float) and not isinstance(value, bool):
         most = _FLOATS.get(name, math.inf)
         if -most <= value <= most or abs(value) == math.inf or value != value:
             return float(value)
-        raise MisfitError(f"{where} takes {-most:.7g} to {most:.7g}, not {yaml_text.shown(value)}.")
+        raise MisfitError(
+            f"{where} takes {-most:.7g} to {most:.7g}, not {yaml_text.short_repr(value)}."
+        )
     elif isinstance(value, str) and value.lower().lstrip("+-.") in ("nan", "inf", "infinity"):
         return float(value.replace(".", ""))
-    raise _misfit(where, slot, value)
+    raise _misfit_error(where, slot, value)
 
 
-def _misfit(where: str, slot: AbstractType, value: Any) -> MisfitError:
-    return MisfitError(f"{where} takes {in_words(slot)}, not {yaml_text.shown(value)}.")
+def _misfit_error(where: str, slot: AbstractType, value: Any) -> MisfitError:
+    return MisfitError(f"{where} takes {in_words(slot)}, not {yaml_text.short_repr(value)}.")
 
 
-def _named(where: str, name: str) -> str:
+def _describe_place(where: str, name: str) -> str:
     return f"{where} ({name})" if where else name

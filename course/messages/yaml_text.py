@@ -48,17 +48,17 @@ class _Dumper(yaml.SafeDumper):
         return True
 
 
-def _float(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
+def _construct_float(loader: yaml.SafeLoader, node: yaml.ScalarNode) -> float:
     value: float = loader.construct_yaml_float(node)
     if math.isinf(value) and "inf" not in node.value.lower():
         raise ValueError(f"{node.value[:20]} is more than a float64 can hold")
     return value
 
 
-_Loader.add_constructor("tag:yaml.org,2002:float", _float)
+_Loader.add_constructor("tag:yaml.org,2002:float", _construct_float)
 
 
-def read(text: str) -> Any:
+def parse_yaml(text: str) -> Any:
     """Return the plain data of a text in YAML, or in JSON.
 
     Raises:
@@ -85,7 +85,7 @@ def one_line(data: Any) -> str:
     return text.strip().removesuffix("\n...")
 
 
-def lines(data: Any) -> str:
+def to_lines(data: Any) -> str:
     """Return plain data as YAML, a line a field; it ends with the end of a line."""
     text: str = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True)
     return text
@@ -105,7 +105,7 @@ def for_json(data: Any) -> Any:
     return one_line(data) if isinstance(data, int) and abs(data) > _EXACT else data
 
 
-def shown(value: Any, longest: int = 60) -> str:
+def short_repr(value: Any, longest: int = 60) -> str:
     """Return any value as a sentence can name it, cut where it gets too long."""
     try:
         text = repr(value)
@@ -114,6 +114,6 @@ def shown(value: Any, longest: int = 60) -> str:
     return text if len(text) <= longest else f"{text[:longest]}…"
 
 
-def counted(number: int, what: str) -> str:
+def format_count(number: int, what: str) -> str:
     """Return a number of things in words: "1 node", "2 nodes"."""
     return f"{number} {what}{'' if number == 1 else 's'}"

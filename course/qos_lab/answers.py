@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 
 
-def private() -> Callable[[str], None]:
+def claim_stdout() -> Callable[[str], None]:
     """Take standard output away from everybody else; return a function that writes a line there.
 
     Fast DDS prints complaints about shared memory that a killed process has left behind.

@@ -27,7 +27,7 @@ from std_msgs.msg import UInt32
 
 from course.qos_lab import answers, link
 from course.qos_lab.experiment import COUNT, RATE, Experiment, Outcome
-from course.qos_lab.rules import reliable
+from course.qos_lab.rules import is_reliable
 from course.qos_lab.writer import TOPIC
 
 MATCH_TIMEOUT = 8.0
@@ -66,12 +66,12 @@ class Reader:
         self.ended = False
         self.gate = Gate()
         events = SubscriptionEventCallbacks(
-            incompatible_qos=self._incompatible, deadline=self._deadline,
-            liveliness=self._liveliness, matched=self._matched, use_default_callbacks=False,
+            incompatible_qos=self._on_incompatible, deadline=self._on_deadline,
+            liveliness=self._on_liveliness, matched=self._on_matched, use_default_callbacks=False,
         )  # fmt: skip
-        take: Any = self._take  # rclpy's annotation does not know of the second argument
+        take: Any = self._take_message  # rclpy's annotation does not know of the second argument
         self._subscription = self._node.create_subscription(
-            UInt32, TOPIC, take, experiment.requested.qos(), callback_group=self.gate,
+            UInt32, TOPIC, take, experiment.requested.to_rclpy(), callback_group=self.gate,
             event_callbacks=events,
         )  # fmt: skip
         self._executor.add_node(self._node)
@@ -94,11 +94,11 @@ class Reader:
                 self._executor.spin_once(timeout_sec=0.02)
 
     @property
-    def decided(self) -> bool:
+    def is_decided(self) -> bool:
         """Whether DDS has connected the two, or said why not."""
         return self._outcome.connected or bool(self._outcome.broken)
 
-    def _take(self, message: UInt32, info: dict[str, int]) -> None:
+    def _take_message(self, message: UInt32, info: dict[str, int]) -> None:
         if message.data == END:
             self.ended = True
             return
@@ -106,16 +106,16 @@ class Reader:
         late = (info["received_timestamp"] - info["source_timestamp"]) / 1e6
         self._outcome.latency_ms.append(round(late, 3))
 
-    def _matched(self, event: Any) -> None:
+    def _on_matched(self, event: Any) -> None:
         self._outcome.connected = self._outcome.connected or event.current_count > 0
 
-    def _incompatible(self, event: Any) -> None:
+    def _on_incompatible(self, event: Any) -> None:
         self._outcome.broken = qos_policy_name_from_kind(event.last_policy_kind)
 
-    def _deadline(self, event: Any) -> None:
+    def _on_deadline(self, event: Any) -> None:
         self._outcome.deadlines_missed = event.total_count
 
-    def _liveliness(self, event: Any) -> None:
+    def _on_liveliness(self, event: Any) -> None:
         if event.not_alive_count:
             self._outcome.liveliness_lost = True
 
@@ -130,7 +130,7 @@ class Writer:
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
 
-    def do(self, verb: str, value: Any) -> Any:
+    def carry_out(self, verb: str, value: Any) -> Any:
         """Have a line carried out; return the answer."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -143,7 +143,7 @@ class Writer:
 
     def do_beside(self, verb: str, value: Any) -> Callable[[], bool]:
         """Have a line carried out while the reader goes on; the result says whether it is done."""
-        thread = threading.Thread(target=self.do, args=(verb, value))
+        thread = threading.Thread(target=self.carry_out, args=(verb, value))
         thread.start()
         return lambda: not thread.is_alive()
 
@@ -164,100 +164,101 @@ class Bench:
     def __init__(self, experiment: Experiment, *, lossy: bool) -> None:
         """Prepare ``experiment``; ``lossy`` says that the link can drop packets."""
         self._experiment = experiment
-        self._outcome = Outcome(lossy=lossy and experiment.drops > 0)
+        self._outcome = Outcome(lossy=lossy and experiment.drop_percent > 0)
         self._context = Context()
         rclpy.init(args=[], context=self._context, signal_handler_options=SignalHandlerOptions.NO)
         self._writer = Writer()
 
     def run(self) -> Outcome:
         """Run it and return what was seen."""
-        self._writer.do("offer", vars(self._experiment.offered))
+        self._writer.carry_out("offer", vars(self._experiment.offered))
         {
-            "stream": self._stream, "late joiner": self._late_joiner, "slow reader": self._slow,
-            "deadline": self._deadline, "liveliness": self._liveliness,
+            "stream": self._run_stream, "late joiner": self._late_joiner,
+            "slow reader": self._run_slow,
+            "deadline": self._run_deadline, "liveliness": self._run_liveliness,
         }[self._experiment.scenario]()  # fmt: skip
         self._writer.end()
         self._context.try_shutdown()
         return self._outcome
 
-    def _connect(self, *, closed: bool = False) -> Reader | None:
+    def _connect_reader(self, *, closed: bool = False) -> Reader | None:
         reader = Reader(self._context, self._experiment, self._outcome)
         reader.gate.closed = closed
-        reader.spin_until(lambda: reader.decided, MATCH_TIMEOUT)
+        reader.spin_until(lambda: reader.is_decided, MATCH_TIMEOUT)
         if not self._outcome.connected:
             return None
-        self._writer.do("matched", MATCH_TIMEOUT)
+        self._writer.carry_out("matched", MATCH_TIMEOUT)
         return reader
 
-    def _stream(self) -> None:
-        if reader := self._connect():
-            self._lose(self._experiment.loss)
-            self._publish(reader)
-            self._lose(0)
-            self._collect(reader)
+    def _run_stream(self) -> None:
+        if reader := self._connect_reader():
+            self._set_loss(self._experiment.loss)
+            self._publish_messages(reader)
+            self._set_loss(0)
+            self._collect_rest(reader)
 
     def _late_joiner(self) -> None:
-        self._writer.do("publish", (0, COUNT, RATE * 4))
+        self._writer.carry_out("publish", (0, COUNT, RATE * 4))
         self._outcome.sent = COUNT
         # What is sent again comes in several packets. A reader that took the first message between
         # two of them would have room for one more, now and then.
-        if reader := self._connect(closed=True):
-            if reliable(self._experiment):
-                self._writer.do("acked", ACK_TIMEOUT)
+        if reader := self._connect_reader(closed=True):
+            if is_reliable(self._experiment):
+                self._writer.carry_out("acked", ACK_TIMEOUT)
             reader.gate.closed = False
-            self._collect(reader)
+            self._collect_rest(reader)
 
-    def _slow(self) -> None:
-        if reader := self._connect():
-            witness = self._witness()
-            self._lose(self._experiment.loss)
-            self._writer.do("publish", (0, COUNT, RATE * 4))
+    def _run_slow(self) -> None:
+        if reader := self._connect_reader():
+            witness = self._start_witness()
+            self._set_loss(self._experiment.loss)
+            self._writer.carry_out("publish", (0, COUNT, RATE * 4))
             self._outcome.sent = COUNT
-            self._lose(0)
-            if reliable(self._experiment):
-                self._writer.do("acked", ACK_TIMEOUT)
+            self._set_loss(0)
+            if is_reliable(self._experiment):
+                self._writer.carry_out("acked", ACK_TIMEOUT)
             witness()
             reader.drain()
 
-    def _deadline(self) -> None:
-        if reader := self._connect():
-            self._publish(reader, COUNT // 2)
+    def _run_deadline(self) -> None:
+        if reader := self._connect_reader():
+            self._publish_messages(reader, COUNT // 2)
             longest = self._experiment.requested.deadline or self._experiment.offered.deadline
             done = self._writer.do_beside("pause", 3 * longest or 0.3)
             reader.spin_until(done, 200.0)
-            self._publish(reader, COUNT - COUNT // 2, first=COUNT // 2)
-            self._collect(reader)
+            self._publish_messages(reader, COUNT - COUNT // 2, first=COUNT // 2)
+            self._collect_rest(reader)
 
-    def _liveliness(self) -> None:
-        if reader := self._connect():
-            self._publish(reader)
-            self._collect(reader)
+    def _run_liveliness(self) -> None:
+        if reader := self._connect_reader():
+            self._publish_messages(reader)
+            self._collect_rest(reader)
             lease = self._experiment.requested.lease or self._experiment.offered.lease
             reader.spin_until(lambda: self._outcome.liveliness_lost, 3 * lease or 0.3)
 
-    def _publish(self, reader: Reader, count: int = COUNT, first: int = 0) -> None:
+    def _publish_messages(self, reader: Reader, count: int = COUNT, first: int = 0) -> None:
         """Publish one message after the other, and let the reader look after each.
 
         So its queue is never long because the machine is busy: only the slow reader is slow.
         """
         for number in range(first, first + count):
             have = len(self._outcome.received)
-            self._writer.do("publish", (number, 1, RATE))
+            self._writer.carry_out("publish", (number, 1, RATE))
             reader.spin_until(lambda have=have: len(self._outcome.received) > have, 1 / RATE)  # type: ignore[misc]
         self._outcome.sent += count
 
-    def _collect(self, reader: Reader) -> None:
+    def _collect_rest(self, reader: Reader) -> None:
         """Take what is still on its way, until it is certain that nothing more will come."""
-        if reliable(self._experiment):
+        if is_reliable(self._experiment):
             done = self._writer.do_beside("acked", ACK_TIMEOUT)
             reader.spin_until(done, ACK_TIMEOUT + 1)
         else:
             # Nothing is repaired, and a message that is sent later comes later.
-            self._writer.do("publish", (END, 1, RATE))
+            self._writer.carry_out("publish", (END, 1, RATE))
             reader.spin_until(lambda: reader.ended, 2.0)
         reader.drain()
 
-    def _witness(self) -> Callable[[], None]:
+    def _start_witness(self) -> Callable[[], None]:
         """Return a function that waits until the last message has reached this process.
 
         Another subscription of the same participant gets each message with the reader's, which
@@ -284,14 +285,14 @@ class Bench:
         spin(lambda: subscription.get_publisher_count() > 0, MATCH_TIMEOUT)
         return lambda: spin(lambda: COUNT - 1 in seen, 2.0)
 
-    def _lose(self, percent: int) -> None:
+    def _set_loss(self, percent: int) -> None:
         if self._outcome.lossy:
-            link.lose(percent)
+            link.set_loss(percent)
 
 
 def main() -> None:
     """Run the process."""
-    answer = answers.private()
+    answer = answers.claim_stdout()
     lossy = "--link" in sys.argv
     if lossy:
         link.bring_up()

@@ -37,7 +37,7 @@ class Experiment:
     loss: int = 0
 
     @property
-    def drops(self) -> int:
+    def drop_percent(self) -> int:
         """The share of packets that the link drops in this scenario, in %."""
         return self.loss if self.scenario in LOSSY else 0
 
@@ -85,7 +85,7 @@ class Outcome:
         return self.received == sorted(self.received)
 
     @property
-    def missing(self) -> int:
+    def missing_count(self) -> int:
         """How many messages never came."""
         return self.sent - len(set(self.received))
 

@@ -38,7 +38,7 @@ class Processes:
         with self._lock:
             self.ended = True
             for process in self._running:
-                _kill(process)
+                _kill_group(process)
 
     @contextlib.contextmanager
     def start(
@@ -59,16 +59,16 @@ class Processes:
             finally:
                 with self._lock:
                     self._running.discard(process)
-                    _kill(process)
+                    _kill_group(process)
 
 
-def _kill(process: subprocess.Popen[str]) -> None:
+def _kill_group(process: subprocess.Popen[str]) -> None:
     """Kill a process with its group, unless it has ended of itself."""
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)
 
 
-def run(experiment: Experiment, processes: Processes | None = None) -> Outcome:
+def run_experiment(experiment: Experiment, processes: Processes | None = None) -> Outcome:
     """Run ``experiment`` and return what was seen; about two seconds, or longer with a loss.
 
     Args:
@@ -88,11 +88,11 @@ def run(experiment: Experiment, processes: Processes | None = None) -> Outcome:
     if not isinstance(loss, int) or not 0 <= loss <= 90:
         raise LabError(f"A link loses 0 to 90 % of its packets, a whole number, not {loss!r}.")
     remark = _no_loss(experiment)
-    lossy = bool(experiment.drops and not remark)
+    lossy = bool(experiment.drop_percent and not remark)
     command = [sys.executable, "-m", "course.qos_lab.bench"]
     lease = lease_domain()
     try:
-        environment = _environment(lease.domain_id, lossy=lossy)
+        environment = _process_environment(lease.domain_id, lossy=lossy)
         command = [*link.ENTER, *command, "--link"] if lossy else command
         with processes.start(command, environment) as process:
             said, complaints = process.communicate(experiment.to_json() + "\n", TIMEOUT)
@@ -113,12 +113,12 @@ def run(experiment: Experiment, processes: Processes | None = None) -> Outcome:
 
 def _no_loss(experiment: Experiment) -> str:
     """Return why the link loses nothing although it was to, as a sentence; empty if it does."""
-    if experiment.loss and not experiment.drops:
+    if experiment.loss and not experiment.drop_percent:
         return f"The link lost nothing here: it does so in {' and '.join(LOSSY)} only."
     return link.problem() if experiment.loss else ""
 
 
-def _environment(domain_id: int, *, lossy: bool) -> dict[str, str]:
+def _process_environment(domain_id: int, *, lossy: bool) -> dict[str, str]:
     environment = {
         **os.environ,
         "ROS_DOMAIN_ID": str(domain_id),

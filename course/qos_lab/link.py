@@ -27,13 +27,13 @@ _TIMEOUT = 10.0
 @cache
 def problem() -> str:
     """Return why there can be no loss here, as a sentence; empty if there can."""
-    missing = [tool for tool in _TOOLS if executables.find(tool) is None]
+    missing = [tool for tool in _TOOLS if executables.find_tool(tool) is None]
     if missing:
         return (
             f"A lossy link needs {', '.join(missing)}: install util-linux, iproute2 and nftables."
         )
     tried = subprocess.run(
-        [*ENTER, executables.find("nft") or "nft", "list", "tables"],
+        [*ENTER, executables.find_tool("nft") or "nft", "list", "tables"],
         capture_output=True,
         timeout=_TIMEOUT,
         check=False,
@@ -45,19 +45,19 @@ def problem() -> str:
 
 def bring_up() -> None:
     """Make the loopback of this namespace a network on which DDS finds its peers."""
-    _run("ip", "link", "set", "lo", "up", "multicast", "on")
-    _run("ip", "route", "add", "224.0.0.0/4", "dev", "lo")
-    _run("nft", "add table ip lab; add chain ip lab in { type filter hook input priority 0; }")
+    _run_tool("ip", "link", "set", "lo", "up", "multicast", "on")
+    _run_tool("ip", "route", "add", "224.0.0.0/4", "dev", "lo")
+    _run_tool("nft", "add table ip lab; add chain ip lab in { type filter hook input priority 0; }")
 
 
-def lose(percent: int) -> None:
+def set_loss(percent: int) -> None:
     """Drop ``percent`` of all UDP packets from now on; 0 drops none."""
     rules = "flush chain ip lab in"
     if percent:
         rules += f"; add rule ip lab in ip protocol udp numgen random mod 100 < {percent} drop"
-    _run("nft", rules)
+    _run_tool("nft", rules)
 
 
-def _run(tool: str, *arguments: str) -> None:
-    command = [executables.find(tool) or tool, *arguments]
+def _run_tool(tool: str, *arguments: str) -> None:
+    command = [executables.find_tool(tool) or tool, *arguments]
     subprocess.run(command, check=True, capture_output=True, timeout=_TIMEOUT)

@@ -67,7 +67,7 @@ class Profile:
                 raise ProfileError(f"{policy} is {least:g} to {most:g}, not {value!r}.")
 
     @classmethod
-    def of(cls, profile: QoSProfile) -> Profile:
+    def from_rclpy(cls, profile: QoSProfile) -> Profile:
         """Return the data of an rclpy profile.
 
         Raises:
@@ -75,9 +75,10 @@ class Profile:
         """
         return cls(
             profile.reliability.name, profile.durability.name, profile.history.name,
-            max(1, profile.depth), _seconds(profile.deadline), _seconds(profile.lifespan),
+            max(1, profile.depth),
+            _duration_seconds(profile.deadline), _duration_seconds(profile.lifespan),
             profile.liveliness.name if profile.liveliness else "AUTOMATIC",
-            _seconds(profile.liveliness_lease_duration),
+            _duration_seconds(profile.liveliness_lease_duration),
         )  # fmt: skip
 
     @classmethod
@@ -102,11 +103,11 @@ class Profile:
             ) from None
         return cls(**{**data, **numbers})
 
-    def data(self) -> dict[str, Any]:
+    def to_data(self) -> dict[str, Any]:
         """Return it as JSON data."""
         return asdict(self)
 
-    def qos(self) -> QoSProfile:
+    def to_rclpy(self) -> QoSProfile:
         """Return the rclpy profile."""
         times = {
             name: Duration(seconds=value)
@@ -138,6 +139,6 @@ class Profile:
         return ", ".join(parts + ([self.liveliness] if self.liveliness != "AUTOMATIC" else []))
 
 
-def _seconds(duration: Duration) -> float:
+def _duration_seconds(duration: Duration) -> float:
     seconds: float = duration.nanoseconds / 1e9
     return 0.0 if seconds > NUMBERS["deadline"][1] else seconds

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from course.graph.reader import incompatibilities
+from course.graph.reader import find_incompatibilities
 from course.qos_lab.experiment import COUNT, Experiment, Outcome
 from course.qos_lab.profile import Profile
 
@@ -23,9 +23,9 @@ class Rule:
     rule: str
 
 
-def compare(offered: Profile, requested: Profile) -> list[Rule]:
+def compare_profiles(offered: Profile, requested: Profile) -> list[Rule]:
     """Return every policy side by side with its rule (DDS 1.4, section 2.2.3)."""
-    broken = incompatibilities(offered.qos(), requested.qos())
+    broken = find_incompatibilities(offered.to_rclpy(), requested.to_rclpy())
     return [
         Rule(
             "reliability", offered.reliability, requested.reliability, "RELIABILITY" not in broken,
@@ -36,48 +36,50 @@ def compare(offered: Profile, requested: Profile) -> list[Rule]:
             "VOLATILE never satisfies a request for TRANSIENT_LOCAL; the other way round fits.",
         ),
         Rule(
-            "history", _queue(offered), _queue(requested), True,
+            "history", _format_queue(offered), _format_queue(requested), True,
             "Each side has a queue of its own: it never matters to connecting.",
         ),
         Rule(
-            "deadline", _span(offered.deadline), _span(requested.deadline),
+            "deadline", _format_span(offered.deadline), _format_span(requested.deadline),
             "DEADLINE" not in broken,
             "What is offered must not be longer than what is requested.",
         ),
         Rule(
-            "lifespan", _span(offered.lifespan), _span(requested.lifespan), True,
+            "lifespan", _format_span(offered.lifespan), _format_span(requested.lifespan), True,
             "Each side's queue drops what is older than its own. It never matters to connecting.",
         ),
         Rule(
-            "liveliness", _liveliness(offered), _liveliness(requested),
+            "liveliness", _format_liveliness(offered), _format_liveliness(requested),
             "LIVELINESS" not in broken,
             "AUTOMATIC never satisfies MANUAL_BY_TOPIC, and the offered lease must not be longer.",
         ),
     ]  # fmt: skip
 
 
-def connects(experiment: Experiment) -> bool:
+def can_connect(experiment: Experiment) -> bool:
     """Whether DDS connects the two."""
-    return all(rule.fits for rule in compare(experiment.offered, experiment.requested))
+    return all(rule.fits for rule in compare_profiles(experiment.offered, experiment.requested))
 
 
-def reliable(experiment: Experiment) -> bool:
+def is_reliable(experiment: Experiment) -> bool:
     """Whether the connection is reliable: both sides must want it."""
     return experiment.offered.reliability == experiment.requested.reliability == "RELIABLE"
 
 
-def explain(experiment: Experiment, outcome: Outcome) -> str:
+def explain_outcome(experiment: Experiment, outcome: Outcome) -> str:
     """Return why it came out so, in one or two sentences."""
     if not outcome.connected:
-        broken = [r for r in compare(experiment.offered, experiment.requested) if not r.fits]
+        broken = [
+            r for r in compare_profiles(experiment.offered, experiment.requested) if not r.fits
+        ]
         names = ", ".join(
             f"{r.policy} ({r.offered} offered, {r.requested} requested)" for r in broken
         )
         return f"DDS does not connect them: {names or 'no endpoint was found'}."
     if experiment.scenario == "late joiner":
-        return _late(experiment, outcome)
+        return _explain_late_joiner(experiment, outcome)
     if experiment.scenario == "slow reader":
-        return _slow(experiment, outcome)
+        return _explain_slow_reader(experiment, outcome)
     if experiment.scenario == "deadline":
         return (
             f"The reader was told {outcome.deadlines_missed} times that its deadline had passed."
@@ -86,54 +88,57 @@ def explain(experiment: Experiment, outcome: Outcome) -> str:
         )
     if experiment.scenario == "liveliness":
         return _liveliness_lost(experiment, outcome)
-    return _stream(experiment, outcome)
+    return _explain_stream(experiment, outcome)
 
 
-def _stream(experiment: Experiment, outcome: Outcome) -> str:
-    if not outcome.missing:
+def _explain_stream(experiment: Experiment, outcome: Outcome) -> str:
+    if not outcome.missing_count:
         repaired = " What the link dropped was sent again." if outcome.lossy else ""
-        return f"Every message arrived, in order.{repaired if reliable(experiment) else ''}"
-    if not reliable(experiment):
+        return f"Every message arrived, in order.{repaired if is_reliable(experiment) else ''}"
+    if not is_reliable(experiment):
         return (
-            f"Lost on the way: {outcome.missing}. A best-effort connection never sends anything "
-            f"twice.{_too_old(_lifespans(experiment))}"
+            f"Lost on the way: {outcome.missing_count}. A best-effort connection never sends "
+            "anything "
+            f"twice.{_too_old(_describe_lifespans(experiment))}"
         )
-    missing = f"Missing, although the connection is reliable: {outcome.missing}."
+    missing = f"Missing, although the connection is reliable: {outcome.missing_count}."
     return f"{missing} {_not_repaired(experiment)}"
 
 
 def _not_repaired(experiment: Experiment) -> str:
     """Return why a reliable connection did not bring what the link had lost."""
-    causes = _lifespans(experiment)
-    if _room(experiment.offered) < COUNT:
-        causes.insert(0, f"the writer's queue ({_queue(experiment.offered)})")
+    causes = _describe_lifespans(experiment)
+    if _queue_capacity(experiment.offered) < COUNT:
+        causes.insert(0, f"the writer's queue ({_format_queue(experiment.offered)})")
     if not causes:
         return "They had not been sent again when the experiment ended."
     return f"They were dropped before they could be sent again, by {' or '.join(causes)}."
 
 
-def _late(experiment: Experiment, outcome: Outcome) -> str:
-    if not _replays(experiment):
+def _explain_late_joiner(experiment: Experiment, outcome: Outcome) -> str:
+    if not _has_replay(experiment):
         return (
             "The late reader got nothing of the past: that needs TRANSIENT_LOCAL and RELIABLE on "
             "both sides. A topic stores nothing by itself."
         )
-    kept, fit = len(outcome.received), _replayed(experiment)
-    if kept < fit and _lifespans(experiment):
+    kept, fit = len(outcome.received), _replayed_count(experiment)
+    if kept < fit and _describe_lifespans(experiment):
         came = f"Of the writer's last messages {fit} would fit into both queues, and {kept} came."
-        return came + _too_old(_lifespans(experiment))
+        return came + _too_old(_describe_lifespans(experiment))
     return (
         "The writer had kept its last messages for late readers, and sent as many as fit into both "
         f"queues: {kept}."
     )
 
 
-def _slow(experiment: Experiment, outcome: Outcome) -> str:
+def _explain_slow_reader(experiment: Experiment, outcome: Outcome) -> str:
     kept = len(outcome.received)
     if kept == outcome.sent:
         return "The reader's queue was long enough: it found every message."
-    parts = [f"What was left in the reader's queue ({_queue(experiment.requested)}): {kept}."]
-    full = kept >= _room(experiment.requested)
+    parts = [
+        f"What was left in the reader's queue ({_format_queue(experiment.requested)}): {kept}."
+    ]
+    full = kept >= _queue_capacity(experiment.requested)
     newest = list(range(outcome.sent - kept, outcome.sent))
     if full:
         parts.append("Newer messages had pushed out older ones.")
@@ -145,12 +150,12 @@ def _slow(experiment: Experiment, outcome: Outcome) -> str:
 def _never_there(experiment: Experiment, outcome: Outcome) -> str:
     """Return why a slow reader's queue lacks messages that it had room for, if that is known."""
     parts = []
-    if outcome.lossy and reliable(experiment):
+    if outcome.lossy and is_reliable(experiment):
         parts.append(f"The link lost some. {_not_repaired(experiment)}")
     elif outcome.lossy:
         parts.append("The link lost some, and a best-effort connection never sends anything twice.")
     if experiment.requested.lifespan:
-        parts.append(_too_old(_lifespans(experiment)[-1:]).strip())
+        parts.append(_too_old(_describe_lifespans(experiment)[-1:]).strip())
     return " ".join(parts)
 
 
@@ -165,41 +170,41 @@ def _liveliness_lost(experiment: Experiment, outcome: Outcome) -> str:
     )
 
 
-def expected(experiment: Experiment) -> int | None:
+def expected_count(experiment: Experiment) -> int | None:
     """Return how many messages must arrive by the rules; None where chance has a say."""
-    if not connects(experiment):
+    if not can_connect(experiment):
         return 0
     offered, requested = experiment.offered, experiment.requested
-    if experiment.scenario == "late joiner" and not _replays(experiment):
+    if experiment.scenario == "late joiner" and not _has_replay(experiment):
         return 0
     if 0 < min(offered.lifespan or OUTLIVES, requested.lifespan or OUTLIVES) < OUTLIVES:
         return None  # it depends on how soon they come
     if experiment.scenario == "late joiner":
-        return _replayed(experiment)
-    if experiment.drops and not reliable(experiment):
+        return _replayed_count(experiment)
+    if experiment.drop_percent and not is_reliable(experiment):
         return None
     if experiment.scenario == "slow reader":
-        return None if experiment.drops else min(COUNT, _room(requested))
+        return None if experiment.drop_percent else min(COUNT, _queue_capacity(requested))
     # Lost messages are repaired only as long as the writer still has them.
-    return COUNT if not experiment.drops or _room(offered) >= COUNT else None
+    return COUNT if not experiment.drop_percent or _queue_capacity(offered) >= COUNT else None
 
 
-def _replays(experiment: Experiment) -> bool:
+def _has_replay(experiment: Experiment) -> bool:
     """Whether a late reader gets what was published before it came."""
     offered, requested = experiment.offered, experiment.requested
     both = offered.durability == requested.durability == "TRANSIENT_LOCAL"
-    return both and reliable(experiment)
+    return both and is_reliable(experiment)
 
 
-def _replayed(experiment: Experiment) -> int:
+def _replayed_count(experiment: Experiment) -> int:
     """Return how many messages of the past fit into both queues."""
-    return min(COUNT, _room(experiment.offered), _room(experiment.requested))
+    return min(COUNT, _queue_capacity(experiment.offered), _queue_capacity(experiment.requested))
 
 
-def _lifespans(experiment: Experiment) -> list[str]:
+def _describe_lifespans(experiment: Experiment) -> list[str]:
     """Return the lifespans that a side has set."""
     sides = (("writer", experiment.offered.lifespan), ("reader", experiment.requested.lifespan))
-    return [f"the {side}'s lifespan ({_span(span)})" for side, span in sides if span]
+    return [f"the {side}'s lifespan ({_format_span(span)})" for side, span in sides if span]
 
 
 def _too_old(lifespans: list[str]) -> str:
@@ -207,17 +212,21 @@ def _too_old(lifespans: list[str]) -> str:
     return f" What is older than {' or '.join(lifespans)} is dropped." if lifespans else ""
 
 
-def _room(profile: Profile) -> int:
+def _queue_capacity(profile: Profile) -> int:
     return profile.depth if profile.history == "KEEP_LAST" else 10**9
 
 
-def _queue(profile: Profile) -> str:
+def _format_queue(profile: Profile) -> str:
     return f"KEEP_LAST({profile.depth})" if profile.history == "KEEP_LAST" else "KEEP_ALL"
 
 
-def _span(seconds: float) -> str:
+def _format_span(seconds: float) -> str:
     return f"{seconds:g} s" if seconds else "none"
 
 
-def _liveliness(profile: Profile) -> str:
-    return f"{profile.liveliness}, {_span(profile.lease)}" if profile.lease else profile.liveliness
+def _format_liveliness(profile: Profile) -> str:
+    return (
+        f"{profile.liveliness}, {_format_span(profile.lease)}"
+        if profile.lease
+        else profile.liveliness
+    )

@@ -40,13 +40,13 @@ class Writer:
         self._publisher: Publisher | None = None
         self._never = threading.Event()
 
-    def obey(self, line: dict[str, Any]) -> Any:
+    def carry_out(self, line: dict[str, Any]) -> Any:
         """Carry one line out; return the answer."""
         ((verb, value),) = line.items()
         return getattr(self, f"_{verb}")(value)
 
     def _offer(self, profile: dict[str, Any]) -> bool:
-        self._publisher = self._node.create_publisher(UInt32, TOPIC, Profile(**profile).qos())
+        self._publisher = self._node.create_publisher(UInt32, TOPIC, Profile(**profile).to_rclpy())
         return True
 
     def _matched(self, seconds: float) -> bool:
@@ -76,13 +76,13 @@ class Writer:
 
 def main() -> None:
     """Run until standard input ends."""
-    answer = answers.private()
+    answer = answers.claim_stdout()
     context = Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
     node = Node("writer", context=context, enable_rosout=False, start_parameter_services=False)
     writer = Writer(node)
     for line in sys.stdin:
-        answer(json.dumps(writer.obey(json.loads(line))))
+        answer(json.dumps(writer.carry_out(json.loads(line))))
     node.destroy_node()
     context.try_shutdown()
 

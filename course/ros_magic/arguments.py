@@ -34,7 +34,7 @@ class _Done(Exception):  # noqa: N818 - the help has been shown
     pass
 
 
-def run(line: str) -> None:
+def run_line(line: str) -> None:
     """Run one line, such as ``topic info -v /scan``.
 
     Raises:
@@ -45,31 +45,31 @@ def run(line: str) -> None:
         words = shlex.split(line)
     except ValueError as error:
         raise UsageError(f"%ros {line}: {error}.") from None
-    noun = _one_of(nouns(), words[:1], "%ros", "NOUN VERB ...")
-    verb = noun and _one_of(nouns()[noun].VERBS, words[1:2], f"%ros {noun}", "VERB ...")
+    noun = _one_of(noun_modules(), words[:1], "%ros", "NOUN VERB ...")
+    verb = noun and _one_of(noun_modules()[noun].VERBS, words[1:2], f"%ros {noun}", "VERB ...")
     if not (noun and verb):
         return
     try:
         # Intermixed: people write options before, between and after what a command is about.
-        options = vars(parser(noun, verb).parse_intermixed_args(words[2:]))
+        options = vars(make_parser(noun, verb).parse_intermixed_args(words[2:]))
     except _Done:
         return
-    command, _ = nouns()[noun].VERBS[verb]
+    command, _ = noun_modules()[noun].VERBS[verb]
     if answer := command(**options):
         print(answer)  # noqa: T201 - the answer to the learner's line
 
 
 @functools.cache
-def nouns() -> Mapping[str, ModuleType]:
+def noun_modules() -> Mapping[str, ModuleType]:
     """Return the modules of all commands, by noun; each has ``VERBS``."""
     from course.ros_magic import actions, interfaces, nodes, parameters, services, topics
 
     return {one.NOUN: one for one in (topics, nodes, services, actions, parameters, interfaces)}
 
 
-def parser(noun: str, verb: str) -> _Parser:
+def make_parser(noun: str, verb: str) -> _Parser:
     """Return the parser of one command; its ``block`` is the usage, a line an argument."""
-    command, declare = nouns()[noun].VERBS[verb]
+    command, declare = noun_modules()[noun].VERBS[verb]
     made = _Parser(
         prog=f"%ros {noun} {verb}",
         description=(command.__doc__ or "").partition("\n")[0],
@@ -82,22 +82,22 @@ def parser(noun: str, verb: str) -> _Parser:
     return made
 
 
-def valued(noun: str, verb: str) -> set[str]:
+def valued_options(noun: str, verb: str) -> set[str]:
     """Return the options of a command that a value follows."""
     found: set[str] = set()
 
     def add(*names: str, action: str = "", **_: Any) -> None:
         found.update(name for name in names if name.startswith("-") and not action)
 
-    if noun in nouns() and verb in nouns()[noun].VERBS:
-        nouns()[noun].VERBS[verb][1](add)
+    if noun in noun_modules() and verb in noun_modules()[noun].VERBS:
+        noun_modules()[noun].VERBS[verb][1](add)
     return found
 
 
 def _one_of(known: Mapping[str, Any], words: list[str], so_far: str, rest: str) -> str:
     """Return the word, if it is known; "" if it has asked for help, which is then shown."""
     lines = [f"usage: {so_far} {rest}", ""]
-    lines += [f"  {name:<12}{_about(thing)}" for name, thing in known.items()]
+    lines += [f"  {name:<12}{_doc_summary(thing)}" for name, thing in known.items()]
     block = "\n".join(line for line in lines if line)
     word = words[0] if words else ""
     if word in known:
@@ -105,11 +105,11 @@ def _one_of(known: Mapping[str, Any], words: list[str], so_far: str, rest: str) 
     if word in ("-h", "--help"):
         print(block)  # noqa: T201 - the answer to `%ros -h`
         return ""
-    missing = f"{yaml_text.shown(word)} is none of its words" if word else "A word is missing"
+    missing = f"{yaml_text.short_repr(word)} is none of its words" if word else "A word is missing"
     raise UsageError(f"{missing} after {so_far}.\n{block}")
 
 
-def _about(thing: Any) -> str:
+def _doc_summary(thing: Any) -> str:
     """Return the first line about a noun's module or a verb's function."""
     about = thing[0] if isinstance(thing, tuple) else thing
     return (about.__doc__ or "").partition("\n")[0]

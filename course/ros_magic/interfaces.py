@@ -16,12 +16,12 @@ NOUN = "interface"
 
 def show(asked: str, no_comments: bool = True) -> str:
     """Show the definition of an interface; what is nested is indented."""
-    return "\n".join(definition(asked))
+    return "\n".join(definition_lines(asked))
 
 
 def list_(package: str = "", only: str = "") -> str:
     """List the installed interfaces, or those of one package or kind."""
-    known = installed.interfaces()
+    known = installed.read_index()
     if package and package not in known:
         raise SessionError(f"There is no package {package} with interfaces here.")
     return "\n".join(
@@ -34,55 +34,55 @@ def list_(package: str = "", only: str = "") -> str:
 
 def packages() -> str:
     """List the packages that define interfaces."""
-    return "\n".join(sorted(installed.interfaces()))
+    return "\n".join(sorted(installed.read_index()))
 
 
 def proto(asked: str) -> str:
     """Show a message, request or goal with its defaults, to be edited."""
-    cls = _load(asked)
-    return f'"{values.example(getattr(cls, "Request", getattr(cls, "Goal", cls)))}"'
+    cls = _load_interface(asked)
+    return f'"{values.example_line(getattr(cls, "Request", getattr(cls, "Goal", cls)))}"'
 
 
-def definition(name: str) -> list[str]:
+def definition_lines(name: str) -> list[str]:
     """Return an interface's fields, a line each, with the fields of nested messages below.
 
     Raises:
         SessionError: there is no such interface here.
     """
-    cls = _load(name)
+    cls = _load_interface(name)
     kinds = (("Goal", "Result", "Feedback"), ("Request", "Response"))
     named = next((names for names in kinds if hasattr(cls, names[0])), ())
     parts = [getattr(cls, part) for part in named] or [cls]
     lines: list[str] = []
     for number, part in enumerate(parts):
         lines += ["---"] if number else []
-        lines += _fields(part, "")
+        lines += _field_lines(part, "")
     return lines
 
 
-def _load(name: str) -> Any:
+def _load_interface(name: str) -> Any:
     """Return the class of an interface; of a kind that is left out, the first that there is.
 
     Raises:
         SessionError: there is none.
     """
     package, slash, last = name.partition("/")
-    known = installed.interfaces().get(package, ())
+    known = installed.read_index().get(package, ())
     kinds = [kind for kind in ("msg", "srv", "action") if f"{kind}/{last}" in known]
     return load_type(f"{package}/{kinds[0]}/{last}" if slash and kinds else name)
 
 
-def _fields(msg_type: Any, indent: str) -> list[str]:
+def _field_lines(msg_type: Any, indent: str) -> list[str]:
     lines = []
-    for name, slot in values.fields(msg_type):
+    for name, slot in values.message_fields(msg_type):
         lines.append(f"{indent}{values.in_words(slot)} {name}")
         inner = getattr(slot, "value_type", slot)
         if hasattr(inner, "namespaces"):
-            lines += _fields(values.class_of(inner), indent + "\t")
-    return [indent + constant for constant in _constants(msg_type)] + lines
+            lines += _field_lines(values.class_of(inner), indent + "\t")
+    return [indent + constant for constant in _constant_lines(msg_type)] + lines
 
 
-def _constants(msg_type: Any) -> list[str]:
+def _constant_lines(msg_type: Any) -> list[str]:
     """Return a line for each constant; Python knows no more of its type than that it is an int."""
     found = getattr(type(msg_type), f"_Metaclass_{msg_type.__name__}__constants", {})
     package, kind, name = type_name(msg_type).split("/")

@@ -10,13 +10,13 @@ from course import default_session
 from course.errors import SessionError, WaitTimeout
 from course.messages import values, yaml_text
 from course.ros_magic.options import Add
-from course.ros_magic.options import timeout as add_timeout
-from course.ros_magic.qos import declare as declare_qos
-from course.ros_magic.qos import profile
+from course.ros_magic.options import declare_timeout as add_timeout
+from course.ros_magic.qos import declare_options as declare_qos
+from course.ros_magic.qos import profile_from_options
 from course.ros_magic.types import message_type
 from course.runtime.requests.graph_queries import full_topic
 from course.runtime.waiting import Deadline
-from course.util.arguments import seconds, whole
+from course.util.arguments import check_seconds, check_whole_number
 
 _ENOUGH = 20  # messages for a rate that one late message does not spoil
 
@@ -26,35 +26,35 @@ def echo(
     **qos: Any,
 ) -> str:  # fmt: skip
     """Show the next message of a topic; -n for more."""
-    whole(count, "-n", least=1, example=1)
-    longest = whole(longest, "-l", least=0, example=128)
+    check_whole_number(count, "-n", least=1, example=1)
+    longest = check_whole_number(longest, "-l", least=0, example=128)
     msg_type = message_type(topic, asked) if asked else None
-    deadline = Deadline(seconds(timeout))
+    deadline = Deadline(check_seconds(timeout))
     with default_session.record(
-        topic, msg_type, limit=count, timeout=timeout, qos=profile(qos, "sensor_data")
+        topic, msg_type, limit=count, timeout=timeout, qos=profile_from_options(qos, "sensor_data")
     ) as recorder:
         try:
-            messages = recorder.wait(count, round(deadline.left, 2))
+            messages = recorder.wait(count, round(deadline.seconds_left, 2))
         except WaitTimeout:
             messages = recorder.messages
             if not messages:
                 raise
-    shown = [_part(stamped.message, field) for stamped in messages[:count]]
+    shown = [_field_value(stamped.message, field) for stamped in messages[:count]]
     # A longest of 0 keeps all.
     data = [values.to_plain(part, longest or None) for part in shown]
     if flow_style:
         return "\n---\n".join(yaml_text.one_line(one) for one in data)
-    return "---\n".join(yaml_text.lines(one).removesuffix("...\n") for one in data)
+    return "---\n".join(yaml_text.to_lines(one).removesuffix("...\n") for one in data)
 
 
-def _part(message: Any, field: str) -> Any:
+def _field_value(message: Any, field: str) -> Any:
     """Return what a path such as ``pose.position.x`` stands for in a message."""
     part = message
     for name in field.split(".") if field else ():
-        known = [slot for slot, _ in values.fields(type(part))] if _is_message(part) else []
+        known = [slot for slot, _ in values.message_fields(type(part))] if _is_message(part) else []
         if name not in known:
             raise SessionError(
-                f"--field {field}: {yaml_text.shown(name)} is no field there, it has "
+                f"--field {field}: {yaml_text.short_repr(name)} is no field there, it has "
                 f"{', '.join(known) or 'none'}."
             )
         part = getattr(part, name)
@@ -67,11 +67,11 @@ def _is_message(part: Any) -> bool:
 
 def hz(topic: str, window: int, timeout: float) -> str:
     """Measure the rate at which messages are published."""
-    whole(window, "--window", least=2, example=_ENOUGH)
-    deadline = Deadline(seconds(timeout))
+    check_whole_number(window, "--window", least=2, example=_ENOUGH)
+    deadline = Deadline(check_seconds(timeout))
     with default_session.record(topic, timeout=timeout, limit=window) as recorder:
         try:
-            recorder.wait(window, round(deadline.left, 2))
+            recorder.wait(window, round(deadline.seconds_left, 2))
         except WaitTimeout as error:
             if recorder.count < 2:
                 raise _too_few(error, recorder.count, topic, timeout) from None

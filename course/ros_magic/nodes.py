@@ -15,32 +15,34 @@ NOUN = "node"
 
 def list_(everything: bool = False, count: bool = False) -> str:
     """List the nodes."""
-    nodes = _graph(everything).nodes
+    nodes = _read_graph(everything).nodes
     return str(len(nodes)) if count else "\n".join(nodes) or "No nodes."
 
 
 def info(node: str) -> str:
     """Show a node's publishers, subscriptions, services and actions."""
-    graph = _graph(everything=True)
+    graph = _read_graph(everything=True)
     name = node if node.startswith("/") else f"/{node}"
     if name not in graph.nodes:
-        shown = ", ".join(_graph().nodes)
+        shown = ", ".join(_read_graph().nodes)
         raise SessionError(f"There is no node {name}: there are {shown or 'none'}.")
     ends = [(t.name, e) for t in graph.topics for e in (*t.publishers, *t.subscriptions)]
     lines = [name]
-    lines += _endpoints("Publishers", name, (e for e in ends if e[1].role == "publisher"))
-    lines += _endpoints("Subscriptions", name, (e for e in ends if e[1].role == "subscription"))
+    lines += _endpoint_lines("Publishers", name, (e for e in ends if e[1].role == "publisher"))
+    lines += _endpoint_lines(
+        "Subscriptions", name, (e for e in ends if e[1].role == "subscription")
+    )
     for what, exchanges in (("Service", graph.services), ("Action", graph.actions)):
-        lines += _sides(what, name, exchanges)
+        lines += _exchange_lines(what, name, exchanges)
     return "\n".join(lines)
 
 
-def _endpoints(title: str, node: str, ends: Iterable[tuple[str, Endpoint]]) -> list[str]:
+def _endpoint_lines(title: str, node: str, ends: Iterable[tuple[str, Endpoint]]) -> list[str]:
     own = [f"    {topic}: {end.type}" for topic, end in ends if end.node == node]
     return [f"  {title}:", *dict.fromkeys(own)] if own else []
 
 
-def _sides(what: str, node: str, exchanges: tuple[Exchange, ...]) -> list[str]:
+def _exchange_lines(what: str, node: str, exchanges: tuple[Exchange, ...]) -> list[str]:
     lines = []
     for title, side in (("servers", "servers"), ("clients", "clients")):
         own = [x for x in exchanges if node in getattr(x, side)]
@@ -49,9 +51,9 @@ def _sides(what: str, node: str, exchanges: tuple[Exchange, ...]) -> list[str]:
     return lines
 
 
-def _graph(everything: bool = False) -> Graph:
+def _read_graph(everything: bool = False) -> Graph:
     session = default_session.session()
-    return reader.read(session.observer, everything=everything)
+    return reader.read_graph(session.observer, everything=everything)
 
 
 def _declare_list(add: Add) -> None:

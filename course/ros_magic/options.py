@@ -15,13 +15,13 @@ Add = Callable[..., Any]
 """``argparse.ArgumentParser.add_argument``, with which a command declares what it takes."""
 
 
-def timeout(add: Add, default: float = TIMEOUT) -> None:
+def declare_timeout(add: Add, default: float = TIMEOUT) -> None:
     """Declare ``--timeout``."""
     add("--timeout", type=float, default=default, metavar="S", help="seconds to wait at most")
 
 
 def type_and_values(add: Add, example: str, values: str) -> None:
-    """Declare TYPE and VALUES, both of which may be left out; `operands` tells them apart."""
+    """Declare TYPE and VALUES, both of which may be left out; `split_operands` tells them apart."""
     add("asked", nargs="?", default="", metavar="TYPE",
         help=f"as in {example}; may be left out if the graph knows it")  # fmt: skip
     add("text", nargs="?", default="", metavar="VALUES",
@@ -29,7 +29,7 @@ def type_and_values(add: Add, example: str, values: str) -> None:
     add("--type", dest="named", default="", metavar="TYPE", help=argparse.SUPPRESS)
 
 
-def operands(asked: str, text: str, named: str) -> tuple[str, str]:
+def split_operands(asked: str, text: str, named: str) -> tuple[str, str]:
     """Return (type, values) of what was given for `type_and_values`.
 
     A lone word is the type if it has the form of one: such a text is no YAML of any message.

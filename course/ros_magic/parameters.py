@@ -21,7 +21,7 @@ def list_(node: str = "") -> str:
     if node:
         return "\n".join([f"{full_node(node)}:", *(f"  {name}" for name in names_of(node))])
     lines = []
-    for name in reader.read(default_session.session().observer).nodes:
+    for name in reader.read_graph(default_session.session().observer).nodes:
         lines.append(f"{name}:")
         try:
             lines += [f"  {parameter}" for parameter in names_of(name, 1.0)]
@@ -37,16 +37,18 @@ def names_of(node: str, timeout: float = 5.0) -> list[str]:
         SessionError: there is no such node, or it has no parameter services.
         WaitTimeout: it does not answer.
     """
-    return _sheet(node).names(timeout)
+    return _parameter_sheet(node).list_names(timeout)
 
 
 def describe(node: str, names: list[str]) -> str:
     """Show what parameters are for, their type and range."""
-    sheet = _sheet(node)
-    return "\n".join(line for name in names for line in _described(name, sheet.describe(name)))
+    sheet = _parameter_sheet(node)
+    return "\n".join(
+        line for name in names for line in _description_lines(name, sheet.describe(name))
+    )
 
 
-def _described(name: str, found: ParameterDescriptor) -> list[str]:
+def _description_lines(name: str, found: ParameterDescriptor) -> list[str]:
     kind = TYPES.get(found.type, (0, "any type, or none yet"))[1]
     lines = [f"Parameter name: {name}", f"  Type: {kind}"]
     if found.description:
@@ -62,7 +64,7 @@ def _described(name: str, found: ParameterDescriptor) -> list[str]:
 
 def get(node: str, name: str, hide_type: bool = True) -> str:
     """Show a parameter's value."""
-    value = _sheet(node).get(name)
+    value = _parameter_sheet(node).get(name)
     if value is None:
         return f"{name} of {full_node(node)} has no value yet."
     return value if isinstance(value, str) else yaml_text.one_line(value)
@@ -70,28 +72,28 @@ def get(node: str, name: str, hide_type: bool = True) -> str:
 
 def set_(node: str, name: str, value: str) -> str:
     """Change a parameter; a value that the node refuses comes back with its reason."""
-    sheet = _sheet(node)
+    sheet = _parameter_sheet(node)
     try:
-        sheet.set(name, _unquoted(value))
+        sheet.set(name, _strip_quotes(value))
     except RefusedError as refusal:
         return str(refusal)
     return f"{sheet.node}: {name} is now {get(node, name)}"
 
 
-def _unquoted(value: str) -> str:
+def _strip_quotes(value: str) -> str:
     """Return a text without quotes of its own: to YAML '"5"' is the text 5, not a number."""
     if value[:1] in ("'", '"'):
         try:
-            return str(yaml_text.read(value))
+            return str(yaml_text.parse_yaml(value))
         except ValueError:
             pass
     return value
 
 
-def _sheet(node: str) -> ParameterSheet:
+def _parameter_sheet(node: str) -> ParameterSheet:
     session, name = default_session.session(), full_node(node)
-    if name not in reader.read(session.observer, everything=True).nodes:
-        shown = ", ".join(reader.read(session.observer).nodes)
+    if name not in reader.read_graph(session.observer, everything=True).nodes:
+        shown = ", ".join(reader.read_graph(session.observer).nodes)
         raise SessionError(f"There is no node {name}: there are {shown or 'none'}.")
     if not session.observer.count_services(f"{name}/list_parameters"):
         raise SessionError(

@@ -14,7 +14,7 @@ from rclpy.qos import (
 )
 
 from course.ros_magic.options import Add
-from course.util.arguments import whole
+from course.util.arguments import check_whole_number
 
 _POLICIES = {
     "reliability": QoSReliabilityPolicy,
@@ -23,7 +23,7 @@ _POLICIES = {
 }
 
 
-def declare(add: Add) -> None:
+def declare_options(add: Add) -> None:
     """Declare the options."""
     presets = [key for key in QoSPresetProfiles.short_keys() if key != "unknown"]
     add("--qos-profile", choices=presets, metavar="NAME", help="a preset, such as sensor_data")
@@ -33,7 +33,7 @@ def declare(add: Add) -> None:
     add("--qos-depth", type=int, metavar="N", help="of the history, with keep_last")
 
 
-def profile(asked: Mapping[str, Any], preset: str) -> QoSProfile | None:
+def profile_from_options(asked: Mapping[str, Any], preset: str) -> QoSProfile | None:
     """Return the profile that the options ask for; None if none of them was given.
 
     Args:
@@ -49,5 +49,7 @@ def profile(asked: Mapping[str, Any], preset: str) -> QoSProfile | None:
         if (key := given.get(f"qos_{policy}")) is not None:
             policies[policy] = kinds.get_from_short_key(key)
     if "qos_depth" in given:
-        policies["depth"] = whole(given["qos_depth"], "--qos-depth", least=1, example=10)
+        policies["depth"] = check_whole_number(
+            given["qos_depth"], "--qos-depth", least=1, example=10
+        )
     return QoSProfile(**policies)

@@ -6,12 +6,12 @@ import math
 
 from course.errors import SessionError
 from course.ros_magic.options import TIMEOUT, Add
-from course.util.arguments import whole
+from course.util.arguments import check_whole_number
 
 MOST_A_SECOND = 1000.0
 
 
-def declare(add: Add, what: str) -> None:
+def declare_repetitions(add: Add, what: str) -> None:
     """Declare the options of a command that can ``what`` more than once."""
     add("-1", "--once", action="store_true", help=f"{what} once, as without -r and -t")
     add("-t", "--times", type=int, metavar="N", help=f"{what} N times, once a second without -r")
@@ -24,7 +24,7 @@ def declare_rate(add: Add, what: str) -> None:
         help=f"{what} N times a second, for {TIMEOUT:g} s: no cell runs for ever")  # fmt: skip
 
 
-def repetitions(once: bool, times: int | None, rate: float | None) -> tuple[int, float]:
+def parse_repetitions(once: bool, times: int | None, rate: float | None) -> tuple[int, float]:
     """Return (how often, how many times a second) for the options.
 
     Raises:
@@ -37,7 +37,7 @@ def repetitions(once: bool, times: int | None, rate: float | None) -> tuple[int,
             f"--rate is above 0 and at most {MOST_A_SECOND:g} a second, not {rate:g}."
         )
     if times is not None:
-        whole(times, "--times", least=1, example=3)
+        check_whole_number(times, "--times", least=1, example=3)
     if once or (times is None and rate is None):
         return 1, 1.0
     rate = rate or 1.0

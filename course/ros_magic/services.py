@@ -10,10 +10,10 @@ from course.graph import reader
 from course.graph.model import Exchange
 from course.messages import values, yaml_text
 from course.messages.types import load_type, type_name
-from course.ros_magic.options import Add, operands, type_and_values
-from course.ros_magic.options import timeout as add_timeout
-from course.ros_magic.repetitions import declare_rate, repetitions
-from course.ros_magic.types import agreed, message
+from course.ros_magic.options import Add, split_operands, type_and_values
+from course.ros_magic.options import declare_timeout as add_timeout
+from course.ros_magic.repetitions import declare_rate, parse_repetitions
+from course.ros_magic.types import agreed_type, build_message
 from course.runtime.requests.graph_queries import full_service
 
 NOUN = "service"
@@ -21,7 +21,7 @@ NOUN = "service"
 
 def list_(show_types: bool = False, everything: bool = False, count: bool = False) -> str:
     """List the services."""
-    services = [service for service in _services(everything) if service.servers]
+    services = [service for service in _read_services(everything) if service.servers]
     if count:
         return str(len(services))
     return (
@@ -37,20 +37,20 @@ def call(
     service: str, asked: str, text: str, named: str, rate: float | None, timeout: float
 ) -> str:
     """Call a service and show its response; -r to call it more than once."""
-    asked, text = operands(asked, text, named)
+    asked, text = split_operands(asked, text, named)
     name = full_service(default_session.session().observer, service)
-    on_graph = [known.type for known in _services(everything=True) if known.name == name]
+    on_graph = [known.type for known in _read_services(everything=True) if known.name == name]
     if not (asked or on_graph):
         raise _no_service(name)
-    srv_type = agreed("srv", name, asked, on_graph)
-    number, rate = repetitions(False, None, rate)
+    srv_type = agreed_type("srv", name, asked, on_graph)
+    number, rate = parse_repetitions(False, None, rate)
     answers: list[str] = []
     session = default_session.session()
     with contextlib.suppress(KeyboardInterrupt) if number > 1 else contextlib.nullcontext():
         for _ in session.paced(number, rate):
-            request = message(srv_type.Request, text, session)
+            request = build_message(srv_type.Request, text, session)
             response = session.call(srv_type, name, request, timeout)
-            answers.append(yaml_text.lines(values.to_data(response)).strip())
+            answers.append(yaml_text.to_lines(values.to_data(response)).strip())
     return "\n---\n".join(answers)
 
 
@@ -61,7 +61,7 @@ def show_type(service: str) -> str:
 
 def info(service: str) -> str:
     """Show a service's type, and how many nodes serve and use it."""
-    found = _service(service)
+    found = _find_service(service)
     return (
         f"Type: {found.type}\nClients count: {len(found.clients)}\n"
         f"Services count: {len(found.servers)}"
@@ -71,7 +71,7 @@ def info(service: str) -> str:
 def find(asked: str) -> str:
     """List the services of a type."""
     wanted = type_name(load_type(asked, kind="srv"))
-    found = [service.name for service in _services(everything=True) if service.type == wanted]
+    found = [service.name for service in _read_services(everything=True) if service.type == wanted]
     return "\n".join(found) or f"No service is of type {wanted}."
 
 
@@ -81,23 +81,23 @@ def type_of(service: str) -> str:
     Raises:
         SessionError: nobody does; the message names the services there are.
     """
-    return _service(service).type
+    return _find_service(service).type
 
 
-def _service(service: str) -> Exchange:
+def _find_service(service: str) -> Exchange:
     name = full_service(default_session.session().observer, service)
-    for known in _services(everything=True):
+    for known in _read_services(everything=True):
         if known.name == name:
             return known
     raise _no_service(name)
 
 
-def _services(everything: bool) -> tuple[Exchange, ...]:
-    return reader.read(default_session.session().observer, everything=everything).services
+def _read_services(everything: bool) -> tuple[Exchange, ...]:
+    return reader.read_graph(default_session.session().observer, everything=everything).services
 
 
 def _no_service(name: str) -> SessionError:
-    shown = ", ".join(service.name for service in _services(everything=False))
+    shown = ", ".join(service.name for service in _read_services(everything=False))
     return SessionError(f"There is no service {name}: there are {shown or 'none'}.")
 
 

@@ -15,14 +15,14 @@ from course.messages import yaml_text
 from course.messages.types import load_type, type_name
 from course.messages.values import to_data
 from course.ros_magic import listening
-from course.ros_magic.options import Add, operands, type_and_values
-from course.ros_magic.options import timeout as add_timeout
-from course.ros_magic.qos import declare as declare_qos
-from course.ros_magic.qos import profile
-from course.ros_magic.repetitions import declare as add_repetitions
-from course.ros_magic.repetitions import repetitions
-from course.ros_magic.types import message, message_type
-from course.util.arguments import whole
+from course.ros_magic.options import Add, split_operands, type_and_values
+from course.ros_magic.options import declare_timeout as add_timeout
+from course.ros_magic.qos import declare_options as declare_qos
+from course.ros_magic.qos import profile_from_options
+from course.ros_magic.repetitions import declare_repetitions as add_repetitions
+from course.ros_magic.repetitions import parse_repetitions
+from course.ros_magic.types import build_message, message_type
+from course.util.arguments import check_whole_number
 
 NOUN = "topic"
 
@@ -31,47 +31,47 @@ def list_(
     show_types: bool = False, everything: bool = False, count: bool = False, verbose: bool = False
 ) -> str:
     """List the topics."""
-    topics = _graph(everything).topics
+    topics = _read_graph(everything).topics
     if count:
         return str(len(topics))
     if not verbose:
-        return "\n".join(_line(topic, show_types) for topic in topics) or "No topics."
+        return "\n".join(_topic_line(topic, show_types) for topic in topics) or "No topics."
     lines = []
     for what, side in (("Published", "publishers"), ("Subscribed", "subscriptions")):
         lines.append(f"{what} topics:")
         for topic in topics:
             if ends := getattr(topic, side):
-                counted = yaml_text.counted(len(ends), side.removesuffix("s"))
-                lines.append(f" * {_line(topic, True)} {counted}")
+                counted = yaml_text.format_count(len(ends), side.removesuffix("s"))
+                lines.append(f" * {_topic_line(topic, True)} {counted}")
     return "\n".join(lines)
 
 
-def _line(topic: Topic, show_types: bool) -> str:
+def _topic_line(topic: Topic, show_types: bool) -> str:
     return f"{topic.name} [{', '.join(topic.types)}]" if show_types else topic.name
 
 
 def show_type(topic: str) -> str:
     """Show a topic's type."""
-    return "\n".join(_topic(topic).types)
+    return "\n".join(_find_topic(topic).types)
 
 
 def find(asked: str) -> str:
     """List the topics of a type."""
     wanted = type_name(load_type(asked, kind="msg"))
-    found = [topic.name for topic in _graph(everything=True).topics if wanted in topic.types]
+    found = [topic.name for topic in _read_graph(everything=True).topics if wanted in topic.types]
     return "\n".join(found) or f"No topic is of type {wanted}."
 
 
 def info(topic: str, verbose: bool = False) -> str:
     """Show a topic's type and endpoints; -v with the QoS of each."""
-    found = _topic(topic)
+    found = _find_topic(topic)
     lines = [f"Type: {', '.join(found.types)}"]
     for what, ends in (("Publisher", found.publishers), ("Subscription", found.subscriptions)):
         lines.append(f"{what} count: {len(ends)}")
         for end in ends if verbose else ():
             lines += [f"  Node: {end.node}", f"  Type: {end.type}"]
             lines += [f"    {policy}: {value}" for policy, value in end.qos.items()]
-    lines += [f"! {words.mismatch(found.name, pair)}" for pair in found.mismatches]
+    lines += [f"! {words.describe_mismatch(found.name, pair)}" for pair in found.mismatches]
     return "\n".join(lines)
 
 
@@ -81,46 +81,51 @@ def pub(
 ) -> str:  # fmt: skip
     """Publish one message, once a subscription is there to get it; -r and -t for more."""
     session = default_session.session()
-    asked, text = operands(asked, text, named)
+    asked, text = split_operands(asked, text, named)
     msg_type = message_type(topic, asked)
-    number, rate = repetitions(once, times, rate)
+    number, rate = parse_repetitions(once, times, rate)
     endless = number > 1 and times is None
     least = subscriptions if subscriptions is not None else 0 if endless else 1
-    whole(least, "-w", least=0, example=1)
-    offered = profile(qos, "default") or QoSProfile(depth=10)
-    sent = message(msg_type, text, session)
+    check_whole_number(least, "-w", least=0, example=1)
+    offered = profile_from_options(qos, "default") or QoSProfile(depth=10)
+    sent = build_message(msg_type, text, session)
     if number == least == 1:
         session.publish(topic, sent, qos=offered, timeout=timeout)
         return f"Published on {topic}: {to_data(sent)}"
     done, others = 0, 0
     with session.publisher(msg_type, topic, qos=offered, timeout=timeout) as publisher:
-        waited = f"{yaml_text.counted(least, 'subscription')} of {topic} with a QoS that fits"
+        waited = f"{yaml_text.format_count(least, 'subscription')} of {topic} with a QoS that fits"
         session.until(lambda: publisher.get_subscription_count() >= least, timeout, waited)
         with contextlib.suppress(KeyboardInterrupt):
             for number_sent in session.paced(number, rate):
-                sent = message(msg_type, text, session)
+                sent = build_message(msg_type, text, session)
                 publisher.publish(sent)
                 done, others = number_sent, max(others, publisher.get_subscription_count())
-    heard = yaml_text.counted(others, "subscription") if others else "nobody: no subscription fits"
-    return f"Published {yaml_text.counted(done, 'message')} on {topic}, to {heard}: {to_data(sent)}"
+    heard = (
+        yaml_text.format_count(others, "subscription") if others else "nobody: no subscription fits"
+    )
+    return (
+        f"Published {yaml_text.format_count(done, 'message')} on {topic}, to {heard}: "
+        f"{to_data(sent)}"
+    )
 
 
-def _graph(everything: bool = False) -> Graph:
+def _read_graph(everything: bool = False) -> Graph:
     session = default_session.session()
     nodes = list(session.nodes.values())
-    return reader.read(session.observer, everything=everything, own=nodes)
+    return reader.read_graph(session.observer, everything=everything, own=nodes)
 
 
-def _full(topic: str) -> str:
+def _full_name(topic: str) -> str:
     return topic if topic.startswith("/") else f"/{topic}"
 
 
-def _topic(name: str) -> Topic:
-    topics = {topic.name: topic for topic in _graph(everything=True).topics}
-    if _full(name) not in topics:
-        shown = ", ".join(topic.name for topic in _graph().topics)
-        raise SessionError(f"There is no topic {_full(name)}: there are {shown or 'none'}.")
-    return topics[_full(name)]
+def _find_topic(name: str) -> Topic:
+    topics = {topic.name: topic for topic in _read_graph(everything=True).topics}
+    if _full_name(name) not in topics:
+        shown = ", ".join(topic.name for topic in _read_graph().topics)
+        raise SessionError(f"There is no topic {_full_name(name)}: there are {shown or 'none'}.")
+    return topics[_full_name(name)]
 
 
 def _declare_list(add: Add) -> None:

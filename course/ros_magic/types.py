@@ -16,7 +16,7 @@ from course.runtime.core_session import CoreSession
 from course.runtime.requests.graph_queries import full_topic
 
 
-def agreed(kind: str, name: str, asked: str, on_graph: Sequence[str]) -> Any:
+def agreed_type(kind: str, name: str, asked: str, on_graph: Sequence[str]) -> Any:
     """Return the class of the type that was asked for, or that the graph has.
 
     Args:
@@ -37,7 +37,7 @@ def agreed(kind: str, name: str, asked: str, on_graph: Sequence[str]) -> Any:
     return found
 
 
-def message(msg_type: Any, text: str, session: CoreSession) -> Any:
+def build_message(msg_type: Any, text: str, session: CoreSession) -> Any:
     """Return a message of what was typed, where ``auto`` is a header and ``now`` a time of now.
 
     Raises:
@@ -45,14 +45,16 @@ def message(msg_type: Any, text: str, session: CoreSession) -> Any:
     """
     now_ns = session.sim.now_ns if session.options["sim_time"] else time.time_ns()
     stamp = {"sec": now_ns // 10**9, "nanosec": now_ns % 10**9}
-    return values.from_data(msg_type, _stamped(msg_type, values.read(msg_type, text), stamp))
+    return values.from_data(
+        msg_type, _fill_stamps(msg_type, values.parse_text(msg_type, text), stamp)
+    )
 
 
-def _stamped(msg_type: Any, data: Any, stamp: Mapping[str, int]) -> Any:
+def _fill_stamps(msg_type: Any, data: Any, stamp: Mapping[str, int]) -> Any:
     if not isinstance(data, Mapping):
         return data
     filled = dict(data)
-    for name, slot in values.fields(msg_type):
+    for name, slot in values.message_fields(msg_type):
         if name not in data or not isinstance(slot, NamespacedType):
             continue
         given, kind = data[name], (slot.namespaces[0], slot.name)
@@ -61,7 +63,7 @@ def _stamped(msg_type: Any, data: Any, stamp: Mapping[str, int]) -> Any:
         elif given == "now" and kind == ("builtin_interfaces", "Time"):
             filled[name] = stamp
         elif isinstance(given, Mapping):
-            filled[name] = _stamped(values.class_of(slot), given, stamp)
+            filled[name] = _fill_stamps(values.class_of(slot), given, stamp)
     return filled
 
 
@@ -69,7 +71,7 @@ def message_type(topic: str, asked: str) -> Any:
     """Return the class of a topic's type: as asked for, or as on the graph.
 
     Raises:
-        SessionError: see `agreed`; or nobody uses the topic, and no type was asked for.
+        SessionError: see `agreed_type`; or nobody uses the topic, and no type was asked for.
     """
     observer = default_session.session().observer
     name = full_topic(observer, topic)
@@ -79,4 +81,4 @@ def message_type(topic: str, asked: str) -> Any:
             f"Nobody uses {topic}, so its type is unknown: name it behind the topic, as in %ros "
             f'topic pub {topic} std_msgs/msg/String "data: hello".'
         )
-    return agreed("msg", name, asked, types)
+    return agreed_type("msg", name, asked, types)

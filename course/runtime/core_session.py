@@ -74,7 +74,7 @@ class CoreSession:
             DomainError: the domain is out of range, or none is free.
             SessionError: ROS 2 does not start.
         """
-        arguments.whole(threads, "threads", least=1, example=4)
+        arguments.check_whole_number(threads, "threads", least=1, example=4)
         self._lease = lease_domain() if domain_id is None else None
         self.domain_id: int = check_domain_id(self._lease.domain_id if self._lease else domain_id)
         self.options = {
@@ -91,7 +91,7 @@ class CoreSession:
             raise
         self.explains = True
         self._host = NodeHost(context, threads)
-        self._requests = Requests(self._host, self._hints, self._now_ns)
+        self._requests = Requests(self._host, self._find_hints, self._now_ns)
         self._lock = threading.RLock()
         self._endings = Pulse()
         self.context.on_shutdown(self._endings.beat)
@@ -103,7 +103,7 @@ class CoreSession:
             self._sim = SimulatedTime(self._requests.probe, self._host.crew, self._host.residents)
             self._host.residents.on_made.append(self._sim.welcome)
         self._answering = neighbours.Answering(self._lease, self.offered) if self._lease else None
-        closing.register(self)
+        closing.register_session(self)
 
     @property
     def context(self) -> SessionContext:
@@ -433,15 +433,17 @@ class CoreSession:
 
     def moved_nodes(self) -> list[str]:
         """Return the names of nodes that are in an executor of the learner's own."""
-        return self._host.residents.moved()
+        return self._host.residents.moved_nodes()
 
     def half_made(self) -> list[Remains]:
         """Return what is left of nodes whose constructor raised."""
-        return self._host.residents.half_made.all()
+        return self._host.residents.half_made.all_remains()
 
     def paused_nodes(self) -> list[str]:
         """Return the names of paused nodes."""
-        return [resident.name for resident in self._host.residents.all() if resident.paused]
+        return [
+            resident.name for resident in self._host.residents.list_residents() if resident.paused
+        ]
 
     # Closing.
 
@@ -461,7 +463,7 @@ class CoreSession:
         """
         seen = self._endings.count
         self.require_open()
-        with signals.ending(self._endings.beat):
+        with signals.wake_on_signals(self._endings.beat):
             self._endings.wait(seen)
 
     def close(self, timeout: float = 5.0) -> CloseReport:
@@ -480,17 +482,17 @@ class CoreSession:
             self._host.closing = True
             threading.Thread(target=self.close, args=(timeout,), name="ROS session closer").start()
             return self._report
-        timeout = arguments.seconds(timeout)
+        timeout = arguments.check_seconds(timeout)
         with self._lock:
             if not self._closed:
                 self._host.closing = True
-                closing.close(self, self._report, timeout)
+                closing.close_session(self, self._report, timeout)
                 self._closed = True
             return self._report
 
     def on_close(self, callback: Callable[[], None]) -> None:
         """Call `callback` when the session closes, after its threads have stopped."""
-        arguments.function(callback, "The callback", "lambda: print('closed')")
+        arguments.check_function(callback, "The callback", "lambda: print('closed')")
         self._on_close.append(callback)
 
     def __enter__(self) -> Self:
@@ -512,7 +514,7 @@ class CoreSession:
         if self._lease is not None:
             self._lease.release()
 
-    def _hints(self, *, vague: bool, sought: str) -> list[str]:
+    def _find_hints(self, *, vague: bool, sought: str) -> list[str]:
         return self._further_hints(vague=vague, sought=sought) if self.explains else []
 
     def _further_hints(self, *, vague: bool, sought: str) -> list[str]:
@@ -540,5 +542,5 @@ class CoreSession:
         self.context.join(max(0.1, deadline - time.monotonic()))
         self.context.destroy()
         self._release_domain()
-        store.disclaim(self._host.crew)
+        store.disclaim_nodes(self._host.crew)
         return leaked

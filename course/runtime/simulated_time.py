@@ -80,13 +80,16 @@ class SimulatedTime:
                 f"Simulated time moves forward, in positive steps: not by {seconds} s in steps of "
                 f"{step} s."
             )
-        seconds, step = arguments.seconds(seconds, "seconds"), arguments.seconds(step, "step")
+        seconds, step = (
+            arguments.check_seconds(seconds, "seconds"),
+            arguments.check_seconds(step, "step"),
+        )
         if current_job() is not None:
             raise SessionError("A callback cannot move the time that it runs in.")
-        with self._moving, all_held(self._crew.all()):
+        with self._moving, all_held(self._crew.all_executors()):
             step_ns, target = round(step * _NS), self._now_ns + round(seconds * _NS)
             while self._now_ns < target:
-                moment = min(self._now_ns + self._stride(step_ns), target)
+                moment = min(self._now_ns + self._stride_ns(step_ns), target)
                 self._move_to(moment, _STEP_TIMEOUT if patience is None else patience)
 
     def nudge(self) -> None:
@@ -98,9 +101,9 @@ class SimulatedTime:
         """
         with self._moving:
             self._now_ns += 1
-            self._publish()
+            self._publish_time()
         # Nobody hears the time while a callback awaits something in the node's own group.
-        for executor in self._crew.all():
+        for executor in self._crew.all_executors():
             executor.wake()
 
     def welcome(self, node: Node) -> None:
@@ -115,7 +118,7 @@ class SimulatedTime:
                 if not timer.is_canceled():
                     timer.reset()
 
-    def _stride(self, step_ns: int) -> int:
+    def _stride_ns(self, step_ns: int) -> int:
         """Return how far to move: one step, or several at once if no timer is due in between.
 
         Nothing could tell the difference, unless others follow /clock or a callback looks at it.
@@ -124,10 +127,10 @@ class SimulatedTime:
         steps are no more to them than a nap that took longer. Nor are they to whoever will wake one
         that waits for a lock.
         """
-        followers = self._followers()
+        followers = self._following_nodes()
         if self._publisher.get_subscription_count() != len(followers):
             return step_ns
-        most, executors = _LONGEST_STRIDE, self._crew.all()
+        most, executors = _LONGEST_STRIDE, self._crew.all_executors()
         waits: list[float] = []
         running = [job for executor in executors for job in executor.running.copy()]
         if running and follow_each_other(executors):
@@ -155,11 +158,11 @@ class SimulatedTime:
     def _move_to(self, moment_ns: int, patience: float) -> None:
         self._now_ns = moment_ns
         deadline = time.monotonic() + patience
-        executors = self._crew.all()
+        executors = self._crew.all_executors()
         while True:
-            self._publish()
+            self._publish_time()
             settled = come_to_rest(executors, deadline - time.monotonic())
-            late = [node for node in self._followers() if _clock_ns(node) < moment_ns]
+            late = [node for node in self._following_nodes() if _clock_ns(node) < moment_ns]
             if settled and not late:
                 return
             if time.monotonic() >= deadline:
@@ -171,15 +174,15 @@ class SimulatedTime:
             if late:  # blocked, or the message is on its way
                 executors[0].wait_for_a_job(0.001)
 
-    def _publish(self) -> None:
+    def _publish_time(self) -> None:
         message = Clock()
         message.clock.sec, message.clock.nanosec = divmod(self._now_ns, _NS)
         self._publisher.publish(message)
 
-    def _followers(self) -> list[Node]:
+    def _following_nodes(self) -> list[Node]:
         return [
             resident.node
-            for resident in self._residents.all()
+            for resident in self._residents.list_residents()
             if not resident.paused and _simulated_clock(resident.node) is not None
         ]
 

@@ -29,11 +29,11 @@ def destroy_node(node: Node) -> bool:
             node.destroy_node()
     finally:
         left = is_alive(node)
-        sweep(node)
+        destroy_leftovers(node)
     return left
 
 
-def sweep(node: Node) -> None:
+def destroy_leftovers(node: Node) -> None:
     """Destroy what a class's own `destroy_node()` may have left; it is not called. Idempotent."""
     for waitable in list(node.waitables):
         if isinstance(waitable, ActionServer | ActionClient):

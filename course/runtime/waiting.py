@@ -53,7 +53,7 @@ class Pulse:
                 self._waiting.remove(mine)
 
 
-def poll(condition: Callable[[], T], timeout: float, pulse: Pulse) -> T | None:
+def poll_condition(condition: Callable[[], T], timeout: float, pulse: Pulse) -> T | None:
     """Return the first true value of `condition`, or None after `timeout` seconds.
 
     The condition is looked at once more at the deadline, so a timeout of 0 asks exactly once.
@@ -78,6 +78,6 @@ class Deadline:
         self._end = time.monotonic() + timeout
 
     @property
-    def left(self) -> float:
+    def seconds_left(self) -> float:
         """Seconds left, not below 0."""
         return max(0.0, self._end - time.monotonic())

@@ -19,20 +19,22 @@ _KINDS = {
 }
 
 
-def seconds(value: Any, name: str = "timeout") -> float:
+def check_seconds(value: Any, name: str = "timeout") -> float:
     """Return a time span.
 
     Raises:
         SessionError: it is not a number of seconds, 0 or more.
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise SessionError(f"{name} is a number of seconds, such as 5.0, not {shown(value)}.")
+        raise SessionError(
+            f"{name} is a number of seconds, such as 5.0, not {describe_value(value)}."
+        )
     if math.isnan(value) or value < 0:
         raise SessionError(f"{name} is a number of seconds, 0 or more, not {value:g}.")
     return float(value)
 
 
-def whole(value: Any, name: str, least: int, example: int) -> int:
+def check_whole_number(value: Any, name: str, least: int, example: int) -> int:
     """Return a whole number.
 
     Raises:
@@ -40,35 +42,38 @@ def whole(value: Any, name: str, least: int, example: int) -> int:
     """
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         raise SessionError(
-            f"{name} is a whole number, at least {least}, not {shown(value)}: try {name}={example}."
+            f"{name} is a whole number, at least {least}, not {describe_value(value)}: try "
+            f"{name}={example}."
         )
     if value > _MOST:
-        raise SessionError(f"{name} is at most {_MOST}, not {shown(value)}: try {name}={example}.")
+        raise SessionError(
+            f"{name} is at most {_MOST}, not {describe_value(value)}: try {name}={example}."
+        )
     return value
 
 
-def text(value: Any, name: str, example: str) -> str:
+def check_text(value: Any, name: str, example: str) -> str:
     """Return a string.
 
     Raises:
         SessionError: it is something else.
     """
     if not isinstance(value, str):
-        raise SessionError(f"{name} is a string, such as {example!r}, not {shown(value)}.")
+        raise SessionError(f"{name} is a string, such as {example!r}, not {describe_value(value)}.")
     return value
 
 
-def function(value: Any, name: str, example: str) -> None:
+def check_function(value: Any, name: str, example: str) -> None:
     """Check that `value` can be called.
 
     Raises:
         SessionError: it cannot.
     """
     if not callable(value):
-        raise SessionError(f"{name} is a function, such as {example}, not {shown(value)}.")
+        raise SessionError(f"{name} is a function, such as {example}, not {describe_value(value)}.")
 
 
-def qos(value: Any) -> QoSProfile | None:
+def check_qos(value: Any) -> QoSProfile | None:
     """Return a QoS profile; a number stands for its depth, as in rclpy.
 
     Raises:
@@ -76,7 +81,7 @@ def qos(value: Any) -> QoSProfile | None:
     """
     if value is None or isinstance(value, QoSProfile):
         return value
-    return QoSProfile(depth=whole(value, "qos", least=1, example=10))
+    return QoSProfile(depth=check_whole_number(value, "qos", least=1, example=10))
 
 
 def node_or_name(value: Any) -> None:
@@ -87,11 +92,11 @@ def node_or_name(value: Any) -> None:
     """
     if not isinstance(value, str | Node) and not callable(value):
         raise SessionError(
-            f"A node is named by itself, its name or its class, not by {shown(value)}."
+            f"A node is named by itself, its name or its class, not by {describe_value(value)}."
         )
 
 
-def factory(value: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
+def check_factory(value: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
     """Check that `value` is a node, without arguments, or can make one.
 
     Raises:
@@ -106,7 +111,7 @@ def factory(value: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> None:
     elif not callable(value):
         raise SessionError(
             "run() needs a Node class, or a function that returns a node, as in run(Talker); it "
-            f"was {shown(value)}."
+            f"was {describe_value(value)}."
         )
 
 
@@ -124,12 +129,12 @@ def ros_type(value: Any, kind: str) -> None:
     elif not isinstance(value, type) and (_kind_of(type(value)) == "message"):
         was = f"a {type(value).__name__} that has been made: pass the class itself"
     else:
-        was = shown(value)
+        was = describe_value(value)
     article = "an" if kind == "action" else "a"
     raise SessionError(f"The type is {article} {kind} class, such as {example}; it was {was}.")
 
 
-def message(value: Any) -> None:
+def check_message(value: Any) -> None:
     """Check that `value` is a message, not its class.
 
     Raises:
@@ -138,11 +143,11 @@ def message(value: Any) -> None:
     if isinstance(value, type) or _kind_of(type(value)) != "message":
         raise SessionError(
             "The message is made from its class, as in String(data='hello'); it was "
-            f"{shown(value)}."
+            f"{describe_value(value)}."
         )
 
 
-def instance(value: Any, wanted: type, what: str) -> None:
+def check_instance(value: Any, wanted: type, what: str) -> None:
     """Check that `value`, sent as `what`, is made from the class `wanted`.
 
     Raises:
@@ -151,10 +156,10 @@ def instance(value: Any, wanted: type, what: str) -> None:
     if not isinstance(value, wanted):
         outer, _, inner = wanted.__name__.rpartition("_")
         name = f"{outer}.{inner}(...)" if outer else f"{inner}(...)"
-        raise SessionError(f"The {what} is made with {name}; it was {shown(value)}.")
+        raise SessionError(f"The {what} is made with {name}; it was {describe_value(value)}.")
 
 
-def shown(value: Any) -> str:
+def describe_value(value: Any) -> str:
     """Return `value` as a sentence can name it."""
     if isinstance(value, type):
         return f"the class {value.__name__}"

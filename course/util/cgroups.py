@@ -16,7 +16,7 @@ OURS = "grader"
 """The group in it that a grader moves to: a group that is divided can hold no process."""
 
 
-def delegated(mount: Path = MOUNT, of: Path = Path("/proc/self/cgroup")) -> Path | None:
+def delegated_group(mount: Path = MOUNT, of: Path = Path("/proc/self/cgroup")) -> Path | None:
     """Return the group that was delegated to this process; None if there is none.
 
     Args:
@@ -32,11 +32,11 @@ def delegated(mount: Path = MOUNT, of: Path = Path("/proc/self/cgroup")) -> Path
         controllers = set((group / "cgroup.controllers").read_text(encoding="ascii").split())
     except (OSError, StopIteration, ValueError):
         return None
-    marked = any(_attribute(group, mark) == b"1" for mark in MARKS)
+    marked = any(_read_attribute(group, mark) == b"1" for mark in MARKS)
     return group if marked and controllers >= NEEDED and os.access(group, os.W_OK) else None
 
 
-def _attribute(path: Path, name: str) -> bytes:
+def _read_attribute(path: Path, name: str) -> bytes:
     try:
         return os.getxattr(path, name)
     except OSError:

@@ -17,7 +17,7 @@ _PREFIX = 60
 
 
 @contextmanager
-def replacing(path: Path, mode: int = 0o644) -> Iterator[BinaryIO]:
+def replace_file(path: Path, mode: int = 0o644) -> Iterator[BinaryIO]:
     """Give an open file for the block that takes the place of ``path`` when the block is through.
 
     Args:
@@ -44,5 +44,5 @@ def write_text(path: Path, text: str, mode: int = 0o644) -> None:
     Raises:
         OSError: it cannot be written; what stood there before still does.
     """
-    with replacing(path, mode) as file:
+    with replace_file(path, mode) as file:
         file.write(text.encode("utf-8"))

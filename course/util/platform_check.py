@@ -34,7 +34,7 @@ class UnsupportedPlatformError(CourseError):
     exit_code = 2
 
 
-def problem(
+def find_problem(
     *,
     system: str | None = None,
     machine: str | None = None,
@@ -69,9 +69,10 @@ def problem(
         )
     if implementation != "CPython" or not OLDEST <= version <= NEWEST:
         return (
-            f"This course needs CPython {_text(OLDEST)} to {_text(NEWEST)}, not {implementation} "
-            f"{_text(version)}: run it with another Python, for example "
-            f"`uv run --python {_text((3, 12))} course lab`."
+            f"This course needs CPython {_version_text(OLDEST)} to {_version_text(NEWEST)}, not "
+            f"{implementation} "
+            f"{_version_text(version)}: run it with another Python, for example "
+            f"`uv run --python {_version_text((3, 12))} course lab`."
         )
     return None
 
@@ -82,9 +83,9 @@ def require_supported_platform() -> None:
     Raises:
         UnsupportedPlatformError: it cannot; the message says why, and what to do.
     """
-    if (sentence := problem()) is not None:
+    if (sentence := find_problem()) is not None:
         raise UnsupportedPlatformError(sentence)
 
 
-def _text(version: tuple[int, int]) -> str:
+def _version_text(version: tuple[int, int]) -> str:
     return f"{version[0]}.{version[1]}"

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from course.errors import CourseError
-from course.messages.yaml_text import counted, one_line
+from course.messages.yaml_text import format_count, one_line
 from course.runtime.core_session import CoreSession
 from course.views import brief
 from course.views.live import Frame, LiveView
@@ -35,7 +35,7 @@ class ActionView(LiveView):
     @property
     def goals(self) -> list[Goal]:
         """The latest goals, oldest first."""
-        return self._board.goals
+        return self._board.latest_goals
 
     def send(self, **typed: Any) -> None:
         """Send a goal with values by field, as the form does.
@@ -53,7 +53,7 @@ class ActionView(LiveView):
         """
         self._board.cancel(number)
 
-    def control(self, message: dict[str, Any]) -> None:
+    def handle_control(self, message: dict[str, Any]) -> None:
         """Send or cancel a goal."""
         try:
             if isinstance(message.get("goal"), dict):
@@ -64,43 +64,45 @@ class ActionView(LiveView):
         except CourseError as error:
             self._problem = str(error)
 
-    def frame(self) -> Frame:
+    def make_frame(self) -> Frame:
         """Return the form and the goals."""
         return {
             "title": f"Action {self._board.name}",
-            "fields": [asdict(field) for field in forms.fields(self._board.action_type.Goal)],
+            "fields": [asdict(field) for field in forms.form_fields(self._board.action_type.Goal)],
             "problem": self._problem,
-            "goals": [_shown(goal) for goal in self.goals],
+            "goals": [_goal_data(goal) for goal in self.goals],
         }
 
     def words(self) -> str:
         """Return the goals as text."""
-        lines = [f"Action {self._board.name}, {counted(len(self.goals), 'goal')}"]
+        lines = [f"Action {self._board.name}, {format_count(len(self.goals), 'goal')}"]
         for goal in self.goals:
-            shown = _shown(goal)
+            shown = _goal_data(goal)
             states = " -> ".join(f"{name} ({when})" for name, when in shown["states"])
-            told = (*shown["text"], _way(goal), shown["outcome"])
+            told = (*shown["text"], _describe_progress(goal), shown["outcome"])
             parts = (f"goal {goal.number}: {states}", *told)
             lines.append("  " + "; ".join(part for part in parts if part))
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
 
 
-def _shown(goal: Goal) -> dict[str, Any]:
-    text = [f"asked: {_line(goal.asked)}"] if goal.asked is not None else []
-    text += [f"feedback {goal.feedback}: {_line(goal.latest)}"] if goal.feedback else []
-    result = f"result: {_line(goal.result)}" if goal.result is not None else ""
+def _goal_data(goal: Goal) -> dict[str, Any]:
+    text = [f"asked: {_shorten_line(goal.asked)}"] if goal.asked is not None else []
+    text += [f"feedback {goal.feedback}: {_shorten_line(goal.latest)}"] if goal.feedback else []
+    result = f"result: {_shorten_line(goal.result)}" if goal.result is not None else ""
     return {
         "number": goal.number,
         "states": [[state.name, f"{when:.1f} s"] for state, when in goal.states],
         "text": text,
-        "way": {"text": _way(goal), "points": _points(goal)} if goal.way else None,
+        "way": {"text": _describe_progress(goal), "points": _progress_points(goal)}
+        if goal.way
+        else None,
         "outcome": goal.problem or result or goal.note,
-        "bad": bool(goal.problem or (goal.note and not goal.over)),
-        "over": goal.over,
+        "bad": bool(goal.problem or (goal.note and not goal.is_over)),
+        "over": goal.is_over,
     }
 
 
-def _way(goal: Goal) -> str:
+def _describe_progress(goal: Goal) -> str:
     """Return how far a goal has come, in words."""
     if goal.way is None:
         return ""
@@ -109,11 +111,11 @@ def _way(goal: Goal) -> str:
     return f"{name}: {first:g} to {last:g}" if len(points) > 1 else f"{name}: {last:g}"
 
 
-def _points(goal: Goal) -> list[list[float]]:
+def _progress_points(goal: Goal) -> list[list[float]]:
     """Return the same to be drawn: (s since the goal was first seen, number); all finite."""
     points = goal.way[1].copy() if goal.way else ()
     return [[round(when, 2), value] for when, value in points if math.isfinite(value)]
 
 
-def _line(data: Any) -> str:
-    return one_line(brief.data(data, LONGEST))
+def _shorten_line(data: Any) -> str:
+    return one_line(brief.cut_data(data, LONGEST))

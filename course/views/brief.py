@@ -6,17 +6,17 @@ import json
 from typing import Any
 
 
-def text(whole: str, most: int) -> str:
+def cut_text(whole: str, most: int) -> str:
     """Return the first ``most`` characters, and how many were left out."""
     return whole if len(whole) <= most else f"{whole[:most]}… [{len(whole) - most} more characters]"
 
 
-def data(whole: Any, most: int) -> Any:
+def cut_data(whole: Any, most: int) -> Any:
     """Return plain data cut to about ``most`` bytes of JSON; what was left out is counted."""
-    return _cut(whole, [most])
+    return _cut_value(whole, [most])
 
 
-def _cut(whole: Any, left: list[int]) -> Any:
+def _cut_value(whole: Any, left: list[int]) -> Any:
     """Cut what is more than ``left[0]`` bytes, and take what is kept off it."""
     if isinstance(whole, dict):
         kept: dict[str, Any] = {}
@@ -25,18 +25,18 @@ def _cut(whole: Any, left: list[int]) -> Any:
                 kept["…"] = f"{len(whole) - len(kept)} more"
                 break
             left[0] -= len(key)
-            kept[key] = _cut(value, left)
+            kept[key] = _cut_value(value, left)
         return kept
     if isinstance(whole, list):
         items: list[Any] = []
         for value in whole:
             if left[0] <= 0:
                 return [*items, f"… {len(whole) - len(items)} more"]
-            items.append(_cut(value, left))
+            items.append(_cut_value(value, left))
         return items
     if isinstance(whole, str):
         # Beyond ASCII a character takes up to 12 bytes of JSON.
         share = max(16, left[0] if whole.isascii() else left[0] // 6)
-        whole = text(whole, share)
+        whole = cut_text(whole, share)
     left[0] -= len(json.dumps(whole))
     return whole

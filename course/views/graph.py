@@ -6,9 +6,9 @@ from dataclasses import asdict
 from typing import Any
 
 from course.graph import layout, reader, words
-from course.graph.mermaid import mermaid
+from course.graph.mermaid import draw_mermaid
 from course.graph.model import Graph
-from course.messages.yaml_text import counted
+from course.messages.yaml_text import format_count
 from course.runtime.core_session import CoreSession
 from course.views.live import Frame, LiveView
 
@@ -37,38 +37,40 @@ class GraphView(LiveView):
         """What is there now."""
         self.session.require_open()
         own = list(self.session.nodes.values())
-        return reader.read(self.session.observer, everything=self._everything, own=own)
+        return reader.read_graph(self.session.observer, everything=self._everything, own=own)
 
     @property
     def mermaid(self) -> Mermaid:
         """A drawing that stays in a saved notebook: the last expression of a cell shows it."""
-        return Mermaid(mermaid(self.graph))
+        return Mermaid(draw_mermaid(self.graph))
 
-    def frame(self) -> Frame:
+    def make_frame(self) -> Frame:
         """Return boxes and lines with their places."""
-        return self._drawing(self.graph)
+        return self._drawing_frame(self.graph)
 
     def words(self) -> str:
         """Return the graph as text."""
-        return words.describe(self.graph)
+        return words.describe_graph(self.graph)
 
     def look(self) -> tuple[Frame, str]:
         """Return both from one look at the graph."""
         graph = self.graph
-        return self._drawing(graph), words.describe(graph)
+        return self._drawing_frame(graph), words.describe_graph(graph)
 
-    def _drawing(self, graph: Graph) -> Frame:
+    def _drawing_frame(self, graph: Graph) -> Frame:
         apart = graph.mismatches
         title = (
-            f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.topics), 'topic')}, "
-            f"{counted(len(apart), 'pair')} that {'does' if len(apart) == 1 else 'do'} not connect"
+            f"{format_count(len(graph.nodes), 'node')}, "
+            f"{format_count(len(graph.topics), 'topic')}, "
+            f"{format_count(len(apart), 'pair')} that {'does' if len(apart) == 1 else 'do'} not "
+            "connect"
         )
         # Counted first: the layout of a graph that nobody could follow takes long, too.
-        count = layout.count(graph)
+        count = layout.count_boxes(graph)
         if count > MAX_BOXES:
             drawing, note = layout.Drawing((), (), 0, 0), self._too_large(graph, count)
         else:
-            drawing, note = layout.draw(graph), ""
+            drawing, note = layout.draw_graph(graph), ""
         return {"title": title, "note": note, **asdict(drawing)}
 
     def _too_large(self, graph: Graph, count: int) -> str:

@@ -17,7 +17,7 @@ from rclpy.exceptions import InvalidHandle
 
 from course.runtime.core_session import CoreSession
 from course.views import brief
-from course.views.saved import saved
+from course.views.saved import saved_output
 from course.views.shelf import shelf_of
 from course.views.ticker import ticker_of
 
@@ -44,7 +44,7 @@ Frame = dict[str, Any]
 
 
 class LiveWidget(anywidget.AnyWidget):
-    """The browser's end of a view. It draws `frame` and knows nothing of ROS.
+    """The browser's end of a view. It draws `make_frame` and knows nothing of ROS.
 
     Attributes:
         frame: what to draw; JSON data.
@@ -65,8 +65,8 @@ class LiveWidget(anywidget.AnyWidget):
 class LiveView(ABC):
     """A view of a session that keeps itself up to date while somebody looks at it.
 
-    A subclass says what there is to see (`frame`, `words`) and what a control does (`control`),
-    and leaves in `resources` whatever is to be given back when the view ends.
+    A subclass says what there is to see (`make_frame`, `words`) and what a control does
+    (`handle_control`), and leaves in `resources` whatever is to be given back when the view ends.
     In a notebook it shows a widget; anywhere else, and for a screen reader, its words.
 
     A view ends with its session, when its widget is closed, or when the cell that made it is run
@@ -99,7 +99,7 @@ class LiveView(ABC):
         shelf_of(session).put(self, (type(self).__qualname__, repr(about)))
 
     @abstractmethod
-    def frame(self) -> Frame:
+    def make_frame(self) -> Frame:
         """Return what is to be drawn now, as JSON data of a bounded size."""
 
     @abstractmethod
@@ -108,9 +108,9 @@ class LiveView(ABC):
 
     def look(self) -> tuple[Frame, str]:
         """Return both, of one and the same moment."""
-        return self.frame(), self.words()
+        return self.make_frame(), self.words()
 
-    def control(self, message: dict[str, Any]) -> None:  # noqa: B027 - some views have no controls
+    def handle_control(self, message: dict[str, Any]) -> None:  # noqa: B027 - some views have no controls
         """Do what a control in the browser asks for. Runs in the kernel's main thread."""
 
     @property
@@ -118,18 +118,18 @@ class LiveView(ABC):
         """The widget that shows this view; made, and kept up to date, from its first use."""
         if self._widget is None:
             self._widget = _widget_class((*self.shared, self.script))(kind=self.script)
-            self._widget.on_msg(self._heard)
-            self._look()
+            self._widget.on_msg(self._on_message)
+            self._refresh_widget()
             self._widget.ended = self._why
             if not self._why:
-                self._widget.observe(self._closed, "comm")
-                self._widget.comm.on_close(self._closed)
+                self._widget.observe(self._on_close, "comm")
+                self._widget.comm.on_close(self._on_close)
                 self._due = time.monotonic() + self.period
                 ticker_of(self.session).add(self)
         return self._widget
 
     @property
-    def over(self) -> str:
+    def end_reason(self) -> str:
         """Why nothing comes any more; empty while the view is live."""
         return self._why or (CLOSED if self.session.closed else "")
 
@@ -138,7 +138,7 @@ class LiveView(ABC):
         if self.session.closed:  # or its context has been shut down under it
             self.end(CLOSED)
         elif now >= self._due:
-            self._look()
+            self._refresh_widget()
             slow = self._widget is not None and self._widget.number - self._drawn > PATIENCE
             self._due = time.monotonic() + (max(1.0, self.period) if slow else self.period)
         return self._due
@@ -167,11 +167,11 @@ class LiveView(ABC):
 
     def __repr__(self) -> str:
         """Return the view in words."""
-        return f"{self.label}: {self.over}" if self.over else self.words()
+        return f"{self.label}: {self.end_reason}" if self.end_reason else self.words()
 
     def _repr_mimebundle_(self, **kwargs: Any) -> Any:
         # A script, a test, a grader: nobody could look at a widget. And one that is over says so.
-        if not _has_front_end() or self.over:
+        if not _has_front_end() or self.end_reason:
             return {"text/plain": repr(self)}, {}
         bundle = self.widget._repr_mimebundle_(**kwargs)
         data, metadata = bundle if isinstance(bundle, tuple) else (bundle or {}, {})
@@ -183,16 +183,16 @@ class LiveView(ABC):
         data, metadata = self._repr_mimebundle_(**kwargs)
         display(data, metadata=metadata, raw=True)  # type: ignore[no-untyped-call]
         if len(data) > 1:
-            display(saved(self.label, data["text/plain"]), raw=True)  # type: ignore[no-untyped-call]
+            display(saved_output(self.label, data["text/plain"]), raw=True)  # type: ignore[no-untyped-call]
 
-    def _look(self) -> None:
+    def _refresh_widget(self) -> None:
         with self._looking:
             widget = self._widget
             if widget is None or self._why:
                 return
             try:
                 frame, words = self.look()
-                words = brief.text(words, MAX_WORDS)
+                words = brief.cut_text(words, MAX_WORDS)
                 text = json.dumps([frame, words])
                 self._stumbles = 0
             except Exception as error:  # noqa: BLE001 - a view must never take its thread down
@@ -215,11 +215,11 @@ class LiveView(ABC):
                 widget.frame, widget.words, widget.notice = frame, words, ""
                 widget.number += 1
 
-    def _closed(self, _change: Any) -> None:
+    def _on_close(self, _change: Any) -> None:
         """End when somebody has closed the widget, here or in the browser."""
         self.end("Its widget has been closed.", close=True)
 
-    def _heard(self, _widget: Any, message: Any, _buffers: Any) -> None:
+    def _on_message(self, _widget: Any, message: Any, _buffers: Any) -> None:
         if not isinstance(message, dict):
             return
         if isinstance(message.get("drawn"), int):
@@ -228,7 +228,7 @@ class LiveView(ABC):
             assert self._widget is not None
             self._widget.send({"here": True})
         else:
-            self.control(message)
+            self.handle_control(message)
 
 
 def _has_front_end() -> bool:

@@ -43,7 +43,11 @@ class LogPanel(LiveView):
         self._elsewhere = Rosout(session)
         self.resources.callback(self._elsewhere.stop)
         self._least = level
-        self._level = _named(level) if SEVERITIES[_named(level)] > SEVERITIES["INFO"] else "INFO"
+        self._level = (
+            _canonical_level(level)
+            if SEVERITIES[_canonical_level(level)] > SEVERITIES["INFO"]
+            else "INFO"
+        )
         self._search = ""
 
     def filter(self, level: str, search: str = "") -> None:
@@ -53,32 +57,32 @@ class LogPanel(LiveView):
             SessionError: there is no such level.
         """
         self.session.logs(level=level, last=1)
-        self._level, self._search = _named(level), search[:LONGEST_LINE].lower()
+        self._level, self._search = _canonical_level(level), search[:LONGEST_LINE].lower()
 
-    def control(self, message: dict[str, Any]) -> None:
+    def handle_control(self, message: dict[str, Any]) -> None:
         """Filter as chosen."""
         asked = message.get("filter")
         if isinstance(asked, dict) and str(asked.get("level")) in SEVERITIES:
             self.filter(str(asked["level"]), str(asked.get("search", "")))
 
-    def frame(self) -> Frame:
+    def make_frame(self) -> Frame:
         """Return the latest lines that pass the filters: time, level, node, text."""
-        return self._as_frame(*self._found())
+        return self._as_frame(*self._filtered_rows())
 
     def look(self) -> tuple[Frame, str]:
         """Return both from one look at the log."""
-        found, total = self._found()
-        return self._as_frame(found, total), _table(found)
+        found, total = self._filtered_rows()
+        return self._as_frame(found, total), _format_table(found)
 
     def words(self) -> str:
         """Return the last lines as a table."""
-        return _table(self._found()[0])
+        return _format_table(self._filtered_rows()[0])
 
     def _as_frame(self, found: list[LogRow], total: int) -> Frame:
         rows: list[list[str]] = []
         left = MOST_BYTES
         for row in reversed(found[-SHOWN:]):
-            shown = _shown(row)
+            shown = _shortened_cells(row)
             left -= len(json.dumps(shown))
             if left < 0:
                 break
@@ -88,34 +92,34 @@ class LogPanel(LiveView):
             "level": self._level, "search": self._search,
         }  # fmt: skip
 
-    def _found(self) -> tuple[list[LogRow], int]:
+    def _filtered_rows(self) -> tuple[list[LogRow], int]:
         """Return the rows that pass, and how many there are in all."""
         rows = self.session.logs(level=self._least, last=None).rows
-        least = SEVERITIES[_named(self._least)]
-        rows += [r for r in self._elsewhere.rows if SEVERITIES.get(r.level, 0) >= least]
+        least = SEVERITIES[_canonical_level(self._least)]
+        rows += [r for r in self._elsewhere.latest_rows if SEVERITIES.get(r.level, 0) >= least]
         rows.sort(key=lambda row: row.stamp)
         lowest = SEVERITIES[self._level]
         return [
             row
             for row in rows
             if SEVERITIES.get(row.level, 0) >= lowest
-            and (not self._search or self._search in " ".join(_cells(row)).lower())
+            and (not self._search or self._search in " ".join(_row_cells(row)).lower())
         ], len(rows)
 
 
-def _table(found: list[LogRow]) -> str:
-    last = [row._replace(message=brief.text(row.message, LONGEST_LINE)) for row in found[-20:]]
+def _format_table(found: list[LogRow]) -> str:
+    last = [row._replace(message=brief.cut_text(row.message, LONGEST_LINE)) for row in found[-20:]]
     return repr(LogTable(last, left_out=len(found) - len(last)))
 
 
-def _named(level: str) -> str:
+def _canonical_level(level: str) -> str:
     return {"WARNING": "WARN"}.get(level.upper(), level.upper())
 
 
-def _shown(row: LogRow) -> list[str]:
-    return [brief.text(cell, LONGEST_LINE) for cell in _cells(row)]
+def _shortened_cells(row: LogRow) -> list[str]:
+    return [brief.cut_text(cell, LONGEST_LINE) for cell in _row_cells(row)]
 
 
-def _cells(row: LogRow) -> tuple[str, str, str, str]:
+def _row_cells(row: LogRow) -> tuple[str, str, str, str]:
     moment = time.strftime("%H:%M:%S", time.localtime(row.stamp))
     return f"{moment}.{int(row.stamp % 1 * 1000):03d}", row.level, row.node, row.message

@@ -36,7 +36,7 @@ class ParameterPanel(LiveView):
             WaitTimeout: there is no such node, or it does not answer.
         """
         sheet = ParameterSheet(session, node)
-        entries = sheet.entries()
+        entries = sheet.read_entries()
         super().__init__(session, node)
         self._sheet = sheet
         self._entries = entries
@@ -58,10 +58,10 @@ class ParameterPanel(LiveView):
             ParameterError: the node refused, for the reason in the message; or no such value.
             WaitTimeout: the node does not answer.
         """
-        self._sheet.set(arguments.text(name, "The name of a parameter", "speed"), value)
-        self._entries = self._sheet.entries()
+        self._sheet.set(arguments.check_text(name, "The name of a parameter", "speed"), value)
+        self._entries = self._sheet.read_entries()
 
-    def control(self, message: dict[str, Any]) -> None:
+    def handle_control(self, message: dict[str, Any]) -> None:
         """Change a parameter as typed."""
         if not isinstance(message.get("set"), str):
             return
@@ -71,33 +71,33 @@ class ParameterPanel(LiveView):
                 self._sheet.set(message["set"], message.get("value"), ASK_TIMEOUT)
             except ParameterError as error:
                 problem = str(error)
-            entries = self._sheet.entries(ASK_TIMEOUT)
+            entries = self._sheet.read_entries(ASK_TIMEOUT)
         except CourseError as error:  # it does not answer: asking again would only take longer
             problem = problem or str(error)
         with self._lock:
             self._entries, self._problem, self._changes = entries, problem, self._changes + 1
 
-    def frame(self) -> Frame:
+    def make_frame(self) -> Frame:
         """Return the parameters, and what the last change led to."""
-        self._refresh()
+        self._refresh_entries()
         with self._lock:
             problem, changes = self._problem or self._silent, self._changes
         return {
             "title": f"Parameters of {self._sheet.node}",
-            "entries": [_shown(entry) for entry in self._entries],
+            "entries": [_entry_data(entry) for entry in self._entries],
             "problem": problem,
             "changes": changes,
         }
 
-    def _refresh(self) -> None:
+    def _refresh_entries(self) -> None:
         """Ask for the values in a thread: a node that is stuck must not hold up other views."""
         if self._asking.acquire(blocking=False):
-            threading.Thread(target=self._ask, name="ROS parameters", daemon=True).start()
+            threading.Thread(target=self._fetch_entries, name="ROS parameters", daemon=True).start()
 
-    def _ask(self) -> None:
+    def _fetch_entries(self) -> None:
         before = self._changes
         try:
-            entries, self._silent = self._sheet.entries(ASK_TIMEOUT), ""
+            entries, self._silent = self._sheet.read_entries(ASK_TIMEOUT), ""
             with self._lock:
                 if self._changes == before:  # else these may be the values from before a change
                     self._entries = entries
@@ -114,7 +114,7 @@ class ParameterPanel(LiveView):
         for entry in self._entries:
             limits = f" ({entry.least:g} to {entry.most:g})" if entry.least is not None else ""
             about = f"  # {entry.description}" if entry.description else ""
-            value = brief.data(entry.value, LONGEST)
+            value = brief.cut_data(entry.value, LONGEST)
             shown = "not set" if value is None else one_line(value)
             lines.append(f"  {entry.name}: {shown}{limits}{about}")
         if not self._entries:
@@ -124,10 +124,10 @@ class ParameterPanel(LiveView):
         return "\n".join([*lines, *([problem] if problem else [])])
 
 
-def _shown(entry: Entry) -> Frame:
+def _entry_data(entry: Entry) -> Frame:
     """Return what the browser draws: a list as the YAML that is typed to change it."""
     shown: Frame = for_json(asdict(entry))
-    value = brief.data(entry.value, LONGEST)
+    value = brief.cut_data(entry.value, LONGEST)
     shown["value"] = one_line(value) if isinstance(value, list) else for_json(value)
     if value != entry.value:  # what is typed into a part of it would replace the whole
         shown["read_only"] = True

@@ -31,7 +31,7 @@ class Trial:
     problem: str = ""
 
     @property
-    def right(self) -> bool | None:
+    def is_right(self) -> bool | None:
         """Whether the prediction came true; None while it is not known."""
         if self.outcome is None:
             return None
@@ -56,8 +56,8 @@ class QoSLab(LiveView):
     ) -> None:
         """Begin with two profiles; None is the default one."""
         super().__init__(session, offered, requested)
-        self._offered = Profile.of(offered) if offered else Profile()
-        self._requested = Profile.of(requested) if requested else Profile()
+        self._offered = Profile.from_rclpy(offered) if offered else Profile()
+        self._requested = Profile.from_rclpy(requested) if requested else Profile()
         self._processes = lab.Processes()
         self.resources.callback(self._processes.end)
         self._trials: list[Trial] = []
@@ -95,14 +95,14 @@ class QoSLab(LiveView):
             LabError: no such scenario, its processes failed, or this view has ended.
             ProfileError: a profile that the lab does not know.
         """
-        self._offered = Profile.of(offered) if offered else self._offered
-        self._requested = Profile.of(requested) if requested else self._requested
+        self._offered = Profile.from_rclpy(offered) if offered else self._offered
+        self._requested = Profile.from_rclpy(requested) if requested else self._requested
         experiment = Experiment(self._offered, self._requested, scenario, loss)
-        trial = Trial(experiment, connects, arrive, lab.run(experiment, self._processes))
-        self._keep(trial)
+        trial = Trial(experiment, connects, arrive, lab.run_experiment(experiment, self._processes))
+        self._keep_trial(trial)
         return trial
 
-    def control(self, message: dict[str, Any]) -> None:
+    def handle_control(self, message: dict[str, Any]) -> None:
         """Run what the browser asks for, in a thread: the kernel goes on."""
         asked = message.get("run")
         if not isinstance(asked, dict):
@@ -111,13 +111,13 @@ class QoSLab(LiveView):
             if self._running:
                 return
             self._running, self._problem = True, ""
-        threading.Thread(target=self._run, args=(asked,), name="QoS lab", daemon=True).start()
+        threading.Thread(target=self._run_trial, args=(asked,), name="QoS lab", daemon=True).start()
 
-    def frame(self) -> Frame:
+    def make_frame(self) -> Frame:
         """Return profiles, rules and trials."""
         return {
-            "offered": self._offered.data(),
-            "requested": self._requested.data(),
+            "offered": self._offered.to_data(),
+            "requested": self._requested.to_data(),
             "choices": {name: list(choices) for name, choices in CHOICES.items()},
             "numbers": {name: list(limits) for name, limits in NUMBERS.items()},
             "scenarios": SCENARIOS,
@@ -125,32 +125,33 @@ class QoSLab(LiveView):
             "no_loss": link.problem(),
             "running": self._running,
             "problem": self._problem,
-            "trials": [_shown(trial) for trial in reversed(self.trials)],
+            "trials": [_trial_data(trial) for trial in reversed(self.trials)],
         }
 
     def words(self) -> str:
         """Return profiles, trials and the rule of each policy as text."""
         lines = [f"offered: {self._offered}", f"requested: {self._requested}"]
         lines += [
-            f"  {_rule(asdict(rule))}" for rule in rules.compare(self._offered, self._requested)
+            f"  {_format_rule(asdict(rule))}"
+            for rule in rules.compare_profiles(self._offered, self._requested)
         ]
         for trial in self.trials:
-            shown = _shown(trial)
+            shown = _trial_data(trial)
             lines += [f"{shown['title']}: {shown['seen']}", f"  {shown['why']}"]
             lines += [f"  {shown['verdict']}"]
-            lines += [f"  {_rule(rule)}" for rule in shown["rules"]]
+            lines += [f"  {_format_rule(rule)}" for rule in shown["rules"]]
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
 
-    def _run(self, asked: dict[str, Any]) -> None:
+    def _run_trial(self, asked: dict[str, Any]) -> None:
         problem = ""
         try:
             self._offered = Profile.from_data(asked.get("offered"))
             self._requested = Profile.from_data(asked.get("requested"))
             scenario, loss = str(asked.get("scenario")), asked.get("loss") or 0
             experiment = Experiment(self._offered, self._requested, scenario, loss)
-            connects, arrive = bool(asked.get("connects")), _predicted(asked.get("arrive"))
-            outcome = lab.run(experiment, self._processes)
-            self._keep(Trial(experiment, connects, arrive, outcome))
+            connects, arrive = bool(asked.get("connects")), _check_prediction(asked.get("arrive"))
+            outcome = lab.run_experiment(experiment, self._processes)
+            self._keep_trial(Trial(experiment, connects, arrive, outcome))
         except CourseError as error:
             problem = str(error)
         except Exception as error:  # noqa: BLE001 - whatever it was, the buttons work again
@@ -159,37 +160,39 @@ class QoSLab(LiveView):
             with self._lock:
                 self._running, self._problem = False, problem
 
-    def _keep(self, trial: Trial) -> None:
+    def _keep_trial(self, trial: Trial) -> None:
         with self._lock:
             self._trials = [*self._trials, trial][-KEPT:]
 
 
-def _shown(trial: Trial) -> dict[str, Any]:
+def _trial_data(trial: Trial) -> dict[str, Any]:
     experiment, outcome = trial.experiment, trial.outcome
     assert outcome is not None
     loss = f", {experiment.loss} % loss" if outcome.lossy else ""
     said = "connected" if trial.connects else "not connected"
     said += f", {trial.arrive} messages" if trial.arrive is not None else ""
-    truth = "That was right." if trial.right else "It came out otherwise."
+    truth = "That was right." if trial.is_right else "It came out otherwise."
     return {
         "title": f"{experiment.scenario}{loss}",
         "pair": f"{experiment.offered} -> {experiment.requested}",
-        "seen": _seen(experiment, outcome),
-        "why": " ".join(filter(None, [rules.explain(experiment, outcome), outcome.remark])),
-        "right": trial.right,
+        "seen": _describe_outcome(experiment, outcome),
+        "why": " ".join(filter(None, [rules.explain_outcome(experiment, outcome), outcome.remark])),
+        "right": trial.is_right,
         "verdict": f"You said: {said}. {truth}",
         "received": outcome.received,
         "sent": outcome.sent,
-        "rules": [asdict(r) for r in rules.compare(experiment.offered, experiment.requested)],
+        "rules": [
+            asdict(r) for r in rules.compare_profiles(experiment.offered, experiment.requested)
+        ],
     }
 
 
-def _rule(rule: dict[str, Any]) -> str:
+def _format_rule(rule: dict[str, Any]) -> str:
     fits = "fits" if rule["fits"] else "does not fit"
     return f"{rule['policy']}: {rule['offered']} -> {rule['requested']} {fits}. {rule['rule']}"
 
 
-def _seen(experiment: Experiment, outcome: Outcome) -> str:
+def _describe_outcome(experiment: Experiment, outcome: Outcome) -> str:
     if not outcome.connected:
         return f"not connected ({outcome.broken.lower() or 'nothing was found'})"
     parts = [f"connected, {len(outcome.received)} of {outcome.sent} arrived"]
@@ -202,7 +205,7 @@ def _seen(experiment: Experiment, outcome: Outcome) -> str:
     return ", ".join(parts)
 
 
-def _predicted(arrive: Any) -> int | None:
+def _check_prediction(arrive: Any) -> int | None:
     if arrive is None or (isinstance(arrive, int) and 0 <= arrive <= COUNT):
         return arrive
     raise LabError(f"A prediction is a whole number of messages, 0 to {COUNT}, not {arrive!r}.")

@@ -20,7 +20,7 @@ _STYLE = """
 """  # noqa: E501 - a selector stays on one line
 
 
-def saved(label: str, words: str) -> dict[str, str]:
+def saved_output(label: str, words: str) -> dict[str, str]:
     """Return the second output: what the view called ``label`` shows now, in words.
 
     Mime bundle with ``text/html`` and ``text/plain``.

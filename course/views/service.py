@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from course.errors import CourseError
-from course.messages.yaml_text import counted, for_json, one_line
+from course.messages.yaml_text import for_json, format_count, one_line
 from course.runtime.core_session import CoreSession
 from course.views import brief
 from course.views.live import Frame, LiveView
@@ -36,7 +36,7 @@ class ServiceConsole(LiveView):
     @property
     def calls(self) -> list[Call]:
         """The latest calls, oldest first."""
-        return self._model.calls
+        return self._model.latest_calls
 
     def call(self, **typed: Any) -> None:
         """Call with values by field, as the form does; the answer comes in the background.
@@ -46,7 +46,7 @@ class ServiceConsole(LiveView):
         """
         self._model.send({path.replace("__", "."): v for path, v in typed.items()}, self._timeout)
 
-    def control(self, message: dict[str, Any]) -> None:
+    def handle_control(self, message: dict[str, Any]) -> None:
         """Call with what was typed."""
         if not isinstance(message.get("call"), dict):
             return
@@ -56,30 +56,32 @@ class ServiceConsole(LiveView):
         except CourseError as error:
             self._problem = str(error)
 
-    def frame(self) -> Frame:
+    def make_frame(self) -> Frame:
         """Return the form and the calls."""
         return {
             "title": f"Service {self._model.name}",
-            "fields": [asdict(field) for field in forms.fields(self._model.srv_type.Request)],
+            "fields": [asdict(field) for field in forms.form_fields(self._model.srv_type.Request)],
             "problem": self._problem,
-            "calls": [_shown(call) for call in self.calls],
+            "calls": [_call_data(call) for call in self.calls],
         }
 
     def words(self) -> str:
         """Return the calls as text."""
-        lines = [f"Service {self._model.name}, {counted(len(self.calls), 'call')}"]
+        lines = [f"Service {self._model.name}, {format_count(len(self.calls), 'call')}"]
         for call in self.calls:
-            shown = _shown(call)
-            outcome = "waiting" if call.waiting else shown["problem"] or one_line(shown["answer"])
+            shown = _call_data(call)
+            outcome = (
+                "waiting" if call.is_waiting else shown["problem"] or one_line(shown["answer"])
+            )
             lines.append(f"  {call.number}: {one_line(shown['request'])} -> {outcome}")
         return "\n".join([*lines, *([self._problem] if self._problem else [])])
 
 
-def _shown(call: Call) -> dict[str, Any]:
+def _call_data(call: Call) -> dict[str, Any]:
     return {
         "number": call.number,
-        "request": brief.data(for_json(call.request), LONGEST),
-        "answer": brief.data(for_json(call.answer), LONGEST),
-        "problem": brief.text(call.problem, LONGEST),
+        "request": brief.cut_data(for_json(call.request), LONGEST),
+        "answer": brief.cut_data(for_json(call.answer), LONGEST),
+        "problem": brief.cut_text(call.problem, LONGEST),
         "time": "" if call.seconds is None else f"{call.seconds * 1000:.1f} ms",
     }

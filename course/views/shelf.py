@@ -49,7 +49,7 @@ class Shelf:
             about: what the view shows. Outside notebooks, one call that makes views of different
                 things, in a loop, makes as many views.
         """
-        place, run = _whereabouts(about)
+        place, run = _find_place(about)
         with _lock:
             before = [
                 other
@@ -87,7 +87,7 @@ shelf_of = PerSession(Shelf)
 """Returns the shelf of a session."""
 
 
-def _whereabouts(about: Hashable) -> tuple[Hashable, Hashable]:
+def _find_place(about: Hashable) -> tuple[Hashable, Hashable]:
     """Return where in a notebook or program this is, and in which run of that place.
 
     A notebook's front end tells which cell it runs; without that, IPython's kernel names a cell by

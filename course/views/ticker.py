@@ -48,7 +48,7 @@ class Ticker:
             self._views.add(view)
             if self._thread is None:
                 self._thread = threading.Thread(
-                    target=self._run, name="ROS session views", daemon=True
+                    target=self._run_loop, name="ROS session views", daemon=True
                 )
                 self._thread.start()
             self._changed.notify_all()
@@ -70,12 +70,12 @@ class Ticker:
         if thread is not None and thread is not threading.current_thread():
             thread.join(LONGEST_REST)
 
-    def _run(self) -> None:
+    def _run_loop(self) -> None:
         while True:
             due = time.monotonic() + LONGEST_REST
             views = list(self._views)
             for view in views:
-                due = min(due, self._tick(view, due))
+                due = min(due, self._tick_view(view, due))
             del views
             with self._changed:
                 if not self._views:
@@ -83,7 +83,7 @@ class Ticker:
                     return
                 self._changed.wait(max(0.0, due - time.monotonic()))
 
-    def _tick(self, view: Ticking, due: float) -> float:
+    def _tick_view(self, view: Ticking, due: float) -> float:
         """Return when the view is due next; ``due``, if it failed, and with it only this view."""
         try:
             return view.tick(time.monotonic())

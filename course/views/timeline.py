@@ -10,7 +10,7 @@ from typing import Any
 from course.errors import SessionError
 from course.messages import mcap_file
 from course.messages.mcap_file import RecordingError
-from course.messages.yaml_text import counted
+from course.messages.yaml_text import format_count
 from course.runtime.core_session import CoreSession
 from course.util import arguments
 from course.views.live import Frame, LiveView
@@ -50,7 +50,7 @@ class Timeline(LiveView):
         """
         if not 0 < len(topics) <= MOST_TOPICS:
             raise SessionError(f"A timeline shows 1 to {MOST_TOPICS} topics, not {len(topics)}.")
-        window = arguments.seconds(window, "window")
+        window = arguments.check_seconds(window, "window")
         if not 0 < window <= 60:
             raise SessionError(f"A timeline shows up to 60 s, not {window:g} s.")
         super().__init__(session, *topics, window)
@@ -58,7 +58,7 @@ class Timeline(LiveView):
         self._rows: list[tuple[Trace, CallbackTap]] = []
         try:
             for name, msg_type in topics:
-                self._add(name, msg_type)
+                self._add_topic(name, msg_type)
         except BaseException:
             self.stop()
             raise
@@ -68,13 +68,19 @@ class Timeline(LiveView):
         """Return the figures of each topic over the window that ends now."""
         self._keep_up()
         start = time.time_ns() - self._window
-        return {trace.topic: timeline.figures(trace.since(start)) for trace, _ in self._rows}
+        return {
+            trace.topic: timeline.compute_figures(trace.passages_since(start))
+            for trace, _ in self._rows
+        }
 
-    def runs(self, topic: str) -> list[Run]:
+    def callback_runs(self, topic: str) -> list[Run]:
         """Return when callbacks of a topic's subscriptions ran in the window that ends now."""
         start = time.time_ns() - self._window
         return [
-            run for trace, tap in self._rows if trace.topic == topic for run in tap.since(start)
+            run
+            for trace, tap in self._rows
+            if trace.topic == topic
+            for run in tap.runs_since(start)
         ]
 
     def save(self, path: str | Path) -> Path:
@@ -85,15 +91,17 @@ class Timeline(LiveView):
         Raises:
             RecordingError: the file cannot be written, or this timeline has ended.
         """
-        if self.over:
+        if self.end_reason:
             raise RecordingError(
                 "This timeline has ended, and has let its messages go: run its cell again, and "
                 "save while it is live."
             )
-        recordings = {trace.topic: (trace.msg_type, trace.messages) for trace, _ in self._rows}
-        return mcap_file.write(path, recordings)
+        recordings = {
+            trace.topic: (trace.msg_type, trace.latest_messages) for trace, _ in self._rows
+        }
+        return mcap_file.write_recordings(path, recordings)
 
-    def frame(self) -> Frame:
+    def make_frame(self) -> Frame:
         """Return lanes as counts a column, and figures in words."""
         self._keep_up()
         now = time.time_ns()
@@ -104,7 +112,7 @@ class Timeline(LiveView):
             "window": self._window / 1e9,
             "columns": timeline.COLUMNS,
             "bins": timeline.BINS,
-            "topics": [self._topic(trace, tap, start) for trace, tap in self._rows],
+            "topics": [self._topic_data(trace, tap, start) for trace, tap in self._rows],
         }
 
     def words(self) -> str:
@@ -113,15 +121,15 @@ class Timeline(LiveView):
         start = time.time_ns() - self._window
         found = self.figures()
         for trace, tap in self._rows:
-            text = describe(found[trace.topic]) + _shortened(trace, tap, start)
+            text = describe_figures(found[trace.topic]) + _describe_shortening(trace, tap, start)
             lines.append(f"  {trace.topic}: {text}")
-            for node, runs in self._nodes(trace.topic).items():
-                missed = sum(count for _, count in timeline.drops(runs))
+            for node, runs in self._runs_by_node(trace.topic).items():
+                missed = sum(count for _, count in timeline.find_drops(runs))
                 passed = f", {missed} messages passed it by" if missed else ""
                 lines.append(f"    callbacks of {node}: {len(runs)}{passed}")
         return "\n".join(lines)
 
-    def _add(self, name: str, msg_type: Any | None) -> None:
+    def _add_topic(self, name: str, msg_type: Any | None) -> None:
         trace = Trace(self.session, name, msg_type)
         self.resources.callback(trace.stop)
         tap = CallbackTap(trace.topic)
@@ -130,54 +138,61 @@ class Timeline(LiveView):
 
     def _keep_up(self) -> None:
         """Follow nodes and publishers that have come since the last look."""
-        if self.over:
+        if self.end_reason:
             return
         nodes = list(self.session.nodes.values())
         for trace, tap in self._rows:
-            trace.adapt()
+            trace.adapt_qos()
             tap.watch(nodes)
 
-    def _nodes(self, topic: str) -> dict[str, list[Run]]:
-        return _by_node(self.runs(topic))
+    def _runs_by_node(self, topic: str) -> dict[str, list[Run]]:
+        return _by_node(self.callback_runs(topic))
 
-    def _topic(self, trace: Trace, tap: CallbackTap, start: int) -> dict[str, Any]:
-        passages = trace.since(start)
-        found = timeline.figures(passages)
-        plots = timeline.plots(passages, start, self._window)
+    def _topic_data(self, trace: Trace, tap: CallbackTap, start: int) -> dict[str, Any]:
+        passages = trace.passages_since(start)
+        found = timeline.compute_figures(passages)
+        plots = timeline.compute_plots(passages, start, self._window)
         lanes = [
-            self._lane("published", [passage.published for passage in passages], start),
-            self._lane("received", [passage.received for passage in passages], start, found.drops),
+            self._lane_data("published", [passage.published for passage in passages], start),
+            self._lane_data(
+                "received", [passage.received for passage in passages], start, found.drops
+            ),
         ]
-        for node, runs in _by_node(tap.since(start)).items():
+        for node, runs in _by_node(tap.runs_since(start)).items():
             moments = [run.started for run in runs]
-            lanes.append(self._lane(f"callback of {node}", moments, start, timeline.drops(runs)))
+            lanes.append(
+                self._lane_data(f"callback of {node}", moments, start, timeline.find_drops(runs))
+            )
         return {
             "name": trace.topic,
-            "text": describe(found) + _shortened(trace, tap, start),
+            "text": describe_figures(found) + _describe_shortening(trace, tap, start),
             "lanes": lanes,
-            "rate": _rounded(plots.rate, 1.0, 2),
-            "p50": _rounded(plots.p50, 1e3, 3),
-            "p95": _rounded(plots.p95, 1e3, 3),
+            "rate": _round_values(plots.rate, 1.0, 2),
+            "p50": _round_values(plots.p50, 1e3, 3),
+            "p95": _round_values(plots.p95, 1e3, 3),
             "gaps": [
-                [self._share(begin, start), self._share(end, start)] for begin, end in found.gaps
+                [self._window_share(begin, start), self._window_share(end, start)]
+                for begin, end in found.gaps
             ],
         }
 
-    def _lane(
+    def _lane_data(
         self, label: str, moments: list[int], start: int, drops: Sequence[tuple[float, int]] = ()
     ) -> dict[str, Any]:
         return {
             "label": label,
-            "counts": timeline.columns(moments, start, self._window),
-            "drops": [[self._share(when, start), count] for when, count in drops[-MOST_DROPS:]],
+            "counts": timeline.count_columns(moments, start, self._window),
+            "drops": [
+                [self._window_share(when, start), count] for when, count in drops[-MOST_DROPS:]
+            ],
         }
 
-    def _share(self, moment: float, start: int) -> float:
+    def _window_share(self, moment: float, start: int) -> float:
         """Return where a moment (s) is in the window from ``start`` (ns), 0 to 1."""
         return round((moment - start / 1e9) / (self._window / 1e9), 4)
 
 
-def describe(figures: Figures) -> str:
+def describe_figures(figures: Figures) -> str:
     """Return figures in words."""
     if not figures.count:
         return "nothing"
@@ -190,7 +205,7 @@ def describe(figures: Figures) -> str:
     longest = max((end - begin for begin, end in figures.gaps), default=0.0)
     if figures.gaps:
         count = len(figures.gaps)
-        parts.append(f"{counted(count, 'gap')}, the longest {longest:.2f} s")
+        parts.append(f"{format_count(count, 'gap')}, the longest {longest:.2f} s")
     if figures.lost:
         parts.append(f"{figures.lost} lost on the way")
     return ", ".join(parts)
@@ -204,7 +219,7 @@ def _by_node(runs: list[Run]) -> dict[str, list[Run]]:
     return found
 
 
-def _shortened(trace: Trace, tap: CallbackTap, start: int) -> str:
+def _describe_shortening(trace: Trace, tap: CallbackTap, start: int) -> str:
     """Return, to be added to the figures, that what came since ``start`` (ns) is not all here."""
     begins = max(trace.complete_since, tap.complete_since)
     if begins <= start:
@@ -216,5 +231,5 @@ def _shortened(trace: Trace, tap: CallbackTap, start: int) -> str:
     )
 
 
-def _rounded(values: list[float | None], unit: float, digits: int) -> list[float | None]:
+def _round_values(values: list[float | None], unit: float, digits: int) -> list[float | None]:
     return [None if value is None else round(value * unit, digits) for value in values]

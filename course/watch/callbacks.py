@@ -48,25 +48,25 @@ class CallbackTap:
 
     def watch(self, nodes: list[Node]) -> None:
         """Listen to the subscriptions that ``nodes`` have now, and to no others. Idempotent."""
-        present = [found for node in nodes for found in self._subscriptions(node)]
+        present = [found for node in nodes for found in self._find_subscriptions(node)]
         with _lock:
-            wrapped = [_wrap(subscription, name) for subscription, name in present]
+            wrapped = [_wrap_callback(subscription, name) for subscription, name in present]
             for known in list(self._heard):
                 if known not in wrapped:
-                    known.leave(self._runs)
+                    known.remove_listener(self._runs)
                     self._heard.discard(known)
             for found in wrapped:
-                found.join(self._runs)
+                found.add_listener(self._runs)
                 self._heard.add(found)
 
-    def _subscriptions(self, node: Node) -> list[tuple[Subscription, str]]:
+    def _find_subscriptions(self, node: Node) -> list[tuple[Subscription, str]]:
         try:
             name = node.get_fully_qualified_name()
             return [(end, name) for end in node.subscriptions if end.topic_name == self.topic]
         except InvalidHandle:  # it has been destroyed just now, or one of its subscriptions has
             return []
 
-    def since(self, moment_ns: int) -> list[Run]:
+    def runs_since(self, moment_ns: int) -> list[Run]:
         """Return the runs that started since a moment (ns since the epoch)."""
         with _lock:
             runs = list(self._runs)
@@ -130,12 +130,12 @@ class _Wrapped:
         # Known by the callback alone: a table of them would keep nodes that nobody has any more.
         self.callback.__dict__[_MARK] = self
 
-    def join(self, listener: deque[Run]) -> None:
+    def add_listener(self, listener: deque[Run]) -> None:
         """Have a listener hear of the callback; called with the lock held. Idempotent."""
         if not any(known is listener for known in self._listeners):
             self._listeners = (*self._listeners, listener)
 
-    def leave(self, listener: deque[Run]) -> None:
+    def remove_listener(self, listener: deque[Run]) -> None:
         """Have a listener hear no more; called with the lock held. Idempotent."""
         self._listeners = tuple(known for known in self._listeners if known is not listener)
 
@@ -144,7 +144,7 @@ _MARK = "_course_wrapped"
 _lock = threading.Lock()
 
 
-def _wrap(subscription: Subscription, node: str) -> _Wrapped:
+def _wrap_callback(subscription: Subscription, node: str) -> _Wrapped:
     """Return the wrapper of a subscription's callback, a new one if there is none around it."""
     found = getattr(subscription.callback, "__dict__", {}).get(_MARK)
     if not isinstance(found, _Wrapped) or found.callback is not subscription.callback:

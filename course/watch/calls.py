@@ -28,7 +28,7 @@ class Call:
     seconds: float | None = None
 
     @property
-    def waiting(self) -> bool:
+    def is_waiting(self) -> bool:
         """Whether the answer is still to come."""
         return self.answer is None and not self.problem
 
@@ -46,7 +46,7 @@ class Calls:
         self._lock = threading.Lock()
 
     @property
-    def calls(self) -> list[Call]:
+    def latest_calls(self) -> list[Call]:
         """The latest calls, oldest first (a snapshot)."""
         with self._lock:
             return list(self._calls)
@@ -57,16 +57,19 @@ class Calls:
         Raises:
             MisfitError: something does not fit its field.
         """
-        request = forms.message(self.srv_type.Request, typed)
+        request = forms.build_message(self.srv_type.Request, typed)
         with self._lock:
             self._count += 1
             call = Call(self._count, values.to_data(request))
             self._calls.append(call)
         threading.Thread(
-            target=self._wait, args=(call, request, timeout), name="ROS service call", daemon=True
+            target=self._await_answer,
+            args=(call, request, timeout),
+            name="ROS service call",
+            daemon=True,
         ).start()
 
-    def _wait(self, call: Call, request: Any, timeout: float) -> None:
+    def _await_answer(self, call: Call, request: Any, timeout: float) -> None:
         started = time.monotonic()
         try:
             response = self._session.call(self.srv_type, self.name, request, timeout)

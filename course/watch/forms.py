@@ -28,20 +28,20 @@ class Field:
     default: str
 
 
-def fields(msg_type: Any) -> list[Field]:
+def form_fields(msg_type: Any) -> list[Field]:
     """Return the inputs for a message of ``msg_type``, nested messages flattened by path."""
-    flat = list(_flatten(msg_type, msg_type(), ""))
-    return flat if len(flat) <= MAX_FIELDS else list(_top(msg_type, msg_type()))
+    flat = list(_flatten_fields(msg_type, msg_type(), ""))
+    return flat if len(flat) <= MAX_FIELDS else list(_top_fields(msg_type, msg_type()))
 
 
-def message(msg_type: Any, typed: Mapping[str, Any]) -> Any:
+def build_message(msg_type: Any, typed: Mapping[str, Any]) -> Any:
     """Return a message of what was typed into the inputs, by path; what is missing is default.
 
     Raises:
         MisfitError: there is no such input, or a text does not fit its field; the message names
             it.
     """
-    known = {field.path: field for field in fields(msg_type)}
+    known = {field.path: field for field in form_fields(msg_type)}
     data: dict[str, Any] = {}
     for path, value in typed.items():
         if path not in known:
@@ -52,25 +52,25 @@ def message(msg_type: Any, typed: Mapping[str, Any]) -> Any:
         place = data
         for name in above:
             place = place.setdefault(name, {})
-        place[last] = _parsed(known[path], value)
+        place[last] = _parse_input(known[path], value)
     return values.from_data(msg_type, data)
 
 
-def _flatten(msg_type: Any, default: Any, prefix: str) -> Iterator[Field]:
-    for name, slot in values.fields(msg_type):
+def _flatten_fields(msg_type: Any, default: Any, prefix: str) -> Iterator[Field]:
+    for name, slot in values.message_fields(msg_type):
         value = getattr(default, name)
         if isinstance(slot, NamespacedType):
-            yield from _flatten(values.class_of(slot), value, f"{prefix}{name}.")
+            yield from _flatten_fields(values.class_of(slot), value, f"{prefix}{name}.")
         else:
-            yield _field(slot, value, prefix + name)
+            yield _make_field(slot, value, prefix + name)
 
 
-def _top(msg_type: Any, default: Any) -> Iterator[Field]:
-    for name, slot in values.fields(msg_type):
-        yield _field(slot, getattr(default, name), name)
+def _top_fields(msg_type: Any, default: Any) -> Iterator[Field]:
+    for name, slot in values.message_fields(msg_type):
+        yield _make_field(slot, getattr(default, name), name)
 
 
-def _field(slot: Any, value: Any, path: str) -> Field:
+def _make_field(slot: Any, value: Any, path: str) -> Field:
     takes = values.in_words(slot)
     if isinstance(slot, AbstractString | AbstractWString):
         return Field(path, takes, "text", value)
@@ -81,16 +81,18 @@ def _field(slot: Any, value: Any, path: str) -> Field:
     return Field(path, takes, "yaml", yaml_text.one_line(values.to_plain(value, None)))
 
 
-def _parsed(field: Field, typed: Any) -> Any:
+def _parse_input(field: Field, typed: Any) -> Any:
     """Return what was typed as plain data; what is no text has been given by a program."""
     if not isinstance(typed, str):
         return typed
     if field.kind == "text":
         return typed
     try:
-        read = yaml_text.read(typed)
+        read = yaml_text.parse_yaml(typed)
     except ValueError:
         read = None
     if read is None:
-        raise values.MisfitError(f"{field.path} takes {field.takes}, not {yaml_text.shown(typed)}.")
+        raise values.MisfitError(
+            f"{field.path} takes {field.takes}, not {yaml_text.short_repr(typed)}."
+        )
     return read

@@ -40,9 +40,9 @@ OVER = (GoalState.SUCCEEDED, GoalState.CANCELED, GoalState.ABORTED)
 class Goal:
     """One goal: the states that it went through with their times (s since it was first seen).
 
-    ``way`` is how far it had come, as `progress.measure` tells: the number's name, and (s since the
-    goal was first seen, number) of the latest feedback messages. ``problem`` says why it never
-    began; ``note`` what else there is to say about it.
+    ``way`` is how far it had come, as `progress.measure_progress` tells: the number's name, and (s
+    since the goal was first seen, number) of the latest feedback messages. ``problem`` says why it
+    never began; ``note`` what else there is to say about it.
     """
 
     number: int
@@ -62,7 +62,7 @@ class Goal:
         return self.states[-1][0] if self.states else GoalState.UNKNOWN
 
     @property
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether it has ended."""
         return self.state in OVER or bool(self.problem)
 
@@ -102,7 +102,7 @@ class GoalBoard:
             self._session.unwatch(subscription)
 
     @property
-    def goals(self) -> list[Goal]:
+    def latest_goals(self) -> list[Goal]:
         """The latest goals, oldest first (a snapshot)."""
         with self._lock:
             both = [*self._goals.values(), *self._rejected]
@@ -114,9 +114,9 @@ class GoalBoard:
         Raises:
             MisfitError: something does not fit its field.
         """
-        goal = forms.message(self.action_type.Goal, typed)
+        goal = forms.build_message(self.action_type.Goal, typed)
         threading.Thread(
-            target=self._follow, args=(goal, timeout), name="ROS goal", daemon=True
+            target=self._follow_goal, args=(goal, timeout), name="ROS goal", daemon=True
         ).start()
 
     def cancel(self, number: int, timeout: float = 5.0) -> None:
@@ -134,32 +134,32 @@ class GoalBoard:
                 CancelGoal, f"{self.name}/_action/cancel_goal", request, timeout
             )
             agreed = any(bytes(info.goal_id.uuid) == key for info in response.goals_canceling)
-            goal.note = "" if agreed or goal.over else "The server refused to cancel."
+            goal.note = "" if agreed or goal.is_over else "The server refused to cancel."
 
-    def _follow(self, goal: Any, timeout: float) -> None:
+    def _follow_goal(self, goal: Any, timeout: float) -> None:
         asked = values.to_data(goal)
         try:
             run = self._session.send_goal(self.action_type, self.name, goal, timeout=timeout)
         except CourseError as error:
-            self._reject(asked, str(error))
+            self._add_rejected(asked, str(error))
             return
         except Exception as error:  # noqa: BLE001 - the session may end under it
-            self._reject(asked, f"{type(error).__name__}: {error}")
+            self._add_rejected(asked, f"{type(error).__name__}: {error}")
             return
         if not run.accepted:
-            self._reject(asked, "The server rejected this goal.")
+            self._add_rejected(asked, "The server rejected this goal.")
             return
         with self._lock:
-            kept = self._goal(run.goal_id)
+            kept = self._get_goal(run.goal_id)
             if kept is not None:
                 kept.asked = asked
 
-    def _ask(self, key: bytes, goal: Goal, tries: int = TRIES) -> None:
+    def _request_result(self, key: bytes, goal: Goal, tries: int = TRIES) -> None:
         """Have the result of a goal that is over fetched; called with the lock held."""
         if not self._stopped:
-            self._asker.submit(self._fetch, key, goal, tries)
+            self._asker.submit(self._fetch_result, key, goal, tries)
 
-    def _fetch(self, key: bytes, goal: Goal, tries: int) -> None:
+    def _fetch_result(self, key: bytes, goal: Goal, tries: int) -> None:
         service = self.action_type.Impl.GetResultService
         request = service.Request(goal_id=UUID(uuid=list(key)))
         try:
@@ -170,7 +170,7 @@ class GoalBoard:
             goal.note = "Its server has not given its result yet."
             with self._lock:
                 if tries > 1 and key in self._goals:
-                    self._ask(key, goal, tries - 1)
+                    self._request_result(key, goal, tries - 1)
             return
         goal.note = ""
         if response.status in OVER:
@@ -178,13 +178,13 @@ class GoalBoard:
         else:
             goal.note = "Its server has not kept the result."
 
-    def _reject(self, asked: dict[str, Any], problem: str) -> None:
+    def _add_rejected(self, asked: dict[str, Any], problem: str) -> None:
         with self._lock:
             self._count += 1
             self._rejected.append(Goal(self._count, asked=asked, problem=problem))
             del self._rejected[:-KEPT]
 
-    def _goal(self, key: bytes) -> Goal | None:
+    def _get_goal(self, key: bytes) -> Goal | None:
         """Return the goal of an id, None if it was let go of; called with the lock held."""
         if key in self._let_go:
             return None
@@ -198,29 +198,29 @@ class GoalBoard:
         listed = {bytes(status.goal_info.goal_id.uuid): status for status in message.status_list}
         with self._lock:
             for key, status in listed.items():
-                goal = self._goal(key)
+                goal = self._get_goal(key)
                 if goal is None:
                     continue
                 state = GoalState(status.status)
                 if goal.state != state:
                     goal.states.append((state, max(0.0, now - goal.seen)))
-                    if goal.over:
+                    if goal.is_over:
                         goal.note = ""
-                        self._ask(key, goal)
+                        self._request_result(key, goal)
             # A server lists goals for minutes after their end: these are not new ones.
             self._let_go &= listed.keys()
-            oldest = sorted(self._goals, key=lambda key: not self._goals[key].over)
+            oldest = sorted(self._goals, key=lambda key: not self._goals[key].is_over)
             for key in oldest[: max(0, len(oldest) - KEPT)]:
                 del self._goals[key]
                 self._let_go |= {key} & listed.keys()
 
     def _on_feedback(self, message: Any) -> None:
         with self._lock:
-            goal = self._goal(bytes(message.goal_id.uuid))
+            goal = self._get_goal(bytes(message.goal_id.uuid))
             if goal is not None:
                 goal.feedback += 1
                 goal.latest = values.to_data(message.feedback)
-                if (found := progress.measure(message.feedback)) is not None:
+                if (found := progress.measure_progress(message.feedback)) is not None:
                     if goal.way is None or goal.way[0] != found.name:
                         goal.way = found.name, deque(maxlen=POINTS)
                     goal.way[1].append((time.monotonic() - goal.seen, found.value))

@@ -28,7 +28,7 @@ _GUESSES = (  # in this order: an empty list is one of bytes, as rclpy has it
     ParameterType.PARAMETER_INTEGER_ARRAY, ParameterType.PARAMETER_DOUBLE_ARRAY,
     ParameterType.PARAMETER_STRING_ARRAY,
 )  # fmt: skip
-_SLOTS = dict(values.fields(ParameterValue))
+_SLOTS = dict(values.message_fields(ParameterValue))
 
 
 class ParameterError(CourseError):
@@ -60,8 +60,8 @@ def to_value(name: str, typed: Any, declared: int) -> ParameterValue:
     """
     takes = TYPES[declared][1] if declared in TYPES else "a value, or a list of one kind of value"
     try:
-        data = _data(typed, declared)
-        type_ = declared if declared in TYPES else _guess(data)
+        data = _parse_typed(typed, declared)
+        type_ = declared if declared in TYPES else _guess_type(data)
         field, _ = TYPES[type_]
         if isinstance(data, float) and data.is_integer() and field == "integer_value":
             data = int(data)  # a slider's 2.0
@@ -69,19 +69,19 @@ def to_value(name: str, typed: Any, declared: int) -> ParameterValue:
     except values.MisfitError as error:
         if declared == ParameterType.PARAMETER_INTEGER and type(data) is int:
             raise ParameterError(str(error)) from None  # the range
-        raise ParameterError(f"{name} takes {takes}, not {yaml_text.shown(typed)}.") from None
+        raise ParameterError(f"{name} takes {takes}, not {yaml_text.short_repr(typed)}.") from None
     except ValueError:
-        raise ParameterError(f"{name} takes {takes}, not {yaml_text.shown(typed)}.") from None
+        raise ParameterError(f"{name} takes {takes}, not {yaml_text.short_repr(typed)}.") from None
     return ParameterValue(type=type_, **{field: held})
 
 
-def _data(typed: Any, declared: int) -> Any:
+def _parse_typed(typed: Any, declared: int) -> Any:
     if isinstance(typed, str) and declared != ParameterType.PARAMETER_STRING:
-        return yaml_text.read(typed)
+        return yaml_text.parse_yaml(typed)
     return typed.tolist() if hasattr(typed, "tolist") else typed  # numpy's
 
 
-def _guess(data: Any) -> int:
+def _guess_type(data: Any) -> int:
     if data == []:
         return int(ParameterType.PARAMETER_BYTE_ARRAY)
     for type_ in _GUESSES:

@@ -21,18 +21,18 @@ class Measure(NamedTuple):
     value: float
 
 
-def measure(feedback: Any) -> Measure | None:
+def measure_progress(feedback: Any) -> Measure | None:
     """Return the number of a feedback message that tells most of its progress; None without any.
 
     A field whose name says so comes first (see `TELLING`), then any other number, then the length
     of a list that grows, as of a path or a sequence. A duration counts in seconds.
     """
-    found = sorted(_numbers(feedback, "", _DEEPEST), key=_rank)
+    found = sorted(_find_numbers(feedback, "", _DEEPEST), key=_rank_measure)
     return found[0] if found else None
 
 
-def _numbers(message: Any, start: str, depth: int) -> Iterator[Measure]:
-    for field, _ in values.fields(type(message)):
+def _find_numbers(message: Any, start: str, depth: int) -> Iterator[Measure]:
+    for field, _ in values.message_fields(type(message)):
         if field in _STAMPS:
             continue
         path, value = start + field, getattr(message, field)
@@ -45,12 +45,12 @@ def _numbers(message: Any, start: str, depth: int) -> Iterator[Measure]:
         elif hasattr(value, "nanosec"):
             yield Measure(f"{path} (s)", value.sec + value.nanosec / 1e9)
         elif depth > 1:
-            yield from _numbers(value, f"{path}.", depth - 1)
+            yield from _find_numbers(value, f"{path}.", depth - 1)
 
 
 _LENGTH = " (number of values)"
 
 
-def _rank(found: Measure) -> tuple[int, bool]:
+def _rank_measure(found: Measure) -> tuple[int, bool]:
     telling = [place for place, word in enumerate(TELLING) if word in found.name.lower()]
     return min(telling, default=len(TELLING)), found.name.endswith(_LENGTH)

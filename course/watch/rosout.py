@@ -31,10 +31,10 @@ class Rosout:
         self._session = session
         self._rows: deque[LogRow] = deque(maxlen=KEPT)
         self._lock = threading.Lock()
-        self._subscription = session.watch(Log, "/rosout", self._take, _QOS)
+        self._subscription = session.watch(Log, "/rosout", self._take_line, _QOS)
 
     @property
-    def rows(self) -> list[LogRow]:
+    def latest_rows(self) -> list[LogRow]:
         """The latest lines, in the order in which they came (a snapshot)."""
         with self._lock:
             return list(self._rows)
@@ -43,8 +43,8 @@ class Rosout:
         """Listen no more. Idempotent."""
         self._session.unwatch(self._subscription)
 
-    def _take(self, message: Log) -> None:
-        if store.knows(message.name):
+    def _take_line(self, message: Log) -> None:
+        if store.has_logger(message.name):
             return
         stamp = message.stamp.sec + message.stamp.nanosec / 1e9
         row = LogRow(stamp, level_name(message.level), node_of(message.name), message.msg[:LONGEST])

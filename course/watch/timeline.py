@@ -99,18 +99,18 @@ class Trace:
         self._subscribe()
 
     @property
-    def messages(self) -> list[tuple[int, bytes]]:
+    def latest_messages(self) -> list[tuple[int, bytes]]:
         """The latest messages, each with its time (ns) and as CDR, oldest first (a snapshot)."""
         with self._lock:
             return list(self._messages)
 
-    def adapt(self) -> None:
+    def adapt_qos(self) -> None:
         """Subscribe anew if there is a publisher now that offers less than was requested.
 
         A talker's cell is run again with another QoS, say; what asks for less goes on fitting.
         """
         offers = self._session.observer.get_publishers_info_by_topic(self.topic)
-        if any(reader.incompatibilities(offer.qos_profile, self._qos) for offer in offers):
+        if any(reader.find_incompatibilities(offer.qos_profile, self._qos) for offer in offers):
             self._session.unwatch(self._subscription)
             self._subscribe()
 
@@ -126,10 +126,10 @@ class Trace:
         # Fits every offer, and brings nothing of the past: what is replayed is not what is late.
         self._qos.durability = DurabilityPolicy.VOLATILE
         self._subscription = self._session.watch(
-            self.msg_type, self.topic, self._take, self._qos, raw=True
+            self.msg_type, self.topic, self._take_message, self._qos, raw=True
         )
 
-    def since(self, moment_ns: int) -> list[Passage]:
+    def passages_since(self, moment_ns: int) -> list[Passage]:
         """Return the passages received since a moment (ns), oldest first."""
         with self._lock:
             passages = list(self._passages)
@@ -142,7 +142,7 @@ class Trace:
             full = len(self._passages) == self._passages.maxlen
             return self._passages[0].received if full else 0
 
-    def _take(self, message: bytes, info: dict[str, int]) -> None:
+    def _take_message(self, message: bytes, info: dict[str, int]) -> None:
         passage = Passage(
             info["source_timestamp"], info["received_timestamp"] or time.time_ns(),
             info.get("publication_sequence_number") or 0,
@@ -159,26 +159,26 @@ class Trace:
                 self._size -= len(self._messages.popleft()[1])
 
 
-def figures(passages: Sequence[Passage]) -> Figures:
+def compute_figures(passages: Sequence[Passage]) -> Figures:
     """Return what passages, oldest first, show."""
     if not passages:
         return Figures(0)
     latencies = sorted((p.received - p.published) / _NS for p in passages)
     stamps = [p.published / _NS for p in passages]
     span = stamps[-1] - stamps[0]
-    missing = drops(passages)
+    missing = find_drops(passages)
     return Figures(
         len(passages),
         rate=(len(stamps) - 1) / span if span > 0 else None,
-        latency_p50=_share(latencies, 0.5),
-        latency_p95=_share(latencies, 0.95),
+        latency_p50=_pick_quantile(latencies, 0.5),
+        latency_p95=_pick_quantile(latencies, 0.95),
         lost=sum(count for _, count in missing),
-        gaps=_gaps(stamps),
+        gaps=_find_gaps(stamps),
         drops=missing,
     )
 
 
-def plots(passages: Sequence[Passage], start: int, window_ns: int) -> Plots:
+def compute_plots(passages: Sequence[Passage], start: int, window_ns: int) -> Plots:
     """Return rate and latency over a window from ``start`` (ns) of passages, oldest first.
 
     The rate of a part is that of the periods that end in it, so that a steady topic has a level
@@ -196,7 +196,7 @@ def plots(passages: Sequence[Passage], start: int, window_ns: int) -> Plots:
         before = passage
     rate = [len(found) / sum(found) if sum(found) > 0 else None for found in periods]
     part = window_ns / BINS / _NS
-    for begin, end in figures(passages).gaps:
+    for begin, end in compute_figures(passages).gaps:
         for place, found in enumerate(latencies):
             middle = start / _NS + (place + 0.5) * part
             if begin < middle < end and not found:
@@ -204,11 +204,14 @@ def plots(passages: Sequence[Passage], start: int, window_ns: int) -> Plots:
     ordered = [sorted(found) for found in latencies]
     return Plots(
         rate,
-        *([_share(found, share) if found else None for found in ordered] for share in (0.5, 0.95)),
+        *(
+            [_pick_quantile(found, share) if found else None for found in ordered]
+            for share in (0.5, 0.95)
+        ),
     )
 
 
-def columns(moments: Sequence[int], start: int, window_ns: int) -> list[int]:
+def count_columns(moments: Sequence[int], start: int, window_ns: int) -> list[int]:
     """Return how many moments (ns) fall into each of `COLUMNS` parts of a window from ``start``."""
     counts = [0] * COLUMNS
     for moment in moments:
@@ -218,7 +221,7 @@ def columns(moments: Sequence[int], start: int, window_ns: int) -> list[int]:
     return counts
 
 
-def _share(ordered: Sequence[float], share: float) -> float:
+def _pick_quantile(ordered: Sequence[float], share: float) -> float:
     return ordered[min(len(ordered) - 1, int(len(ordered) * share))]
 
 
@@ -234,7 +237,7 @@ class Counted(Protocol):
         """See `Passage`."""
 
 
-def drops(messages: Sequence[Counted]) -> tuple[tuple[float, int], ...]:
+def find_drops(messages: Sequence[Counted]) -> tuple[tuple[float, int], ...]:
     """Return where numbers are missing, if all come from one publisher that counts.
 
     Returns:
@@ -250,7 +253,7 @@ def drops(messages: Sequence[Counted]) -> tuple[tuple[float, int], ...]:
     )
 
 
-def _gaps(stamps: Sequence[float]) -> tuple[tuple[float, float], ...]:
+def _find_gaps(stamps: Sequence[float]) -> tuple[tuple[float, float], ...]:
     pauses = [(b - a, a, b) for a, b in itertools.pairwise(stamps)]
     if len(pauses) < 4:
         return ()

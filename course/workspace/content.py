@@ -27,7 +27,7 @@ def content_root() -> Path:
     Raises:
         ContentError: the installation is incomplete.
     """
-    return _first("notebooks", _CLONE / "notebooks", _DATA / "notebooks")
+    return _first_folder("notebooks", _CLONE / "notebooks", _DATA / "notebooks")
 
 
 def working_root() -> Path:
@@ -76,7 +76,7 @@ def copy_authoring(root: Path, folder: Path) -> Path:
     return folder.resolve()
 
 
-def _first(what: str, *places: Path) -> Path:
+def _first_folder(what: str, *places: Path) -> Path:
     for place in places:
         if place.is_dir():
             return place

@@ -67,7 +67,7 @@ def make_copy(folder: Path, root: Path | None = None) -> Copied:
         for name, content in files.items():
             _hand_out(copied, name, content, handed_out.setdefault(str(name), []))
         _write_manifest(folder, handed_out)
-        welcome.refresh(folder)
+        welcome.refresh_progress(folder)
     except OSError as error:
         raise LabError(
             f"The working copy {folder} cannot be written ({error.strerror or error}): name a "
@@ -127,17 +127,17 @@ def _hand_out(copied: Copied, name: Path, content: bytes, digests: list[str]) ->
     target = copied.folder / name
     target.parent.mkdir(parents=True, exist_ok=True)
     if not target.exists():
-        _create(target, content)
+        _create_file(target, content)
         copied.new.append(name)
     elif digest not in digests and target.read_bytes() != content:
         beside = _free_name(target)
-        _create(beside, content)
+        _create_file(beside, content)
         copied.beside[name] = beside.relative_to(copied.folder)
     if digest not in digests:
         digests.append(digest)
 
 
-def _create(path: Path, content: bytes) -> None:
+def _create_file(path: Path, content: bytes) -> None:
     """Write a file that is not there; a full disk leaves none rather than half of one."""
     file = path.open("xb")  # x: not even a file that appeared this very moment is overwritten
     try:

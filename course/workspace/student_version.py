@@ -26,11 +26,11 @@ def student_versions(root: Path) -> dict[Path, str]:
     paths = sorted((root / "source").glob("*/*.ipynb"))
     if not paths:
         return {}
-    config = _config(root)
+    config = _read_config(root)
     return {path.relative_to(root / "source"): _student_version(path, config) for path in paths}
 
 
-def _config(root: Path) -> Config:
+def _read_config(root: Path) -> Config:
     try:
         return Config(PyFileConfigLoader(CONFIG, path=str(root)).load_config())
     except OSError as error:

@@ -29,7 +29,7 @@ def open_bank(name: str, own: Path | None = None) -> Bank:
     else:
         path = Path(name)
         sheet = closing.quiz_of(path)
-        bank = closing.read(path, sheet) if sheet else loader.read_bank(path)
+        bank = closing.read_sheet(path, sheet) if sheet else loader.read_bank(path)
         source = path.name
     if bank.keyless:
         raise BankError(f"{source} holds questions without keys: take the bank they come from.")
@@ -54,13 +54,13 @@ def export_bank(bank: Bank, format_name: str, to: Path | None = None) -> tuple[P
         )
     path = to or Path(f"{bank.quiz}{FORMATS[format_name]}")
     if format_name == "gift":
-        content = gift.write(questions.of_bank(bank), bank.title).encode()
+        content = gift.format_gift(questions.of_bank(bank), bank.title).encode()
         notes = limits.of_gift(bank)
     else:
         from quizzes.exchange import qti  # text2qti takes a moment to import
 
-        content, notes = qti.package(bank)
-    _write(path, content)
+        content, notes = qti.make_package(bank)
+    _write_file(path, content)
     return path, notes
 
 
@@ -85,7 +85,7 @@ def import_gift(path: Path, bank: Bank, to: Path | None = None) -> tuple[Path, m
         raise ExchangeError(f"{path}, line {line}: this is not UTF-8 text.") from None
     except OSError as error:
         raise ExchangeError(f"{path} cannot be read: {error.strerror or error}.") from None
-    merged = merge.merge(bank, gift.read(content, path.name), path.name)
+    merged = merge.merge_questions(bank, gift.read_gift(content, path.name), path.name)
     target = to or Path(f"{bank.quiz}.yaml")
     if to is None and target.exists():
         raise ExchangeError(f"{target} is there already: name the file to write with --to.")
@@ -96,7 +96,7 @@ def import_gift(path: Path, bank: Bank, to: Path | None = None) -> tuple[Path, m
         )
     content = merged.to_yaml()
     loader.bank_of(content, target.name, bank.folder)  # what is written can be read again
-    _write(target, content.encode())
+    _write_file(target, content.encode())
     try:
         loader.bank_of(content, target.name, target.parent)
     except BankError:
@@ -104,7 +104,7 @@ def import_gift(path: Path, bank: Bank, to: Path | None = None) -> tuple[Path, m
     return target, merged
 
 
-def _write(path: Path, content: bytes) -> None:
+def _write_file(path: Path, content: bytes) -> None:
     try:
         path.write_bytes(content)
     except OSError as error:

@@ -11,13 +11,13 @@ from collections.abc import Iterable
 from decimal import Decimal
 
 from quizzes.exchange.gift_reader import MAX_SIZE as MAX_SIZE
-from quizzes.exchange.gift_reader import read as read
+from quizzes.exchange.gift_reader import read_gift as read_gift
 from quizzes.exchange.questions import ChoiceQuestion, MatchQuestion, NumberQuestion, Question
 
 _SPECIAL = "~=#{}:"
 
 
-def write(questions: Iterable[Question], title: str = "") -> str:
+def format_gift(questions: Iterable[Question], title: str = "") -> str:
     """Return questions as a GIFT file, in their order, grouped by category."""
     blocks = [f"// {' '.join(title.split())}"] if title else []
     category = ""
@@ -25,11 +25,11 @@ def write(questions: Iterable[Question], title: str = "") -> str:
         if question.category != category:
             category = question.category
             blocks.append(f"$CATEGORY: {category}")
-        blocks.append(_question(question))
+        blocks.append(_format_question(question))
     return "\n\n".join(blocks) + "\n"
 
 
-def escape(text: str) -> str:
+def escape_text(text: str) -> str:
     """Return a text with all that GIFT gives a meaning escaped, on one line."""
     text = text.replace("\r\n", "\n").replace("\r", "\n").replace("\\", "\\\\")
     for character in _SPECIAL:
@@ -37,56 +37,60 @@ def escape(text: str) -> str:
     return text.replace("\n", "\\n")
 
 
-def _text(text: str) -> str:
+def _format_text(text: str) -> str:
     # What begins like the name of a text format, or like a weight, is text all the same.
-    return ("[markdown]" if text.startswith(("[", "%")) else "") + escape(text)
+    return ("[markdown]" if text.startswith(("[", "%")) else "") + escape_text(text)
 
 
-def _question(question: Question) -> str:
-    lines = [f"::{escape(question.name)}::[markdown]{escape(question.text)}{{"]
+def _format_question(question: Question) -> str:
+    lines = [f"::{escape_text(question.name)}::[markdown]{escape_text(question.text)}{{"]
     if isinstance(question, NumberQuestion):
         lines[0] += "#"
-        lines += _numbers(question)
+        lines += _format_numbers(question)
     elif isinstance(question, MatchQuestion):
-        lines += [f"={_text(left)} -> {escape(right)}" for left, right in question.pairs]
-        lines += [f"= -> {escape(extra)}" for extra in question.extras]
+        lines += [
+            f"={_format_text(left)} -> {escape_text(right)}" for left, right in question.pairs
+        ]
+        lines += [f"= -> {escape_text(extra)}" for extra in question.extras]
     else:
-        lines += _choices(question)
+        lines += _format_choices(question)
     if question.feedback:
-        lines.append(f"####{_text(question.feedback)}")
+        lines.append(f"####{_format_text(question.feedback)}")
     return "\n\t".join(lines) + "\n}"
 
 
-def _choices(question: ChoiceQuestion) -> list[str]:
+def _format_choices(question: ChoiceQuestion) -> list[str]:
     lines = []
     for choice in question.choices:
         if question.one and choice.share == 100:
             mark = "="
         elif choice.share:
-            mark = f"~%{_decimal(choice.share)}%"
+            mark = f"~%{_short_decimal(choice.share)}%"
         else:
             mark = "~"
-        lines.append(mark + _text(choice.text) + _feedback(choice.feedback))
+        lines.append(mark + _format_text(choice.text) + _format_feedback(choice.feedback))
     return lines
 
 
-def _numbers(question: NumberQuestion) -> list[str]:
+def _format_numbers(question: NumberQuestion) -> list[str]:
     lines = [
-        f"=%{_decimal(number.share)}%{_exact(number.value)}:{_exact(number.tolerance)}"
-        + _feedback(number.feedback)
+        f"=%{_short_decimal(number.share)}%{_exact_decimal(number.value)}:{_exact_decimal(number.tolerance)}"
+        + _format_feedback(number.feedback)
         for number in question.numbers
     ]
-    return lines + ([f"~#{_text(question.wrong_feedback)}"] if question.wrong_feedback else [])
+    return lines + (
+        [f"~#{_format_text(question.wrong_feedback)}"] if question.wrong_feedback else []
+    )
 
 
-def _feedback(text: str) -> str:
-    return f"#{_text(text)}" if text else ""
+def _format_feedback(text: str) -> str:
+    return f"#{_format_text(text)}" if text else ""
 
 
-def _exact(number: float) -> str:
+def _exact_decimal(number: float) -> str:
     """Return all digits of a number, and no exponent: not every reader of GIFT knows those."""
     return format(Decimal(repr(number)), "f")
 
 
-def _decimal(number: float) -> str:
+def _short_decimal(number: float) -> str:
     return f"{number:.5f}".rstrip("0").rstrip(".")

@@ -24,18 +24,18 @@ Having = Callable[[Callable[[Variant], bool]], str]
 
 def of_gift(bank: Bank) -> list[str]:
     """Return what is lost in GIFT, or changes its form, as Moodle reads it."""
-    having = _having(bank)
-    attempts = str(bank.counted) if bank.counted <= MOODLE_MOST else "Unlimited"
+    having = _question_filter(bank)
+    attempts = str(bank.attempt_limit) if bank.attempt_limit <= MOODLE_MOST else "Unlimited"
     notes = [
         f"A GIFT file has questions alone. In Moodle's quiz add one random question from each "
         f"category, with one point each: {len(bank.concepts)} points in all. The title, the "
         f"chapter and the pass mark ({bank.pass_text}, where a platform counts points) are "
         "settings of that quiz.",
-        f"Attempt rules are settings, too: the best of {bank.counted} counts, so choose "
+        f"Attempt rules are settings, too: the best of {bank.attempt_limit} counts, so choose "
         f"'Attempts allowed: {attempts}' and 'Grading method: Highest grade'."
         + (
             f" Moodle has no limit between {MOODLE_MOST} and none, so every attempt counts there."
-            if bank.counted > MOODLE_MOST
+            if bank.attempt_limit > MOODLE_MOST
             else ""
         ),
     ]
@@ -52,9 +52,11 @@ def of_gift(bank: Bank) -> list[str]:
         "and that for a wrong answer.":
             having(lambda v: isinstance(v, Ordering | Matching) and bool(v.feedback)),
         "There are no pictures: in {} the picture's description stands in its place.":
-            having(lambda v: any(PICTURE.search(CODE.sub("", text)) for text in _texts(v))),
+            having(
+                lambda v: any(PICTURE.search(CODE.sub("", text)) for text in _markdown_texts(v))
+            ),
         "Formulas are in double dollars, which Moodle shows with its MathJax filter: {}.":
-            having(lambda v: any(LATEX.search(CODE.sub("", text)) for text in _texts(v))),
+            having(lambda v: any(LATEX.search(CODE.sub("", text)) for text in _markdown_texts(v))),
         "GIFT's arrow -> cannot stand on a left side: in {} it became →.":
             having(lambda v: isinstance(v, Matching) and any("->" in p.left for p in v.pairs)),
     }  # fmt: skip
@@ -63,12 +65,12 @@ def of_gift(bank: Bank) -> list[str]:
 
 def of_qti(bank: Bank) -> list[str]:
     """Return what is lost in text2qti's packages, or changes its form, as Canvas reads them."""
-    having = _having(bank)
+    having = _question_filter(bank)
     notes = [
         f"The pass mark ({bank.pass_text}) stands in the description alone: Canvas counts points, "
         "and passes nobody.",
-        f"The package asks for {bank.counted} "
-        + ("attempt" if bank.counted == 1 else "attempts, of which the best counts")
+        f"The package asks for {bank.attempt_limit} "
+        + ("attempt" if bank.attempt_limit == 1 else "attempts, of which the best counts")
         + ", and then Canvas closes the quiz"
         + ("." if bank.closed else ": there is no practice after them."),
     ]
@@ -88,16 +90,16 @@ def of_qti(bank: Bank) -> list[str]:
         "wrong numbers.":
             having(lambda v: isinstance(v, Numeric) and bool(v.traps)),
         f"text2qti rounds the bounds of a number to {DECIMALS} decimals: {{}}.":
-            having(lambda v: isinstance(v, Numeric) and _rounded(v)),
+            having(lambda v: isinstance(v, Numeric) and _is_rounded(v)),
     }  # fmt: skip
     return notes + [sentence.format(ids) for sentence, ids in several.items() if ids]
 
 
 def _of_both(bank: Bank) -> Iterator[str]:
-    having = _having(bank)
+    having = _question_filter(bank)
     behind = {
         "misconceptions": bool(bank.misconceptions),
-        "the cells that show what really happens": bool(having(_shows)),
+        "the cells that show what really happens": bool(having(_has_demonstration)),
         "the names of the proofs": bool(having(lambda v: bool(v.proof))),
         "the concepts' objectives": True,
     }
@@ -120,13 +122,13 @@ def _of_both(bank: Bank) -> Iterator[str]:
     )
 
 
-def _having(bank: Bank) -> Having:
+def _question_filter(bank: Bank) -> Having:
     """Return a function that names the questions for which something holds."""
     variants = [variant for concept in bank.concepts for variant in concept.variants]
     return lambda holds: ", ".join(variant.id for variant in variants if holds(variant))
 
 
-def _shows(variant: Variant) -> bool:
+def _has_demonstration(variant: Variant) -> bool:
     if isinstance(variant, Ordering | Matching):
         return bool(variant.show)
     if isinstance(variant, Numeric):
@@ -134,17 +136,17 @@ def _shows(variant: Variant) -> bool:
     return any(option.show for option in variant.options)
 
 
-def _rounded(variant: Numeric) -> bool:
+def _is_rounded(variant: Numeric) -> bool:
     bounds = (variant.answer - variant.tolerance, variant.answer + variant.tolerance)
     return any(abs(round(bound, DECIMALS) - bound) > 1e-9 for bound in bounds)
 
 
-def _texts(part: Part) -> Iterator[str]:
+def _markdown_texts(part: Part) -> Iterator[str]:
     """Yield every text of a question that is Markdown."""
     for name, value in part:
         if name not in _NO_MARKDOWN:
             for one in value if isinstance(value, list) else [value]:
                 if isinstance(one, Part):
-                    yield from _texts(one)
+                    yield from _markdown_texts(one)
                 elif isinstance(one, str):
                     yield one

@@ -30,7 +30,7 @@ from quizzes.exchange.questions import (
     code_block,
     from_plain,
     of_variant,
-    plain,
+    to_plain,
     unit_line,
 )
 
@@ -56,10 +56,10 @@ class Merged:
 
     def to_yaml(self) -> str:
         """Return the bank as YAML."""
-        return dump(self.bank)
+        return dump_bank(self.bank)
 
 
-def merge(bank: Bank, questions: Sequence[Question], source: str) -> Merged:
+def merge_questions(bank: Bank, questions: Sequence[Question], source: str) -> Merged:
     """Return ``bank`` with the questions of a file named ``source`` in it.
 
     Raises:
@@ -72,19 +72,19 @@ def merge(bank: Bank, questions: Sequence[Question], source: str) -> Merged:
     changed = 0
     for question in questions:
         concept, variant = known.get(question.name, (None, None))
-        place = _place(data, question, concept, source)
+        place = _find_variants(data, question, concept, source)
         if concept is None or variant is None:
             changed += 1
-            place.append(_built(question, None, {}, teaches=not bank.closed))
+            place.append(_build_variant(question, None, {}, teaches=not bank.closed))
             lacks = "" if bank.closed else ": name its proofs, misconceptions and cells"
             notes.append(f"'{question.name}' is new{lacks}.")
             continue
         before = of_variant(bank.quiz, concept, variant)
-        if _same(before, question):
+        if _is_same(before, question):
             continue
         changed += 1
         index = next(i for i, old in enumerate(place) if old["id"] == variant.id)
-        place[index] = _built(question, before, place[index], teaches=not bank.closed)
+        place[index] = _build_variant(question, before, place[index], teaches=not bank.closed)
         proven = ": see that its proofs still prove its key" if variant.proof else ""
         notes.append(f"'{question.name}' has changed{proven}.")
     missing = known.keys() - {question.name for question in questions}
@@ -93,13 +93,13 @@ def merge(bank: Bank, questions: Sequence[Question], source: str) -> Merged:
     if UNNAMED in str(data["concepts"]):
         data["misconceptions"][UNNAMED] = "Imported: name the belief behind this answer."
     try:
-        merged = loader.sound(data, source, bank.quiz, bank.folder, noun="question")
+        merged = loader.validate_bank(data, source, bank.quiz, bank.folder, noun="question")
     except BankError as error:
         raise ExchangeError(str(error)) from None
     return Merged(merged, notes, changed)
 
 
-def dump(bank: Bank) -> str:
+def dump_bank(bank: Bank) -> str:
     """Return a bank as YAML that people can edit: texts of several lines as blocks."""
     usual = {name for name in ("closed", "keyless") if not getattr(bank, name)}
     data = bank.model_dump(exclude_none=True, exclude=usual)
@@ -110,16 +110,16 @@ class _Dumper(yaml.SafeDumper):
     pass
 
 
-def _represent(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+def _represent_text(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
     return dumper.represent_scalar(
         "tag:yaml.org,2002:str", text, style="|" if "\n" in text else None
     )
 
 
-_Dumper.add_representer(str, _represent)
+_Dumper.add_representer(str, _represent_text)
 
 
-def _place(
+def _find_variants(
     data: dict[str, Any], question: Question, concept: Concept | None, source: str
 ) -> list[dict[str, Any]]:
     if concept is None and not _ID.fullmatch(question.name):
@@ -139,12 +139,12 @@ def _place(
     )
 
 
-def _same(before: Question, question: Question) -> bool:
+def _is_same(before: Question, question: Question) -> bool:
     """Whether a question says what the bank would export; where it is filed does not matter."""
     return {**vars(before), "category": ""} == {**vars(question), "category": ""}
 
 
-def _built(
+def _build_variant(
     question: Question, before: Question | None, old: dict[str, Any], *, teaches: bool
 ) -> dict[str, Any]:
     """Return a variant's fields from a question, with all that can be kept of the old ones."""
@@ -156,14 +156,14 @@ def _built(
         data["kind"] = "numeric"
     else:
         data["kind"] = "ordering" if _is_ordering(question) else "matching"
-    data |= _texts(question, before, old)
+    data |= _text_fields(question, before, old)
     data["proof"] = old.get("proof", [UNPROVEN])
     if isinstance(question, ChoiceQuestion):
-        data |= _options(question, old)
+        data |= _option_fields(question, old)
     elif isinstance(question, NumberQuestion):
-        data |= _numbers(question, old)
+        data |= _number_fields(question, old)
     else:
-        data |= _pairs(question, old)
+        data |= _pair_fields(question, old)
     return data if teaches else _without_fillers(data)
 
 
@@ -177,7 +177,9 @@ def _without_fillers(data: dict[str, Any]) -> dict[str, Any]:
     return kept
 
 
-def _texts(question: Question, before: Question | None, old: dict[str, Any]) -> dict[str, Any]:
+def _text_fields(
+    question: Question, before: Question | None, old: dict[str, Any]
+) -> dict[str, Any]:
     if before is not None and before.text == question.text:
         return {name: old[name] for name in ("stem", "code", "unit") if old.get(name)}
     text = question.text
@@ -190,25 +192,25 @@ def _texts(question: Question, before: Question | None, old: dict[str, Any]) -> 
         same = code_block(old["code"]) == found[0]
         fields["code"] = old["code"] if same else f"{found[1]}\n"
         text = text[: found.start()]
-    return {"stem": _kept(text, old.get("stem")), **fields}
+    return {"stem": _keep_form(text, old.get("stem")), **fields}
 
 
-def _kept(text: str, *candidates: str | None) -> str:
+def _keep_form(text: str, *candidates: str | None) -> str:
     """Return the bank's own form of a text if one of them is exported as it, else the text."""
-    return next((c for c in candidates if c is not None and plain(c) == text), from_plain(text))
+    return next((c for c in candidates if c is not None and to_plain(c) == text), from_plain(text))
 
 
-def _options(question: ChoiceQuestion, old: dict[str, Any]) -> dict[str, Any]:
+def _option_fields(question: ChoiceQuestion, old: dict[str, Any]) -> dict[str, Any]:
     left = list(old.get("options", []))
     options = []
     for choice in question.choices:
         correct = choice.share > 0
-        twin = _twin(left, choice.text, choice.feedback, correct=correct)
+        twin = _find_twin(left, choice.text, choice.feedback, correct=correct)
         if twin:
             left.remove(twin)
         option: dict[str, Any] = {
-            "text": _kept(choice.text, twin.get("text")),
-            "feedback": _kept(choice.feedback, twin.get("feedback")) or NO_FEEDBACK,
+            "text": _keep_form(choice.text, twin.get("text")),
+            "feedback": _keep_form(choice.feedback, twin.get("feedback")) or NO_FEEDBACK,
         }
         if correct:
             option["correct"] = True
@@ -220,17 +222,19 @@ def _options(question: ChoiceQuestion, old: dict[str, Any]) -> dict[str, Any]:
     return {"options": options}
 
 
-def _twin(left: list[dict[str, Any]], text: str, feedback: str, *, correct: bool) -> dict[str, Any]:
+def _find_twin(
+    left: list[dict[str, Any]], text: str, feedback: str, *, correct: bool
+) -> dict[str, Any]:
     """Return the old option that this one was: of the same text, or else of the same feedback."""
     mine = [option for option in left if bool(option.get("correct")) is correct]
     for field, wanted in (("text", text), ("feedback", feedback)):
         for option in mine:
-            if plain(option.get(field)) == wanted:
+            if to_plain(option.get(field)) == wanted:
                 return option
     return {}
 
 
-def _numbers(question: NumberQuestion, old: dict[str, Any]) -> dict[str, Any]:
+def _number_fields(question: NumberQuestion, old: dict[str, Any]) -> dict[str, Any]:
     [right] = [number for number in question.numbers if number.share == 100]
     traps = []
     known = {trap["value"]: trap for trap in old.get("traps", [])}
@@ -242,17 +246,18 @@ def _numbers(question: NumberQuestion, old: dict[str, Any]) -> dict[str, Any]:
             "value": number.value,
             "tolerance": number.tolerance,
             "misconception": twin.get("misconception", UNNAMED),
-            "feedback": _kept(number.feedback, twin.get("feedback")) or NO_FEEDBACK,
+            "feedback": _keep_form(number.feedback, twin.get("feedback")) or NO_FEEDBACK,
         }
         traps.append(trap | ({"show": twin["show"]} if twin.get("show") else {}))
     fields: dict[str, Any] = {
         "answer": right.value,
         "tolerance": right.tolerance,
-        "feedback": _kept(right.feedback or question.feedback, old.get("feedback")) or NO_FEEDBACK,
+        "feedback": _keep_form(right.feedback or question.feedback, old.get("feedback"))
+        or NO_FEEDBACK,
         "traps": traps,
     }
     if question.wrong_feedback:
-        fields["wrong_feedback"] = _kept(question.wrong_feedback, old.get("wrong_feedback"))
+        fields["wrong_feedback"] = _keep_form(question.wrong_feedback, old.get("wrong_feedback"))
     return fields | {name: old[name] for name in ("misconception", "show") if old.get(name)}
 
 
@@ -261,22 +266,22 @@ def _is_ordering(question: MatchQuestion) -> bool:
     return not question.extras and [left for left, _ in question.pairs] == positions
 
 
-def _pairs(question: MatchQuestion, old: dict[str, Any]) -> dict[str, Any]:
+def _pair_fields(question: MatchQuestion, old: dict[str, Any]) -> dict[str, Any]:
     right, _, wrong = question.feedback.partition(BOTH)
     fields: dict[str, Any] = {
-        "feedback": _kept(right, old.get("feedback")) or NO_FEEDBACK,
-        "wrong_feedback": _kept(wrong or right, old.get("wrong_feedback")) or NO_FEEDBACK,
+        "feedback": _keep_form(right, old.get("feedback")) or NO_FEEDBACK,
+        "wrong_feedback": _keep_form(wrong or right, old.get("wrong_feedback")) or NO_FEEDBACK,
         "misconception": old.get("misconception", UNNAMED),
     }
     if old.get("show"):
         fields["show"] = old["show"]
     if _is_ordering(question):
         items = old.get("items", [])
-        return {"items": [_kept(item, *items) for _, item in question.pairs], **fields}
+        return {"items": [_keep_form(item, *items) for _, item in question.pairs], **fields}
     lefts = [pair["left"] for pair in old.get("pairs", [])]
     rights = [*(pair["right"] for pair in old.get("pairs", [])), *old.get("extras", [])]
     pairs = [
-        {"left": _kept(left, *lefts), "right": _kept(right, *rights)}
+        {"left": _keep_form(left, *lefts), "right": _keep_form(right, *rights)}
         for left, right in question.pairs
     ]
-    return {"pairs": pairs, "extras": [_kept(e, *rights) for e in question.extras], **fields}
+    return {"pairs": pairs, "extras": [_keep_form(e, *rights) for e in question.extras], **fields}

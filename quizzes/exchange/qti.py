@@ -22,7 +22,7 @@ _PICTURE = re.compile(r"!\[([^\]]*)\]\(([^)\s]+)\)")
 _TEXT_BLOCK = re.compile(r"(```.*?```)", re.DOTALL)
 
 
-def package(bank: Bank) -> tuple[bytes, list[str]]:
+def make_package(bank: Bank) -> tuple[bytes, list[str]]:
     """Return a bank as the bytes of a QTI package, and what it leaves out, a sentence each.
 
     Raises:
@@ -31,7 +31,7 @@ def package(bank: Bank) -> tuple[bytes, list[str]]:
     asked: dict[str, str] = {}
     for concept in bank.concepts:  # one by one first: text2qti knows lines, people know items
         for variant in concept.variants:
-            text = " ".join(_stem(variant).split())
+            text = " ".join(_format_stem(variant).split())
             if text in asked:
                 raise ExchangeError(
                     f"{bank.quiz}.yaml, items '{asked[text]}' and '{variant.id}' ask the same "
@@ -39,17 +39,17 @@ def package(bank: Bank) -> tuple[bytes, list[str]]:
                 )
             asked[text] = variant.id
             try:
-                _parsed("\n".join(_question(bank, variant)) + "\n")
+                _parse_quiz("\n".join(_format_question(bank, variant)) + "\n")
             except Text2qtiError as error:
                 reason = " ".join(str(error).split())
                 raise ExchangeError(
                     f"{bank.quiz}.yaml, item '{variant.id}' cannot be written as QTI: {reason}."
                 ) from None
-    return _zip(bank), limits.of_qti(bank)
+    return _zip_package(bank), limits.of_qti(bank)
 
 
-def _zip(bank: Bank) -> bytes:
-    quiz = _parsed(plain_text(bank))
+def _zip_package(bank: Bank) -> bytes:
+    quiz = _parse_quiz(plain_text(bank))
     groups = [part.group for part in quiz.questions_and_delims if isinstance(part, GroupStart)]
     for group, concept in zip(groups, bank.concepts, strict=True):
         group.title_xml = concept.id
@@ -58,15 +58,17 @@ def _zip(bank: Bank) -> bytes:
     quiz.points_possible = sum(group.pick * group.points_per_question for group in groups)
     package = QTI(quiz)
     # text2qti has no word for the number of attempts, and writes 1.
-    package.assessment_meta = _replaced(
-        package.assessment_meta, "<allowed_attempts>1<", f"<allowed_attempts>{bank.counted}<"
+    package.assessment_meta = _replace_once(
+        package.assessment_meta, "<allowed_attempts>1<", f"<allowed_attempts>{bank.attempt_limit}<"
     )
     field = "<fieldlabel>cc_maxattempts</fieldlabel>\n        <fieldentry>{}<"
-    package.assessment = _replaced(package.assessment, field.format(1), field.format(bank.counted))
+    package.assessment = _replace_once(
+        package.assessment, field.format(1), field.format(bank.attempt_limit)
+    )
     return bytes(package.zip_bytes())
 
 
-def _replaced(xml: str, old: str, new: str) -> str:
+def _replace_once(xml: str, old: str, new: str) -> str:
     if xml.count(old) != 1:
         raise ExchangeError(
             "This version of text2qti writes another package than the one that is known: install "
@@ -87,41 +89,41 @@ def plain_text(bank: Bank) -> str:
     for concept in bank.concepts:
         lines += ["GROUP", "pick: 1", f"points per question: {POINTS}", ""]
         for variant in concept.variants:
-            lines += [*_question(bank, variant), ""]
+            lines += [*_format_question(bank, variant), ""]
         lines += ["END_GROUP", ""]
     return "\n".join(lines)
 
 
-def _parsed(text: str) -> Quiz:
+def _parse_quiz(text: str) -> Quiz:
     # Not the user's own settings: what comes out depends on the bank alone.
     return Quiz(text, config=Config(), source_name="the bank")
 
 
-def _question(bank: Bank, variant: Variant) -> list[str]:
+def _format_question(bank: Bank, variant: Variant) -> list[str]:
     lines = [f"Title: {variant.id}", f"Points: {POINTS}"]
-    lines += _item(bank, "1.", _stem(variant))
+    lines += _format_item(bank, "1.", _format_stem(variant))
     if isinstance(variant, Numeric):
-        lines += _item(bank, "+", variant.feedback)
-        lines += _item(bank, "-", variant.wrong_feedback or variant.feedback)
+        lines += _format_item(bank, "+", variant.feedback)
+        lines += _format_item(bank, "-", variant.wrong_feedback or variant.feedback)
         return [*lines, f"= {variant.answer!r} +- {variant.tolerance!r}"]
     if isinstance(variant, Ordering | Matching):
-        options = _arrangements(variant)
-        lines += _item(bank, "+", variant.feedback)
-        lines += _item(bank, "-", variant.wrong_feedback)
+        options = _list_arrangements(variant)
+        lines += _format_item(bank, "+", variant.feedback)
+        lines += _format_item(bank, "-", variant.wrong_feedback)
         for letter, option in zip("abcdefgh", options, strict=False):
-            lines += _item(bank, f"{'*' if option == options[0] else ''}{letter})", option)
+            lines += _format_item(bank, f"{'*' if option == options[0] else ''}{letter})", option)
         return lines
     for letter, choice in zip("abcdefghij", variant.options, strict=False):
         mark = "*" if choice.correct else ""
         if isinstance(variant, Multiple):
-            lines += _item(bank, f"[{mark or ' '}]", choice.text)
+            lines += _format_item(bank, f"[{mark or ' '}]", choice.text)
         else:
-            lines += _item(bank, f"{mark}{letter})", choice.text)
-        lines += _item(bank, "...", choice.feedback)
+            lines += _format_item(bank, f"{mark}{letter})", choice.text)
+        lines += _format_item(bank, "...", choice.feedback)
     return lines
 
 
-def _stem(variant: Variant) -> str:
+def _format_stem(variant: Variant) -> str:
     """Return all that stands above the answers."""
     stem = variant.stem + (code_block(variant.code) if variant.code else "")
     if isinstance(variant, Numeric):
@@ -132,30 +134,35 @@ def _stem(variant: Variant) -> str:
 def _to_arrange(variant: Ordering | Matching) -> str:
     """Return what stands below the stem: the things to arrange, under numbers and letters."""
     if isinstance(variant, Ordering):
-        return "\n\n" + _lettered(variant.items)
+        return "\n\n" + _format_lettered(variant.items)
     lefts = "\n".join(f"- {number}: {pair.left}" for number, pair in enumerate(variant.pairs, 1))
-    return f"\n\n{lefts}\n\nWhat there is to choose from:\n\n{_lettered(variant.texts)}"
+    return (
+        f"\n\n{lefts}\n\nWhat there is to choose from:\n\n"
+        f"{_format_lettered(variant.lettered_texts)}"
+    )
 
 
-def _lettered(texts: list[str]) -> str:
-    return "\n".join(f"- {_letter(place)}: {text}" for place, text in enumerate(_shown(texts)))
+def _format_lettered(texts: list[str]) -> str:
+    return "\n".join(
+        f"- {_capital_letter(place)}: {text}" for place, text in enumerate(_shown_order(texts))
+    )
 
 
-def _arrangements(variant: Ordering | Matching) -> list[str]:
+def _list_arrangements(variant: Ordering | Matching) -> list[str]:
     """Return answers to choose from, the right one first: Canvas' QTI 1.2 has no ordering."""
     if isinstance(variant, Ordering):
-        shown = _shown(variant.items)
-        key = [_letter(shown.index(item)) for item in variant.items]
-        return [", ".join(letters) for letters in _near(key)]
-    shown = _shown(variant.texts)
-    key = [_letter(shown.index(pair.right)) for pair in variant.pairs]
+        shown = _shown_order(variant.items)
+        key = [_capital_letter(shown.index(item)) for item in variant.items]
+        return [", ".join(letters) for letters in _near_arrangements(key)]
+    shown = _shown_order(variant.lettered_texts)
+    key = [_capital_letter(shown.index(pair.right)) for pair in variant.pairs]
     return [
         ", ".join(f"{number}-{letter}" for number, letter in enumerate(letters, start=1))
-        for letters in _near(key)
+        for letters in _near_arrangements(key)
     ]
 
 
-def _near(key: list[str]) -> list[list[str]]:
+def _near_arrangements(key: list[str]) -> list[list[str]]:
     """Return the key, and arrangements that differ from it by swapping neighbours or turning."""
     swapped = [[*key[:i], key[i + 1], key[i], *key[i + 2 :]] for i in range(len(key) - 1)]
     others = [*swapped, [*key[1:], key[0]], key[::-1]]
@@ -163,24 +170,24 @@ def _near(key: list[str]) -> list[list[str]]:
     return [key, *[letters for letters in distinct if letters != key][:3]]
 
 
-def _shown(texts: list[str]) -> list[str]:
+def _shown_order(texts: list[str]) -> list[str]:
     return sorted(texts)
 
 
-def _letter(number: int) -> str:
+def _capital_letter(number: int) -> str:
     return "ABCDEFGHIJKLMNOP"[number]
 
 
-def _item(bank: Bank, mark: str, text: str | None) -> list[str]:
+def _format_item(bank: Bank, mark: str, text: str | None) -> list[str]:
     """Return a text behind its mark, its further lines indented as text2qti wants it."""
     if text is None:
         return []
-    first, *rest = _pictures(bank, text.strip()).split("\n")
+    first, *rest = _locate_pictures(bank, text.strip()).split("\n")
     indent = " " * (len(mark) + 1)
     return [f"{mark} {first}", *(f"{indent}{line}" if line.strip() else "" for line in rest)]
 
 
-def _pictures(bank: Bank, text: str) -> str:
+def _locate_pictures(bank: Bank, text: str) -> str:
     """Point pictures to their files, wherever the command runs."""
 
     def located(found: re.Match[str]) -> str:

@@ -92,36 +92,36 @@ def of_bank(bank: Bank) -> list[Question]:
 
 def of_variant(quiz: str, concept: Concept, variant: Variant) -> Question:
     """Return a variant as a platform can hold it; its category is the concept."""
-    name, category, text = variant.id, f"{quiz}/{concept.id}", _text(variant)
+    name, category, text = variant.id, f"{quiz}/{concept.id}", _question_text(variant)
     if isinstance(variant, Numeric):
         numbers = (
-            Number(variant.answer, variant.tolerance, 100.0, plain(variant.feedback)),
-            *(Number(t.value, t.tolerance, 0.0, plain(t.feedback)) for t in variant.traps),
+            Number(variant.answer, variant.tolerance, 100.0, to_plain(variant.feedback)),
+            *(Number(t.value, t.tolerance, 0.0, to_plain(t.feedback)) for t in variant.traps),
         )
-        return NumberQuestion(name, category, text, numbers, plain(variant.wrong_feedback))
+        return NumberQuestion(name, category, text, numbers, to_plain(variant.wrong_feedback))
     if isinstance(variant, Ordering | Matching):
-        feedback = plain(variant.feedback)
+        feedback = to_plain(variant.feedback)
         if variant.wrong_feedback:
-            feedback += BOTH + plain(variant.wrong_feedback)
+            feedback += BOTH + to_plain(variant.wrong_feedback)
         if isinstance(variant, Ordering):
             pairs = tuple(
-                (POSITION.format(number=number), plain(item))
+                (POSITION.format(number=number), to_plain(item))
                 for number, item in enumerate(variant.items, start=1)
             )
             return MatchQuestion(name, category, text, pairs, (), feedback)
-        pairs = tuple((_left(pair.left), plain(pair.right)) for pair in variant.pairs)
-        extras = tuple(plain(extra) for extra in variant.extras)
+        pairs = tuple((_left_side(pair.left), to_plain(pair.right)) for pair in variant.pairs)
+        extras = tuple(to_plain(extra) for extra in variant.extras)
         return MatchQuestion(name, category, text, pairs, extras, feedback)
-    share = round(100 / len(variant.right), 5)
+    share = round(100 / len(variant.right_positions), 5)
     wrong = -share if isinstance(variant, Multiple) else 0.0
     choices = tuple(
-        Choice(plain(o.text), share if o.correct else wrong, plain(o.feedback))
+        Choice(to_plain(o.text), share if o.correct else wrong, to_plain(o.feedback))
         for o in variant.options
     )
     return ChoiceQuestion(name, category, text, choices, not isinstance(variant, Multiple))
 
 
-def plain(text: str | None) -> str:
+def to_plain(text: str | None) -> str:
     """Return a bank's Markdown as a platform takes it: no pictures, LaTeX in double dollars.
 
     What a bank does not have is an empty text.
@@ -135,7 +135,7 @@ def plain(text: str | None) -> str:
 
 
 def from_plain(text: str) -> str:
-    """Return a platform's Markdown as a bank has it; the other way of `plain` but for pictures."""
+    """Return a platform's Markdown as a bank has it; reverses `to_plain` but for pictures."""
     return _outside_code(text, lambda prose: _DOUBLE_LATEX.sub(r"$\1$", prose))
 
 
@@ -149,8 +149,8 @@ def unit_line(unit: str) -> str:
     return f"\n\n*(Answer in {unit}.)*" if unit else ""
 
 
-def _text(variant: Variant) -> str:
-    text = plain(variant.stem)
+def _question_text(variant: Variant) -> str:
+    text = to_plain(variant.stem)
     if variant.code:
         text += code_block(variant.code)
     if isinstance(variant, Numeric):
@@ -158,8 +158,8 @@ def _text(variant: Variant) -> str:
     return text
 
 
-def _left(text: str) -> str:
-    return plain(text).replace("->", "→")  # GIFT has no escape for its arrow
+def _left_side(text: str) -> str:
+    return to_plain(text).replace("->", "→")  # GIFT has no escape for its arrow
 
 
 def _outside_code(text: str, convert: Callable[[str], str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from quizzes.insight.analysis import Analysis as Analysis
-from quizzes.insight.analysis import analyse as analyse
+from quizzes.insight.analysis import analyse_results as analyse_results
 from quizzes.insight.collect import ClassResults as ClassResults
-from quizzes.insight.collect import collect as collect
-from quizzes.insight.report import write as write
+from quizzes.insight.collect import collect_class as collect_class
+from quizzes.insight.report import write_report as write_report

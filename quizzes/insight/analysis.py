@@ -87,7 +87,9 @@ class Analysis:
         return len(self.scores)
 
 
-def analyse(bank: Bank, results: Mapping[str, Result], notes: Iterable[str] = ()) -> Analysis:
+def analyse_results(
+    bank: Bank, results: Mapping[str, Result], notes: Iterable[str] = ()
+) -> Analysis:
     """Analyse one result of each learner."""
     answered = [(mark, result) for result in results.values() for mark in result.marks]
     by_concept: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
@@ -96,9 +98,11 @@ def analyse(bank: Bank, results: Mapping[str, Result], notes: Iterable[str] = ()
         pair = (mark.credit, sum(other.credit for other in result.marks) - mark.credit)
         by_concept[mark.item.concept.id].append(pair)
         by_variant[mark.item.variant.id].append(pair)
-    concepts = tuple(_figures(c.id, "concept", c.id, by_concept[c.id]) for c in bank.concepts)
+    concepts = tuple(_item_figures(c.id, "concept", c.id, by_concept[c.id]) for c in bank.concepts)
     variants = tuple(
-        _figures(v.id, v.kind, c.id, by_variant[v.id]) for c in bank.concepts for v in c.variants
+        _item_figures(v.id, v.kind, c.id, by_variant[v.id])
+        for c in bank.concepts
+        for v in c.variants
     )
     return Analysis(
         bank,
@@ -106,12 +110,12 @@ def analyse(bank: Bank, results: Mapping[str, Result], notes: Iterable[str] = ()
         sum(result.passed for result in results.values()),
         concepts,
         variants,
-        _beliefs(bank, [(learner, m) for learner, r in results.items() for m in r.marks]),
+        _belief_figures(bank, [(learner, m) for learner, r in results.items() for m in r.marks]),
         tuple(notes),
     )
 
 
-def discrimination(pairs: Iterable[tuple[float, float]]) -> float | None:
+def compute_discrimination(pairs: Iterable[tuple[float, float]]) -> float | None:
     """Return the correlation of (credit, rest score) pairs.
 
     None where it is not defined: with fewer than three learners, or where all have the same credit
@@ -127,15 +131,19 @@ def discrimination(pairs: Iterable[tuple[float, float]]) -> float | None:
         return None
 
 
-def _figures(name: str, kind: str, concept: str, pairs: list[tuple[float, float]]) -> ItemFigures:
+def _item_figures(
+    name: str, kind: str, concept: str, pairs: list[tuple[float, float]]
+) -> ItemFigures:
     difficulty = statistics.fmean(credit for credit, _ in pairs) if pairs else None
-    correlation = discrimination(pairs)
+    correlation = compute_discrimination(pairs)
     wrong = sum(credit < 1 for credit, _ in pairs)
-    advice = _advice(len(pairs), wrong, difficulty, correlation)
+    advice = _item_advice(len(pairs), wrong, difficulty, correlation)
     return ItemFigures(name, kind, concept, len(pairs), difficulty, correlation, advice)
 
 
-def _advice(learners: int, wrong: int, difficulty: float | None, correlation: float | None) -> str:
+def _item_advice(
+    learners: int, wrong: int, difficulty: float | None, correlation: float | None
+) -> str:
     if difficulty is None:
         return "nobody has answered it"
     if learners < FEW:
@@ -153,7 +161,7 @@ def _advice(learners: int, wrong: int, difficulty: float | None, correlation: fl
     return ""
 
 
-def _beliefs(bank: Bank, marks: list[tuple[str, Mark]]) -> tuple[BeliefFigures, ...]:
+def _belief_figures(bank: Bank, marks: list[tuple[str, Mark]]) -> tuple[BeliefFigures, ...]:
     tempting: defaultdict[str, set[str]] = defaultdict(set)
     for answer in lint.wrong_answers(bank):
         if answer.misconception:

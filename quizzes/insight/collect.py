@@ -23,7 +23,7 @@ class ClassResults:
     notes: tuple[str, ...]
 
 
-def collect(bank: Bank, contents: Mapping[str, bytes | None]) -> ClassResults:
+def collect_class(bank: Bank, contents: Mapping[str, bytes | None]) -> ClassResults:
     """Mark the attempts of a class.
 
     Args:
@@ -32,14 +32,14 @@ def collect(bank: Bank, contents: Mapping[str, bytes | None]) -> ClassResults:
     """
     results: dict[str, Result] = {}
     notes = []
-    name = record.filename(bank.quiz)
+    name = record.attempts_filename(bank.quiz)
     for learner, content in sorted(contents.items()):
         if content is None:
             notes.append(f"{learner} has handed in no {name}.")
             continue
         marked = regrade.mark_file(bank, content)
-        if marked.first is not None:
-            results[learner] = marked.first
+        if marked.first_result is not None:
+            results[learner] = marked.first_result
         elif marked.other_edition:
             notes.append(f"{learner} answered another edition of the quiz, which is left out.")
         else:

@@ -35,7 +35,7 @@ _BARS = 15
 """Most misconceptions in the plot; the table has them all."""
 
 
-def items(analysis: Analysis) -> str:
+def plot_items(analysis: Analysis) -> str:
     """Return difficulty against discrimination, a mark for each variant that has both."""
     with mpl.rc_context(_STYLE):
         figure, axes = new_axes(8.0, 4.8)
@@ -69,7 +69,7 @@ def items(analysis: Analysis) -> str:
         return svg_of(figure, "items")
 
 
-def beliefs(analysis: Analysis) -> str:
+def plot_beliefs(analysis: Analysis) -> str:
     """Return the most common misconceptions as bars; "" if nobody has shown one."""
     shown = [figures for figures in analysis.beliefs if figures.holders][:_BARS][::-1]
     if not shown:
@@ -87,7 +87,7 @@ def beliefs(analysis: Analysis) -> str:
         return svg_of(figure, "beliefs")
 
 
-def scores(analysis: Analysis) -> str:
+def plot_scores(analysis: Analysis) -> str:
     """Return how many learners have which score, to the nearest half point."""
     most = len(analysis.bank.concepts)
     steps = [half / 2 for half in range(2 * most + 1)]

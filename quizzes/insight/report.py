@@ -35,7 +35,7 @@ class ReportError(QuizError):
     """The report cannot be written; the message says where and why."""
 
 
-def write(analysis: Analysis, folder: Path) -> list[Path]:
+def write_report(analysis: Analysis, folder: Path) -> list[Path]:
     """Write ``quiz-NAME-report.html``, ``-items.csv`` and ``-misconceptions.csv``; return them.
 
     The last one only if the bank names misconceptions.
@@ -45,12 +45,12 @@ def write(analysis: Analysis, folder: Path) -> list[Path]:
     """
     name = f"quiz-{analysis.bank.quiz}"
     contents = {
-        folder / f"{name}-report.html": page(analysis),
-        folder / f"{name}-items.csv": _csv(ITEM_COLUMNS, item_rows(analysis)),
+        folder / f"{name}-report.html": render_page(analysis),
+        folder / f"{name}-items.csv": _format_csv(ITEM_COLUMNS, item_rows(analysis)),
     }
     if analysis.beliefs:
         rows = belief_rows(analysis)
-        contents[folder / f"{name}-misconceptions.csv"] = _csv(BELIEF_COLUMNS, rows)
+        contents[folder / f"{name}-misconceptions.csv"] = _format_csv(BELIEF_COLUMNS, rows)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for path, content in contents.items():
@@ -80,7 +80,7 @@ def belief_rows(analysis: Analysis) -> list[tuple[str, ...]]:
     ]
 
 
-def page(analysis: Analysis) -> str:
+def render_page(analysis: Analysis) -> str:
     """Return the report as one HTML page."""
     bank, learners = analysis.bank, analysis.learners
     parts = [
@@ -93,14 +93,16 @@ def page(analysis: Analysis) -> str:
         few = f"With fewer than {FEW} learners these figures say little."
         parts.append(f"<p><strong>{few}</strong></p>")
     if learners:
-        parts.append(_figure(plots.scores(analysis), "How many learners have which score."))
+        parts.append(
+            _render_figure(plots.plot_scores(analysis), "How many learners have which score.")
+        )
     parts += ["<h2>Questions</h2>", _EXPLAINED]
     if any(v.discrimination is not None for v in analysis.variants):
         caption = "Each mark is a variant, numbered within its concept; the table has the figures."
-        parts.append(_figure(plots.items(analysis), caption))
-    parts.append(_table("Figures of each concept and of its variants", ITEM_COLUMNS,
+        parts.append(_render_figure(plots.plot_items(analysis), caption))
+    parts.append(_render_table("Figures of each concept and of its variants", ITEM_COLUMNS,
                         item_rows(analysis), numbers=(2, 3, 4)))  # fmt: skip
-    parts += _beliefs(analysis) if analysis.beliefs else []
+    parts += _render_beliefs(analysis) if analysis.beliefs else []
     if analysis.notes:
         items = "".join(f"<li>{escape(note)}</li>" for note in analysis.notes)
         parts.append(f"<h2>Notes</h2><ul>{items}</ul>")
@@ -113,12 +115,12 @@ def page(analysis: Analysis) -> str:
     )
 
 
-def _beliefs(analysis: Analysis) -> list[str]:
+def _render_beliefs(analysis: Analysis) -> list[str]:
     parts = ["<h2>What the class believes</h2>"]
-    if drawn := plots.beliefs(analysis):
+    if drawn := plots.plot_beliefs(analysis):
         caption = "The most common misconceptions among those whom a question tempted with them."
-        parts.append(_figure(drawn, caption))
-    parts.append(_table("All misconceptions of the bank", BELIEF_COLUMNS,
+        parts.append(_render_figure(drawn, caption))
+    parts.append(_render_table("All misconceptions of the bank", BELIEF_COLUMNS,
                         belief_rows(analysis), numbers=(2, 3, 4)))  # fmt: skip
     return parts
 
@@ -132,23 +134,23 @@ _EXPLAINED = (
 )
 
 
-def _figure(svg: str, caption: str) -> str:
+def _render_figure(svg: str, caption: str) -> str:
     described = svg.replace("<svg", f'<svg role="img" aria-label="{escape(caption)}"', 1)
     return f"<figure>{described}<figcaption>{escape(caption)}</figcaption></figure>"
 
 
-def _table(
+def _render_table(
     caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int]
 ) -> str:
     head = "".join(f'<th scope="col">{escape(column)}</th>' for column in columns)
-    body = "".join(_row(row, numbers) for row in rows)
+    body = "".join(_render_row(row, numbers) for row in rows)
     return (
         f'<div class="scroll"><table><caption>{escape(caption)}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
     )
 
 
-def _row(row: Sequence[str], numbers: Sequence[int]) -> str:
+def _render_row(row: Sequence[str], numbers: Sequence[int]) -> str:
     cells = "".join(
         f'<td class="{"number" if place in numbers else "text"}">{escape(value)}</td>'
         for place, value in enumerate(row)
@@ -169,7 +171,7 @@ def _item_row(figures: ItemFigures) -> tuple[str, ...]:
     )
 
 
-def _csv(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def _format_csv(columns: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(columns)

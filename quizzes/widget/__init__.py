@@ -51,7 +51,7 @@ class QuizWidget(anywidget.AnyWidget):
         super().__init__()
         self.layout.width = "100%"
         self.on_msg(self._on_message)
-        self._update()
+        self._update_traits()
 
     def _ipython_display_(self, **kwargs: Any) -> None:
         from IPython.display import display
@@ -68,23 +68,23 @@ class QuizWidget(anywidget.AnyWidget):
         """
         if isinstance(content, dict):
             with self._one_by_one:
-                self._obey(content)
+                self._obey_message(content)
 
-    def _obey(self, content: dict[str, Any]) -> None:
+    def _obey_message(self, content: dict[str, Any]) -> None:
         kind = content.get("type")
         if kind == "hello":
             self.send({"type": "here", "id": content.get("id")})
             return
         # A second click, or a second window, may speak of an attempt that is over: it is dropped.
         if content.get("attempt") == self._quiz.attempt:
-            self._do(str(kind), content)
-        self._update()
+            self._do_action(str(kind), content)
+        self._update_traits()
         self.send({"type": "done", "id": content.get("id")})
 
-    def _do(self, kind: str, content: dict[str, Any]) -> None:
+    def _do_action(self, kind: str, content: dict[str, Any]) -> None:
         try:
             if kind == "answer":
-                self._answer(content, content.get("number", 0), content.get("answer"))
+                self._answer_question(content, content.get("number", 0), content.get("answer"))
             elif kind == "submit":
                 self._answer_all(content)
                 self._quiz.submit()
@@ -94,7 +94,7 @@ class QuizWidget(anywidget.AnyWidget):
         except QuizError as error:
             self._trouble = str(error)
 
-    def _answer(self, content: dict[str, Any], number: Any, answer: Any) -> None:
+    def _answer_question(self, content: dict[str, Any], number: Any, answer: Any) -> None:
         """Answer a question, unless the same page has sent a newer answer before."""
         view, order = content.get("view"), content.get("order")
         if isinstance(view, str) and isinstance(order, int) and isinstance(number, int):
@@ -109,17 +109,17 @@ class QuizWidget(anywidget.AnyWidget):
         if self._quiz.result is None and isinstance(shown, dict):
             for item in self._quiz.items:
                 if (answer := shown.get(str(item.number), "")) != "":
-                    self._answer(content, item.number, answer)
+                    self._answer_question(content, item.number, answer)
 
-    def _update(self) -> None:
+    def _update_traits(self) -> None:
         quiz = self._quiz
         shown = (quiz.attempt, len(quiz.attempts))
         with self.hold_sync():
             if shown != self._shown:  # rendering takes a moment, and an answer changes none of it
                 self._shown = shown
-                self.paper = view.paper(quiz)
+                self.paper = view.paper_data(quiz)
             self.answers = {
                 str(item.number): quiz.given.get(item.concept.id, "") for item in quiz.items
             }
-            self.result = view.result(quiz)
+            self.result = view.result_data(quiz)
             self.notice = self._trouble or quiz.notice

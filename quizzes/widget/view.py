@@ -12,25 +12,25 @@ from quizzes.model import Item
 from quizzes.quiz_core import QuizCore
 
 
-def paper(quiz: QuizCore) -> dict[str, Any]:
+def paper_data(quiz: QuizCore) -> dict[str, Any]:
     """Return the questions of the attempt at hand: texts and letters, and nothing of the key."""
     return {
         "title": quiz.bank.title,
         "chapter": quiz.bank.chapter,
         "attempt": quiz.attempt,
         "needed": quiz.bank.pass_text,
-        "standing": _standing(quiz),
+        "standing": _describe_standing(quiz),
         "more": quiz.more,
-        "questions": [_question(item, quiz.bank.folder) for item in quiz.items],
+        "questions": [_question_data(item, quiz.bank.folder) for item in quiz.items],
     }
 
 
-def _standing(quiz: QuizCore) -> str:
+def _describe_standing(quiz: QuizCore) -> str:
     """Return the first and the best score in words; empty before the first attempt."""
     first, best = quiz.first, quiz.best
     if first is None or best is None:
         return ""
-    counted = quiz.bank.counted
+    counted = quiz.bank.attempt_limit
     if quiz.bank.keyless:
         return f"Handed in: {len(quiz.counted)} of {counted}."
     most = len(quiz.bank.concepts)
@@ -43,32 +43,32 @@ def _standing(quiz: QuizCore) -> str:
     )
 
 
-def _question(item: Item, folder: Path) -> dict[str, Any]:
+def _question_data(item: Item, folder: Path) -> dict[str, Any]:
     variant = item.variant
     lefts = [pair.left for pair in variant.pairs] if isinstance(variant, Matching) else []
     return {
         "number": item.number,
         "kind": variant.kind,
         "instruction": text.INSTRUCTIONS[variant.kind],
-        "stem": rendering.block(variant.stem, folder),
-        "code": rendering.code(variant.code) if variant.code else "",
+        "stem": rendering.render_block(variant.stem, folder),
+        "code": rendering.render_code(variant.code) if variant.code else "",
         "unit": variant.unit if isinstance(variant, Numeric) else "",
         "lefts": [
-            {"html": rendering.inline(left, folder), "text": rendering.plain(left)}
+            {"html": rendering.render_inline(left, folder), "text": rendering.render_plain(left)}
             for left in lefts
         ],
         "options": [
             {
                 "letter": letter,
-                "html": rendering.inline(item.text(letter), folder),
-                "text": rendering.plain(item.text(letter)),
+                "html": rendering.render_inline(item.text_of(letter), folder),
+                "text": rendering.render_plain(item.text_of(letter)),
             }
             for letter in item.letters
         ],
     }
 
 
-def result(quiz: QuizCore) -> dict[str, Any] | None:
+def result_data(quiz: QuizCore) -> dict[str, Any] | None:
     """Return what came of the attempt at hand; None before it is submitted.
 
     Of a quiz that is marked elsewhere ``passed`` is None, and there are no marks.
@@ -80,31 +80,33 @@ def result(quiz: QuizCore) -> dict[str, Any] | None:
         "attempt": quiz.attempt,
         "headline": quiz.result.headline,
         "passed": None if quiz.bank.keyless else quiz.result.passed,
-        "marks": [_mark(mark, quiz.bank.folder) for mark in marks],
+        "marks": [_mark_data(mark, quiz.bank.folder) for mark in marks],
     }
 
 
-def _mark(mark: Mark, folder: Path) -> dict[str, Any]:
+def _mark_data(mark: Mark, folder: Path) -> dict[str, Any]:
     variant = mark.item.variant
     several = isinstance(variant, Multiple)
-    key = "" if mark.right or several else text.of_answer(mark.item, model.key(mark.item))
+    key = (
+        "" if mark.is_right or several else text.of_answer(mark.item, model.right_answer(mark.item))
+    )
     return {
         "number": mark.item.number,
-        "right": mark.right,
-        "verdict": text.verdict(mark),
-        "key": rendering.inline(key, folder) if key else "",
-        "run": _cell(variant.code) if variant.kind == "predict" and variant.code else None,
+        "right": mark.is_right,
+        "verdict": text.describe_mark(mark),
+        "key": rendering.render_inline(key, folder) if key else "",
+        "run": _cell_data(variant.code) if variant.kind == "predict" and variant.code else None,
         "remarks": [
             {
                 "letter": remark.letter if several else "",
                 "right": remark.right,
-                "html": rendering.block(remark.feedback, folder),
-                "show": _cell(remark.show) if remark.show and not remark.right else None,
+                "html": rendering.render_block(remark.feedback, folder),
+                "show": _cell_data(remark.show) if remark.show and not remark.right else None,
             }
             for remark in mark.remarks
         ],
     }
 
 
-def _cell(source: str) -> dict[str, str]:
-    return {"html": rendering.code(source), "source": source.strip("\n") + "\n"}
+def _cell_data(source: str) -> dict[str, str]:
+    return {"html": rendering.render_code(source), "source": source.strip("\n") + "\n"}

@@ -20,7 +20,7 @@ from autograder.corpus import Case
 from autograder.corpus.trials import one_notebook
 from autograder.examination import points
 from autograder.gradebook.course_gradebook import Grade
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from tests.killing import Engine, fresh_copy
 from tests.left_out import leave_out
@@ -37,11 +37,11 @@ class Course:
 
     @property
     def source(self) -> NotebookNode:
-        return submission.read(self.root / "source" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+        return submission.read_notebook(self.root / "source" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
 
     @property
     def released(self) -> NotebookNode:
-        return submission.read(self.root / "release" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+        return submission.read_notebook(self.root / "release" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
 
     def folder(self, student: str) -> Path:
         folder = self.root / "submitted" / student / ASSIGNMENT
@@ -61,7 +61,7 @@ class Course:
 def released_course(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = one_notebook(tmp_path_factory.mktemp("course"), "qos", ASSIGNMENT)
     build(root)
-    release(root, ASSIGNMENT)
+    make_release(root, ASSIGNMENT)
     return root
 
 
@@ -74,7 +74,7 @@ def course(released_course: Path, tmp_path: Path) -> Course:
 
 @pytest.fixture(scope="session")
 def cases() -> dict[str, Case]:
-    return {case.name: case for case in corpus.load("qos")}
+    return {case.name: case for case in corpus.load_cases("qos")}
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def class_(
     course = Course(fresh_copy(released_course, folder / "ungraded"))
     for student, case in {"right": "right-chapter", "same": "right-chapter",
                           "wrong": "wrong-imu-single"}.items():  # fmt: skip
-        course.submit(student, cases[case].submission(course.source, course.released))
+        course.submit(student, cases[case].make_submission(course.source, course.released))
     course.submit("cut-off", "{")
     whole = Engine(fresh_copy(course.root, folder / "graded"), ASSIGNMENT, folder / "scratch")
     started = time.monotonic()
@@ -137,7 +137,7 @@ def graded_course(
         "ann": "right-two-sides", "bob": "wrong-imu-endless", "cy": "wrong-imu-endless",
         "-dan": "right-two-sides",
     }.items():  # fmt: skip
-        notebook = cases[case].submission(course.source, course.released)
+        notebook = cases[case].make_submission(course.source, course.released)
         notebook.metadata["authors"] = [{"name": student}]  # no two files are the same
         course.submit(student, notebook)
     (course.folder("ann") / "timestamp.txt").write_text("2026-04-30 14:05:00 UTC")

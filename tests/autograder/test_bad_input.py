@@ -58,7 +58,7 @@ def grade(course: Course, progress: Progress = engine.QUIET) -> dict[str, Graded
 
 
 def grades(course: Course) -> dict[str, Grade]:
-    return {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    return {g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)}
 
 
 def book(course: Course) -> Gradebook:
@@ -110,7 +110,7 @@ def test_folders_that_are_not_what_they_should_be_stop_nobody(
 
 def test_why_it_could_not_be_run_stands_where_a_person_grades(course: Course) -> None:
     grade(course)
-    copy = submission.read(
+    copy = submission.read_notebook(
         course.root / "autograded" / "cut-off" / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
     )
     shown = [
@@ -261,21 +261,21 @@ def test_every_full_disk_is_recognised() -> None:
         "[Errno 28] No space left on device",
         "Disk quota exceeded",
     ):
-        assert isinstance(words.unusable(said, Path("/c")), DiskFullError)
-    assert words.unusable("InvalidEntry: no such thing", Path("/c")) is None
+        assert isinstance(words.unusable_error(said, Path("/c")), DiskFullError)
+    assert words.unusable_error("InvalidEntry: no such thing", Path("/c")) is None
 
 
 def test_a_disk_is_full_only_if_there_is_no_room(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     said = "ValidationError: No space left on device"
-    assert words.full(said, Path("/c"), [tmp_path, tmp_path]) is None
+    assert words.disk_full_error(said, Path("/c"), [tmp_path, tmp_path]) is None
     assert list(tmp_path.iterdir()) == []
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (words.ROOM - 1, limits[1]))
     try:
-        assert isinstance(words.full(said, Path("/c"), [tmp_path]), DiskFullError)
-        assert words.full("ValidationError: no", Path("/c"), [tmp_path]) is None
+        assert isinstance(words.disk_full_error(said, Path("/c"), [tmp_path]), DiskFullError)
+        assert words.disk_full_error("ValidationError: no", Path("/c"), [tmp_path]) is None
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
@@ -389,7 +389,7 @@ def test_nobody_at_all_is_one_sentence(course: Course) -> None:
 def test_the_grades_of_every_assignment_are_written(tmp_path: Path) -> None:
     design = Grade("ada", 3.0, 5.0, False, {"design": {"a": 3.0}}, seconds_late=3600.0, penalty=1.5)
     quiz = Grade("ada", 1.0, 2.0, True, {"quiz": {"q": None}})
-    grades_csv.write({"ch05": [design], "ch05-quiz": [quiz]}, tmp_path / "grades.csv")
+    grades_csv.write_grades({"ch05": [design], "ch05-quiz": [quiz]}, tmp_path / "grades.csv")
     head, *lines = (tmp_path / "grades.csv").read_text().splitlines()
     late = ",total_seconds_late,late_submission_penalty"
     assert head.endswith(f"needs_manual_grade,design:a,quiz:q{late}")
@@ -401,7 +401,7 @@ def test_the_grades_of_every_assignment_are_written(tmp_path: Path) -> None:
 
 def test_a_spreadsheet_runs_nothing_of_what_a_student_is_called(tmp_path: Path) -> None:
     found = [Grade("=1+1", 3.0, 5.0, False, {"@nb": {"cell": 3.0, "text": None}})]
-    grades_csv.write({"-ch05": found}, tmp_path / "grades.csv")
+    grades_csv.write_grades({"-ch05": found}, tmp_path / "grades.csv")
     head, line = (tmp_path / "grades.csv").read_text().splitlines()
     assert head.startswith(
         "assignment,student_id,score,max_score,needs_manual_grade,'@nb:cell,'@nb:text,"

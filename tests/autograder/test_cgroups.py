@@ -9,7 +9,7 @@ import pytest
 
 from autograder.sandbox import cgroups
 from autograder.sandbox.limits import Limits
-from course.util.cgroups import delegated
+from course.util.cgroups import delegated_group
 
 OWN = "user.slice/grading.scope"
 
@@ -26,7 +26,7 @@ def scope(tmp_path: Path) -> Path:
 
 def found(scope: Path) -> Path | None:
     mount = scope.parents[1]
-    return delegated(mount, mount / "table")
+    return delegated_group(mount, mount / "table")
 
 
 def test_only_what_was_delegated_is_divided(scope: Path) -> None:
@@ -44,19 +44,19 @@ def test_only_what_was_delegated_is_divided(scope: Path) -> None:
 
 
 def test_without_cgroups_there_is_none(tmp_path: Path) -> None:
-    assert delegated(tmp_path, tmp_path / "nothing") is None
-    assert cgroups.divide(None) is None
+    assert delegated_group(tmp_path, tmp_path / "nothing") is None
+    assert cgroups.enable_controllers(None) is None
 
 
 def test_the_grader_moves_out_of_the_way_and_each_submission_is_bounded(scope: Path) -> None:
     (scope / "cgroup.subtree_control").write_text("")
-    assert cgroups.divide(scope) == scope
+    assert cgroups.enable_controllers(scope) == scope
     assert (scope / "grader/cgroup.procs").read_text() == "12"  # the last that was written
     assert (scope / "cgroup.subtree_control").read_text() == "+memory +pids"
     limits = Limits()
     group = cgroups.Group(scope, limits)
     (made,) = scope.glob("submission-*")
-    group.add(77)
+    group.add_process(77)
     said = {path.name: path.read_text() for path in made.iterdir()}
     assert said == {
         "memory.max": str(limits.memory), "memory.swap.max": "0", "pids.max": str(limits.tasks),

@@ -32,8 +32,8 @@ from autograder.class_report import (
 )
 from autograder.class_report import page as pages
 from autograder.class_report import report as reports
-from autograder.class_report.collect import ClassData, Person, collect
-from autograder.class_report.own_text import GivenText, OwnText, tokens
+from autograder.class_report.collect import ClassData, Person, collect_class
+from autograder.class_report.own_text import GivenText, OwnText, own_tokens
 from autograder.class_report.platforms import exports
 from autograder.examination import points
 from autograder.examination.verdict import CheckResult, Status, Verdict
@@ -129,7 +129,7 @@ def test_failure_rates_and_discrimination_are_what_numpy_says() -> None:
         for notebooks in data.records.values()
     ])  # fmt: skip
     earned = passed * np.array(worth)
-    found = figures.checks(data)
+    found = figures.check_figures(data)
     assert [check.name for check in found] == ["c0", "c1", "c2", "c3", "c4"]
     for k, check in enumerate(found):
         rest = earned.sum(axis=1) - earned[:, k]
@@ -147,7 +147,7 @@ def test_nothing_is_advised_on_fewer_than_five_failures() -> None:
                          result("y", "passed" if n % 2 else "failed")]
             for n in range(students)
         })  # fmt: skip
-        return figures.checks(data)[0].advice
+        return figures.check_figures(data)[0].advice
 
     assert advice(9, 8) == "too few submissions"
     assert [advice(students, 4) for students in (10, 12, 400)] == ["", "", ""]
@@ -163,10 +163,10 @@ def test_what_was_not_handed_in_is_apart_from_what_was_not_checked() -> None:
         "c": [result("x", "failed"), result("y", "not_checked")],
     })  # fmt: skip
     data = replace(data, left_out={"b": frozenset({NOTEBOOK})}, absent=("zoe",))
-    x, y = figures.checks(data)
-    assert (x.passed, x.failed, x.not_checked, x.not_handed_in, x.examined) == (1, 1, 0, 2, 2)
-    assert (y.not_checked, y.not_handed_in, y.examined) == (2, 2, 0)
-    assert "b" not in figures.times(data).seconds
+    x, y = figures.check_figures(data)
+    assert (x.passed, x.failed, x.not_checked, x.not_handed_in, x.examined_count) == (1, 1, 0, 2, 2)
+    assert (y.not_checked, y.not_handed_in, y.examined_count) == (2, 2, 0)
+    assert "b" not in figures.run_times(data).seconds
 
 
 # Means
@@ -216,9 +216,11 @@ def test_every_check_and_every_written_answer_of_the_course_has_one_objective() 
         for exam, entry in points.table().items()
         for name in [*itertools.chain(*entry.parts.values()), *entry.manual]
     }
-    assert set(means.objectives()) == asked
-    for exam in exercises.names():
-        lists = tomllib.loads(exercise_folders.file(exam, "objectives.toml").read_text("utf-8"))
+    assert set(means.load_objectives()) == asked
+    for exam in exercises.exercise_names():
+        lists = tomllib.loads(
+            exercise_folders.exercise_file(exam, "objectives.toml").read_text("utf-8")
+        )
         named = [name for names in lists.values() for name in names]
         assert len(named) == len(set(named)), exam
 
@@ -230,7 +232,7 @@ def test_what_was_not_examined_is_no_failure() -> None:
         "c": [result("x", "passed"), result("y", "grader_error")],
         "d": [result("x", "passed"), result("y", "failed")],
     })  # fmt: skip
-    x, y = figures.checks(data)
+    x, y = figures.check_figures(data)
     assert (x.passed, x.failed, x.failure_rate) == (3, 1, 0.25)
     assert (y.passed, y.failed, y.not_checked, y.grader_errors) == (1, 1, 1, 1)
     assert y.failure_rate == 0.5
@@ -246,11 +248,11 @@ def test_every_figure_says_of_how_many_it_is() -> None:
     })  # fmt: skip
     nothing: dict[str, dict[str, OwnText]] = {}
     report = reports.ClassReport(
-        data, figures.checks(data), figures.times(data), [], [],
-        likeness.compare(data, nothing, NOTHING_GIVEN, 0.9), nothing, NOTHING_GIVEN, 0.9, (),
+        data, figures.check_figures(data), figures.run_times(data), [], [],
+        likeness.compare_class(data, nothing, NOTHING_GIVEN, 0.9), nothing, NOTHING_GIVEN, 0.9, (),
         means.Means((), (), ()),
     )  # fmt: skip
-    scores, checks, times = re.findall(r"<svg.*?</svg>", pages.page(report), re.DOTALL)
+    scores, checks, times = re.findall(r"<svg.*?</svg>", pages.render_page(report), re.DOTALL)
     assert ">points (n = 3)</text>" in scores
     assert ">seconds that a submission took (n = 3)</text>" in times
     rows = re.findall(r">n = (\d)</text>", checks)
@@ -280,7 +282,7 @@ def test_a_check_that_good_students_fail_is_pointed_out() -> None:
         ]
         for n in range(13)
     })  # fmt: skip
-    odd = figures.checks(data)[-1]
+    odd = figures.check_figures(data)[-1]
     assert odd.discrimination is not None
     assert odd.discrimination < -0.5
     assert "wording" in odd.advice
@@ -290,7 +292,7 @@ def test_a_check_that_good_students_fail_is_pointed_out() -> None:
     "pairs", [[], [(1, 2), (0, 1)], [(1, 1), (1, 2), (1, 3)], [(0, 5), (1, 5), (1, 5)]]
 )
 def test_a_correlation_that_is_not_defined_is_none(pairs: list[tuple[float, float]]) -> None:
-    assert figures.discrimination(pairs) is None
+    assert figures.compute_discrimination(pairs) is None
 
 
 def test_questions_of_a_quiz_and_unreadable_submissions_are_no_checks() -> None:
@@ -301,9 +303,9 @@ def test_questions_of_a_quiz_and_unreadable_submissions_are_no_checks() -> None:
     )
     kept = {**data.records, "b": {NOTEBOOK: quiz}, "c": {NOTEBOOK: blank}}
     both = ClassData(data.root, ASSIGNMENT, 20.0, data.grades, records=kept)
-    [x] = figures.checks(both)
+    [x] = figures.check_figures(both)
     assert (x.name, x.passed, x.not_checked) == ("x", 1, 0)
-    assert set(figures.times(both).seconds) == {"a", "b"}
+    assert set(figures.run_times(both).seconds) == {"a", "b"}
 
 
 # Feedback
@@ -320,20 +322,20 @@ def test_questions_of_a_quiz_and_unreadable_submissions_are_no_checks() -> None:
     ],
 )
 def test_feedback_is_grouped_without_numbers_and_names(one: str, other: str) -> None:
-    assert feedback.stripped(one, ["ann"]) == feedback.stripped(other, ["bob"])
+    assert feedback.strip_details(one, ["ann"]) == feedback.strip_details(other, ["bob"])
 
 
 def test_different_feedback_stays_different_and_short() -> None:
-    assert feedback.stripped("It isn't there, it can't be") == "It isn't there, it can't be"
-    assert feedback.stripped("too few") != feedback.stripped("too many")
-    assert len(feedback.stripped("x" * 10_000)) <= feedback.LONGEST
+    assert feedback.strip_details("It isn't there, it can't be") == "It isn't there, it can't be"
+    assert feedback.strip_details("too few") != feedback.strip_details("too many")
+    assert len(feedback.strip_details("x" * 10_000)) <= feedback.LONGEST
     data = class_of({
         "a": [result("x", "failed", actual="Got 3.")],
         "b": [result("x", "failed", actual="Got 17.")],
         "c": [result("x", "failed", actual="Nothing came.")],
         "d": [result("x", "passed", actual="Got 3.")],
     })  # fmt: skip
-    first, second = feedback.common(data)
+    first, second = feedback.common_groups(data)
     assert (first.text, first.students) == ("Got #.", ("a", "b"))
     assert second.students == ("c",)
 
@@ -344,14 +346,14 @@ def test_different_feedback_stays_different_and_short() -> None:
 def test_canvas_and_moodle_files_have_the_columns_that_they_import() -> None:
     people = {"ann": Person("ann", "Ann", "O'Hara, Jr.", "ann@example.org", "4711")}
     data = ClassData(Path("/x"), "ch05", 20.0, (grade("ann", 12.25), grade("bob", 7)), people)
-    canvas = rows_of(exports.canvas(data, "Exercise 1 (99)").text)
+    canvas = rows_of(exports.export_canvas(data, "Exercise 1 (99)").text)
     assert canvas == [
         ["Student", "ID", "SIS User ID", "SIS Login ID", "Section", "Exercise 1 (99)"],
         ["    Points Possible", "", "", "", "", "20"],
         ["O'Hara, Jr., Ann", "4711", "", "ann", "", "12.25"],
         ["bob", "", "", "bob", "", "7"],
     ]
-    moodle = rows_of(exports.moodle(data).text)
+    moodle = rows_of(exports.export_moodle(data).text)
     assert moodle == [
         ["Username", "ID number", "First name", "Last name", "Email address", "ch05"],
         ["ann", "4711", "Ann", "O'Hara, Jr.", "ann@example.org", "12.25"],
@@ -371,7 +373,7 @@ def test_everybody_is_exported_and_only_a_final_grade_is_a_number() -> None:
         rows = [row for row in rows_of(export.text)[1:] if row[0] != exports.POINTS_POSSIBLE]
         return {(row[0] or row[3]): row[-1] for row in rows}
 
-    for write in (exports.canvas, exports.moodle):
+    for write in (exports.export_canvas, exports.export_moodle):
         export = write(data)
         assert cells(export) == {"ann": "1", "bob": "", "zoe": ""}
         assert (export.students, export.waiting, export.absent) == (1, ("bob",), ("zoe",))
@@ -386,7 +388,7 @@ def test_everybody_is_exported_and_only_a_final_grade_is_a_number() -> None:
 def test_no_cell_of_an_export_is_a_formula(student: str) -> None:
     people = {student: Person(student, student, student, student, student)}
     data = ClassData(Path("/x"), "=ch05", 20.0, (grade(student),), people)
-    for write in (exports.canvas, exports.moodle):
+    for write in (exports.export_canvas, exports.export_moodle):
         export = write(data)
         assert export.guarded == (student,)
         for cell in (cell for row in rows_of(export.text) for cell in row):
@@ -423,7 +425,7 @@ def text(source: str) -> OwnText:
 def test_a_renamed_copy_is_found_and_another_idea_is_not() -> None:
     renamed = re.sub(r"\bfound\b", "mine", CODE).replace("number", "i").replace("make", "build")
     renamed = "# all my own work\n" + renamed.replace("    ", "  ").replace("limit", "n")
-    found = similarity.alike(
+    found = similarity.compare_programs(
         {"ann": text(CODE), "bob": text(renamed), "cy": text(OTHER)}, NOTHING_GIVEN
     )
     assert found.pairs == (similarity.Pair("ann", "bob", 1.0),)
@@ -432,11 +434,11 @@ def test_a_renamed_copy_is_found_and_another_idea_is_not() -> None:
 
 def test_given_code_and_the_stub_do_not_count(course: Course) -> None:
     given = GivenText({NOTEBOOK: course.released})
-    stub = given.own({NOTEBOOK: course.released}, {})
-    assert tokens(stub, given, frozenset()) == ()
-    solved = given.own({NOTEBOOK: course.source}, {})
-    assert tokens(solved, given, frozenset())
-    assert similarity.alike({"a": stub, "b": stub}, given).too_short == ("a", "b")
+    stub = given.extract_own_text({NOTEBOOK: course.released}, {})
+    assert own_tokens(stub, given, frozenset()) == ()
+    solved = given.extract_own_text({NOTEBOOK: course.source}, {})
+    assert own_tokens(solved, given, frozenset())
+    assert similarity.compare_programs({"a": stub, "b": stub}, given).too_short == ("a", "b")
 
 
 ANSWER = (
@@ -454,7 +456,7 @@ def class_with(
     texts = {name: {who: text(code) for who, code in found.items()}
              for name, found in programs.items()}  # fmt: skip
     title = questions.title_of_notebook(NOTEBOOK)
-    where = likeness.called(title, asked[NOTEBOOK]["q"])
+    where = likeness.answers_title(title, asked[NOTEBOOK]["q"])
     return data, {**texts, where: {who: text(said) for who, said in answers.items()}}
 
 
@@ -470,7 +472,7 @@ def test_one_copied_exercise_in_an_otherwise_own_submission_is_found_and_named()
         "Exercise 2": {who: own() for who in ("ann", "bob", "cy")},
     }
     data, texts = class_with({}, programs)
-    found = likeness.compare(data, texts, NOTHING_GIVEN, 0.9)
+    found = likeness.compare_class(data, texts, NOTHING_GIVEN, 0.9)
     assert found.pairs == (similarity.Pair("ann", "bob", 1.0, "Exercise 1"),)
 
 
@@ -485,7 +487,7 @@ def test_a_copied_answer_is_found_and_the_model_answer_does_not_count() -> None:
         "eve": "Short.", "fay": "Short.",
     }  # fmt: skip
     data, texts = class_with(answers, {})
-    found = likeness.compare(data, texts, NOTHING_GIVEN, 0.9)
+    found = likeness.compare_class(data, texts, NOTHING_GIVEN, 0.9)
     [pair] = found.pairs
     assert (pair.left, pair.right) == ("ann", "bob")
     assert pair.where == "Exercise 1: QoS profile design: Loss"
@@ -495,14 +497,16 @@ def test_a_copied_answer_is_found_and_the_model_answer_does_not_count() -> None:
 
 def test_the_exemplars_own_lines_do_not_count(course: Course) -> None:
     given = GivenText({NOTEBOOK: course.released}, {NOTEBOOK: course.source})
-    assert tokens(given.own({NOTEBOOK: course.source}, {}), given, frozenset()) == ()
+    assert (
+        own_tokens(given.extract_own_text({NOTEBOOK: course.source}, {}), given, frozenset()) == ()
+    )
 
 
 def test_what_many_have_is_common_ground() -> None:
     texts = {f"s{n}": text(CODE) for n in range(20)}
-    assert similarity.alike(texts, NOTHING_GIVEN).found == 0
+    assert similarity.compare_programs(texts, NOTHING_GIVEN).found == 0
     few = {f"s{n}": text(CODE) for n in range(4)}
-    assert similarity.alike(few, NOTHING_GIVEN).found == 6
+    assert similarity.compare_programs(few, NOTHING_GIVEN).found == 6
 
 
 def test_odd_texts_are_compared_without_a_word(recwarn: pytest.WarningsRecorder) -> None:
@@ -514,7 +518,7 @@ def test_odd_texts_are_compared_without_a_word(recwarn: pytest.WarningsRecorder)
         "x" + ".y" * 9_000,
         "\ud800",
     ):
-        similarity.alike({"a": text(odd), "b": text(odd + "\n")}, NOTHING_GIVEN)
+        similarity.compare_programs({"a": text(odd), "b": text(odd + "\n")}, NOTHING_GIVEN)
     assert not recwarn.list
 
 
@@ -527,10 +531,12 @@ def test_work_is_bounded_and_only_the_most_alike_are_shown() -> None:
         )
         for n in range(300)
     }
-    assert similarity.alike(texts, NOTHING_GIVEN, 0.7).found == 0, "all of it is common ground"
+    assert similarity.compare_programs(texts, NOTHING_GIVEN, 0.7).found == 0, (
+        "all of it is common ground"
+    )
     twins = {f"{s}{t}": OwnText((*(f"a{k} = {k}{s}" for k in range(20)),)) for s in range(60)
              for t in "xy"}  # fmt: skip
-    found = similarity.alike(twins, NOTHING_GIVEN, 1.0)
+    found = similarity.compare_programs(twins, NOTHING_GIVEN, 1.0)
     assert found.found >= 60
     assert len(found.pairs) == similarity.MOST_PAIRS
 
@@ -558,11 +564,11 @@ def test_everything_from_a_student_is_escaped_and_nothing_is_loaded() -> None:
     texts = {EVIL: {name: text(CODE + f"print('{EVIL}')") for name in (evil, "bob")}}
     mean = means.Mean(EVIL, EVIL, 1, 0.5, 1.0, 1)
     report = reports.ClassReport(
-        data, figures.checks(data), figures.times(data), feedback.common(data),
-        needs.people_needed(data), likeness.compare(data, texts, NOTHING_GIVEN, 0.9), texts,
+        data, figures.check_figures(data), figures.run_times(data), feedback.common_groups(data),
+        needs.people_needed(data), likeness.compare_class(data, texts, NOTHING_GIVEN, 0.9), texts,
         NOTHING_GIVEN, 0.9, data.notes, means.Means((mean,), (mean,), (mean,)),
     )  # fmt: skip
-    html = pages.page(report)
+    html = pages.render_page(report)
     assert report.alike.pairs
     assert "<script" not in html
     assert html.count("&lt;script&gt;") >= 18
@@ -576,11 +582,11 @@ def test_everything_from_a_student_is_escaped_and_nothing_is_loaded() -> None:
 
 
 def test_the_report_of_a_graded_class(graded: Path) -> None:
-    report = reports.make(graded, ASSIGNMENT)
-    page, canvas, moodle = reports.write(report)
+    report = reports.make_report(graded, ASSIGNMENT)
+    page, canvas, moodle = reports.write_report(report)
 
     by_name = {check.name: check for check in report.checks}
-    assert set(by_name) == set(exercises.load("qos").checks)
+    assert set(by_name) == set(exercises.load_exam("qos").checks)
     assert (by_name["imu_burst"].passed, by_name["imu_burst"].failed) == (2, 2)
     assert by_name["readings_flow"].failure_rate == 0
     assert set(report.times.seconds) == {"ann", "bob", "cy", "-dan"}
@@ -627,9 +633,9 @@ def test_who_handed_in_in_another_place_is_asked_about_and_gets_no_zero(
     path = graded / "submitted" / "zoe" / place
     path.parent.mkdir(parents=True)
     path.write_text("x")
-    data = collect(graded, ASSIGNMENT)
+    data = collect_class(graded, ASSIGNMENT)
     assert (data.absent, data.not_entered) == ((), ("late", "zoe"))
-    written = rows_of(exports.canvas(data, zero_absent=True).text)
+    written = rows_of(exports.export_canvas(data, zero_absent=True).text)
     assert [row[-1] for row in written if row[3] == "zoe"] == [""]
     [need] = [need for need in needs.people_needed(data) if "zoe" in need.students]
     assert need.urgent
@@ -644,7 +650,7 @@ def test_answers_of_notebooks_that_came_without_metadata_are_compared(graded: Pa
     )
     for student in ("ann", "cy"):
         copy = graded / "autograded" / student / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
-        notebook = submission.read(copy)
+        notebook = submission.read_notebook(copy)
         [answer] = [c for c in notebook.cells if submission.grade_id(c) == cell]
         answer.source = mine
         copy.chmod(0o644)
@@ -653,8 +659,8 @@ def test_answers_of_notebooks_that_came_without_metadata_are_compared(graded: Pa
             one.metadata = nbformat.from_dict({})
         handed_in = graded / "submitted" / student / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
         nbformat.write(notebook, handed_in)
-    report = reports.make(graded, ASSIGNMENT)
-    where = likeness.called(
+    report = reports.make_report(graded, ASSIGNMENT)
+    where = likeness.answers_title(
         questions.title_of_notebook(NOTEBOOK), report.data.questions[NOTEBOOK][cell]
     )
     pairs = [pair for pair in report.alike.pairs if pair.where == where]
@@ -665,8 +671,8 @@ def test_answers_of_notebooks_that_came_without_metadata_are_compared(graded: Pa
     "damage", ["", "[]", '{"version": 1}', '{"version": 99}', "\x00" * 20, "[" * 100_000]
 )
 def test_a_damaged_record_costs_its_own_figures_and_says_so(graded: Path, damage: str) -> None:
-    records.path(graded / ".autograder", ASSIGNMENT, "bob", NOTEBOOK).write_text(damage)
-    report = reports.make(graded, ASSIGNMENT)
+    records.record_path(graded / ".autograder", ASSIGNMENT, "bob", NOTEBOOK).write_text(damage)
+    report = reports.make_report(graded, ASSIGNMENT)
     assert set(report.times.seconds) == {"ann", "cy", "-dan"}
     [note] = report.data.notes
     assert "bob's check results" in note
@@ -674,8 +680,8 @@ def test_a_damaged_record_costs_its_own_figures_and_says_so(graded: Path, damage
 
 
 def test_a_grade_from_before_records_were_kept_is_counted(graded: Path) -> None:
-    records.path(graded / ".autograder", ASSIGNMENT, "bob", NOTEBOOK).unlink()
-    [note] = reports.make(graded, ASSIGNMENT).data.notes
+    records.record_path(graded / ".autograder", ASSIGNMENT, "bob", NOTEBOOK).unlink()
+    [note] = reports.make_report(graded, ASSIGNMENT).data.notes
     assert "1 notebook has a grade but no record" in note
 
 
@@ -688,7 +694,7 @@ def test_the_command_speaks_to_people_and_to_machines(graded: Path) -> None:
     assert "Empty for 1 student who handed in nothing" in shown
     assert "match them by hand: -dan" in shown
     spoken = json.loads(autograder("report", ASSIGNMENT, *root, "--json", cwd=graded).stdout)
-    assert len(spoken["checks"]) == len(exercises.load("qos").checks)
+    assert len(spoken["checks"]) == len(exercises.load_exam("qos").checks)
     assert spoken["absent"] == ["zoe"]
     assert len(spoken["means"]["questions"]) == 7
     assert {"-dan", "bob"} <= {pair["left"] for pair in spoken["alike"]}
@@ -705,13 +711,13 @@ def test_a_read_only_folder_is_one_sentence(graded: Path) -> None:
 
 def test_an_assignment_that_is_not_there_or_not_graded_is_one_sentence(course: Course) -> None:
     with pytest.raises(InsightError, match=r"no assignment 'ch99'.*there are ch05"):
-        reports.make(course.root, "ch99")
+        reports.make_report(course.root, "ch99")
     with pytest.raises(InsightError, match=r"Nothing of 'ch05' has been graded yet: run"):
-        reports.make(course.root, ASSIGNMENT)
+        reports.make_report(course.root, ASSIGNMENT)
     result = autograder(
         "report", "ch05", "--root", str(course.root), cwd=course.root, code=1
     ).stderr
     assert "graded yet" in result
     (course.root / "gradebook.db").write_text("this is no database, but a long enough text" * 99)
     with pytest.raises(GradebookUnusable, match="is damaged"):
-        reports.make(course.root, ASSIGNMENT)
+        reports.make_report(course.root, ASSIGNMENT)

@@ -20,7 +20,7 @@ from autograder.assignments.quiz_sheets import QuizSheetError
 from autograder.commands import quiz_report
 from autograder.commands.quiz_command import QuizCommandError
 from autograder.gradebook.course_gradebook import CourseGradebook
-from autograder.gradebook.release import ReleaseError, release
+from autograder.gradebook.release import ReleaseError, make_release
 from autograder.grading import engine
 from course.workspace.content import content_root, copy_authoring
 from course.workspace.lab import make_copy
@@ -31,7 +31,7 @@ from tests.quizzes import sample
 from .test_quiz_marks import wrong
 
 QUIZ = ASSIGNMENT = "midterm"
-SHEET = closing.filename(QUIZ)
+SHEET = closing.sheet_filename(QUIZ)
 TEXT = """\
 # %% nbgrader={"grade": false, "grade_id": "take", "locked": true, "schema_version": 3, "solution": false}
 import quizzes
@@ -71,7 +71,7 @@ def write_bank(root: Path, text: str = "", **changes: Any) -> None:
 def root(tmp_path: Path) -> Path:
     root = course(tmp_path / "course")
     build(root)
-    release(root, ASSIGNMENT)
+    make_release(root, ASSIGNMENT)
     return root
 
 
@@ -81,13 +81,13 @@ def hand_in(root: Path, student: str, *, right: int) -> Path:
     quiz = quizzes.load(QUIZ, student=student, folder=folder)
     bank = loader.load_bank(QUIZ, root / "authoring" / "banks")
     for item in model.draw(bank, student, 1).items:
-        quiz.answer(item.number, model.key(item) if item.number <= right else wrong(item))
+        quiz.answer(item.number, model.right_answer(item) if item.number <= right else wrong(item))
     quiz.submit()
     return folder
 
 
 def points(root: Path) -> dict[str, float | None]:
-    grades = CourseGradebook(root).grades(ASSIGNMENT)
+    grades = CourseGradebook(root).read_grades(ASSIGNMENT)
     return {grade.student: grade.cells["exam"][f"quiz-{QUIZ}"] for grade in grades}
 
 
@@ -157,16 +157,16 @@ def test_questions_that_are_not_in_step_with_the_bank_are_not_released(root: Pat
     data["concepts"][0]["variants"][0]["stem"] = "What else?"
     write_bank(root, concepts=data["concepts"])
     with pytest.raises(ReleaseError, match=rf"{SHEET} is not in step with the quiz: run"):
-        release(root, ASSIGNMENT)
+        make_release(root, ASSIGNMENT)
     build(root)
-    release(root, ASSIGNMENT)
+    make_release(root, ASSIGNMENT)
     assert "What else?" in (root / "release" / ASSIGNMENT / SHEET).read_text()
 
 
 def test_a_bank_in_the_place_of_the_questions_is_not_released(root: Path) -> None:
     shutil.copy(root / "authoring" / "banks" / f"{QUIZ}.yaml", root / "source" / ASSIGNMENT / SHEET)
     with pytest.raises(ReleaseError, match="is not in step with the quiz"):
-        release(root, ASSIGNMENT)
+        make_release(root, ASSIGNMENT)
     assert yaml.safe_load((root / "release" / ASSIGNMENT / SHEET).read_text())["keyless"]
 
 
@@ -176,7 +176,7 @@ def test_three_questions_with_one_variant_each_are_an_exam(tmp_path: Path) -> No
     text = (schema.EXAMPLES / "exam.yaml").read_text().replace("quiz: exam", f"quiz: {QUIZ}")
     root = course(tmp_path / "course", text=text)
     build(root)
-    release(root, ASSIGNMENT)
+    make_release(root, ASSIGNMENT)
     hand_in(root, "ada", right=3)
     hand_in(root, "alan", right=1)
     engine.grade(root, ASSIGNMENT)

@@ -160,14 +160,14 @@ def test_a_scheduler_that_is_not_there_is_one_sentence(
 def test_a_job_survives_the_journey() -> None:
     job = Job((Cell("x = 1"), Cell("", "qos-visible", "qos", "visible", {"a": 1})), {"f": b"\0"})
     assert Job.from_json(job.to_json()) == job
-    other = job.to_json().replace(job.salt, "0" * 64)
+    other = job.to_json().replace(job.code_digest, "0" * 64)
     with pytest.raises(JobError, match="another version"):
         Job.from_json(other)
 
 
 def test_an_outcome_is_bounded() -> None:
     stream = {"output_type": "stream", "name": "stdout", "text": "x" * jobs.MAX_OUTCOME}
-    outcome = jobs.bounded(Outcome([[stream], []], notes=["a note"]))
+    outcome = jobs.bounded_outcome(Outcome([[stream], []], notes=["a note"]))
     assert outcome.outputs == [[], []]
     assert outcome.notes[0] == "a note"
     assert "left out" in outcome.notes[1]

@@ -21,13 +21,13 @@ from autograder.running import runner
 from autograder.sandbox import abilities
 from autograder.sandbox.probe import Abilities
 
-CASES = {exam: corpus.load(exam) for exam in exercises.names()}
-EXAMS = pytest.mark.parametrize("exam", exercises.names())
+CASES = {exam: corpus.load_cases(exam) for exam in exercises.exercise_names()}
+EXAMS = pytest.mark.parametrize("exam", exercises.exercise_names())
 
 
 @cache
 def notebooks(exam: str) -> Notebooks:
-    return trials.notebooks(exam)
+    return trials.make_notebooks(exam)
 
 
 WHOLE = "qos"
@@ -113,7 +113,7 @@ def test_every_mutant_is_killed_and_designs_differ(exam: str) -> None:
     own = CASES[exam]
     for case in own:
         assert (not case.fails) == case.name.startswith("right-"), case.name
-        assert case.must_fail <= set(exercises.load(exam).checks), case.name
+        assert case.must_fail <= set(exercises.load_exam(exam).checks), case.name
     assert sum(not case.fails for case in own) >= 6
     assert sum(bool(case.fails) for case in own) >= 15
 
@@ -126,7 +126,7 @@ def test_every_mistake_is_told_in_words_that_are_tested(exam: str) -> None:
 
 def test_the_table_of_checks_and_mutants_is_in_step() -> None:
     table = Path(tables.__file__).with_name("README.md")
-    assert table.read_text(encoding="utf-8") == tables.matrix(CASES)
+    assert table.read_text(encoding="utf-8") == tables.checks_matrix(CASES)
 
 
 def test_a_difference_is_reported() -> None:
@@ -138,8 +138,8 @@ def test_a_difference_is_reported() -> None:
 
 def test_other_points_than_a_case_must_earn_are_reported() -> None:
     case = CASES["qos"][0]
-    program = submission.program(case.submission(*notebooks("qos")))
-    outcome = runner.refuse(program, "this machine was too busy", "not_examined")
+    program = submission.extract_program(case.make_submission(*notebooks("qos")))
+    outcome = runner.refused_outcome(program, "this machine was too busy", "not_examined")
     assert "earned 0 points, not 3" in replace(case, points=3.0).verdict_of(outcome)
     assert "earned" not in replace(case, points=0.0).verdict_of(outcome)
 
@@ -154,8 +154,8 @@ def test_a_message_without_its_fragment_is_reported() -> None:
 
 def test_what_the_grader_failed_at_is_reported_with_the_reason() -> None:
     case = CASES["qos"][0]
-    program = submission.program(case.submission(*notebooks("qos")))
-    outcome = runner.refuse(program, "the examiner was ended", "grader_error")
+    program = submission.extract_program(case.make_submission(*notebooks("qos")))
+    outcome = runner.refused_outcome(program, "the examiner was ended", "grader_error")
     difference = case.verdict_of(outcome)
     assert "grader error in " in difference
     assert "the examiner was ended" in difference
@@ -165,8 +165,8 @@ def test_what_could_not_be_examined_is_reported_with_the_reason(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     case = CASES["qos"][0]
-    program = submission.program(case.submission(*notebooks("qos")))
-    outcome = runner.refuse(program, "this machine was too busy", "not_examined")
+    program = submission.extract_program(case.make_submission(*notebooks("qos")))
+    outcome = runner.refused_outcome(program, "this machine was too busy", "not_examined")
     told = "imu_burst was not examined: 'this machine was too busy'"
     monkeypatch.setattr("autograder.corpus.case.abilities", lambda: Abilities(loss=True))
     assert told in case.verdict_of(outcome)
@@ -177,8 +177,8 @@ def test_what_could_not_be_examined_is_reported_with_the_reason(
 
 def test_feedback_that_shows_the_insides_of_the_grader_is_reported() -> None:
     case = CASES["qos"][0]
-    program = submission.program(case.submission(*notebooks("qos")))
-    outcome = runner.refuse(program, "see /tmp/x/exam.py", "not_examined")
+    program = submission.extract_program(case.make_submission(*notebooks("qos")))
+    outcome = runner.refused_outcome(program, "see /tmp/x/exam.py", "not_examined")
     assert "feedback holds '/tmp/'" in case.verdict_of(outcome)
 
 
@@ -209,7 +209,7 @@ def test_a_corpus_that_is_not_well_formed_is_named(
     (tmp_path / "right.py").write_text("# title: t\n# fails: nothing\nx = 1\n")
     (tmp_path / name).write_text(text)
     with pytest.raises(CorpusError, match=message):
-        corpus.load("qos", tmp_path)
+        corpus.load_cases("qos", tmp_path)
 
 
 def test_a_case_without_splices_is_the_exemplar(tmp_path: Path) -> None:
@@ -218,11 +218,11 @@ def test_a_case_without_splices_is_the_exemplar(tmp_path: Path) -> None:
     (tmp_path / "mutants.toml").write_text(table)
     case = next(
         c
-        for c in corpus.load("qos", tmp_path, every=tmp_path / "none")
+        for c in corpus.load_cases("qos", tmp_path, every=tmp_path / "none")
         if c.name == "right-exemplar"
     )
     source, released = notebooks("qos")
-    handed_in = case.submission(source, released)
+    handed_in = case.make_submission(source, released)
     solution = next(c for c in handed_in.cells if submission.grade_id(c) == "qos-solution")
     exemplar = next(c for c in source.cells if submission.grade_id(c) == "qos-solution")
     assert solution.source == without_markers(exemplar.source)
@@ -248,13 +248,13 @@ def test_busy_loops_end_with_the_block_and_with_a_process_that_is_killed() -> No
 
 def test_a_missing_corpus_is_named(tmp_path: Path) -> None:
     with pytest.raises(CorpusError, match="no corpus for 'other'"):
-        corpus.load("other", tmp_path)
+        corpus.load_cases("other", tmp_path)
 
 
 def test_a_case_that_is_not_there_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(trials, "run", lambda *_, **__: pytest.fail("nothing should be run"))
     with pytest.raises(CorpusError, match="no case 'right-halt': did you mean right-halts"):
-        command.run(only=["right-exemplar", "right-halt"])
+        command.run_corpus(only=["right-exemplar", "right-halt"])
 
 
 def test_a_splice_that_does_not_fit_the_exemplar_is_refused() -> None:
@@ -262,4 +262,4 @@ def test_a_splice_that_does_not_fit_the_exemplar_is_refused() -> None:
     splices = {"qos-solution": (("not there", "new"),)}
     case = Case("qos", "mutant", "t", frozenset({"imu_burst"}), splices=splices)
     with pytest.raises(CorpusError, match="'not there' stands 0 times in the exemplar"):
-        case.submission(source, released)
+        case.make_submission(source, released)

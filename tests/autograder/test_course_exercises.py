@@ -16,13 +16,13 @@ from autograder import exercise_folders, exercises
 from autograder.assignments import listing, submission
 from autograder.assignments.build import build
 from autograder.corpus import command
-from autograder.corpus.command import untrusting
+from autograder.corpus.command import needs_trust
 from autograder.examination import points
 from autograder.examination.exam import ExamError
 from autograder.examination.program import Cell
 from autograder.exercise_folders import ExerciseError
 from autograder.gradebook.course_gradebook import CourseGradebook
-from autograder.gradebook.release import ReleaseError, release
+from autograder.gradebook.release import ReleaseError, make_release
 from autograder.grading import engine
 from autograder.grading.engine import Graded
 from autograder.grading.progress import Collecting
@@ -142,7 +142,7 @@ def write_exercise(root: Path, name: str = "lamp", **instead: str) -> Path:
 @pytest.fixture(autouse=True)
 def only_the_packages_afterwards() -> Iterator[None]:
     yield
-    exercise_folders.use(None)
+    exercise_folders.use_course(None)
 
 
 @pytest.fixture
@@ -165,7 +165,7 @@ def released_lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copy(content_root() / CONFIG, root)
     write_exercise(root)
     build(root)
-    release(root, "lab2")
+    make_release(root, "lab2")
     return root
 
 
@@ -180,7 +180,8 @@ def files_in(folder: Path) -> set[str]:
 
 def hand_in(root: Path, student: str, old: str = "", new: str = "") -> None:
     source, released = (
-        submission.read(root / step / "lab2" / "lamp.ipynb") for step in ("source", "release")
+        submission.read_notebook(root / step / "lab2" / "lamp.ipynb")
+        for step in ("source", "release")
     )
     for cell, solved in zip(released.cells, source.cells, strict=True):
         if submission.grade_id(cell) == "lamp-solution":
@@ -196,8 +197,8 @@ def test_it_is_built_beside_those_of_the_package_and_only_its_exam_is_handed_out
     built = [str(path.relative_to(root)) for path in build(root)]
     assert built[:2] == ["source/lab1/lamp.ipynb", "source/lab1/qos-design.ipynb"]
     assert build(root, check=True)
-    assert "lamp" not in exercises.names(), "it is one of that course only"
-    released = release(root, "lab1")
+    assert "lamp" not in exercises.exercise_names(), "it is one of that course only"
+    released = make_release(root, "lab1")
     assert files_in(released) == {"lamp.ipynb", "qos-design.ipynb", *SHIPPED}
     text = "\n".join(path.read_text() for path in released.rglob("*") if path.is_file())
     assert "create_timer" not in text
@@ -218,8 +219,8 @@ def test_a_second_chapter_changes_nothing_of_the_first(
     assert set(map(str, built - first)) == added
     for path in first:
         assert (root / path).read_bytes() == (content_root() / path).read_bytes(), path
-    release(root, "ch05-quiz")
-    release(root, "ch06")
+    make_release(root, "ch05-quiz")
+    make_release(root, "ch06")
     lab.make_copy(tmp_path / "mine", root)
     monkeypatch.chdir(tmp_path / "mine")
     progress = course.progress()
@@ -236,7 +237,7 @@ def test_what_is_handed_out_is_in_step_with_the_exercise(root: Path) -> None:
     with pytest.raises(CourseError, match=r"Not in step.*source/lab1/exercises/lamp/words\.py"):
         build(root, check=True)
     with pytest.raises(ReleaseError, match=r"words\.py is not in step with the exercise"):
-        release(root, "lab1")
+        make_release(root, "lab1")
 
 
 @needs_sandbox
@@ -259,7 +260,7 @@ def test_a_right_and_a_wrong_submission_are_graded_in_the_sandbox(lab2: Path) ->
     assert verdicts["right"] == {"shines": "passed", "is_lit": "passed"}
     assert verdicts["dark"] == {"shines": "passed", "is_lit": "failed"}
     assert verdicts["own"] == {"shines": "failed", "is_lit": "not_checked"}
-    scores = {grade.student: grade.score for grade in CourseGradebook(lab2).grades("lab2")}
+    scores = {grade.student: grade.score for grade in CourseGradebook(lab2).read_grades("lab2")}
     assert scores == {"right": 3.0, "dark": 1.0, "own": 0.0}
 
 
@@ -270,13 +271,13 @@ def test_nbgrader_itself_grades_it_as_well(lab2: Path) -> None:
         [sys.executable, "-m", "nbgrader", "autograde", "lab2", "--create"], cwd=lab2, check=True,
         capture_output=True, timeout=120,
     )  # fmt: skip
-    (grade,) = CourseGradebook(lab2).grades("lab2")
+    (grade,) = CourseGradebook(lab2).read_grades("lab2")
     assert grade.score == 3.0
 
 
 def test_a_student_checks_it_with_what_was_released(lab2: Path) -> None:
     hand_in(lab2, "ana")
-    notebook = submission.read(lab2 / "submitted" / "ana" / "lab2" / "lamp.ipynb")
+    notebook = submission.read_notebook(lab2 / "submitted" / "ana" / "lab2" / "lamp.ipynb")
     given, solution = (cell.source for cell in notebook.cells[:2])
     program = f"{given}\n{solution}\nfrom autograder import check\nprint(check('lamp'))"
     done = subprocess.run(
@@ -288,11 +289,11 @@ def test_a_student_checks_it_with_what_was_released(lab2: Path) -> None:
 
 
 def test_its_corpus_is_run_like_one_of_the_package(root: Path) -> None:
-    exercise_folders.use(root)
+    exercise_folders.use_course(root)
     only = ["right-exemplar", "wrong-dark", "wrong-stub"]
-    trials = command.run("lamp", only=only)
+    trials = command.run_corpus("lamp", only=only)
     assert {trial.case.name: trial.difference for trial in trials} == dict.fromkeys(only, "")
-    assert "lamp" in exercises.names()
+    assert "lamp" in exercises.exercise_names()
 
 
 READS = """
@@ -306,7 +307,7 @@ print(found)
 
 @needs_sandbox
 def test_a_submission_sees_nothing_of_it(root: Path) -> None:
-    exercise_folders.use(root)
+    exercise_folders.use_course(root)
     program = (Cell(READS.format(root=str(root))), Cell("", "lamp-visible", "lamp", "visible"))
     outcome = runner.run(program, hidden=[root])
     assert outcome.outputs[0][0]["text"] == "[]\n"
@@ -315,8 +316,8 @@ def test_a_submission_sees_nothing_of_it(root: Path) -> None:
 
 
 def test_trusted_submissions_are_examined_too(root: Path) -> None:
-    exercise_folders.use(root)
-    untrusting(lambda _line: None)
+    exercise_folders.use_course(root)
+    needs_trust(lambda _line: None)
     cells = [part.partition("\n")[2] for part in TASK.split("# %% ")[1:3]]
     program = (*map(Cell, cells), Cell("", "lamp-visible", "lamp", "visible"))
     outcome = runner.run(program, trust=True)
@@ -324,7 +325,7 @@ def test_trusted_submissions_are_examined_too(root: Path) -> None:
 
 
 def test_its_digest_covers_exam_instruments_and_points_and_nothing_else(root: Path) -> None:
-    exercise_folders.use(root)
+    exercise_folders.use_course(root)
     before, package = digests.of_exams(("lamp",)), digests.of_exams(("qos",))
     folder = root / "exercises" / "lamp"
 
@@ -332,7 +333,7 @@ def test_its_digest_covers_exam_instruments_and_points_and_nothing_else(root: Pa
         path = folder / file
         text = path.read_text()
         path.write_text(text + more)
-        exercise_folders.use(root)
+        exercise_folders.use_course(root)
         digest = digests.of_exams(("lamp",))
         assert digests.of_exams(("qos",)) == package
         path.write_text(text)
@@ -343,14 +344,14 @@ def test_its_digest_covers_exam_instruments_and_points_and_nothing_else(root: Pa
     for file in ("exam.py", "listener.py", "words.py"):
         assert after(file, "\n") != before, file
     assert after("points.toml", "late = 1\n") != before
-    exercise_folders.use(root)
+    exercise_folders.use_course(root)
     assert digests.of_exams(("lamp",)) == before
 
 
 def test_a_misspelt_name_is_one_sentence(root: Path) -> None:
-    exercise_folders.use(root)
+    exercise_folders.use_course(root)
     with pytest.raises(ExamError, match=r"no exam 'lmap': there are .*lamp.* Did you mean 'lamp'"):
-        exercises.load("lmap")
+        exercises.load_exam("lmap")
 
 
 @pytest.mark.parametrize(
@@ -364,11 +365,11 @@ def test_a_name_that_an_exercise_cannot_have_is_one_sentence(
     root: Path, name: str, says: str
 ) -> None:
     write_exercise(root, name)
-    for door in (exercise_folders.use, build, lambda place: release(place, "lab1")):
+    for door in (exercise_folders.use_course, build, lambda place: make_release(place, "lab1")):
         with pytest.raises(ExerciseError, match=says) as raised:
             door(root)
         assert len(str(raised.value).splitlines()) == 1
-    assert exercises.names() == [n for n in exercises.names() if n != "lamp"]
+    assert exercises.exercise_names() == [n for n in exercises.exercise_names() if n != "lamp"]
 
 
 @pytest.mark.parametrize(
@@ -405,23 +406,23 @@ def test_an_exam_that_is_none_is_one_sentence(
 ) -> None:
     path = root / "exercises" / "lamp" / "exam.py"
     path.unlink() if text is None else path.write_text(text)
-    exercise_folders.use(root)
+    exercise_folders.use_course(root)
     with pytest.raises(error, match=says):
-        exercises.load("lamp")
+        exercises.load_exam("lamp")
 
 
 def test_the_exam_of_another_course_is_another(root: Path, tmp_path: Path) -> None:
     other = tmp_path / "other"
     write_exercise(other, **{"exam.py": EXAM.replace("The lamp shines.", "It is bright.")})
     for place, title in ((root, "The lamp shines."), (other, "It is bright.")) * 2:
-        exercise_folders.use(place)
-        assert exercises.load("lamp").checks["shines"].title == title
+        exercise_folders.use_course(place)
+        assert exercises.load_exam("lamp").checks["shines"].title == title
         assert points.table()["lamp"].title == "The lamp"
     assert str(root) not in sys.path
 
 
 def test_workers_elsewhere_are_not_asked_for_it(root: Path) -> None:
-    exercise_folders.use(root)
+    exercise_folders.use_course(root)
     cluster = object.__new__(Cluster)
     with pytest.raises(ClusterError, match=r"'lamp' is the course's own.*without --scheduler"):
         cluster.submit("key", Job((Cell("", "lamp-visible", "lamp", "visible"),), {}))

@@ -38,8 +38,8 @@ def longer(path: Path, more: bytes = b"") -> Iterator[None]:
 
 
 def of_all(root: Path) -> dict[str, str]:
-    digests.forget()
-    return {name: digests.of_exams((name,), root) for name in exercises.names()}
+    digests.forget_code()
+    return {name: digests.of_exams((name,), root) for name in exercises.exercise_names()}
 
 
 def test_a_change_of_one_exam_runs_nothing_else_again(copy: Path) -> None:
@@ -70,10 +70,10 @@ def test_text_corpus_and_design_note_of_an_exercise_run_nothing_again(copy: Path
 @pytest.fixture(scope="module")
 def covered() -> dict[str, set[str]]:
     """Return the modules that decide the verdicts of each exam."""
-    return {name: digests.modules_of_exams([name]) for name in exercises.names()}
+    return {name: digests.modules_of_exams([name]) for name in exercises.exercise_names()}
 
 
-@pytest.mark.parametrize("name", exercises.names())
+@pytest.mark.parametrize("name", exercises.exercise_names())
 def test_an_exam_is_its_own_business(covered: dict[str, set[str]], name: str) -> None:
     module = f"autograder.exercises.{name}.exam"
     assert [exam for exam, modules in covered.items() if module in modules] == [name]
@@ -85,9 +85,9 @@ def test_an_exam_is_its_own_business(covered: dict[str, set[str]], name: str) ->
         ("autograder.exercises.qos.rig", {"qos"}),
         ("autograder.exercises.qos.packet_loss", {"qos"}),
         ("autograder.exercises.safety.navigator_client", {"safety"}),
-        ("autograder.examination.subject.server", set(exercises.names())),
-        ("autograder.sandbox.limits", set(exercises.names())),
-        ("course.runtime.core_session", set(exercises.names())),
+        ("autograder.examination.subject.server", set(exercises.exercise_names())),
+        ("autograder.sandbox.limits", set(exercises.exercise_names())),
+        ("course.runtime.core_session", set(exercises.exercise_names())),
         ("autograder.cli", set()),
         ("autograder.gradebook.course_gradebook", set()),
     ],
@@ -125,12 +125,12 @@ def test_what_makes_points_of_verdicts_enters_again_but_runs_nothing(copy: Path)
     before = digests.of_grading(("qos",), copy)
     for file in ("quizzes/banks/ch05.yaml", "autograder/gradebook/bridge.py"):
         with longer(copy / file):
-            digests.forget()
+            digests.forget_code()
             assert digests.of_grading(("qos",), copy) != before
 
 
 def test_the_installed_code_has_the_digest_of_its_copy(copy: Path) -> None:
-    digests.forget()
+    digests.forget_code()
     assert digests.of_exams(("qos",)) == digests.of_exams(("qos",), copy)
 
 
@@ -138,7 +138,7 @@ def test_the_installed_code_has_the_digest_of_its_copy(copy: Path) -> None:
 def test_no_import_is_overlooked(package: str) -> None:
     for file in modules_of(HOME / package):
         source = file.read_bytes()
-        found = digests._imports("a.module", source)
+        found = digests._imported_modules("a.module", source)
         for node in of_a_run(ast.parse(source)):
             if isinstance(node, ast.Import):
                 assert {alias.name for alias in node.names} <= found, file

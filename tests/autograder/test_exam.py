@@ -14,7 +14,14 @@ import pytest
 from autograder import exercises
 from autograder.examination import points
 from autograder.examination.check_context import Bench, StudentError, SubjectGone
-from autograder.examination.exam import Exam, ExamError, Failed, NotExaminable, Part, unexamined
+from autograder.examination.exam import (
+    Exam,
+    ExamError,
+    Failed,
+    NotExaminable,
+    Part,
+    unexamined_verdict,
+)
 from autograder.examination.verdict import CheckResult, Verdict
 
 
@@ -30,7 +37,7 @@ class Deadline:
         self._left = left
 
     @property
-    def left(self) -> float:
+    def seconds_left(self) -> float:
         return next(self._left) if self._left else 1.0
 
 
@@ -241,7 +248,7 @@ def test_an_exam_may_have_a_fresh_rig_for_each_part(exam: Exam[list[str]]) -> No
 
 
 def test_unexamined_parts_keep_their_points_out_of_reach(exam: Exam[list[str]]) -> None:
-    verdict = unexamined(exam, "visible", "the process ended")
+    verdict = unexamined_verdict(exam, "visible", "the process ended")
     assert (verdict.score, verdict.max_score) == (0.0, 7.0)
     assert {check.actual for check in verdict.checks} == {"the process ended"}
 
@@ -258,12 +265,12 @@ def test_an_unknown_need_is_refused(exam: Exam[list[str]]) -> None:
 
 def test_an_unknown_exam_names_those_there_are() -> None:
     with pytest.raises(ExamError, match=r"no exam 'qso': there are .*qos.* Did you mean 'qos'"):
-        exercises.load("qso")
+        exercises.load_exam("qso")
 
 
-@pytest.mark.parametrize("name", exercises.names())
+@pytest.mark.parametrize("name", exercises.exercise_names())
 def test_every_exam_and_the_table_of_points_agree(name: str) -> None:
-    exam = exercises.load(name)
+    exam = exercises.load_exam(name)
     worth = [check for part in points.table()[name].parts for check in exam.part(part)]
     assert sorted(worth) == sorted(exam.checks), "each check has points in exactly one part"
     for check in exam.checks.values():

@@ -68,8 +68,8 @@ def both(people: People, *command: str) -> None:
 def work(people: People, name: str, course: Course, case: Case, answer: str) -> None:
     """Have a student work on what they fetched: their own is changed, not replaced."""
     path = people[name].home / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
-    fetched = submission.read(path)
-    notebook = case.submission(course.source, fetched)
+    fetched = submission.read_notebook(path)
+    notebook = case.make_submission(course.source, fetched)
     (cell,) = (c for c in notebook.cells if c.id == "qos-explanation-depth")
     cell.source = answer
     nbformat.write(notebook, path)

@@ -14,12 +14,12 @@ from tests.machine import needs_isolation
 from .goldens import golden
 
 EXAM = "architecture"
-CASES = {case.name: case for case in corpus.load(EXAM)}
+CASES = {case.name: case for case in corpus.load_cases(EXAM)}
 
 
 @pytest.fixture(scope="module")
 def notebooks() -> trials.Notebooks:
-    return trials.notebooks(EXAM)
+    return trials.make_notebooks(EXAM)
 
 
 @needs_isolation
@@ -51,7 +51,7 @@ def test_the_examiner_has_the_action_that_the_notebook_gives(notebooks: trials.N
 
 
 def test_nothing_of_the_grader_is_in_what_a_student_reads() -> None:
-    for check in exercises.load(EXAM).checks.values():
+    for check in exercises.load_exam(EXAM).checks.values():
         for text in (check.title, check.rationale, *check.hints, check.read):
             assert "autograder" not in text
             assert "rig" not in text.split()

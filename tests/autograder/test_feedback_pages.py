@@ -163,7 +163,8 @@ def test_nothing_of_a_submission_runs_in_a_page(number: int) -> None:
     allowed_html.screen_texts(written, new_notebook(), Page())
     for cell in written.cells:
         cell.outputs = [
-            from_dict(allowed_html.screened(output, Page())) for output in cell.get("outputs", [])
+            from_dict(allowed_html.screen_output(output, Page()))
+            for output in cell.get("outputs", [])
         ]
     assert not executable(page(HTMLExporter, written))
 
@@ -212,7 +213,8 @@ def test_a_page_loads_nothing_by_itself_but_what_lies_beside_the_notebook(text: 
     allowed_html.screen_texts(hostile, new_notebook(), Page())
     for cell in hostile.cells:
         cell.outputs = [
-            from_dict(allowed_html.screened(output, Page())) for output in cell.get("outputs", [])
+            from_dict(allowed_html.screen_output(output, Page()))
+            for output in cell.get("outputs", [])
         ]
     assert loaded(page(HTMLExporter, hostile)) == []
 
@@ -283,17 +285,18 @@ def test_what_takes_too_long_is_shown_as_it_was_typed(what: str) -> None:
     allowed_html.screen_texts(notebook, new_notebook(), Page())
     for cell in notebook.cells:
         cell.outputs = [
-            from_dict(allowed_html.screened(output, Page())) for output in cell.get("outputs", [])
+            from_dict(allowed_html.screen_output(output, Page()))
+            for output in cell.get("outputs", [])
         ]
     # As the formgrader does, in the server that all windows share.
     assert "<em>all</em> the rest" in page(HTMLExporter, notebook)
 
 
 def test_the_process_that_formats_is_started_anew_if_it_is_lost() -> None:
-    assert Page().markdown("*a*", {}) == "<p><em>a</em></p>\n"
+    assert Page().format_markdown("*a*", {}) == "<p><em>a</em></p>\n"
     page_texts._formatter._process.kill()
     page_texts._formatter._process.wait()
-    assert Page().markdown("*b*", {}) == "<p><em>b</em></p>\n"
+    assert Page().format_markdown("*b*", {}) == "<p><em>b</em></p>\n"
 
 
 def test_files_beside_a_notebook_run_nothing_where_they_are_served() -> None:

@@ -20,15 +20,15 @@ from .goldens import golden
 
 @cache
 def _notebooks() -> trials.Notebooks:
-    return trials.notebooks("patterns")
+    return trials.make_notebooks("patterns")
 
 
 def report(name: str, part: str) -> str:
     """Return what the student of a corpus case reads about one part, with all hints."""
-    case = next(case for case in corpus.load("patterns") if case.name == name)
+    case = next(case for case in corpus.load_cases("patterns") if case.name == name)
     source, released = _notebooks()
-    notebook, _ = submission.restore(case.submission(source, released), source, released)
-    outcome = runner.run(submission.program(notebook), seed=USUAL_SEED)
+    notebook, _ = submission.restore_cells(case.make_submission(source, released), source, released)
+    outcome = runner.run(submission.extract_program(notebook), seed=USUAL_SEED)
     return repr(Report(outcome.verdicts[f"patterns-{part}"], hints=3)) + "\n"
 
 

@@ -13,7 +13,7 @@ from tests.machine import needs_sandbox
 
 from .goldens import golden
 
-CASES = {case.name: case for case in corpus.load("qos")}
+CASES = {case.name: case for case in corpus.load_cases("qos")}
 MISTAKES = (
     "wrong-camera-reliable",
     "wrong-constructor-raises",
@@ -25,7 +25,7 @@ MISTAKES = (
 @needs_sandbox
 @pytest.mark.parametrize("name", MISTAKES)
 def test_the_report_reads_as_it_should(name: str) -> None:
-    (trial,) = corpus.run([CASES[name]], *trials.notebooks("qos"), jobs=1)
+    (trial,) = corpus.run([CASES[name]], *trials.make_notebooks("qos"), jobs=1)
     shown = [repr(Report(verdict, hints=3)) for verdict in trial.outcome.verdicts.values()]
     text = "\n".join(shown) + "\n"
     # Readings come in at a sensor's rate until all have had their pause: one more or less. And of

@@ -11,7 +11,7 @@ from nbformat.v4 import new_code_cell, new_notebook
 from autograder import corpus
 from autograder.assignments import submission
 from autograder.corpus import Case
-from autograder.corpus.trials import Notebooks, notebooks
+from autograder.corpus.trials import Notebooks, make_notebooks
 from autograder.examination.draws import USUAL_SEED
 from autograder.examination.verdict_text import Report
 from autograder.running import runner
@@ -22,12 +22,12 @@ from .goldens import golden
 
 @pytest.fixture(scope="module")
 def versions() -> Notebooks:
-    return notebooks("resources")
+    return make_notebooks("resources")
 
 
 @pytest.fixture(scope="module")
 def cases() -> dict[str, Case]:
-    return {case.name: case for case in corpus.load("resources")}
+    return {case.name: case for case in corpus.load_cases("resources")}
 
 
 @needs_isolation
@@ -35,8 +35,8 @@ def cases() -> dict[str, Case]:
 def test_the_report_of_a_typical_mistake(
     name: str, versions: Notebooks, cases: dict[str, Case]
 ) -> None:
-    notebook, _ = submission.restore(cases[name].submission(*versions), *versions)
-    outcome = runner.run(submission.program(notebook), seed=USUAL_SEED)
+    notebook, _ = submission.restore_cells(cases[name].make_submission(*versions), *versions)
+    outcome = runner.run(submission.extract_program(notebook), seed=USUAL_SEED)
     reports = [repr(Report(verdict, hints=3)) for verdict in outcome.verdicts.values()]
     # A device of the examiner's has a random number in its name.
     text = re.sub(r"-[0-9a-f]{8}\b", "-1234abcd", "\n\n".join(reports)) + "\n"
@@ -46,7 +46,7 @@ def test_the_report_of_a_typical_mistake(
 def test_what_else_a_kernel_does_does_not_disturb(
     versions: Notebooks, cases: dict[str, Case]
 ) -> None:
-    cells = cases["right-exemplar"].submission(*versions).cells
+    cells = cases["right-exemplar"].make_submission(*versions).cells
     wanted = ("resources-given", "resources-solution", "resources-lifecycle")
     mine = [cell.source for cell in cells if submission.grade_id(cell) in wanted]
     own = "import course\nnodes = course.run(CameraDriver), course.run(ManagedCamera)"

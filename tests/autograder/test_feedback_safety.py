@@ -11,14 +11,14 @@ from tests.machine import needs_isolation
 
 from .goldens import golden
 
-CASES = {case.name: case for case in corpus.load("safety")}
+CASES = {case.name: case for case in corpus.load_cases("safety")}
 MISTAKES = ("wrong-gripper-constant-pauses", "wrong-speed-nan", "wrong-drive-shutdown-drives-on")
 
 
 @needs_isolation
 @pytest.mark.parametrize("name", MISTAKES)
 def test_the_report_reads_as_it_should(name: str) -> None:
-    (trial,) = corpus.run([CASES[name]], *trials.notebooks("safety"), jobs=1)
+    (trial,) = corpus.run([CASES[name]], *trials.make_notebooks("safety"), jobs=1)
     shown = [repr(Report(verdict, hints=3)) for verdict in trial.outcome.verdicts.values()]
     text = "\n".join(shown) + "\n"
     assert text == golden(f"safety-{name}", text)
@@ -39,7 +39,7 @@ def test_an_error_of_one_node_is_not_told_of_another() -> None:
     case = Case(
         "safety", "two", "Two mistakes", frozenset({"goals_end", "drive_cancels"}), splices=splices
     )
-    (trial,) = corpus.run([case], *trials.notebooks("safety"), jobs=1)
+    (trial,) = corpus.run([case], *trials.make_notebooks("safety"), jobs=1)
     found = {check.name: check for v in trial.outcome.verdicts.values() for check in v.checks}
     assert {name for name, check in found.items() if check.status == "failed"} == case.fails
     assert "raised" not in found["drive_cancels"].actual

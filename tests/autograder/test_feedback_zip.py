@@ -72,7 +72,9 @@ def test_moodle_gets_each_students_pages_in_the_folder_that_it_made(
         "Un Known_104_assignsubmission_file/x.ipynb": b"{}",
         "Zoe Zest_105_assignsubmission_onlinetext/onlinetext.html": b"",
     })  # fmt: skip
-    done = feedback_archive.pack(graded, ASSIGNMENT, "moodle", names, tmp_path / "new" / "out.zip")
+    done = feedback_archive.pack_feedback(
+        graded, ASSIGNMENT, "moodle", names, tmp_path / "new" / "out.zip"
+    )
     with zipfile.ZipFile(done.path) as file:
         found = {member: moodles_participant(member) for member in file.namelist()}
         for student, number in {"eve": "101", "ann": "102", "bob": "103"}.items():
@@ -96,7 +98,7 @@ def test_moodles_grading_worksheet_is_enough(graded: Path, tmp_path: Path) -> No
             ["Teilnehmer/in 201", "Ann O'Hara", "", "Zur Bewertung abgegeben", ""],
             ["Teilnehmer/in 202", "Cy_Young", "cy", "Zur Bewertung abgegeben", ""],
         ])  # fmt: skip
-    done = feedback_archive.pack(graded, ASSIGNMENT, "moodle", sheet, tmp_path / "out.zip")
+    done = feedback_archive.pack_feedback(graded, ASSIGNMENT, "moodle", sheet, tmp_path / "out.zip")
     assert done.students == ("ann", "cy")
     with zipfile.ZipFile(done.path) as file:
         numbers = {found[0] for name in file.namelist() if (found := moodles_participant(name))}
@@ -114,7 +116,9 @@ def test_canvas_gets_files_under_the_names_that_it_gave_with_what_the_names_say(
                (f"{NOTEBOOK}.ipynb", handed_in(graded, "eve")))
     )  # fmt: skip
     (folder / "strange_13_903_notes.txt").write_bytes(b"who?")
-    done = feedback_archive.pack(graded, ASSIGNMENT, "canvas", folder, tmp_path / "out.zip")
+    done = feedback_archive.pack_feedback(
+        graded, ASSIGNMENT, "canvas", folder, tmp_path / "out.zip"
+    )
     assert done.students == ("ann", "eve")
     with zipfile.ZipFile(done.path) as file:
         assert set(file.namelist()) == {f"oharaann_LATE_11_901_{NOTEBOOK}-2.ipynb",
@@ -145,7 +149,9 @@ def test_canvas_gets_feedback_on_what_was_taken_whatever_its_name(
         shutil.copyfile(own / name, folder / f"{student}_{number}_9{number}_{name}")
     (graded / "submitted" / "cy" / ASSIGNMENT / "other.ipynb").write_text("{}")
     (folder / "cy_13_914_other.ipynb").write_text("{}")
-    done = feedback_archive.pack(graded, ASSIGNMENT, "canvas", folder, tmp_path / "out.zip")
+    done = feedback_archive.pack_feedback(
+        graded, ASSIGNMENT, "canvas", folder, tmp_path / "out.zip"
+    )
     assert done.students == ("ann", "bob", "cy")
     with zipfile.ZipFile(done.path) as file:
         assert set(file.namelist()) == {
@@ -162,14 +168,14 @@ def test_a_number_of_the_platform_or_an_address_says_who_it_is() -> None:
         "bob": Person("bob", "Bob", "Bee"), "bo2": Person("bo2", "Bob", "Bee"),
     }  # fmt: skip
     participant = platform_names.Participant
-    found = platform_names.match(
+    found = platform_names.match_participants(
         [participant("11", "", frozenset({"11"})), participant("9", "b", frozenset({"bob bee"}))],
         people, {},
     )  # fmt: skip
     assert {student: p.number for student, p in found.who.items()} == {"ann": "11"}
     assert found.unknown == ("b",), "two have this name"
-    decomposed = participant("1", "x", frozenset({platform_names._same("ANN  O\u0308")}))
-    assert set(platform_names.match([decomposed], people, {}).who) == {"ann"}
+    decomposed = participant("1", "x", frozenset({platform_names._comparable_name("ANN  O\u0308")}))
+    assert set(platform_names.match_participants([decomposed], people, {}).who) == {"ann"}
 
 
 def test_files_that_two_have_handed_in_alike_say_nothing(tmp_path: Path) -> None:
@@ -177,8 +183,8 @@ def test_files_that_two_have_handed_in_alike_say_nothing(tmp_path: Path) -> None
     same.write_bytes(b"{}")
     download = archive(tmp_path / "d.zip", {"X Y_1_assignsubmission_file/a.ipynb": b"{}"})
     participants = platform_names.of_moodle(download)
-    assert not platform_names.match(participants, {}, {"a": [same], "b": [same]}).who
-    assert set(platform_names.match(participants, {}, {"a": [same]}).who) == {"a"}
+    assert not platform_names.match_participants(participants, {}, {"a": [same], "b": [same]}).who
+    assert set(platform_names.match_participants(participants, {}, {"a": [same]}).who) == {"a"}
 
 
 @pytest.mark.parametrize("platform", ["moodle", "canvas"])

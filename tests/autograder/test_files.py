@@ -51,12 +51,12 @@ def test_scratch_folders_of_the_dead_are_swept_and_only_those(tmp_path: Path) ->
     theirs = Path(other.stdout.readline().strip())
     (tmp_path / "ros2-course-interfaces-x").mkdir()
     with files.scratch_folder() as own:
-        assert files.sweep() == 0
+        assert files.sweep_scratch() == 0
         assert own.is_dir()
         assert theirs.is_dir()
         other.kill()
         other.communicate()
-        assert files.sweep() == 1
+        assert files.sweep_scratch() == 1
         assert own.is_dir()
         assert not theirs.exists()
     assert [path.name for path in tmp_path.iterdir()] == ["ros2-course-interfaces-x"]

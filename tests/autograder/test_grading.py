@@ -41,7 +41,7 @@ def grade(course: Course, **options: bool) -> dict[str, Grade]:
 
 
 def grades(course: Course) -> dict[str, Grade]:
-    return {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    return {g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)}
 
 
 def cells(grade: Grade) -> dict[str, float | None]:
@@ -62,9 +62,11 @@ def nbgrader(course: Course, *arguments: str) -> subprocess.CompletedProcess[str
 
 
 def test_a_class_is_graded_whatever_state_its_files_are_in(course: Course, cases: Cases) -> None:
-    right = partial(cases["right-chapter"].submission, course.source)
+    right = partial(cases["right-chapter"].make_submission, course.source)
     course.submit("right", right(course.released))
-    course.submit("wrong", cases["wrong-imu-endless"].submission(course.source, course.released))
+    course.submit(
+        "wrong", cases["wrong-imu-endless"].make_submission(course.source, course.released)
+    )
     course.submit("cut-off", "{" + '"cells": [')
     course.folder("empty")
     course.submit("deleted", without(right(course.released), "qos-hidden"))
@@ -126,7 +128,7 @@ def with_nonsense(text: str) -> str:
 
 
 def test_what_one_student_hands_in_never_stops_the_others(course: Course, cases: Cases) -> None:
-    right = nbformat.writes(cases["right-chapter"].submission(course.source, course.released))
+    right = nbformat.writes(cases["right-chapter"].make_submission(course.source, course.released))
     course.submit("a-surrogate", right.replace("My idea", "My \\ud83d idea"))
     course.submit("b-version", right.replace('"nbformat": 4', '"nbformat": 4.0'))
     (course.folder("c-folder") / f"{NOTEBOOK}.ipynb").mkdir()
@@ -191,7 +193,7 @@ def test_what_one_student_hands_in_never_stops_the_others(course: Course, cases:
 
 
 def test_manual_marks_survive_a_regrade(course: Course, cases: Cases) -> None:
-    course.submit("right", cases["right-chapter"].submission(course.source, course.released))
+    course.submit("right", cases["right-chapter"].make_submission(course.source, course.released))
     grade(course)
     database = f"sqlite:///{course.root / 'gradebook.db'}"
     with Gradebook(database) as book:
@@ -206,7 +208,7 @@ def test_manual_marks_survive_a_regrade(course: Course, cases: Cases) -> None:
 def test_what_did_not_change_is_not_run_again(
     course: Course, cases: Cases, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    course.submit("right", cases["right-chapter"].submission(course.source, course.released))
+    course.submit("right", cases["right-chapter"].make_submission(course.source, course.released))
     runs: list[Program] = []
     really_run = runner.run
 
@@ -221,15 +223,17 @@ def test_what_did_not_change_is_not_run_again(
     assert first == second
     grade(course, fresh=True)
     assert len(runs) == 2
-    course.submit("right", cases["wrong-imu-single"].submission(course.source, course.released))
+    course.submit(
+        "right", cases["wrong-imu-single"].make_submission(course.source, course.released)
+    )
     assert cells(grade(course)["right"])["qos-hidden"] == 3.0
     assert len(runs) == 3
 
 
 def test_nbgraders_own_command_gives_the_same_grades(course: Course, cases: Cases) -> None:
-    course.submit("right", cases["right-two-sides"].submission(course.source, course.released))
+    course.submit("right", cases["right-two-sides"].make_submission(course.source, course.released))
     wrong = without(
-        cases["wrong-lidar-deep"].submission(course.source, course.released), "qos-visible"
+        cases["wrong-lidar-deep"].make_submission(course.source, course.released), "qos-visible"
     )
     course.submit("wrong", wrong)
     reasons = {"cut-off": "was cut off or damaged", "pipe": "is not a file", "deep": "is nested"}

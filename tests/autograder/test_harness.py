@@ -395,11 +395,14 @@ def test_what_is_missing_is_not_said_to_have_raised(
     with pytest.raises(StudentError) as raised:
         subject.start("Nobody")
     sentence = "No Nobody was defined: did its cell end with an error?"
-    assert raised.value.told == sentence
+    assert raised.value.feedback_text == sentence
     monkeypatch.setattr(sys, "last_value", ValueError("no depth."), raising=False)
     with pytest.raises(StudentError) as raised:
         subject.value("Nobody")
-    assert raised.value.told == f"{sentence} The last error of a cell was ValueError: no depth."
+    assert (
+        raised.value.feedback_text
+        == f"{sentence} The last error of a cell was ValueError: no depth."
+    )
 
 
 def test_the_first_error_of_the_notebook_is_told_and_not_what_came_of_it(
@@ -409,24 +412,26 @@ def test_the_first_error_of_the_notebook_is_told_and_not_what_came_of_it(
     monkeypatch.setattr(sys, "last_value", missing, raising=False)
     with pytest.raises(StudentError) as raised:
         subject.start("Nobody")
-    assert raised.value.told == "No Nobody was defined: did its cell end with an error?"
+    assert raised.value.feedback_text == "No Nobody was defined: did its cell end with an error?"
     monkeypatch.setattr(
         server, "get_ipython", lambda: SimpleNamespace(first_error=ValueError("no depth"))
     )
     with pytest.raises(StudentError) as raised:
         subject.start("Nobody")
-    assert raised.value.told.endswith(" The first error of a cell was ValueError: no depth.")
+    assert raised.value.feedback_text.endswith(
+        " The first error of a cell was ValueError: no depth."
+    )
     unread = SyntaxError("invalid syntax", ("<ipython-input-2>", 3, 1, "a b"))
     monkeypatch.setattr(server, "get_ipython", lambda: SimpleNamespace(first_error=unread))
     with pytest.raises(StudentError) as raised:
         subject.start("Nobody")
-    assert raised.value.told.endswith(" SyntaxError: invalid syntax, in line 3.")
+    assert raised.value.feedback_text.endswith(" SyntaxError: invalid syntax, in line 3.")
 
 
 def test_an_error_without_a_message_is_told_by_its_name(subject: Subject) -> None:
     with pytest.raises(StudentError) as raised:
         subject.start("Speechless")
-    assert raised.value.told.startswith("It raised AssertionError. It happened here:\n")
+    assert raised.value.feedback_text.startswith("It raised AssertionError. It happened here:\n")
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")

@@ -75,7 +75,7 @@ def intake(folder: Path, claims: dict[str, Claim] | None = None) -> Intake:
 
 
 def found(folder: Path, claims: dict[str, Claim] | None = None) -> Found:
-    return intake(folder, claims).notebook(NAME)
+    return intake(folder, claims).find_notebook(NAME)
 
 
 def work(notebook: NotebookNode) -> bool:
@@ -98,7 +98,7 @@ def test_the_one_notebook_of_another_name_is_taken_and_said(
     taken = found(folder)
     assert work(taken.notebook)
     for said in (*taken.notes, *taken.remarks):
-        assert file_names.shown(place) in said
+        assert file_names.printable_name(place) in said
         assert said.isprintable()
     assert len(taken.notes) == len(taken.remarks) == 1
 
@@ -114,14 +114,14 @@ def test_a_notebook_in_a_zip_file_is_taken_with_what_lies_beside_it(
     taken = found(folder)
     assert work(taken.notebook)
     assert f"'{place}/{member}'" in taken.notes[0]
-    assert intake(folder).beside(taken).files["helper.py"] == b"depth = 5"
+    assert intake(folder).find_attachments(taken).files["helper.py"] == b"depth = 5"
 
 
 def test_a_notebook_in_a_folder_finds_what_lies_beside_it(folder: Path) -> None:
     put(folder, "ch05/qos-design.ipynb", text())
     put(folder, "ch05/data/größe.csv", "1")
     taken = found(folder)
-    assert intake(folder).beside(taken).files["data/größe.csv"] == b"1"
+    assert intake(folder).find_attachments(taken).files["data/größe.csv"] == b"1"
 
 
 @pytest.mark.parametrize("flag", [True, False])
@@ -178,7 +178,7 @@ def test_what_may_be_the_notebook_is_asked_about(
     folder: Path, place: str, content: str | bytes
 ) -> None:
     put(folder, place, content)
-    assert f"'{file_names.shown(place)}" in str(asked(folder))
+    assert f"'{file_names.printable_name(place)}" in str(asked(folder))
 
 
 UNCLAIMED: dict[str, str | bytes] = {
@@ -247,7 +247,7 @@ def test_links_folders_and_odd_paths_in_zip_files_lead_nowhere(folder: Path) -> 
     assert "hand-in.zip/link.ipynb" not in places
     assert "hand-in.zip/folder.ipynb/" not in places
     taken = found(folder)
-    assert set(intake(folder).beside(taken).files) == {"hand-in.zip", "ok/mine.py"}
+    assert set(intake(folder).find_attachments(taken).files) == {"hand-in.zip", "ok/mine.py"}
 
 
 def test_what_is_another_notebooks_is_not_asked_about(folder: Path) -> None:
@@ -263,7 +263,7 @@ def test_what_is_another_notebooks_is_not_asked_about(folder: Path) -> None:
         given=frozenset({"lab.py"}),
     )  # fmt: skip
     with pytest.raises(SubmissionError, match=r"There is no qos-design.ipynb in the submission\.$"):
-        released_with.notebook(NAME)
+        released_with.find_notebook(NAME)
     assert released_with.has_others
 
 
@@ -283,9 +283,9 @@ def test_what_lies_beside_the_folder_is_asked_about(folder: Path) -> None:
 
     taken = of_student(folder.parents[2], "ch05", "ana", notebooks)
 
-    assert taken.notebook(OTHER).item is None
+    assert taken.find_notebook(OTHER).item is None
     with pytest.raises(UnclearError, match=r"next to the submission's folder lies 'ch05 \(1\)'"):
-        taken.notebook(NAME)
+        taken.find_notebook(NAME)
 
 
 def test_an_empty_folder_asks_nothing(folder: Path) -> None:
@@ -347,14 +347,14 @@ def test_decomposed_names_are_the_same_names(folder: Path, written: str) -> None
 
     form = "NFC" if written == "composed" else "NFD"
     put(folder, f"{unicodedata.normalize(form, 'Übung')}.ipynb", text())
-    taken = Intake(folder, {"Übung": released()}, {}, whose="ch05 ana").notebook("Übung")
+    taken = Intake(folder, {"Übung": released()}, {}, whose="ch05 ana").find_notebook("Übung")
     assert work(taken.notebook)
     assert (taken.notes, taken.remarks) == ((), ())
 
 
 def claimed(folder: Path, file: str) -> dict[str, Claim]:
     handed_in = look_through(folder)
-    return {NAME: Claim(file, claim_records.state(folder, handed_in, f"{NAME}.ipynb", file))}
+    return {NAME: Claim(file, claim_records.digest_state(folder, handed_in, f"{NAME}.ipynb", file))}
 
 
 def test_what_is_claimed_counts(folder: Path) -> None:
@@ -395,12 +395,12 @@ def test_that_there_is_nothing_holds_until_something_else_is_handed_in(folder: P
 
 def test_claims_are_kept_and_taken_back(tmp_path: Path) -> None:
     odd = os.fsdecode(b"b\xff.ipynb")
-    claim_records.keep(tmp_path, "ch05", "ana", NAME, Claim(odd, "1"))
-    claim_records.keep(tmp_path, "ch05", "ana", OTHER, Claim("", "2"))
+    claim_records.keep_claim(tmp_path, "ch05", "ana", NAME, Claim(odd, "1"))
+    claim_records.keep_claim(tmp_path, "ch05", "ana", OTHER, Claim("", "2"))
     assert claim_records.of_student(tmp_path, "ch05", "ana") == {
         NAME: Claim(odd, "1"), OTHER: Claim("", "2"),
     }  # fmt: skip
-    claim_records.keep(tmp_path, "ch05", "ana", NAME, None)
+    claim_records.keep_claim(tmp_path, "ch05", "ana", NAME, None)
     assert set(claim_records.of_student(tmp_path, "ch05", "ana")) == {OTHER}
     assert claim_records.of_student(tmp_path, "ch06", "ana") == {}
 
@@ -421,7 +421,7 @@ def test_a_damaged_file_of_claims_says_so(tmp_path: Path, content: str) -> None:
     ],
 )  # fmt: skip
 def test_names_are_shown_safely(name: str, shown: str) -> None:
-    assert file_names.shown(name) == shown
+    assert file_names.printable_name(name) == shown
 
 
 def test_no_more_than_so_many_files_are_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,7 +28,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def verdict(folder: Path, student: str = "ada") -> Verdict:
-    return marks.verdict(load_bank("ch05"), folder, student)
+    return marks.mark_best_attempt(load_bank("ch05"), folder, student)
 
 
 def rename(folder: Path, name: str) -> None:
@@ -174,7 +174,7 @@ def test_a_login_of_somebody_else_in_the_class_is_asked_about(folder: Path, name
 def test_the_class_is_whom_the_gradebook_knows_too(folder: Path) -> None:
     take(folder, "bob", 5)
     (folder.parents[1] / "carl").mkdir()
-    found = marks.verdict(load_bank("ch05"), folder, "ada", roster=("ada", "bob"))
+    found = marks.mark_best_attempt(load_bank("ch05"), folder, "ada", roster=("ada", "bob"))
     assert "under the login of 'bob', who is in the class" in asked(found)
 
 
@@ -197,8 +197,8 @@ def test_a_decomposed_login_is_the_students_own(tmp_path: Path) -> None:
 
 
 def claim(folder: Path, file: str) -> None:
-    state = claim_records.state(folder, look_through(folder), FILE, file)
-    claim_records.keep(folder.parents[2], "ch05-quiz", "ada", KEY, Claim(file, state))
+    state = claim_records.digest_state(folder, look_through(folder), FILE, file)
+    claim_records.keep_claim(folder.parents[2], "ch05-quiz", "ada", KEY, Claim(file, state))
 
 
 def test_what_is_claimed_counts_whoever_made_it(folder: Path) -> None:

@@ -75,8 +75,8 @@ def at(notebook: NotebookNode, name: str) -> int:
 
 def mended(notebook: NotebookNode) -> tuple[dict[str, str], Recognised, NotebookNode]:
     """Return {grade id: text} after everything is put right, what was said, and the notebook."""
-    known = cell_matching.recognise(notebook, released())
-    whole, _ = submission.restore(notebook, released(), released())
+    known = cell_matching.recognise_cells(notebook, released())
+    whole, _ = submission.restore_cells(notebook, released(), released())
     ids = [name for one in whole.cells if (name := submission.grade_id(one))]
     assert sorted(ids) == sorted(submission.grade_id(c) for c in released().cells)
     texts = {submission.grade_id(one): one.source for one in whole.cells}
@@ -87,7 +87,7 @@ RIGHT = {"solution": WORK, **GIVEN}
 
 
 def code(notebook: NotebookNode) -> str:
-    return "\n".join(c.source for c in submission.program(notebook))
+    return "\n".join(c.source for c in submission.extract_program(notebook))
 
 
 def test_an_honest_notebook_is_left_as_it_is() -> None:
@@ -95,13 +95,13 @@ def test_an_honest_notebook_is_left_as_it_is() -> None:
     notebook.cells.insert(3, new_code_cell("depth"))
     notebook.cells.insert(0, new_markdown_cell("My notes."))
     before = copy.deepcopy(notebook)
-    known = cell_matching.recognise(notebook, released())
+    known = cell_matching.recognise_cells(notebook, released())
     assert (known, notebook) == (Recognised(), before)
 
 
 def test_an_untouched_notebook_is_left_as_it_is() -> None:
     notebook = released()
-    assert cell_matching.recognise(notebook, released()) == Recognised()
+    assert cell_matching.recognise_cells(notebook, released()) == Recognised()
     assert notebook == released()
     assert mended(stripped(released()))[1].doubts == {}
 
@@ -315,8 +315,8 @@ def test_work_in_another_cell_of_the_assignment_is_found() -> None:
     notebook = copy.deepcopy(two)
     both = f"{WORK}\n\n\ndef finish():\n    return 'done'"
     notebook.cells[at(notebook, "solution")].source = both
-    known = cell_matching.recognise(without(notebook, "second"), two)
-    whole, _ = submission.restore(notebook, two, two)
+    known = cell_matching.recognise_cells(without(notebook, "second"), two)
+    whole, _ = submission.restore_cells(notebook, two, two)
     assert known.doubts == {}
     assert code(whole).count("def finish") == 1
 
@@ -325,7 +325,7 @@ def test_a_stub_that_defines_nothing_is_known_by_its_place() -> None:
     empty = released()
     empty.cells[at(empty, "solution")].source = "# Your work goes here."
     notebook = stripped(worked_on(), "solution")
-    known = cell_matching.recognise(notebook, empty)
+    known = cell_matching.recognise_cells(notebook, empty)
     assert known.doubts == {}
     assert notebook.cells[at(notebook, "solution")].source == WORK
 
@@ -350,10 +350,12 @@ def test_whatever_stands_in_a_cell_stops_nothing(source: str) -> None:
 
 
 def test_a_notebook_is_known_by_half_of_what_was_given() -> None:
-    assert cell_matching.likeness(stripped(worked_on()), released()) == 1.0
-    assert cell_matching.likeness(new_notebook(cells=[new_code_cell(WORK)]), released()) == 0.0
+    assert cell_matching.measure_likeness(stripped(worked_on()), released()) == 1.0
+    assert (
+        cell_matching.measure_likeness(new_notebook(cells=[new_code_cell(WORK)]), released()) == 0.0
+    )
     half = without(worked_on(), "task", "given", "visible")
-    assert cell_matching.likeness(stripped(half), released()) == 0.5
+    assert cell_matching.measure_likeness(stripped(half), released()) == 0.5
 
 
 def test_an_import_added_inside_a_given_cell_is_run_as_well() -> None:

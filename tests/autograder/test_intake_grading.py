@@ -21,13 +21,13 @@ from autograder import cli
 from autograder.assignments import submission
 from autograder.assignments.build import build
 from autograder.class_report import needs
-from autograder.class_report.collect import collect
+from autograder.class_report.collect import collect_class
 from autograder.class_report.platforms import exports, grades_csv
 from autograder.commands import quiz_report
 from autograder.corpus import Case
 from autograder.gradebook.bridge import NotReadyError
 from autograder.gradebook.course_gradebook import CourseGradebook, Grade
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from course.workspace.content import content_root, copy_authoring
 from tests.machine import needs_sandbox
@@ -65,22 +65,27 @@ def answered(notebook: NotebookNode) -> NotebookNode:
 
 def grade(course: Course, assignment: str = ASSIGNMENT) -> tuple[dict[str, Grade], dict[str, str]]:
     problems = {g.student: g.problem for g in engine.grade(course.root, assignment, feedback=False)}
-    found = CourseGradebook(course.root).grades(assignment)
+    found = CourseGradebook(course.root).read_grades(assignment)
     return {one.student: one for one in found}, problems
 
 
 def scores(course: Course, assignment: str = ASSIGNMENT) -> dict[str, str]:
     """Return {student: score} of grades.csv."""
     gradebook = CourseGradebook(course.root)
-    grades_csv.write({assignment: gradebook.grades(assignment)}, course.root / "grades.csv")
+    grades_csv.write_grades(
+        {assignment: gradebook.read_grades(assignment)}, course.root / "grades.csv"
+    )
     rows = csv.DictReader(io.StringIO((course.root / "grades.csv").read_text()))
     return {row["student_id"]: row["score"] for row in rows}
 
 
 def exported(course: Course, assignment: str = ASSIGNMENT) -> tuple[set[str], set[str]]:
     """Return who has a number in the files for Canvas and Moodle, be it one that may change."""
-    data = collect(course.root, assignment)
-    texts = [export(data, provisional=True).text for export in (exports.canvas, exports.moodle)]
+    data = collect_class(course.root, assignment)
+    texts = [
+        export(data, provisional=True).text
+        for export in (exports.export_canvas, exports.export_moodle)
+    ]
     students = {grade.student for grade in data.grades}
     tables = [list(csv.reader(io.StringIO(text))) for text in texts]
     canvas, moodle = (
@@ -109,8 +114,8 @@ def claim(course: Course, *arguments: str, assignment: str = ASSIGNMENT) -> str:
 def test_a_score_is_never_zero_because_of_a_name_or_lost_metadata(
     course: Course, cases: dict[str, Case]
 ) -> None:
-    right = partial(cases["right-chapter"].submission, course.source, course.released)
-    wrong = partial(cases["wrong-imu-single"].submission, course.source, course.released)
+    right = partial(cases["right-chapter"].make_submission, course.source, course.released)
+    wrong = partial(cases["wrong-imu-single"].make_submission, course.source, course.released)
     put(course, "renamed", f"{NOTEBOOK} (1).ipynb", right())
     put(course, "stripped", f"{NOTEBOOK}.ipynb", stripped(answered(right())))
     put(course, unicodedata.normalize("NFD", MUELLER), f"{ASSIGNMENT}/{NOTEBOOK}.ipynb", right())
@@ -145,8 +150,8 @@ def test_a_score_is_never_zero_because_of_a_name_or_lost_metadata(
     written = scores(course)
     assert {student for student, score in written.items() if not score} == asked
     assert exported(course) == (set(found) - asked,) * 2
-    urgent = {s for need in needs.people_needed(collect(course.root, ASSIGNMENT)) if need.urgent
-              for s in need.students}  # fmt: skip
+    urgent = {s for need in needs.people_needed(collect_class(course.root, ASSIGNMENT))
+              if need.urgent for s in need.students}  # fmt: skip
     assert asked <= urgent
     table = CliRunner().invoke(cli.app, ["grade", ASSIGNMENT, "--root", str(course.root)])
     assert "? of 20" in table.output
@@ -167,8 +172,8 @@ def test_a_score_is_never_zero_because_of_a_name_or_lost_metadata(
             entry = book.find_grade(name, NOTEBOOK, ASSIGNMENT, "lost")
             entry.manual_score, entry.needs_manual_grade = points, False
         book.db.commit()
-    assert CourseGradebook(course.root).grades(ASSIGNMENT)
-    settled = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}["lost"]
+    assert CourseGradebook(course.root).read_grades(ASSIGNMENT)
+    settled = {g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)}["lost"]
     assert (settled.asked, settled.score) == ({}, 4.0)
 
 
@@ -176,7 +181,7 @@ def test_a_score_is_never_zero_because_of_a_name_or_lost_metadata(
 def quiz_course(tmp_path: Path) -> Course:
     root = copy_authoring(content_root(), tmp_path / "course")
     build(root)
-    release(root, quiz.ASSIGNMENT)
+    make_release(root, quiz.ASSIGNMENT)
     return Course(root)
 
 
@@ -286,7 +291,7 @@ def test_nbgraders_own_command_asks_where_it_would_give_zero(
     nbformat.write(second, course.root / "source" / ASSIGNMENT / "second.ipynb")
     CourseGradebook(course.root).generate_assignment(ASSIGNMENT)
     put(course, "renamed", "second.ipynb", second)
-    right = cases["right-chapter"].submission(course.source, course.released)
+    right = cases["right-chapter"].make_submission(course.source, course.released)
     put(course, "renamed", f"{NOTEBOOK} (1).ipynb", right)
     put(course, "left-out", "second.ipynb", second)
     (course.folder("renamed") / "timestamp.txt").write_text("2026-07-27 20:15:05 CEST\n")
@@ -294,7 +299,7 @@ def test_nbgraders_own_command_asks_where_it_would_give_zero(
     done = nbgrader(course, "autograde", ASSIGNMENT)
 
     assert done.returncode == 0, done.stderr
-    found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    found = {g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)}
     assert found["renamed"].needs_manual_grade
     assert f"`autograder grade {ASSIGNMENT}` takes it" in found["renamed"].asked[NOTEBOOK]
     assert set(found["renamed"].cells[NOTEBOOK].values()) == {None}

@@ -42,7 +42,7 @@ from autograder.assignments.intake.times import UnclearTimeError
     ],
 )
 def test_a_time_is_read_as_it_was_meant(text: str, utc: str) -> None:
-    moment = times.read(text)
+    moment = times.parse_time(text)
     assert moment == datetime.fromisoformat(utc).replace(tzinfo=UTC)
     assert parse_utc(times.for_nbgrader(moment)) == moment.replace(tzinfo=None)
 
@@ -65,7 +65,7 @@ def test_a_time_is_read_as_it_was_meant(text: str, utc: str) -> None:
 )
 def test_a_time_that_can_be_several_is_asked_about(text: str, why: str) -> None:
     with pytest.raises(UnclearTimeError, match=why):
-        times.read(text)
+        times.parse_time(text)
 
 
 @pytest.mark.parametrize(
@@ -83,10 +83,10 @@ def test_a_time_that_can_be_several_is_asked_about(text: str, why: str) -> None:
 def test_the_courses_own_zone_settles_what_its_clocks_are_called(
     text: str, zone: str, utc: str
 ) -> None:
-    assert times.read(text, zone) == datetime.fromisoformat(utc).replace(tzinfo=UTC)
+    assert times.parse_time(text, zone) == datetime.fromisoformat(utc).replace(tzinfo=UTC)
 
 
 @pytest.mark.parametrize("text", ["", "yesterday", "2026-13-40 20:15", "9" * 150, "\x00", "1e999"])
 def test_what_is_no_time_is_none(text: str) -> None:
     with pytest.raises(ValueError, match=r"date|year"):
-        times.read(text)
+        times.parse_time(text)

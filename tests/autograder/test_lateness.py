@@ -69,7 +69,7 @@ def due(course: Course, hours: float) -> None:
 def again(course: Course, *students: str) -> tuple[Seen, dict[str, Grade]]:
     seen = Seen()
     engine.grade(course.root, ASSIGNMENT, students=students, feedback=False, progress=seen)
-    return seen, {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    return seen, {g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)}
 
 
 def test_what_is_taken_off_follows_dates_extensions_marks_and_rules(course: Course) -> None:
@@ -87,7 +87,7 @@ def test_what_is_taken_off_follows_dates_extensions_marks_and_rules(course: Cour
     seen, _ = again(course)
     assert (seen.unchanged, seen.entered) == (4, [])
 
-    [granted] = extensions.extend(course.root, ASSIGNMENT, ["right"], 1)
+    [granted] = extensions.grant_extensions(course.root, ASSIGNMENT, ["right"], 1)
     assert (granted.time, granted.waits) == (HANDED_IN - timedelta(hours=1), False)
     seen, found = again(course)
     assert (seen.run, seen.entered) == (0, ["right"])
@@ -106,7 +106,7 @@ def test_what_is_taken_off_follows_dates_extensions_marks_and_rules(course: Cour
     configure(course, "\nc.LateSubmissionPlugin.penalty_method = 'zero'\n")
     _, found = again(course)
     assert (found["right"].score, found["same"].score) == (0, 0)
-    extensions.extend(course.root, ASSIGNMENT, ["right", "same"], 2)
+    extensions.grant_extensions(course.root, ASSIGNMENT, ["right", "same"], 2)
     _, found = again(course)
     assert (found["right"].score, found["same"].score) == (full + 1, full)
 
@@ -146,7 +146,9 @@ def test_an_extension_may_come_before_the_work(course: Course, class_: Undisturb
     ).stdout
     assert "early: due 2030-01-31 12:30 UTC; it counts once the work is graded." in said
     assert "right: due 2030-01-31 12:30 UTC; run `autograder grade ch05`" in said
-    assert not [g for g in CourseGradebook(course.root).grades(ASSIGNMENT) if g.student == "early"]
+    assert not [
+        g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT) if g.student == "early"
+    ]
     course.submit("early", (course.folder("right") / f"{NOTEBOOK}.ipynb").read_text())
     (course.folder("early") / "timestamp.txt").write_text(f"{HANDED_IN} UTC")
     _, found = again(course)
@@ -155,7 +157,7 @@ def test_an_extension_may_come_before_the_work(course: Course, class_: Undisturb
     with book(course) as gradebook:
         submission = gradebook.find_submission(ASSIGNMENT, "early")
         assert submission.extension == timedelta(hours=2.5)
-    extensions.extend(course.root, ASSIGNMENT, ["early"], 0)
+    extensions.grant_extensions(course.root, ASSIGNMENT, ["early"], 0)
     _, found = again(course)
     assert found["early"].score == 0, "an extension that is taken away stays away"
 
@@ -169,12 +171,12 @@ def test_a_name_is_the_same_student_in_either_form_of_unicode(
     due(course, 2)
     course.submit(written, (course.folder("right") / f"{NOTEBOOK}.ipynb").read_text())
     (course.folder(written) / "timestamp.txt").write_text(f"{HANDED_IN} UTC")
-    [granted] = extensions.extend(course.root, ASSIGNMENT, [typed], 2.5)
+    [granted] = extensions.grant_extensions(course.root, ASSIGNMENT, [typed], 2.5)
     assert (granted.student, granted.waits) == (name, True)
     seen, found = again(course, typed)
     assert seen.entered == [name]
     assert found[name].score == class_.grades["right"].score, "it has its extension"
-    [granted] = extensions.extend(course.root, ASSIGNMENT, [typed], 0)
+    [granted] = extensions.grant_extensions(course.root, ASSIGNMENT, [typed], 0)
     assert (granted.student, granted.waits) == (name, False)
     only = ("--student", typed, "--root", str(course.root), "--json")
     said = autograder("grade", ASSIGNMENT, *only, cwd=course.root.parent, timeout=600).stdout
@@ -183,17 +185,17 @@ def test_a_name_is_the_same_student_in_either_form_of_unicode(
 
 def test_an_extension_that_makes_no_sense_is_one_sentence(course: Course) -> None:
     with pytest.raises(ExtensionError, match=r"never due.*--duedate"):
-        extensions.extend(course.root, ASSIGNMENT, ["right"], 1)
+        extensions.grant_extensions(course.root, ASSIGNMENT, ["right"], 1)
     due(course, 1)
     with pytest.raises(ExtensionError, match=r"no student 'rihgt' \(is it 'right'\?\)"):
-        extensions.extend(course.root, ASSIGNMENT, ["same", "rihgt"], 1)
+        extensions.grant_extensions(course.root, ASSIGNMENT, ["same", "rihgt"], 1)
     with book(course) as gradebook:
         assert gradebook.find_submission(ASSIGNMENT, "same").extension is None
     with pytest.raises(ExtensionError, match=r"no assignment 'ch5'.*there are ch05"):
-        extensions.extend(course.root, "ch5", ["right"], 1)
+        extensions.grant_extensions(course.root, "ch5", ["right"], 1)
     for hours in (-1, float("nan"), float("inf"), 1e9):
         with pytest.raises(ExtensionError, match="0 to 87840 hours"):
-            extensions.extend(course.root, ASSIGNMENT, ["right"], hours)
+            extensions.grant_extensions(course.root, ASSIGNMENT, ["right"], hours)
 
 
 def test_only_the_named_students_are_graded(course: Course) -> None:
@@ -238,14 +240,14 @@ def test_a_rule_is_its_class_its_code_and_its_settings() -> None:
     ],
 )  # fmt: skip
 def test_lateness_is_told_as_people_tell_it(seconds: float, words: str) -> None:
-    assert penalties.lateness(seconds) == words
+    assert penalties.lateness_text(seconds) == words
 
 
 def test_columns_of_lateness_come_last_and_only_when_somebody_was_late(tmp_path: Path) -> None:
     in_time = Grade("ada", 3.0, 5.0, False, {"nb": {"a": 3.0}})
     late = Grade("bob", 2.0, 5.0, False, {"nb": {"a": 3.0}}, seconds_late=3600, penalty=1)
-    assert len(grades_table.table([in_time], {"eve": "why"}).columns) == 4
-    assert len(grades_table.table([in_time, late], {"eve": "[why"}).columns) == 6
-    grades_csv.write({"ch05": [in_time, late]}, tmp_path / "grades.csv")
+    assert len(grades_table.make_table([in_time], {"eve": "why"}).columns) == 4
+    assert len(grades_table.make_table([in_time, late], {"eve": "[why"}).columns) == 6
+    grades_csv.write_grades({"ch05": [in_time, late]}, tmp_path / "grades.csv")
     rows = list(csv.reader((tmp_path / "grades.csv").read_text().splitlines()))
     assert [row[-3:] for row in rows[1:]] == [["3.0", "0.0", "0.0"], ["3.0", "3600", "1"]]

@@ -14,7 +14,7 @@ from autograder.assignments.build import build
 from autograder.examination import points
 from autograder.gradebook import marked
 from autograder.gradebook.marked import Marked, Marks
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from tests.killing import fresh_copy
 from tests.machine import needs_sandbox
@@ -59,14 +59,14 @@ def grade(course: Course) -> str:
 
 
 def hand_in(course: Course, change: Callable[[dict[str, nbformat.NotebookNode]], None]) -> None:
-    notebook = submission.read(course.folder("right") / f"{NOTEBOOK}.ipynb")
+    notebook = submission.read_notebook(course.folder("right") / f"{NOTEBOOK}.ipynb")
     change({submission.grade_id(cell): cell for cell in notebook.cells})
     course.submit("right", notebook)
 
 
 def test_an_answer_that_is_worth_more_is_looked_at_again(course: Course) -> None:
     build(course.root, points={**points.of_grade_cells(), "qos-explanation-loss": 2.0})
-    release(course.root, ASSIGNMENT)
+    make_release(course.root, ASSIGNMENT)
     said = grade(course)
     assert (
         "To be marked again: “A lost camera frame” of Exercise 1: QoS profile design "
@@ -140,8 +140,8 @@ def test_an_engine_that_ends_in_between_forgets_no_mark(
 )
 def test_what_must_be_looked_at_again(old: Marked, new: Marked, same: bool, why: str) -> None:
     cell = ("notebook", "cell")
-    assert marked.changes({cell: old}, {cell: new}, same=same) == ({cell: why} if why else {})
-    assert marked.changes({cell: old}, {}, same=same) == {}
+    assert marked.find_changes({cell: old}, {cell: new}, same=same) == ({cell: why} if why else {})
+    assert marked.find_changes({cell: old}, {}, same=same) == {}
 
 
 def test_what_was_marked_is_kept_whole_or_not_at_all(course: Course) -> None:
@@ -150,9 +150,9 @@ def test_what_was_marked_is_kept_whole_or_not_at_all(course: Course) -> None:
     with book(course) as gradebook:
         for student in ("right", "wrong", "nobody"):
             marks.remember(gradebook, student, copy)
-    assert {cell for _, cell in marks.kept("right")} == {*ANSWERS, "qos-visible"}
-    assert all(cell.content and cell.points for cell in marks.kept("right").values())
-    assert marks.kept("wrong") == marks.kept("nobody") == {}
+    assert {cell for _, cell in marks.remembered_cells("right")} == {*ANSWERS, "qos-visible"}
+    assert all(cell.content and cell.points for cell in marks.remembered_cells("right").values())
+    assert marks.remembered_cells("wrong") == marks.remembered_cells("nobody") == {}
     (path,) = (course.root / ".autograder" / marked.FOLDER).rglob("*.json")
     path.write_text(path.read_text()[:20])
-    assert marks.kept("right") == {}
+    assert marks.remembered_cells("right") == {}

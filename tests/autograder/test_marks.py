@@ -104,7 +104,7 @@ def test_a_spreadsheet_in_another_language_is_understood(graded: Path) -> None:
 def test_a_row_whose_answer_or_mark_has_changed_since_is_left_out_and_named(graded: Path) -> None:
     file = exported(graded)
     copy = graded / "autograded" / "bob" / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
-    notebook = submission.read(copy)
+    notebook = submission.read_notebook(copy)
     cell = next(c for c in notebook.cells if submission.grade_id(c) == CELL)
     cell.source += " And something else."
     nbformat.write(notebook, copy)
@@ -130,7 +130,9 @@ def test_a_spreadsheet_may_write_a_name_in_the_other_form_of_unicode(graded: Pat
     other = unicodedata.normalize("NFD", name)
     fill_in(file, lambda row: {**row, "student": other, "points": "1"}
             if row["student"] == "cy" else row)  # fmt: skip
-    assert answers.enter(CourseGradebook(graded), file).changed == (name,), "no answer was exported"
+    assert answers.enter_marks(CourseGradebook(graded), file).changed == (name,), (
+        "no answer was exported"
+    )
 
 
 @pytest.mark.parametrize(
@@ -157,7 +159,7 @@ def test_a_file_with_a_fault_is_not_entered_at_all(
     file = exported(graded)
     fill_in(file, lambda row: change(marked({"cy": "1"})(row)))
     with pytest.raises(MarksError, match=said):
-        answers.enter(gradebook, file)
+        answers.enter_marks(gradebook, file)
     assert entry(graded, "cy")[:2] == (None, True)
 
 
@@ -177,7 +179,7 @@ def test_another_file_is_one_sentence(
     file = tmp_path / "marks.csv"
     file.write_bytes(content)
     with pytest.raises(MarksError, match=said):
-        answers.enter(CourseGradebook(course.root), file)
+        answers.enter_marks(CourseGradebook(course.root), file)
 
 
 def test_a_question_is_found_by_its_title_or_its_id_and_the_others_are_named(
@@ -185,11 +187,11 @@ def test_a_question_is_found_by_its_title_or_its_id_and_the_others_are_named(
 ) -> None:
     gradebook = CourseGradebook(course.root)
     for wanted in (CELL, TITLE.upper(), "camera"):
-        assert answers.find(gradebook, ASSIGNMENT, wanted).grade_id == CELL
+        assert answers.find_question(gradebook, ASSIGNMENT, wanted).grade_id == CELL
     with pytest.raises(MarksError, match=r"can be several questions: .*-loss .*-stop"):
-        answers.find(gradebook, ASSIGNMENT, "a lost")
+        answers.find_question(gradebook, ASSIGNMENT, "a lost")
     with pytest.raises(MarksError, match=r"there are .*-loss \(A lost camera frame\)"):
-        answers.find(gradebook, ASSIGNMENT, "naught")
+        answers.find_question(gradebook, ASSIGNMENT, "naught")
 
 
 def test_an_answer_to_be_looked_at_again_is_not_settled_by_a_file_that_nobody_filled_in(
@@ -199,10 +201,10 @@ def test_an_answer_to_be_looked_at_again_is_not_settled_by_a_file_that_nobody_fi
         book.find_grade(CELL, NOTEBOOK, ASSIGNMENT, "ann").needs_manual_grade = True
         book.db.commit()
     file = exported(graded)
-    answers.enter(CourseGradebook(graded), file)
+    answers.enter_marks(CourseGradebook(graded), file)
     assert entry(graded, "ann")[:2] == (0.5, True)
     fill_in(file, marked({"ann": "0.5"}))
-    answers.enter(CourseGradebook(graded), file)
+    answers.enter_marks(CourseGradebook(graded), file)
     assert entry(graded, "ann")[:2] == (0.5, False)
 
 
@@ -220,7 +222,7 @@ def test_the_page_has_the_model_answer_and_shows_answers_as_text() -> None:
          Answer("b", "B", "*x*", 1.0, "", False, "2")),
         ("c",), (EVIL,),
     )  # fmt: skip
-    html = answers_page.page(found, "marks.csv")
+    html = answers_page.render_page(found, "marks.csv")
     shown = Text(html)
     assert html.count("<script") == 2, "the page's data and its own script"
     assert len(shown.loads) == 2

@@ -26,7 +26,7 @@ def run(*sources: str) -> list[list[Output]]:
 
 
 def given(course: Course, case: Case) -> list[str]:
-    cells = case.submission(course.source, course.released).cells
+    cells = case.make_submission(course.source, course.released).cells
     wanted = ("qos-given", "qos-solution")
     return [cell.source for cell in cells if submission.grade_id(cell) in wanted]
 

@@ -23,18 +23,18 @@ class Cells:
 
     def begin(self, number: int) -> None:
         self.now = str(number)
-        self.recording.begin(number, self.now)
+        self.recording.begin_cell(number, self.now)
 
     def send(self, kind: str, **content: Any) -> None:
         header = {"msg_type": kind}
         parent = {"msg_id": self.now}
-        self.recording.take({"header": header, "parent_header": parent, "content": content})
+        self.recording.take_message({"header": header, "parent_header": parent, "content": content})
 
     def show(self, data: dict[str, Any], display_id: str = "", kind: str = "display_data") -> None:
         self.send(kind, data=data, metadata={}, transient={"display_id": display_id})
 
     def write(self, text: str, name: str = "stdout") -> None:
-        if kept := self.recording.fitting(name, self.now, len(text)):
+        if kept := self.recording.reserve_room(name, self.now, len(text)):
             self.send("stream", name=name, text=text[:kept])
 
     def error(self, name: str = "ValueError", value: str = "no") -> None:
@@ -48,7 +48,7 @@ class Cells:
         self.send("comm_msg", comm_id=model, data={"state": {"msg_id": self.now * inside}})
 
     def shown(self, number: int) -> list[Output]:
-        return self.recording.changed()[number]
+        return self.recording.take_changes()[number]
 
     def texts(self, number: int) -> list[str]:
         found = self.shown(number)
@@ -96,10 +96,10 @@ def test_a_display_is_updated_wherever_it_is_shown(cells: Cells) -> None:
     cells.begin(1)
     cells.show({"text/plain": "two"}, "mine", "update_display_data")
     cells.show({"text/plain": "nobody's"}, "", "update_display_data")
-    assert cells.recording.changed().keys() == {0, 1}
+    assert cells.recording.take_changes().keys() == {0, 1}
     cells.show({"text/plain": "three"}, "mine", "update_display_data")
     assert cells.texts(0) == ["three", "other"]
-    assert cells.recording.changed() == {}
+    assert cells.recording.take_changes() == {}
 
 
 def test_updates_that_grow_are_bounded(cells: Cells) -> None:
@@ -108,7 +108,7 @@ def test_updates_that_grow_are_bounded(cells: Cells) -> None:
         cells.show({"text/plain": "x" * MAX_SHOWN}, str(number), "update_display_data")
     cells.error()
     found = cells.shown(0)
-    assert outputs.size({"all": found}) < MAX_LINE
+    assert outputs.json_size({"all": found}) < MAX_LINE
     assert found[-1]["ename"] == "ValueError"
 
 
@@ -129,7 +129,7 @@ def test_whatever_a_cell_shows_fits_into_a_message(cells: Cells) -> None:
         cells.show({"text/plain": "\x01" * 10_000})
         cells.error(value="\x01" * MAX_TEXT)
     found = cells.shown(0)
-    assert outputs.size({"all": found}) < MAX_LINE
+    assert outputs.json_size({"all": found}) < MAX_LINE
     assert any(map(outputs.is_error, found))
 
 
@@ -154,7 +154,7 @@ def test_widgets_that_show_each_other_come_to_an_end(cells: Cells) -> None:
         for _ in range(100):
             cells.show({"text/plain": "Output()", VIEW: {"model_id": other}})
         cells.within(model, inside=False)
-    assert outputs.size({"all": cells.shown(0)}) < MAX_LINE
+    assert outputs.json_size({"all": cells.shown(0)}) < MAX_LINE
 
 
 def test_of_widgets_there_are_only_so_many(cells: Cells) -> None:
@@ -187,7 +187,7 @@ for _ in range(100):
     ],
 )
 def test_only_data_that_a_notebook_can_hold_are_kept(data: Any, kept: bool) -> None:
-    assert bool(outputs.shown(data, {})[0]) == kept
+    assert bool(outputs.displayable_data(data, {})[0]) == kept
     output = {"output_type": "display_data", "data": data, "metadata": {}}
     assert outputs.is_output(output) == kept
 
@@ -198,7 +198,7 @@ def test_of_what_is_said_about_data_only_simple_values_are_kept() -> None:
         "text/html": {"isolated": True},
         "width": 5,
     }
-    _, kept = outputs.shown({"image/png": "x"}, about)
+    _, kept = outputs.displayable_data({"image/png": "x"}, about)
     assert kept == {"image/png": {"width": 300, "height": "50%", "needs_background": "light"}}
 
 
@@ -221,7 +221,9 @@ def test_nbgrader_is_given_a_score_that_it_can_take(text: str | None, kind: str)
 def test_of_outputs_beyond_the_bound_of_a_notebook_the_errors_are_left() -> None:
     notebook = Notebook([[] for _ in range(20)])
     for number in range(20):
-        notebook.put(number, [outputs.stream("x" * 10**6), outputs.error("E", "no", [])])
+        notebook.put_outputs(
+            number, [outputs.stream_output("x" * 10**6), outputs.error_output("E", "no", [])]
+        )
     assert notebook.cut
     assert notebook.cells[0][0]["output_type"] == "stream"
     assert [output["ename"] for output in notebook.cells[-1]] == ["E"]

@@ -22,7 +22,7 @@ from autograder.processes.outside.requests import CannotLoseError, RequestError
 from autograder.processes.process_folders import Sandboxed, number_inside
 from autograder.running import runner
 from autograder.sandbox.box import Box
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 from tests.machine import needs_sandbox, needs_warm_starts
 
 EXAMINED = """
@@ -85,7 +85,7 @@ def test_a_forked_examiner_is_where_its_sandbox_is() -> None:
         fd = control.fileno()
         examiner = box.spawn([*command, "--control", str(fd)], pass_fds=[fd])
         status = Path(f"/proc/{examiner.pid}/status")
-        assert poll(lambda: "Seccomp:\t2" in status.read_text(), 30.0, Pulse())
+        assert poll_condition(lambda: "Seccomp:\t2" in status.read_text(), 30.0, Pulse())
         for kind in ("mnt", "pid", "net", "ipc", "uts"):
             theirs, own = (Path(f"/proc/{who}/ns/{kind}") for who in (examiner.pid, os.getpid()))
             assert theirs.stat().st_ino != own.stat().st_ino, kind
@@ -107,7 +107,7 @@ def test_no_process_of_ours_imports_from_the_folder_that_it_is_started_in(
     monkeypatch.chdir(tmp_path)
     outcome = runner.run((Cell("print('ran')"), Cell("", "qos-visible", "qos", "visible")))
     assert outcome.outputs[0][0]["text"] == "ran\n"
-    assert not outcome.spoilt
+    assert not outcome.has_grader_error
 
 
 @contextmanager
@@ -148,15 +148,15 @@ def test_what_a_child_holds_counts_and_it_is_named() -> None:
     from autograder.processes.outside import usage
 
     with sandboxed(CHILD) as (processes, _):
-        held = usage.usage(processes)
+        held = usage.measure_usage(processes)
         assert held.threads >= 12
         assert held.files >= 50
-        numbers = [len(usage.thread_ids(folder)) for folder in processes.folders()]
+        numbers = [len(usage.thread_ids(folder)) for folder in processes.list_folders()]
         assert sum(numbers) == held.threads
-        assert usage.names(processes, 2) == [repr("hoard\x1b[2J")]
-        seen = processes.outside()
-        assert len(seen) == len(processes.inside()) == 2
-        assert sorted(map(number_inside, seen)) == sorted(processes.inside())
+        assert usage.process_names(processes, 2) == [repr("hoard\x1b[2J")]
+        seen = processes.outer_pids()
+        assert len(seen) == len(processes.inner_pids()) == 2
+        assert sorted(map(number_inside, seen)) == sorted(processes.inner_pids())
 
 
 @needs_sandbox
@@ -164,8 +164,8 @@ def test_a_sandbox_that_has_ended_is_never_taken_for_another() -> None:
     with sandboxed(CHILD) as (processes, running):
         pass
     running.wait()
-    assert poll(lambda: not processes.folders(), 10.0, Pulse())
-    assert processes.outside() == []
+    assert poll_condition(lambda: not processes.list_folders(), 10.0, Pulse())
+    assert processes.outer_pids() == []
 
 
 @pytest.mark.parametrize(
@@ -191,7 +191,7 @@ def test_a_sandbox_that_has_ended_is_never_taken_for_another() -> None:
 def test_a_request_that_is_none_is_refused(what: Any, given: dict[str, Any]) -> None:
     scene = Here(os.getpid())._scene
     with pytest.raises(RequestError):
-        requests.answer(scene, what, given)
+        requests.answer_request(scene, what, given)
 
 
 def test_a_network_that_others_use_loses_nothing() -> None:

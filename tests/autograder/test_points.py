@@ -13,7 +13,7 @@ EXERCISES = points.table()
 
 
 def test_every_exercise_has_its_points() -> None:
-    assert sorted(EXERCISES) == exercises.names()
+    assert sorted(EXERCISES) == exercises.exercise_names()
     assert EXERCISES
 
 
@@ -45,7 +45,7 @@ def test_an_exercise_has_10_visible_points_5_hidden_ones_and_5_for_explanations(
 
 @pytest.mark.parametrize("exam", EXERCISES)
 def test_who_breaks_a_check_without_points_loses_those_of_another_beside_it(exam: str) -> None:
-    checks = exercises.load(exam).checks
+    checks = exercises.load_exam(exam).checks
 
     def needs(name: str) -> set[str]:
         direct = checks[name].needs

@@ -181,7 +181,7 @@ def test_what_is_no_request_is_refused_and_starts_nothing(request_: dict[str, An
 
     subject: Any = None
     with ProgramHost(start_subject, subject, []) as host:
-        assert "error" in host.answer(request_)
+        assert "error" in host.answer_request(request_)
 
 
 def test_programs_that_take_long_to_come_up_are_not_started_without_end() -> None:
@@ -206,6 +206,6 @@ def test_programs_that_take_long_to_come_up_are_not_started_without_end() -> Non
         patched.setattr(program_host, "UP_TIMEOUT_S", 0.3)
         patched.setattr(program_host, "ALL_UP_S", 0.5)
         with ProgramHost(start_program, subject, []) as host:
-            answers = [host.answer(request) for _ in range(4)]
+            answers = [host.answer_request(request) for _ in range(4)]
     assert answers == [{"up": False}] * 2 + [{"slow": True}] * 2
     assert len(started) == 2

@@ -31,9 +31,9 @@ def test_lines_say_what_each_submission_got() -> None:
     out = console(terminal=False)
     lines = Lines(out)
     lines.begin(submissions=10, notebooks=10, unchanged=2)
-    lines.ran(waited=False)
-    lines.done(ADA)
-    lines.done(BOB)
+    lines.notebook_ran(waited=False)
+    lines.submission_done(ADA)
+    lines.submission_done(BOB)
     lines.end()
     assert said(out).splitlines() == [
         "2 submissions have not changed since they were graded: they are left as they are.",
@@ -50,7 +50,7 @@ def test_what_was_not_examined_is_said_once_with_its_reason() -> None:
     lines = Lines(out)
     lines.begin(submissions=2, notebooks=2, unchanged=0)
     for student in ("ada", "bob"):
-        lines.done(Graded(student, {"qos-design": outcome}, 13.0, 15.0, 4.0))
+        lines.submission_done(Graded(student, {"qos-design": outcome}, 13.0, 15.0, 4.0))
     lines.end()
     assert said(out).splitlines() == [
         "  1 of 2  ada: 13 of 15 automatic points (2 not examined), 4.0 s",
@@ -64,7 +64,7 @@ def test_many_reasons_are_told_by_the_report() -> None:
     for number in range(20):
         check = CheckResult("c", f"Check {number}", "not_examined", 0.0, 1.0, actual="Why.")
         outcome = Outcome(verdicts={"hidden": Verdict("qos", "hidden", (check,))})
-        lines.done(Graded("ada", {"qos-design": outcome}))
+        lines.submission_done(Graded("ada", {"qos-design": outcome}))
     lines.end()
     told = [line for line in said(out).splitlines() if line.startswith("Left to a person")]
     assert len(told) == progress.MOST_REASONS + 1
@@ -75,8 +75,8 @@ def test_a_terminal_has_a_bar_that_goes_away() -> None:
     out = console(terminal=True)
     live = Live(out)
     live.begin(submissions=2, notebooks=2, unchanged=0)
-    live.ran(waited=True)
-    live.done(ADA)
+    live.notebook_ran(waited=True)
+    live.submission_done(ADA)
     live.end()
     assert "1/2" in said(out)
     assert "a few seconds left" in said(out)
@@ -88,17 +88,17 @@ def test_the_time_left_counts_what_was_really_run() -> None:
     now = [100.0]
     clock = Clock(now=lambda: now[0])
     clock.begin(notebooks=100)
-    assert clock.remaining() == ""
+    assert clock.time_left() == ""
     for _ in range(60):
-        clock.ran(waited=False)
-    assert clock.remaining() == "", "what was kept took no time"
+        clock.count_notebook(waited=False)
+    assert clock.time_left() == "", "what was kept took no time"
     now[0] += 60
     for _ in range(10):
-        clock.ran(waited=True)
-    assert clock.remaining() == "about 3 min left"
+        clock.count_notebook(waited=True)
+    assert clock.time_left() == "about 3 min left"
     for _ in range(30):
-        clock.ran(waited=True)
-    assert clock.remaining() == ""
+        clock.count_notebook(waited=True)
+    assert clock.time_left() == ""
 
 
 @pytest.mark.parametrize(

@@ -52,13 +52,13 @@ def autograder(
 def hand_in(root: Path, student: str) -> Path:
     """Hand in an attempt in which everything is right; return its file."""
     paper = model.draw(BANK, student, 1)
-    result = marking.mark_paper(paper, {i.concept.id: model.key(i) for i in paper.items})
+    result = marking.mark_paper(paper, {i.concept.id: model.right_answer(i) for i in paper.items})
     given = {m.item.concept.id: Given(m.item.variant.id, m.answer) for m in result.marks}
     attempt = Attempt("ch05", student, 1, BANK.edition, "2026-01-01T00:00:00+00:00",
                       given, 0.0, 0, False)  # fmt: skip
     folder = root / "submitted" / student / "ch05-quiz"
     folder.mkdir(parents=True)
-    file = folder / record.filename("ch05")
+    file = folder / record.attempts_filename("ch05")
     file.write_text(attempt.to_json() + "\n", encoding="utf-8")
     return file
 
@@ -188,7 +188,7 @@ def test_a_courses_own_quiz_is_known_by_its_name(
 
 def test_the_format_is_printed_for_people_and_for_editors(autograder: Run) -> None:
     said, _ = autograder("quiz", "schema")
-    assert said == schema.markdown()
+    assert said == schema.as_markdown()
     said, _ = autograder("quiz", "schema", "--json")
     assert json.loads(said) == schema.json_schema()
 
@@ -208,7 +208,7 @@ def test_a_classs_quiz_is_analysed(tmp_path: Path) -> None:
         "quiz-ch05-misconceptions.csv",
         "quiz-ch05-report.html",
     ]
-    items, beliefs, _ = report.tables()
+    items, beliefs, _ = report.as_tables()
     dealt = {i.variant.id for s in ("ann", "ben") for i in model.draw(BANK, s, 1).items}
     assert items.row_count == len(BANK.concepts) + len(dealt)
     assert beliefs.row_count == 0
@@ -224,9 +224,11 @@ def test_attempts_that_the_gradebook_takes_are_in_the_report_whatever_their_name
     places["ben"].unlink()
     places["cem"].rename(places["cem"].with_name("saved.bin"))
     folder = places["cem"].parent
-    state = claim_records.state(folder, look_through(folder), places["cem"].name, "saved.bin")
+    state = claim_records.digest_state(
+        folder, look_through(folder), places["cem"].name, "saved.bin"
+    )
     claim = Claim("saved.bin", state)
-    claim_records.keep(tmp_path, "ch05-quiz", "cem", "quiz-ch05", claim)
+    claim_records.keep_claim(tmp_path, "ch05-quiz", "cem", "quiz-ch05", claim)
     places["dee"].write_bytes(places["ann"].with_name("my attempts.jsonl").read_bytes())
     places["eli"].rename(places["eli"].with_name("attempts.docx"))
     places["eli"].with_name("attempts.docx").write_bytes(b"PK")
@@ -312,7 +314,7 @@ def test_what_was_added_to_an_attempt_or_given_another_login_earns_nothing(tmp_p
     extra = {**line["answers"], "more": {"variant": "more", "answer": "a"}}
     for changes in ({"answers": extra}, {"student": "ben"}):
         marked = regrade.mark_file(BANK, json.dumps({**line, **changes}).encode())
-        assert marked.best is None or marked.best.score < 1, changes
+        assert marked.best_result is None or marked.best_result.score < 1, changes
         assert "answers questions that were not asked in it" in "".join(marked.problems)
 
 

@@ -16,11 +16,11 @@ import pytest
 
 from autograder.assignments import quiz_cells, submission
 from autograder.assignments.build import build
-from autograder.class_report.collect import collect
+from autograder.class_report.collect import collect_class
 from autograder.class_report.needs import people_needed
 from autograder.examination.verdict import Verdict
 from autograder.gradebook.course_gradebook import CourseGradebook, Grade
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from autograder.grading.engine import Graded
 from autograder.grading.progress import Collecting
@@ -41,7 +41,7 @@ FILE = "quiz-ch05.attempts.jsonl"
 def released(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = copy_authoring(content_root(), tmp_path_factory.mktemp("course"))
     build(root)
-    release(root, ASSIGNMENT)
+    make_release(root, ASSIGNMENT)
     return root
 
 
@@ -73,13 +73,15 @@ def take(folder: Path, student: str, *rights: int) -> None:
         if quiz.result is not None:
             quiz.retry()
         for item in quiz.items:
-            quiz.answer(item.number, model.key(item) if item.number <= right else wrong(item))
+            quiz.answer(
+                item.number, model.right_answer(item) if item.number <= right else wrong(item)
+            )
         quiz.submit()
 
 
 def wrong(item: Item) -> str | float:
     """Return an answer that fits the question and is not right."""
-    key = model.key(item)
+    key = model.right_answer(item)
     if isinstance(key, float):
         return key + 1000
     if item.variant.kind in ("ordering", "matching"):
@@ -88,7 +90,7 @@ def wrong(item: Item) -> str | float:
 
 
 def grades(root: Path) -> dict[str, Grade]:
-    return {grade.student: grade for grade in CourseGradebook(root).grades(ASSIGNMENT)}
+    return {grade.student: grade for grade in CourseGradebook(root).read_grades(ASSIGNMENT)}
 
 
 def points(root: Path) -> dict[str, float | None]:
@@ -96,7 +98,7 @@ def points(root: Path) -> dict[str, float | None]:
 
 
 def verdict(folder: Path, student: str = "ada") -> Verdict:
-    return marks.verdict(load_bank("ch05"), folder, student)
+    return marks.mark_best_attempt(load_bank("ch05"), folder, student)
 
 
 @needs_isolation
@@ -113,7 +115,7 @@ def test_the_best_attempt_becomes_points(root: Path, hand_in: HandIn) -> None:
     lost = hand_in("lost", 3)
     (lost / f"{NOTEBOOK}.ipynb").unlink()
     crashed = hand_in("crashed", 3)
-    notebook = submission.read(crashed / f"{NOTEBOOK}.ipynb")
+    notebook = submission.read_notebook(crashed / f"{NOTEBOOK}.ipynb")
     notebook.cells.insert(0, nbformat.v4.new_code_cell("import os; os._exit(3)"))
     nbformat.write(notebook, crashed / f"{NOTEBOOK}.ipynb")
 
@@ -137,7 +139,9 @@ def test_the_best_attempt_becomes_points(root: Path, hand_in: HandIn) -> None:
         "lost",
     }
     needs = {
-        student: n.why for n in people_needed(collect(root, ASSIGNMENT)) for student in n.students
+        student: n.why
+        for n in people_needed(collect_class(root, ASSIGNMENT))
+        for student in n.students
     }
     assert "more than # attempts were submitted within # seconds" in needs["hasty"]
     for student, says in {
@@ -178,7 +182,7 @@ def test_a_new_attempt_counts_when_graded_again(root: Path, hand_in: HandIn) -> 
 @needs_isolation
 def test_a_changed_grade_cell_earns_nothing(root: Path, hand_in: HandIn) -> None:
     folder = hand_in("ada", 0)
-    notebook = submission.read(folder / f"{NOTEBOOK}.ipynb")
+    notebook = submission.read_notebook(folder / f"{NOTEBOOK}.ipynb")
     for cell in notebook.cells:
         if submission.grade_id(cell) == CELL:
             cell.source = "5.0"

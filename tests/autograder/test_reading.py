@@ -33,9 +33,9 @@ def is_there(reference: str) -> bool:
     return any(heading in name and lead in leads for name, leads in places().items())
 
 
-@pytest.mark.parametrize("exam", exercises.names())
+@pytest.mark.parametrize("exam", exercises.exercise_names())
 def test_what_a_check_tells_to_read_is_in_the_students_chapter(exam: str) -> None:
-    for check in exercises.load(exam).checks.values():
+    for check in exercises.load_exam(exam).checks.values():
         assert check.read, check.name
         if check.read.startswith("Chapter 5, "):
             references = re.findall(r"“(.+?)”", check.read)

@@ -21,7 +21,7 @@ from nbgrader.api import Gradebook
 from autograder import exercise_folders
 from autograder.gradebook import course_gradebook
 from autograder.gradebook.database import GradebookLockedError
-from autograder.gradebook.release import ReleaseError, leaks, release
+from autograder.gradebook.release import ReleaseError, find_leaks, make_release
 from course.workspace.student_version import student_versions
 
 REGION = re.compile(r"### BEGIN (?:SOLUTION|HIDDEN TESTS)\n(.*?)### END", re.DOTALL)
@@ -53,7 +53,7 @@ def change(path: Path, grade_id: str, text: str) -> None:
 def test_the_release_holds_no_solution_hidden_test_or_authoring_file(root: Path) -> None:
     folder = root / "release" / "ch05"
     assert [path.name for path in folder.rglob("*")] == ["qos-design.ipynb"]
-    assert leaks(root / "source" / "ch05", folder) == []
+    assert find_leaks(root / "source" / "ch05", folder) == []
     text = "\n".join(cell.source for cell in read(released(root)).cells)
     assert "BEGIN" not in text
     source = read(root / "source" / "ch05" / "qos-design.ipynb")
@@ -94,7 +94,7 @@ def test_a_leak_is_found_wherever_it_is(
     root: Path, grade_id: str, text: str, says: str | None
 ) -> None:
     change(released(root), grade_id, text)
-    [found] = leaks(root / "source" / "ch05", root / "release" / "ch05")
+    [found] = find_leaks(root / "source" / "ch05", root / "release" / "ch05")
     assert (says or grade_id) in found
 
 
@@ -102,9 +102,9 @@ def test_files_too_many_or_too_few_are_found(root: Path) -> None:
     folder = root / "release" / "ch05"
     (folder / "notes").mkdir()
     (folder / "notes" / "qos-design.py").touch()
-    assert leaks(root / "source" / "ch05", folder) == ["it holds the file notes/qos-design.py"]
+    assert find_leaks(root / "source" / "ch05", folder) == ["it holds the file notes/qos-design.py"]
     shutil.rmtree(folder)
-    assert leaks(root / "source" / "ch05", folder) == ["qos-design.ipynb is missing from it"]
+    assert find_leaks(root / "source" / "ch05", folder) == ["qos-design.ipynb is missing from it"]
 
 
 def test_outputs_are_found(root: Path) -> None:
@@ -112,7 +112,7 @@ def test_outputs_are_found(root: Path) -> None:
     cell = next(cell for cell in data["cells"] if cell["cell_type"] == "code")
     cell["outputs"] = [{"output_type": "stream", "name": "stdout", "text": ["42"]}]
     released(root).write_text(json.dumps(data), encoding="utf-8")
-    [found] = leaks(root / "source" / "ch05", root / "release" / "ch05")
+    [found] = find_leaks(root / "source" / "ch05", root / "release" / "ch05")
     assert found.endswith("has outputs")
 
 
@@ -131,11 +131,11 @@ def test_a_release_that_leaks_is_not_made_and_the_old_one_stays(root: Path) -> N
     stub = 'c.ClearSolutions.code_stub = {"python": "stop_qos = QoSProfile("}\n'
     config.write_text(config.read_text(encoding="utf-8") + stub, encoding="utf-8")
     with pytest.raises(ReleaseError, match=r"because in the release .*qos-solution.*as it was"):
-        release(root, "ch05")
+        make_release(root, "ch05")
     assert state(root) == before
     shutil.rmtree(root / "release")
     with pytest.raises(ReleaseError, match=r"then build and release again\.$"):
-        release(root, "ch05")
+        make_release(root, "ch05")
     assert list((root / "release").iterdir()) == []
 
 
@@ -155,7 +155,7 @@ def add_a_notebook(root: Path) -> None:
     shutil.copy(old, old.with_name("a-new-one.ipynb"))
     texts = root / "authoring" / "assignments" / "ch05"
     texts.mkdir()
-    shutil.copy(exercise_folders.file("qos", "task.py"), texts / "a-new-one.py")
+    shutil.copy(exercise_folders.exercise_file("qos", "task.py"), texts / "a-new-one.py")
 
 
 @pytest.mark.filterwarnings("ignore::sqlalchemy.exc.SAWarning")  # of nbgrader's own
@@ -173,7 +173,7 @@ def test_what_nbgrader_refuses_once_work_is_graded_is_said_with_the_way_out(
     change(root)
     before = state(root)
     with pytest.raises(ReleaseError) as raised:
-        release(root, "ch05")
+        make_release(root, "ch05")
     said = str(raised.value)
     assert re.search(f"'ch05' is not released, because nbgrader says: {reason}", said)
     assert "undo that change, or release it as an assignment of another name" in said
@@ -196,10 +196,10 @@ def test_a_release_that_cannot_be_put_in_place_leaves_the_old_one(
 
     monkeypatch.setattr(Path, "rename", fails)
     with pytest.raises(ReleaseError, match=r"cannot be replaced \(No space left"):
-        release(root, "ch05")
+        make_release(root, "ch05")
     assert state(root) == before
     monkeypatch.undo()
-    release(root, "ch05")
+    make_release(root, "ch05")
     after = state(root)
     assert [name for name in before if after[name] != before[name]] == [
         "release/ch05/qos-design.ipynb", "gradebook",
@@ -218,7 +218,7 @@ def test_a_gradebook_that_cannot_be_written_leaves_the_old_release(
     with closing(sqlite3.connect(root / "gradebook.db")) as other:
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(GradebookLockedError):
-            release(root, "ch05")
+            make_release(root, "ch05")
     assert state(root) == before
     assert [path.name for path in (root / "release").iterdir()] == ["ch05"] * released_before
 
@@ -228,7 +228,7 @@ def test_what_a_killed_release_leaves_is_cleared_away(root: Path) -> None:
         left = root / "release" / f".ch05.{name}.partial"
         left.mkdir()
         os.utime(left, (time.time() - age,) * 2)
-    release(root, "ch05")
+    make_release(root, "ch05")
     assert sorted(path.name for path in (root / "release").iterdir()) == [
         ".ch05.new.partial",
         "ch05",
@@ -241,29 +241,29 @@ def test_a_notebook_without_its_text_is_not_released(root: Path) -> None:
     source = root / "source" / "ch05" / "qos-design.ipynb"
     shutil.copy(source, source.with_name("removed.ipynb"))
     with pytest.raises(ReleaseError, match=r"removed\.ipynb is none of the notebooks .*remove it"):
-        release(root, "ch05")
+        make_release(root, "ch05")
     assert state(root) == before
 
 
 def test_releasing_again_replaces_the_release(root: Path) -> None:
     before = released(root).read_bytes()
     change(released(root), "qos-visible", "\n# changed")
-    assert release(root, "ch05") == root / "release" / "ch05"
+    assert make_release(root, "ch05") == root / "release" / "ch05"
     assert released(root).read_bytes() == before
 
 
 def test_an_unknown_assignment_names_the_ones_there_are(root: Path) -> None:
     with pytest.raises(ReleaseError, match=r"no assignment 'ch5' in .*: there are ch05\."):
-        release(root, "ch5")
+        make_release(root, "ch5")
 
 
 def test_an_assignment_that_is_not_built_says_so(root: Path) -> None:
     shutil.rmtree(root / "source")
     with pytest.raises(ReleaseError, match="has not been built: run `autograder build`"):
-        release(root, "ch05")
+        make_release(root, "ch05")
 
 
 def test_a_stray_file_is_not_handed_out(root: Path) -> None:
     (root / "source" / "ch05" / "solution.py").touch()
     with pytest.raises(ReleaseError, match=r"solution\.py would be handed out"):
-        release(root, "ch05")
+        make_release(root, "ch05")

@@ -102,10 +102,10 @@ class Seen(Progress):
     def begin(self, submissions: int, notebooks: int, unchanged: int) -> None:
         self.unchanged = unchanged
 
-    def ran(self, waited: bool) -> None:
+    def notebook_ran(self, waited: bool) -> None:
         self.run += waited
 
-    def done(self, graded: Graded) -> None:
+    def submission_done(self, graded: Graded) -> None:
         self.entered.append(graded.student)
 
 
@@ -140,7 +140,9 @@ def test_what_is_missing_is_made_again(class_: Undisturbed, tmp_path: Path) -> N
     seen = again(course)
     assert (seen.run, sorted(seen.entered)) == (0, ["right", "same"])
     assert (course.root / "feedback" / "wrong" / ASSIGNMENT / f"{NOTEBOOK}.html").is_file()
-    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
+    assert {
+        g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)
+    } == class_.grades
 
 
 def test_marks_that_a_person_gives_get_into_the_feedback(
@@ -160,12 +162,12 @@ def test_marks_that_a_person_gives_get_into_the_feedback(
     assert "Well argued, Countess." in page.read_text()
     seen = again(course, fresh=True)
     assert seen.run == 3
-    found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    found = {g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)}
     assert found["right"].score == class_.grades["right"].score + 2.5
     assert not found["right"].needs_manual_grade, "the work is the same"
     course.submit("right", course.released)
     again(course)
-    found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    found = {g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)}
     assert found["right"].needs_manual_grade, "the work is another"
 
 
@@ -176,7 +178,7 @@ def test_a_penalty_for_lateness_is_taken_off(class_: Undisturbed, tmp_path: Path
             late = book.find_submission_notebook(NOTEBOOK, ASSIGNMENT, student)
             late.late_submission_penalty = penalty
         book.db.commit()
-    found = {g.student: g.score for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    found = {g.student: g.score for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)}
     assert found["right"] == class_.grades["right"].score - 1.5
     assert (found["wrong"], found["same"]) == (0.0, class_.grades["same"].score)
 
@@ -190,7 +192,9 @@ def test_scores_that_somebody_else_entered_are_put_right(
         book.db.commit()
     seen = again(course)
     assert (seen.run, seen.entered) == (0, ["wrong"])
-    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
+    assert {
+        g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)
+    } == class_.grades
 
 
 def test_a_mistake_of_the_grader_is_tried_again(
@@ -201,7 +205,7 @@ def test_a_mistake_of_the_grader_is_tried_again(
     with monkeypatch.context() as broken:
         broken.setattr(runner, "START_TIMEOUT", 0.0)
         again(course)
-    found = {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)}
+    found = {g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)}
     assert found["right"].needs_manual_grade
     feedback = course.root / "feedback" / "right" / ASSIGNMENT / f"{NOTEBOOK}.html"
     assert "did not start" in feedback.read_text()
@@ -220,7 +224,9 @@ def test_a_mistake_of_the_grader_that_passes_costs_nobody_a_grade(
     )  # fmt: skip
     engine.grade(course.root, ASSIGNMENT, jobs=1)
     assert next(timeouts, None) is None
-    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
+    assert {
+        g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)
+    } == class_.grades
 
 
 def refuse(folder: Path, monkeypatch: pytest.MonkeyPatch, times: int) -> None:
@@ -246,7 +252,9 @@ def test_a_machine_that_refuses_for_a_moment_costs_nobody_a_grade(
     refuse(tmp_path, monkeypatch, 2)
     engine.grade(course.root, ASSIGNMENT, jobs=1)
     assert (tmp_path / "left").read_text() == "0\n"
-    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
+    assert {
+        g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)
+    } == class_.grades
 
 
 def test_a_machine_that_goes_on_refusing_ends_the_run_with_the_reason(
@@ -258,7 +266,9 @@ def test_a_machine_that_goes_on_refusing_ends_the_run_with_the_reason(
         engine.grade(course.root, ASSIGNMENT, jobs=1)
     (tmp_path / "left").write_text("0")
     engine.grade(course.root, ASSIGNMENT, jobs=1)
-    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
+    assert {
+        g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)
+    } == class_.grades
 
 
 def test_one_engine_at_a_time(class_: Undisturbed, tmp_path: Path) -> None:
@@ -273,4 +283,6 @@ def test_one_engine_at_a_time(class_: Undisturbed, tmp_path: Path) -> None:
 def test_the_number_of_jobs_does_not_matter(class_: Undisturbed, tmp_path: Path) -> None:
     course = course_of(class_, tmp_path, graded=False)
     engine.grade(course.root, ASSIGNMENT, jobs=1)
-    assert {g.student: g for g in CourseGradebook(course.root).grades(ASSIGNMENT)} == class_.grades
+    assert {
+        g.student: g for g in CourseGradebook(course.root).read_grades(ASSIGNMENT)
+    } == class_.grades

@@ -21,7 +21,7 @@ def submitted(tmp_path: Path) -> Path:
 
 
 def found(submitted: Path) -> tuple[list[str], dict[str, str]]:
-    return roster.submissions(submitted.parent, "ch05", Roster())
+    return roster.find_submissions(submitted.parent, "ch05", Roster())
 
 
 def test_a_link_to_what_another_student_handed_in_is_refused(submitted: Path) -> None:
@@ -57,7 +57,7 @@ def test_what_lies_in_no_assignments_folder_is_asked_about(submitted: Path, plac
     (submitted / "bob" / "ch04" / "exercise.ipynb").write_text("{}")
     (submitted / "bob" / place).parent.mkdir(parents=True, exist_ok=True)
     (submitted / "bob" / place).write_text("x")
-    good, wrong = roster.submissions(submitted.parent, "ch05", Roster(), ["ch04", "ch05"])
+    good, wrong = roster.find_submissions(submitted.parent, "ch05", Roster(), ["ch04", "ch05"])
     assert good == ["alice"]
     name = place.partition("/")[0]
     assert wrong == {
@@ -87,7 +87,7 @@ def test_who_has_handed_in_other_assignments_alone_is_not_asked_about(submitted:
     (submitted / "__MACOSX" / "Ch05").mkdir(parents=True)
     (submitted / "__MACOSX" / "Ch05" / "exercise.ipynb").write_text("x")
     (submitted.parent / "release" / "ch06").mkdir(parents=True)
-    assert roster.submissions(submitted.parent, "ch05", Roster(), ["ch04"]) == (["alice"], {})
+    assert roster.find_submissions(submitted.parent, "ch05", Roster(), ["ch04"]) == (["alice"], {})
 
 
 @pytest.mark.parametrize("kind", ["pipe", "huge", "link", "folder", "no date"])
@@ -104,7 +104,7 @@ def test_a_time_stamp_that_is_none_is_not_waited_for(tmp_path: Path, kind: str) 
         file.mkdir()
     else:
         file.write_text("yesterday")
-    assert roster.timestamp(file) is None
+    assert roster.read_timestamp(file) is None
     assert roster.remarks(tmp_path) == [
         "timestamp.txt holds no date, so the time of submission is unknown."
     ]
@@ -113,14 +113,14 @@ def test_a_time_stamp_that_is_none_is_not_waited_for(tmp_path: Path, kind: str) 
 def test_a_time_stamp_is_read(tmp_path: Path) -> None:
     assert roster.remarks(tmp_path) == []
     (tmp_path / "timestamp.txt").write_text("2026-01-01 12:00:00 UTC\n")
-    assert roster.timestamp(tmp_path / "timestamp.txt") == "2026-01-01 12:00:00.000000 UTC"
+    assert roster.read_timestamp(tmp_path / "timestamp.txt") == "2026-01-01 12:00:00.000000 UTC"
     assert roster.remarks(tmp_path) == []
 
 
 @pytest.mark.parametrize("text", ["2026-01-01 12:00 CST", "01/02/2026 12:00"])
 def test_a_time_stamp_that_can_be_several_is_asked_about(tmp_path: Path, text: str) -> None:
     (tmp_path / "timestamp.txt").write_text(text)
-    assert roster.timestamp(tmp_path / "timestamp.txt") is None
+    assert roster.read_timestamp(tmp_path / "timestamp.txt") is None
     (said,) = roster.remarks(tmp_path)
     assert "timestamp.txt is not clear" in said
     assert "nothing is taken off for lateness" in said
@@ -129,7 +129,7 @@ def test_a_time_stamp_that_can_be_several_is_asked_about(tmp_path: Path, text: s
 def test_the_courses_zone_makes_a_time_stamp_clear(tmp_path: Path) -> None:
     (tmp_path / "timestamp.txt").write_text("2026-01-01 12:00 CST")
     file, zone = tmp_path / "timestamp.txt", "America/Chicago"
-    assert roster.timestamp(file, zone) == "2026-01-01 18:00:00.000000 UTC"
+    assert roster.read_timestamp(file, zone) == "2026-01-01 18:00:00.000000 UTC"
     assert roster.remarks(tmp_path, zone) == []
 
 
@@ -140,8 +140,8 @@ def test_a_decomposed_folder_name_is_the_student_of_the_roster(submitted: Path) 
     (submitted / unicodedata.normalize("NFD", MUELLER) / "ch05").mkdir(parents=True)
     root = submitted.parent
     for people in (Roster(), Roster(frozenset({"alice", MUELLER}), closed=True)):
-        assert roster.submissions(root, "ch05", people) == ([MUELLER, "alice"], {})
-    assert (roster.folder(root, MUELLER) / "ch05").is_dir()
+        assert roster.find_submissions(root, "ch05", people) == ([MUELLER, "alice"], {})
+    assert (roster.student_folder(root, MUELLER) / "ch05").is_dir()
 
 
 @pytest.mark.parametrize(("kept", "asked"), [("NFC", "NFD"), ("NFD", "NFC")])
@@ -150,12 +150,12 @@ def test_what_waits_for_a_student_is_found_in_either_form_of_the_name(
 ) -> None:
     kept, asked = unicodedata.normalize(kept, MUELLER), unicodedata.normalize(asked, MUELLER)
     waiting = WaitingExtensions(tmp_path, "ch05")
-    waiting.put(kept, 2.0)
-    assert waiting.of(asked) == 2.0
-    waiting.put(asked, 0)
-    assert waiting.of(kept) == 0
+    waiting.set_hours(kept, 2.0)
+    assert waiting.hours_for(asked) == 2.0
+    waiting.set_hours(asked, 0)
+    assert waiting.hours_for(kept) == 0
     claim = Claim("a.ipynb", "state")
-    claim_records.keep(tmp_path, "ch05", kept, "qos", claim)
+    claim_records.keep_claim(tmp_path, "ch05", kept, "qos", claim)
     assert claim_records.of_student(tmp_path, "ch05", asked) == {"qos": claim}
 
 

@@ -163,16 +163,16 @@ registry.destroy_node = queue.SimpleQueue().get  # waits, and is no line of thei
 """
     hidden = Cell("", "qos-hidden", "qos", "hidden")
     outcome = runner.run((*program(source), Cell("x = 1"), hidden), cell_timeout=5)
-    assert not outcome.spoilt
+    assert not outcome.has_grader_error
     (reason,) = {check.actual for check in outcome.verdicts["qos-hidden"].checks}
     assert "still being taken down 5 s after an examination (in registry.py:" in reason
 
 
 def test_only_what_failed_before_the_program_began_is_tried_again() -> None:
-    failed = runner.refuse(program("x = 1"), "the examiner did not start", "grader_error")
+    failed = runner.refused_outcome(program("x = 1"), "the examiner did not start", "grader_error")
     assert failed.may_be_tried_again
     failed.begun = True
-    assert failed.spoilt
+    assert failed.has_grader_error
     assert not failed.may_be_tried_again
     assert runner.Outcome.from_json(failed.to_json()) == failed
 
@@ -281,14 +281,14 @@ def test_a_cell_that_was_not_reached_is_not_right() -> None:
     cells = (Cell("x = 1", "mine"), Cell("import os; os._exit(1)", "ends"), Cell("1", "own"))
     outcome = runner.run((*cells, EXAM))
     assert outcome.outputs == [[], [runner.NOT_RUN], [runner.NOT_RUN], []]
-    refused = runner.refuse((*cells, EXAM), "It is no notebook.")
+    refused = runner.refused_outcome((*cells, EXAM), "It is no notebook.")
     assert refused.outputs == [[runner.NOT_RUN]] * 3 + [[]]
 
 
 def test_of_outputs_that_are_too_many_the_errors_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     outcome = runner.run((Cell("print('x' * 1000)\nassert False, 'y' * 1000", "own"),))
     monkeypatch.setattr(jobs, "MAX_OUTCOME", 1000)
-    ((error,),) = jobs.bounded(outcome).outputs
+    ((error,),) = jobs.bounded_outcome(outcome).outputs
     assert error == {**runner.NOT_RUN, "ename": "AssertionError", "evalue": "y" * 200,
                      "traceback": []}  # fmt: skip
 

@@ -21,7 +21,7 @@ from autograder.corpus import Case
 from autograder.examination.program import Cell
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.grading import engine
-from autograder.processes.descriptors import readable
+from autograder.processes.descriptors import readable_descriptors
 from autograder.running import runner
 from autograder.running.outcome_store import OutcomeStore
 from autograder.running.start import ExaminerError, ExaminerProcess
@@ -68,9 +68,9 @@ def test_nobody_is_graded_without_a_sandbox(course: Course, tmp_path: Path) -> N
 def test_what_a_trusted_run_cannot_examine_is_left_to_a_person(
     course: Course, cases: dict[str, Case]
 ) -> None:
-    course.submit("right", cases["right-chapter"].submission(course.source, course.released))
+    course.submit("right", cases["right-chapter"].make_submission(course.source, course.released))
     engine.grade(course.root, ASSIGNMENT, trust=True)
-    (entry,) = CourseGradebook(course.root).grades(ASSIGNMENT)
+    (entry,) = CourseGradebook(course.root).read_grades(ASSIGNMENT)
     assert entry.score == 13, "what needs a lossy network is neither passed nor failed"
     assert entry.needs_manual_grade
     feedback = (course.root / f"feedback/right/{ASSIGNMENT}/{NOTEBOOK}.html").read_text()
@@ -84,7 +84,7 @@ def test_appamor_is_named_where_it_is_the_reason(
     setting = tmp_path / "apparmor_restrict_unprivileged_userns"
     setting.write_text("1\n")
     monkeypatch.setattr(probe, "_APPARMOR", setting)
-    advice = probe._advice("bwrap: setting up uid map: Permission denied")
+    advice = probe._failure_advice("bwrap: setting up uid map: Permission denied")
     assert "AppArmor" in advice
     assert "apparmor_parser -r /etc/apparmor.d/bwrap" in advice
     assert "--trust-submissions" in advice
@@ -93,7 +93,7 @@ def test_appamor_is_named_where_it_is_the_reason(
 
 def test_a_container_without_the_right_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(probe, "_reads", lambda _path: "")
-    advice = probe._advice("bwrap: No permissions to create new namespace")
+    advice = probe._failure_advice("bwrap: No permissions to create new namespace")
     assert "No permissions to create new namespace" in advice
     assert "docker run --privileged" in advice
 
@@ -164,7 +164,7 @@ def test_a_submission_reads_no_solution_no_hidden_test_and_no_corpus(
     monkeypatch: pytest.MonkeyPatch, warm: bool
 ) -> None:
     kept = contents(exercise_folders.kept_from_students())
-    for name in exercises.names():
+    for name in exercises.exercise_names():
         own = [file for file in kept if f"/exercises/{name}/" in file]
         assert any(file.endswith("/task.py") for file in own)
         assert any(file.endswith("/design.md") for file in own)
@@ -213,7 +213,7 @@ print(*opened, sep="\\n")
 
 @needs_sandbox
 def test_a_subjects_process_is_seen_from_outside() -> None:
-    with sandbox.place() as place:
+    with sandbox.choose_place() as place:
         examiner = place.spawn(["sh", "-c", "read -r _"], stdin=subprocess.PIPE)
         program = "import os, sys; os.write(int(sys.argv[1]), b'up'); os.read(int(sys.argv[2]), 1)"
         (up, up_end), (stay, stay_end) = os.pipe(), os.pipe()
@@ -268,9 +268,9 @@ while True:
 """
     limits = Limits(cpu=3, wall=60)
     with Box(limits) as box:
-        network = box.join(["sh", "-c", "read -r _"], stdin=subprocess.PIPE)
+        network = box.run_in_network(["sh", "-c", "read -r _"], stdin=subprocess.PIPE)
         with box.start([sys.executable, "-c", program], {}, ()) as subject:
-            assert subject.fate(90) == "it used more than 3 s of processor time"
+            assert subject.describe_end(90) == "it used more than 3 s of processor time"
         network.communicate(b"\n")
 
 
@@ -324,7 +324,7 @@ def test_connections_are_seen_where_there_are_any(where: str, table: str) -> Non
         for _ in range(3):
             process.stdout.readline()
             seen.append(usage.has_connections(net))
-            held.append(sum(map(usage.queued, usage.rows(f"{net}/{table}"))))
+            held.append(sum(map(usage.queued_bytes, usage.read_rows(f"{net}/{table}"))))
             process.stdin.write(b"\n")
             process.stdin.flush()
     assert seen == [False, True, True]
@@ -371,7 +371,9 @@ def test_files_that_stay_unreadable_end_a_sandbox(monkeypatch: pytest.MonkeyPatc
 @needs_sandbox
 def test_a_failure_of_the_watch_is_left_to_a_person(monkeypatch: pytest.MonkeyPatch) -> None:
     def stumble(_: Watch, processes: list[Process]) -> str:
-        if max(map(usage.descriptors, processes), default=0) > 200:  # the cell has been reached
+        if (
+            max(map(usage.count_descriptors, processes), default=0) > 200
+        ):  # the cell has been reached
             raise ValueError("odd")
         return ""
 
@@ -428,7 +430,7 @@ def test_a_sandbox_that_is_gone_before_its_subject_says_why(
         raise ValueError("odd")
 
     def late(arguments: list[str], fds: list[int], process: int, user: int | None) -> object:
-        assert readable([process], 30), "the watch ends the sandbox"
+        assert readable_descriptors([process], 30), "the watch ends the sandbox"
         return subject(arguments, fds, process, user)
 
     subject = warmth.subject
@@ -439,7 +441,7 @@ def test_a_sandbox_that_is_gone_before_its_subject_says_why(
 
 
 def test_the_filter_is_a_whole_number_of_instructions() -> None:
-    program = seccomp.program()
+    program = seccomp.filter_program()
     assert len(program) % 8 == 0
     assert len(program) // 8 < 4096, "more than the kernel takes"
 
@@ -471,7 +473,7 @@ def test_a_warden_that_is_gone_is_let_go_when_it_is_told_something() -> None:
     ) as process:
         process.wait()
         with Warden(process) as warden:
-            warden.tell(1, 1, [])
+            warden.announce_subject(1, 1, [])
         for stream in (process.stdin, process.stdout, process.stderr):
             assert stream is not None
             assert stream.closed

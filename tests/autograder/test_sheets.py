@@ -83,18 +83,18 @@ def test_what_waits_is_no_zero(line: Line, said: str) -> None:
 def test_totals_say_what_is_still_to_come() -> None:
     given = Line("a", "A", 8.0, 10.0, waits=False)
     answer = Line("b", "B", 0.0, 1.0, waits=True, written=True)
-    assert sheets.total([given], 8.0) == "8 of 10 points."
-    assert sheets.total([given, answer], 8.0) == (
+    assert sheets.describe_score([given], 8.0) == "8 of 10 points."
+    assert sheets.describe_score([given, answer], 8.0) == (
         "8 of 11 points so far; 1 answer waits for a mark and can add up to 1."
     )
-    assert sheets.total([given, answer, Line("c", "C", 2.0, 5.0, waits=True)], 10.0) == (
+    assert sheets.describe_score([given, answer, Line("c", "C", 2.0, 5.0, waits=True)], 10.0) == (
         "10 of 16 points so far; 2 parts wait for a person and can add up to 4."
     )
 
 
 def test_a_penalty_counts_in_the_total_and_never_below_zero() -> None:
     lines = (Line("a", "A", 3.0, 10.0, waits=False),)
-    assert Exercise("n", "N", lines, penalty=1.5).total == "1.5 of 10 points."
+    assert Exercise("n", "N", lines, penalty=1.5).score_sentence == "1.5 of 10 points."
     assert Exercise("n", "N", lines, penalty=9.0).score == 0.0
 
 
@@ -108,13 +108,13 @@ def test_a_penalty_counts_in_the_total_and_never_below_zero() -> None:
     ],
 )
 def test_lateness_is_said_with_what_it_costs(seconds: float, penalty: float, said: str) -> None:
-    assert sheets.late(seconds, penalty) == said
+    assert sheets.describe_lateness(seconds, penalty) == said
 
 
 def test_everything_on_the_index_page_is_escaped_and_nothing_is_loaded() -> None:
     line = Line(EVIL, EVIL, 0.0, 1.0, waits=True, written=True, comment=EVIL)
     sheet = Sheet(EVIL, EVIL, EVIL, (Exercise(EVIL, EVIL, (line,), 0.5),), datetime(2026, 1, 2), 60)
-    html = index_page.page(sheet)
+    html = index_page.render_page(sheet)
     assert "<script" not in html
     assert Text(html).loads == []
 
@@ -181,8 +181,8 @@ def test_the_index_page_has_totals_lateness_and_links_that_lead_somewhere(
 def test_the_sum_of_a_sheet_is_the_grade(graded_course: Path) -> None:
     gradebook = CourseGradebook(graded_course)
     with Gradebook(gradebook.coursedir.db_url) as book:
-        for grade in gradebook.grades(ASSIGNMENT):
-            sheet = sheets.read(book, gradebook.coursedir, ASSIGNMENT, grade.student)
+        for grade in gradebook.read_grades(ASSIGNMENT):
+            sheet = sheets.read_sheet(book, gradebook.coursedir, ASSIGNMENT, grade.student)
             assert sheet.score == pytest.approx(grade.score)
             assert sum(line.max_points for line in sheet.lines) == grade.max_score
             assert any(line.waits for line in sheet.lines) == grade.needs_manual_grade

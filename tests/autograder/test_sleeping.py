@@ -9,9 +9,9 @@ from contextlib import contextmanager
 
 import pytest
 
-from autograder.processes.outside.sleeping import Sleeper, sleepers
+from autograder.processes.outside.sleeping import Sleeper, find_sleepers
 from autograder.processes.outside.usage import thread_ids
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 
 WAITS = {
     "time.sleep": "time.sleep(300)",
@@ -48,13 +48,13 @@ def running(wait: str) -> Iterator[str]:
 
 
 def asleep(process: str) -> list[Sleeper]:
-    return sleepers(process, thread_ids(process), {})
+    return find_sleepers(process, thread_ids(process), {})
 
 
 @pytest.mark.parametrize("wait", WAITS.values(), ids=[*WAITS])
 def test_a_thread_that_waits_for_a_time_is_seen_with_what_is_left_of_it(wait: str) -> None:
     with running(wait) as process:
-        assert poll(lambda: asleep(process), 30.0, Pulse())
+        assert poll_condition(lambda: asleep(process), 30.0, Pulse())
         (sleeper,) = asleep(process)
     assert 200 < sleeper.left_s <= 300
     assert sleeper.to_the_end is (wait == WAITS["time.sleep"])
@@ -64,7 +64,7 @@ def test_a_thread_that_waits_for_a_time_is_seen_with_what_is_left_of_it(wait: st
 def test_one_that_waits_for_something_else_is_not(wait: str) -> None:
     with running(wait) as process:
         seen: list[int] = []
-        poll(lambda: seen.extend(s.thread for s in asleep(process)), 1.5, Pulse())
+        poll_condition(lambda: seen.extend(s.thread for s in asleep(process)), 1.5, Pulse())
         assert not asleep(process)
         assert len(seen) < 20  # while it starts, some may
 
@@ -72,7 +72,7 @@ def test_one_that_waits_for_something_else_is_not(wait: str) -> None:
 def test_a_process_that_has_ended_has_no_threads_though_its_parent_has_not_heard_of_it() -> None:
     process = subprocess.Popen([sys.executable, "-c", ""])
     try:
-        assert poll(lambda: not thread_ids(f"/proc/{process.pid}"), 30.0, Pulse())
+        assert poll_condition(lambda: not thread_ids(f"/proc/{process.pid}"), 30.0, Pulse())
         assert process.returncode is None
         assert not asleep(f"/proc/{process.pid}")
     finally:

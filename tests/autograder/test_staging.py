@@ -44,7 +44,9 @@ def files(folder: Path) -> dict[str, tuple[int, bytes]]:
 
 def own_plot(root: Path) -> bytes:
     """Return the plot of ada's own cell, as the graded copy has it."""
-    graded = submission.read(root / "autograded" / "ada" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+    graded = submission.read_notebook(
+        root / "autograded" / "ada" / ASSIGNMENT / f"{NOTEBOOK}.ipynb"
+    )
     (cell,) = (cell for cell in graded.cells if cell.source == PLOT)
     (output,) = cell.outputs
     return base64.b64decode(output.data["image/png"])
@@ -53,7 +55,7 @@ def own_plot(root: Path) -> bytes:
 @pytest.fixture
 def beside(course: Course, cases: dict[str, Case]) -> Course:
     """A course in which ada has handed in everything that one can think of."""
-    notebook = cases["right-chapter"].submission(course.source, course.released)
+    notebook = cases["right-chapter"].make_submission(course.source, course.released)
     (answer,) = (c for c in notebook.cells if c.id == "qos-explanation-depth")
     answer.source = "My idea, see ![a plot](my%20plots/plot.png) and <img src='plot.svg'>."
     notebook.cells.append(new_code_cell(PLOT))

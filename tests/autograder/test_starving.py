@@ -19,18 +19,18 @@ def test_a_deadline_is_put_off_while_others_keep_the_process_from_running_not_fo
         before, deadline = kept(), FairDeadline(1.0, of_process(os.getpid()))
         while kept() - before < 1.2:
             pass
-        assert deadline.left > 0
-        while deadline.left:  # it is put off by no more than two seconds
+        assert deadline.seconds_left > 0
+        while deadline.seconds_left:  # it is put off by no more than two seconds
             pass
 
 
 class Several:
     """Some processes that are one program's."""
 
-    def folders(self) -> list[str]:
+    def list_folders(self) -> list[str]:
         return [f"/proc/{pid}" for pid in (os.getpid(), *children())]
 
-    def of(self, pid: int) -> str:
+    def folder_of(self, pid: int) -> str:
         return f"/proc/{pid}"
 
 
@@ -44,7 +44,7 @@ def test_who_is_kept_from_running_by_its_own_processes_gets_no_more_time() -> No
         before, mark = kept(), delay.mark()
         while kept() - before < 1.2:
             pass
-        assert delay.since(mark) < 0.6
+        assert delay.delay_since(mark) < 0.6
 
 
 def test_who_is_kept_from_running_by_processes_that_have_gone_gets_no_more_time() -> None:
@@ -60,9 +60,9 @@ def test_who_is_kept_from_running_by_processes_that_have_gone_gets_no_more_time(
         mark = delay.mark()
         while kept() - before < 0.6:
             pass
-        assert delay.since(mark) < 0.3
+        assert delay.delay_since(mark) < 0.3
 
 
 def test_a_process_that_is_not_there_was_never_kept_waiting() -> None:
     delay = of_process(0)
-    assert delay.since(delay.mark()) == 0.0
+    assert delay.delay_since(delay.mark()) == 0.0

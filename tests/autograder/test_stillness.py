@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from autograder.processes.descriptors import readable
+from autograder.processes.descriptors import readable_descriptors
 from autograder.processes.outside import stillness
 from autograder.processes.outside.stillness import ENDLESS, RESTLESS, Stillness
 from autograder.processes.process_folders import Single
@@ -60,12 +60,12 @@ def watching(other: subprocess.Popen[bytes]) -> Stillness:
 
 def test_two_processes_that_sleep_are_still() -> None:
     with process(ASLEEP) as other:
-        assert watching(other).reached(timeout=30.0)
+        assert watching(other).wait_for_rest(timeout=30.0)
 
 
 def test_a_process_that_computes_is_not() -> None:
     with process(BUSY) as other:
-        assert not watching(other).reached(timeout=0.2)
+        assert not watching(other).wait_for_rest(timeout=0.2)
 
 
 def test_a_thread_of_the_examiners_own_counts() -> None:
@@ -79,10 +79,10 @@ def test_a_thread_of_the_examiners_own_counts() -> None:
     thread.start()
     try:
         with process(ASLEEP) as other:
-            assert not watching(other).reached(timeout=0.2)
+            assert not watching(other).wait_for_rest(timeout=0.2)
             stop.set()
             thread.join()
-            assert watching(other).reached(timeout=30.0)
+            assert watching(other).wait_for_rest(timeout=30.0)
     finally:
         stop.set()
         thread.join()
@@ -99,18 +99,18 @@ def test_a_thread_that_takes_the_place_of_an_ended_one_counts() -> None:
     first.start()
     with process(ASLEEP) as other:
         still = watching(other)
-        assert still.reached(timeout=30.0)
+        assert still.wait_for_rest(timeout=30.0)
         stop.set()
         first.join()
         stop.clear()
         second = threading.Thread(target=compute)
         second.start()
         try:
-            assert not still.reached(timeout=0.2)
+            assert not still.wait_for_rest(timeout=0.2)
         finally:
             stop.set()
             second.join()
-        assert still.reached(timeout=30.0)
+        assert still.wait_for_rest(timeout=30.0)
 
 
 def test_a_kernel_that_keeps_no_account_of_run_times_tells_enough(
@@ -127,7 +127,7 @@ def test_a_kernel_that_keeps_no_account_of_run_times_tells_enough(
 def test_a_process_that_has_ended_leaves_the_examiners_own() -> None:
     with process(ASLEEP) as other:
         pass
-    assert watching(other).reached(timeout=30.0)
+    assert watching(other).wait_for_rest(timeout=30.0)
 
 
 def tell(other: subprocess.Popen[bytes], line: str) -> None:
@@ -137,15 +137,15 @@ def tell(other: subprocess.Popen[bytes], line: str) -> None:
 
 
 def rests_not_reached(still: Stillness) -> int:
-    return next(n for n in range(100) if still.reached(timeout=30.0))
+    return next(n for n in range(100) if still.wait_for_rest(timeout=30.0))
 
 
 def require_that_answers_are_waited_for(still: Stillness, other: subprocess.Popen[bytes]) -> None:
     assert other.stdout is not None
     for _ in range(10):
         tell(other, "?")
-        assert still.reached(timeout=30.0)
-        assert readable([other.stdout], 0.0)
+        assert still.wait_for_rest(timeout=30.0)
+        assert readable_descriptors([other.stdout], 0.0)
         assert other.stdout.readline() == b"!\n"
 
 
@@ -171,6 +171,6 @@ def test_a_thread_that_has_fallen_asleep_counts_again() -> None:
         assert rests_not_reached(still) > 0
         tell(other, "sleep")
         assert rests_not_reached(still) == 0
-        assert still.reached(timeout=30.0)
+        assert still.wait_for_rest(timeout=30.0)
         tell(other, "compute")
         assert rests_not_reached(still) > 0

@@ -14,7 +14,7 @@ from nbformat.v4 import new_code_cell, new_markdown_cell, new_notebook
 
 from autograder.assignments import bounds, submission
 from autograder.assignments.submission import SubmissionError
-from autograder.examination.program import digest
+from autograder.examination.program import program_digest
 from autograder.processes.channel import MAX_LINE
 
 
@@ -40,7 +40,7 @@ SOURCE, RELEASED = notebook("  # secret"), notebook()
 
 
 def restored(submitted: NotebookNode) -> tuple[NotebookNode, list[str]]:
-    return submission.restore(submitted, SOURCE, RELEASED)
+    return submission.restore_cells(submitted, SOURCE, RELEASED)
 
 
 def ids(nb: NotebookNode) -> list[str]:
@@ -95,7 +95,7 @@ def test_a_duplicated_test_cell_is_disarmed() -> None:
     nb.cells.insert(4, cell("qos-visible", "7.0", locked=True, grade=True))
     mended, _ = restored(nb)
     assert ids(mended).count("qos-visible") == 1
-    assert [c.exam for c in submission.program(mended)].count("qos") == 1
+    assert [c.exam for c in submission.extract_program(mended)].count("qos") == 1
 
 
 def test_a_cell_of_another_type_is_changed_back() -> None:
@@ -137,17 +137,19 @@ def test_nonsense_in_metadata_reaches_nobody(nonsense: object) -> None:
 
 
 def test_the_program_names_where_exams_are_sat() -> None:
-    program = submission.program(restored(notebook())[0])
+    program = submission.extract_program(restored(notebook())[0])
     assert [(c.source, c.exam, c.part) for c in program] == [
         ("x = 1", "", ""), ("y = 0", "", ""), ("", "qos", "visible"), ("assert y", "", ""),
     ]  # fmt: skip
 
 
 def test_equal_programs_have_equal_digests_and_exams_matter() -> None:
-    program = submission.program(notebook())
-    assert digest(program, {}, "a") == digest(submission.program(notebook()), {}, "a")
-    assert digest(program, {}, "a") != digest(program, {}, "b")
-    assert digest(program, {}, "a") != digest(program, {"x": b""}, "a")
+    program = submission.extract_program(notebook())
+    assert program_digest(program, {}, "a") == program_digest(
+        submission.extract_program(notebook()), {}, "a"
+    )
+    assert program_digest(program, {}, "a") != program_digest(program, {}, "b")
+    assert program_digest(program, {}, "a") != program_digest(program, {"x": b""}, "a")
 
 
 @pytest.mark.parametrize(
@@ -167,7 +169,7 @@ def test_what_is_no_notebook_is_one_sentence(tmp_path: Path, content: str, reaso
     path = tmp_path / "qos-design.ipynb"
     path.write_text(content)
     with pytest.raises(SubmissionError, match=reason) as caught:
-        submission.read(path)
+        submission.read_notebook(path)
     assert "qos-design.ipynb" in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -176,12 +178,12 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "qos-design.ipynb"
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(SubmissionError, match="not valid JSON"):
-        submission.read(path)
+        submission.read_notebook(path)
 
 
 def test_a_missing_notebook_is_named(tmp_path: Path) -> None:
     with pytest.raises(SubmissionError, match=r"no qos-design\.ipynb"):
-        submission.read(tmp_path / "qos-design.ipynb")
+        submission.read_notebook(tmp_path / "qos-design.ipynb")
 
 
 def test_a_huge_notebook_is_refused_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -189,7 +191,7 @@ def test_a_huge_notebook_is_refused_unread(tmp_path: Path, monkeypatch: pytest.M
     path = tmp_path / "qos-design.ipynb"
     path.write_text(json.dumps(nbformat.from_dict(notebook())) + " " * 1000)
     with pytest.raises(SubmissionError, match="clear its outputs"):
-        submission.read(path)
+        submission.read_notebook(path)
 
 
 @pytest.mark.parametrize("depth", [200, 500, 900, 5000])
@@ -200,7 +202,7 @@ def test_a_notebook_that_is_nested_too_deep_is_refused(tmp_path: Path, depth: in
         text.replace('"metadata": {}', f'"metadata": {{"x": {"[" * depth}{"]" * depth}}}', 1)
     )
     with pytest.raises(SubmissionError, match=r"nested|not valid JSON"):
-        submission.read(path)
+        submission.read_notebook(path)
 
 
 def test_more_cells_than_anybody_writes_are_refused(tmp_path: Path) -> None:
@@ -208,7 +210,7 @@ def test_more_cells_than_anybody_writes_are_refused(tmp_path: Path) -> None:
     nb.cells += [new_code_cell("x = 1") for _ in range(1000)]
     nbformat.write(nb, tmp_path / "qos-design.ipynb")
     with pytest.raises(SubmissionError, match="has 1005 cells, more than the 1000"):
-        submission.read(tmp_path / "qos-design.ipynb")
+        submission.read_notebook(tmp_path / "qos-design.ipynb")
 
 
 @pytest.mark.parametrize("letter", ["x", "\x01", "ü"])
@@ -218,20 +220,20 @@ def test_code_that_no_channel_carries_is_refused(tmp_path: Path, letter: str) ->
     sizes = {"x": 1, "\x01": 6, "ü": 2}
     nb.cells[2].source = letter * ((bounds.MAX_CODE - 200) // sizes[letter])
     nbformat.write(nb, path)
-    program = submission.program(submission.read(path))
+    program = submission.extract_program(submission.read_notebook(path))
     told = json.dumps({"cells": [vars(cell) for cell in program]}, ensure_ascii=False)
     assert len(told.encode()) < MAX_LINE
     nb.cells[2].source += letter * 200
     nbformat.write(nb, path)
     with pytest.raises(SubmissionError, match=r"has 1\.0 MB of code.*into a file beside it"):
-        submission.read(path)
+        submission.read_notebook(path)
 
 
 def test_half_a_surrogate_pair_is_replaced(tmp_path: Path) -> None:
     nb = notebook()
     path = tmp_path / "qos-design.ipynb"
     path.write_text(json.dumps(nbformat.from_dict(nb)).replace("y = 0", "y = '\\ud83d'"))
-    read = submission.read(path)
+    read = submission.read_notebook(path)
     assert read.cells[2].source == "y = '?'"
     nbformat.write(read, tmp_path / "again.ipynb")
 
@@ -239,7 +241,7 @@ def test_half_a_surrogate_pair_is_replaced(tmp_path: Path) -> None:
 def test_a_byte_order_mark_is_no_damage(tmp_path: Path) -> None:
     path = tmp_path / "qos-design.ipynb"
     path.write_text(json.dumps(nbformat.from_dict(notebook())), encoding="utf-8-sig")
-    assert len(submission.read(path).cells) == 5
+    assert len(submission.read_notebook(path).cells) == 5
 
 
 def test_what_is_no_plain_file_is_refused_at_once(tmp_path: Path) -> None:
@@ -249,7 +251,7 @@ def test_what_is_no_plain_file_is_refused_at_once(tmp_path: Path) -> None:
     loop.symlink_to(loop)
     for path in (folder, fifo, loop):
         with pytest.raises(SubmissionError, match="hand in the notebook itself"):
-            submission.read(path)
+            submission.read_notebook(path)
 
 
 def test_cells_that_were_moved_are_noted() -> None:

@@ -30,7 +30,9 @@ def shown(*things: object, terminal: bool = False) -> str:
 def test_every_string_is_shown_as_it_is_read(terminal: bool) -> None:
     table = Table("Student", ACTING, title=ACTING, caption=ACTING)
     table.add_row("ada", ACTING)
-    problems = grades_table.table([Grade("ada", 1.0, 2.0, True, {})], {"ada": ACTING, ACTING: "x"})
+    problems = grades_table.make_table(
+        [Grade("ada", 1.0, 2.0, True, {})], {"ada": ACTING, ACTING: "x"}
+    )
     for text in (shown(ACTING, terminal=terminal), shown(table, problems, terminal=terminal)):
         assert "[/zap] [bold]x[/bold] :boom: \\x1b]0;owned\\x07" in text
         for letter in ("\x07", "\x08", "\x9b", "\u202e", "\r", "\x1b]", "\x1b[2J"):

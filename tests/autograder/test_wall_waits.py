@@ -13,7 +13,7 @@ from rclpy.node import Node
 
 from autograder.examination.subject.wall_waits import NAP_S, is_timed, wall_waits
 from course import Session
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 
 LONG = 3600.0  # s: the threads are daemons, and end with the process
 
@@ -39,7 +39,7 @@ def test_a_thread_that_sleeps_for_some_time_is_in_a_call_with_a_time_in_it(
     function: Callable[[], object],
 ) -> None:
     native_id = asleep(function)
-    assert poll(lambda: is_timed(native_id), 30.0, Pulse())
+    assert poll_condition(lambda: is_timed(native_id), 30.0, Pulse())
 
 
 def test_a_thread_that_waits_for_another_is_not() -> None:
@@ -51,7 +51,7 @@ def test_a_thread_that_waits_for_another_is_not() -> None:
 
     native_id = asleep(wait)
     begun.wait()
-    assert poll(lambda: not is_timed(native_id), 30.0, Pulse())
+    assert poll_condition(lambda: not is_timed(native_id), 30.0, Pulse())
     never.set()
 
 

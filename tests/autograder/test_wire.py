@@ -89,7 +89,7 @@ def test_leftovers_that_come_in_drops_do_not_come_for_ever(
     dripping = threading.Thread(target=drip, daemon=True)
     dripping.start()
     try:
-        assert 0 < len(channel.leftovers(1, 0.5)) < 100
+        assert 0 < len(channel.read_leftovers(1, 0.5)) < 100
     finally:
         enough.set()
         dripping.join()

@@ -38,7 +38,7 @@ from autograder.corpus import Case
 from autograder.corpus.trials import one_notebook
 from autograder.examination import points
 from autograder.gradebook.course_gradebook import CourseGradebook
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 
 MIB = 1024 * 1024
 NEED_LOSS = {"camera_moves_on", "stop_repaired"}
@@ -140,15 +140,15 @@ class Assignment:
         root = Path(tempfile.mkdtemp(prefix="class-", dir=self.root.parent)) / "course"
         shutil.copytree(self.root, root)
         source, released = (
-            submission.read(root / step / self.name / f"{self.notebook}.ipynb")
+            submission.read_notebook(root / step / self.name / f"{self.notebook}.ipynb")
             for step in ("source", "release")
         )
-        texts = [case.submission(source, released) for case in self.cases]
+        texts = [case.make_submission(source, released) for case in self.cases]
         for place, notebook in zip(range(number), itertools.cycle(texts)):
             folder = root / "submitted" / f"student{place:05}" / self.name
             folder.mkdir(parents=True)
             for cell in notebook.cells:
-                if submission.metadata(cell).get("solution") and cell.cell_type == "code":
+                if submission.nbgrader_metadata(cell).get("solution") and cell.cell_type == "code":
                     cell.source = f"{cell.source.partition(SIGNED)[0]}{SIGNED}{place}"
             nbformat.write(notebook, folder / f"{self.notebook}.ipynb")
         return root
@@ -165,11 +165,11 @@ def assignment(exercise: str) -> Iterator[Assignment]:
     with tempfile.TemporaryDirectory(prefix="bench-grading-") as folder:
         root = one_notebook(Path(folder) / "course", exercise, ASSIGNMENT)
         build(root)
-        release(root, ASSIGNMENT)
+        make_release(root, ASSIGNMENT)
         # A cell that ends its process ends stock nbgrader's batch: that is not what is compared.
         cases = [
             case
-            for case in corpus.load(exercise)
+            for case in corpus.load_cases(exercise)
             if not case.name.startswith("broken") and not case.must_fail & NEED_LOSS
         ]
         yield Assignment(root, ASSIGNMENT, entry.notebook, cases)
@@ -208,7 +208,7 @@ def stock(root: Path, name: str, number: int) -> Run:
 
 def scores(root: Path, name: str) -> dict[str, float]:
     """Return {student: points} of a graded course."""
-    return {grade.student: grade.score for grade in CourseGradebook(root).grades(name)}
+    return {grade.student: grade.score for grade in CourseGradebook(root).read_grades(name)}
 
 
 def case_of(given: Assignment, student: str) -> str:

@@ -46,7 +46,7 @@ def beside(class_: Class, other: Program, seconds_a_cell: float) -> float:
 def grade(program: Program, class_: Class, *, trust: bool = False) -> None:
     """Grade a submission, and require that nothing went wrong."""
     outcome = runner.run(program, hidden=[class_.root], trust=trust, seed=SEED)
-    assert not outcome.spoilt
+    assert not outcome.has_grader_error
 
 
 def cost(class_: Class, rounds: int) -> None:

@@ -30,7 +30,7 @@ from autograder.assignments import submission
 from autograder.assignments.build import build
 from autograder.corpus.trials import one_notebook
 from autograder.gradebook.course_gradebook import Grade
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 from tests.killing import Engine, LostError, episode, fresh_copy
 
 ASSIGNMENT, NOTEBOOK = "ch05", "qos-design"
@@ -56,16 +56,16 @@ def class_root(folder: Path) -> Path:
     """Return a course in which a small class has handed in one exercise."""
     root = one_notebook(folder, "qos", ASSIGNMENT)
     build(root)
-    release(root, ASSIGNMENT)
-    cases = {case.name: case for case in corpus.load("qos")}
+    make_release(root, ASSIGNMENT)
+    cases = {case.name: case for case in corpus.load_cases("qos")}
     source, released = (
-        submission.read(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+        submission.read_notebook(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
         for step in ("source", "release")
     )
     for name in CASES:
         own = root / "submitted" / name / ASSIGNMENT
         own.mkdir(parents=True)
-        nbformat.write(cases[name].submission(source, released), own / f"{NOTEBOOK}.ipynb")
+        nbformat.write(cases[name].make_submission(source, released), own / f"{NOTEBOOK}.ipynb")
     return root
 
 

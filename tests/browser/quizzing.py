@@ -156,7 +156,7 @@ class Learner:
     def take(self, *, right: int, says: str = "needed") -> None:
         """Answer all questions by keyboard, the first ``right`` of them rightly, and submit."""
         for item in self.quiz.items:
-            key = model.key(item)
+            key = model.right_answer(item)
             answer = key if item.number <= right else WRONG[item.variant.kind](item, key)
             self.answer_by_keyboard(item, answer)
         self.tab_to(self.submit)

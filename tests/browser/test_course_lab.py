@@ -45,9 +45,9 @@ class Exercise:
 @pytest.fixture(scope="module")
 def exercise(course_lab: Lab) -> Exercise:
     path = course_lab.work / EXERCISE
-    source = submission.read(content_root() / "source" / EXERCISE)
-    case = next(c for c in corpus.load("qos") if c.name == "right-chapter")
-    right = case.submission(source, submission.read(path))
+    source = submission.read_notebook(content_root() / "source" / EXERCISE)
+    case = next(c for c in corpus.load_cases("qos") if c.name == "right-chapter")
+    right = case.make_submission(source, submission.read_notebook(path))
     (solution,) = (c.source for c in right.cells if submission.grade_id(c) == SOLUTION)
     return Exercise(path.read_text(encoding="utf-8"), solution)
 

@@ -17,7 +17,7 @@ from autograder.assignments import questions, submission
 from autograder.assignments.build import build
 from autograder.corpus.trials import one_notebook
 from autograder.examination import points
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 from tests.machine import needs_sandbox
 
 from .lab import Lab, until
@@ -37,15 +37,15 @@ def course_root(tmp_path: Path) -> Path:
     """A course with one exercise, released, and one submission that has not been graded."""
     root = one_notebook(tmp_path / "course", "qos", ASSIGNMENT)
     build(root)
-    release(root, ASSIGNMENT)
+    make_release(root, ASSIGNMENT)
     source, released = (
-        submission.read(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+        submission.read_notebook(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
         for step in ("source", "release")
     )
-    case = next(c for c in corpus.load("qos") if c.name == "wrong-lidar-deep")
+    case = next(c for c in corpus.load_cases("qos") if c.name == "wrong-lidar-deep")
     folder = root / "submitted" / "ada" / ASSIGNMENT
     folder.mkdir(parents=True)
-    nbformat.write(case.submission(source, released), folder / f"{NOTEBOOK}.ipynb")
+    nbformat.write(case.make_submission(source, released), folder / f"{NOTEBOOK}.ipynb")
     return root
 
 
@@ -99,7 +99,7 @@ def test_an_instructor_grades_our_assignment_in_the_formgrader(
         frame.get_by_role("link", name=link, exact=True).click()
     expect(frame.locator("body")).to_contain_text("qos: 8 of 10 points")
     # Above each answer stands what it should say, and what the points are for.
-    source = submission.read(course_root / "source" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+    source = submission.read_notebook(course_root / "source" / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
     models = [q.model.splitlines()[0] for q in questions.of_notebook(source, NOTEBOOK).values()
               if q.written]  # fmt: skip
     beside = frame.locator(".model-answer")

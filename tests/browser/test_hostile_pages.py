@@ -22,7 +22,7 @@ from autograder.assignments import submission
 from autograder.assignments.build import build
 from autograder.corpus.trials import one_notebook
 from autograder.examination import points
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from tests.machine import needs_sandbox
 
@@ -75,13 +75,13 @@ def course_root(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A graded course with one submission, whose every part wants to run in a browser."""
     root = one_notebook(tmp_path_factory.mktemp("hostile") / "course", "qos", ASSIGNMENT)
     build(root)
-    release(root, ASSIGNMENT)
+    make_release(root, ASSIGNMENT)
     source, released = (
-        submission.read(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
+        submission.read_notebook(root / step / ASSIGNMENT / f"{NOTEBOOK}.ipynb")
         for step in ("source", "release")
     )
-    case = next(c for c in corpus.load("qos") if c.name == "broken-empty")
-    notebook = case.submission(source, released)
+    case = next(c for c in corpus.load_cases("qos") if c.name == "broken-empty")
+    notebook = case.make_submission(source, released)
     cells = {submission.grade_id(cell): cell for cell in notebook.cells}
     for number, name in enumerate(EXPLANATIONS):
         cells[name].source = ANSWERS[number % len(ANSWERS)]

@@ -25,7 +25,9 @@ def test_marks_are_filled_in_kept_and_saved(browser: Browser, tmp_path: Path) ->
         Answer("cy", "Cy", "Third", 1.0, "Well done", False, "s3"),
     )
     file = tmp_path / "marks.html"
-    file.write_text(answers_page.page(Answers("ch05", question, answers), "marks.csv"), "utf-8")
+    file.write_text(
+        answers_page.render_page(Answers("ch05", question, answers), "marks.csv"), "utf-8"
+    )
     context = browser.new_context(accept_downloads=True)
     page = context.new_page()
     errors: list[str] = []

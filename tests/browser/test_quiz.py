@@ -42,7 +42,7 @@ def sit(
         bank = load_bank(quiz) if real else read_bank(sample.write(banks, data))
         path = write_notebook(lab.work / name, None if real or closed else banks, quiz, attempts)
         if closed:
-            (path.parent / closing.filename(quiz)).write_text(closing.sheet(bank))
+            (path.parent / closing.sheet_filename(quiz)).write_text(closing.make_sheet(bank))
             shutil.copytree(banks / "assets", path.parent / "assets")
         window = open_notebook(path.relative_to(lab.work))
         learner = Learner(window, Quiz(bank, student=STUDENT, folder=tmp_path / "elsewhere"))
@@ -76,7 +76,7 @@ def test_fail_with_three_of_five_then_try_again_and_pass_by_keyboard_alone(sit: 
     )
     quiz = learner.quiz
     for item in quiz.items:  # the same attempt here, so that the next one is dealt
-        quiz.answer(item.number, model.key(item))
+        quiz.answer(item.number, model.right_answer(item))
     quiz.submit()
     quiz.retry()
     learner.take(right=5)
@@ -199,7 +199,7 @@ def test_a_screen_reader_finds_roles_names_and_states(sit: Sit) -> None:
 def test_a_double_click_records_one_attempt(sit: Sit) -> None:
     learner = sit()
     for item in learner.quiz.items:
-        learner.answer_by_keyboard(item, model.key(item))
+        learner.answer_by_keyboard(item, model.right_answer(item))
     learner.submit.dblclick()
     learner.result.filter(has_text="needed").wait_for()
     learner.window.command("notebook:run-all-cells")
@@ -211,15 +211,19 @@ def test_answers_are_there_after_a_reload_and_after_a_restart(sit: Sit) -> None:
     learner = sit()
     items = learner.quiz.items
     for item in items[:3]:
-        learner.answer_by_keyboard(item, model.key(item))
+        learner.answer_by_keyboard(item, model.right_answer(item))
     learner.saved()
     learner.window.save()
 
     def still_there() -> None:
-        for letter in str(model.key(items[1])):
+        for letter in str(model.right_answer(items[1])):
             expect(learner.question(2).locator(f'input[value="{letter}"]')).to_be_checked()
-        expect(learner.question(1).locator("input:checked")).to_have_value(str(model.key(items[0])))
-        expect(learner.question(3).locator("input")).to_have_value(f"{model.key(items[2]):g}")
+        expect(learner.question(1).locator("input:checked")).to_have_value(
+            str(model.right_answer(items[0]))
+        )
+        expect(learner.question(3).locator("input")).to_have_value(
+            f"{model.right_answer(items[2]):g}"
+        )
 
     learner.window.reload()
     still_there()
@@ -236,7 +240,7 @@ def test_answers_are_there_after_a_reload_and_after_a_restart(sit: Sit) -> None:
     still_there()
     expect(alarm).to_have_text("")
     for item in items[3:]:
-        learner.answer_by_keyboard(item, model.key(item))
+        learner.answer_by_keyboard(item, model.right_answer(item))
     learner.tab_to(learner.submit)
     learner.page.keyboard.press("Enter")
     expect(learner.result).to_have_text(re.compile("^Passed: 5 of 5"))
@@ -256,7 +260,7 @@ def test_a_quiz_that_is_opened_again_without_its_kernel_says_what_to_do(sit: Sit
     gone = learner.page.locator(".quiz-gone")
     expect(gone).to_be_hidden()
     item = learner.quiz.items[0]
-    learner.answer_by_keyboard(item, model.key(item))
+    learner.answer_by_keyboard(item, model.right_answer(item))
     learner.saved()
     learner.window.save()
     learner.window.restart_kernel()
@@ -266,7 +270,9 @@ def test_a_quiz_that_is_opened_again_without_its_kernel_says_what_to_do(sit: Sit
     expect(learner.page.get_by_text("model not found")).to_be_hidden()
     learner.start()
     expect(gone).to_be_hidden()
-    expect(learner.question(1).locator("input:checked")).to_have_value(str(model.key(item)))
+    expect(learner.question(1).locator("input:checked")).to_have_value(
+        str(model.right_answer(item))
+    )
 
 
 def test_a_second_window_shows_the_same_quiz_and_records_no_second_attempt(
@@ -274,12 +280,12 @@ def test_a_second_window_shows_the_same_quiz_and_records_no_second_attempt(
 ) -> None:
     learner = sit()
     for item in learner.quiz.items:
-        learner.answer_by_keyboard(item, model.key(item))
+        learner.answer_by_keyboard(item, model.right_answer(item))
     learner.saved()
     learner.window.save()
     other = Learner(open_notebook(learner.window.path), learner.quiz)
     expect(other.question(3).locator("input")).to_have_value(
-        f"{model.key(learner.quiz.items[2]):g}"
+        f"{model.right_answer(learner.quiz.items[2]):g}"
     )
     learner.submit.click()
     expect(other.result).to_have_text(re.compile("^Passed: 5 of 5"))
@@ -290,7 +296,7 @@ def test_a_second_window_shows_the_same_quiz_and_records_no_second_attempt(
 def test_no_key_leaves_the_kernel_before_submission(sit: Sit) -> None:
     learner = sit()
     for item in learner.quiz.items:
-        learner.answer_by_keyboard(item, model.key(item))
+        learner.answer_by_keyboard(item, model.right_answer(item))
     learner.saved()
 
     for place, text in everywhere(learner).items():
@@ -328,7 +334,7 @@ def test_a_closed_quiz_is_handed_in_by_keyboard_and_its_key_is_nowhere(sit: Sit)
         assert not re.search(sample.SECRET, text, re.IGNORECASE), place
     (attempt,) = learner.attempts()
     bank = learner.quiz.bank
-    found = regrade.mark_file(bank, json.dumps(attempt).encode()).best
+    found = regrade.mark_file(bank, json.dumps(attempt).encode()).best_result
     assert found is not None
     assert found.right == 4
     assert learner.window.errors == []
@@ -346,7 +352,7 @@ def test_no_feedback_of_the_real_quiz_is_sent_before_submission(sit: Sit) -> Non
         assert secret not in text
     for item in learner.quiz.items:
         for option in getattr(item.variant, "options", []):
-            assert rendering.plain(option.feedback) not in text
+            assert rendering.render_plain(option.feedback) not in text
 
 
 def test_a_kernel_that_does_not_answer_is_told_and_gets_the_answers_later(sit: Sit) -> None:
@@ -356,14 +362,16 @@ def test_a_kernel_that_does_not_answer_is_told_and_gets_the_answers_later(sit: S
     (kernel,) = learner.window.lab.kernel_processes()
     kernel.suspend()
     try:
-        learner.answer_by_keyboard(item, model.key(item))
+        learner.answer_by_keyboard(item, model.right_answer(item))
         expect(alarm).to_contain_text("The kernel does not answer.")
         expect(learner.question(1).locator("input").first).to_be_enabled()
     finally:
         kernel.resume()
     learner.saved()
     expect(alarm).to_have_text("")
-    expect(learner.question(1).locator("input:checked")).to_have_value(str(model.key(item)))
+    expect(learner.question(1).locator("input:checked")).to_have_value(
+        str(model.right_answer(item))
+    )
 
 
 def test_answers_are_saved_while_another_cell_runs(sit: Sit) -> None:
@@ -378,11 +386,13 @@ def test_answers_are_saved_while_another_cell_runs(sit: Sit) -> None:
     )
     window.wait_for_kernel("busy")
     item = learner.quiz.items[0]
-    learner.answer_by_keyboard(item, model.key(item))
+    learner.answer_by_keyboard(item, model.right_answer(item))
     pipe.write_text("go on")
     learner.saved()
     window.wait_for_kernel("idle")
-    expect(learner.question(1).locator("input:checked")).to_have_value(str(model.key(item)))
+    expect(learner.question(1).locator("input:checked")).to_have_value(
+        str(model.right_answer(item))
+    )
 
 
 def test_a_folder_that_takes_no_files_is_told_in_the_quiz(sit: Sit) -> None:

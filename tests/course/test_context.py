@@ -7,7 +7,7 @@ import os
 from rclpy.node import Node
 
 import course
-from course.runtime.context.context import _environment, ensure_log_dir
+from course.runtime.context.context import _set_environment, ensure_log_dir
 
 RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 
@@ -22,7 +22,7 @@ def test_the_discovery_environment_is_put_back(monkeypatch):
 
 def test_variables_are_set_inside_only(monkeypatch):
     monkeypatch.setenv(PEERS, "192.0.2.1")
-    with _environment({PEERS: "127.0.0.1"}):
+    with _set_environment({PEERS: "127.0.0.1"}):
         assert os.environ[PEERS] == "127.0.0.1"
     assert os.environ[PEERS] == "192.0.2.1"
 

@@ -13,14 +13,14 @@ import pytest
 
 from course import doctor
 from course.doctor import environment, machine, ros, software
-from course.doctor.finding import Finding, ok, problem, warning
+from course.doctor.finding import Finding, make_ok, make_problem, make_warning
 
 COMMAND = [sys.executable, "-c", "from course.launch import course; course()", "doctor"]
 PREFIX = "/opt/python"
 
 
 def look(**variables: str) -> list[Finding]:
-    return list(environment.examine(variables, PREFIX))
+    return list(environment.examine_environment(variables, PREFIX))
 
 
 def test_the_environment_of_a_plain_shell_is_well() -> None:
@@ -65,14 +65,14 @@ def test_the_wheels_own_mark_is_no_problem() -> None:
 
 
 def test_space_is_judged_by_what_is_left(tmp_path: Path) -> None:
-    assert [machine.disk(tmp_path, free).status for free in (10, 100, 5000)] == [
+    assert [machine.check_disk(tmp_path, free).status for free in (10, 100, 5000)] == [
         "problem",
         "warning",
         "ok",
     ]
     assert [machine.shared_memory(tmp_path, free).status for free in (3, 64)] == ["warning", "ok"]
     assert machine.shared_memory(tmp_path / "none").status == "warning"
-    assert machine.disk(tmp_path).message.endswith(f"MB are free in {tmp_path}")
+    assert machine.check_disk(tmp_path).message.endswith(f"MB are free in {tmp_path}")
     assert machine.temporary_folder().status == "ok"
 
 
@@ -100,17 +100,17 @@ def test_the_log_folder_is_tried(tmp_path: Path) -> None:
 
 
 def test_a_clock_that_was_set_back_is_noticed() -> None:
-    assert machine.clock(1_700_000_000, 1_600_000_000).status == "ok"
-    found = machine.clock(0.0, 1_600_000_000)
+    assert machine.check_clock(1_700_000_000, 1_600_000_000).status == "ok"
+    found = machine.check_clock(0.0, 1_600_000_000)
     assert found.status == "warning"
     assert "before the course was installed" in found.message
 
 
 def test_packages_are_compared_with_their_bounds() -> None:
-    found = software.packages()
+    found = software.check_packages()
     assert found.status == "ok"
     assert "nbgrader 0.9." in found.message
-    assert software.packages("no-such-distribution").status == "problem"
+    assert software.check_packages("no-such-distribution").status == "problem"
 
 
 def test_a_package_out_of_bounds_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -120,7 +120,7 @@ def test_a_package_out_of_bounds_is_named(tmp_path: Path, monkeypatch: pytest.Mo
     lines = ["Metadata-Version: 2.1", "Name: sample-course", "Version: 1"]
     (info / "METADATA").write_text("\n".join([*lines, *(f"Requires-Dist: {n}" for n in needs)]))
     monkeypatch.syspath_prepend(tmp_path)
-    found = software.packages("sample-course")
+    found = software.check_packages("sample-course")
     assert found.status == "problem"
     assert "is not <0.1" in found.message
     assert "no-such-package is missing" in found.message
@@ -128,15 +128,15 @@ def test_a_package_out_of_bounds_is_named(tmp_path: Path, monkeypatch: pytest.Mo
 
 
 def test_python_and_kernel_are_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert software.python().status == "ok"
-    assert software.python("Not here.") == problem("Python", "Not here.")
-    assert software.kernel().status == "ok"
+    assert software.check_python().status == "ok"
+    assert software.check_python("Not here.") == make_problem("Python", "Not here.")
+    assert software.check_kernel().status == "ok"
     folder = tmp_path / "kernels" / "python3"
     folder.mkdir(parents=True)
     spec = {"argv": ["/bin/true", "{connection_file}"], "display_name": "x", "language": "python"}
     (folder / "kernel.json").write_text(json.dumps(spec))
     monkeypatch.setenv("JUPYTER_PATH", str(tmp_path))
-    found = software.kernel()
+    found = software.check_kernel()
     assert found.status == "problem"
     assert str(folder) in found.mend
 
@@ -147,15 +147,15 @@ def test_a_missing_compiler_is_a_warning_with_its_mend(
     monkeypatch.setenv("PATH", str(tmp_path))
     for name in ("CC", "CXX"):
         monkeypatch.delenv(name, raising=False)
-    found = software.compiler()
+    found = software.check_compiler()
     assert found.status == "warning"
     assert "g++" in found.mend
 
 
 def test_domains_run_out() -> None:
-    assert ros.domains(set()).status == "ok"
-    assert ros.domains(set(range(97))).status == "warning"
-    assert ros.domains(set(range(102))).status == "problem"
+    assert ros.check_domains(set()).status == "ok"
+    assert ros.check_domains(set(range(97))).status == "warning"
+    assert ros.check_domains(set(range(102))).status == "problem"
 
 
 def test_a_message_travels_within_a_process_and_between_two() -> None:
@@ -165,18 +165,22 @@ def test_a_message_travels_within_a_process_and_between_two() -> None:
 
 
 def test_a_probe_that_fails_is_a_sentence() -> None:
-    assert "error" in ros.probe("both", 300)
-    assert "out of range" in str(ros.probe("both", 300)["error"])
-    assert "error" in ros.probe("both", "not a number")
+    assert "error" in ros.run_probe("both", 300)
+    assert "out of range" in str(ros.run_probe("both", 300)["error"])
+    assert "error" in ros.run_probe("both", "not a number")
 
 
 def test_the_summary_and_the_exit_code_follow_the_worst_finding() -> None:
-    well, warned, ill = ok("a", "x"), warning("b", "y", "do z"), problem("c", "y", "do z")
+    well, warned, ill = (
+        make_ok("a", "x"),
+        make_warning("b", "y", "do z"),
+        make_problem("c", "y", "do z"),
+    )
     assert [doctor.exit_code(f) for f in ([well], [well, warned], [warned, ill])] == [0, 0, 1]
-    assert "All is well" in doctor.summary([well])
-    assert "1 to know" in doctor.summary([well, warned])
-    assert doctor.summary([warned, ill]).startswith("1 to mend")
-    assert ill.text().splitlines() == ["problem  c: y", "         -> do z"]
+    assert "All is well" in doctor.summary_line([well])
+    assert "1 to know" in doctor.summary_line([well, warned])
+    assert doctor.summary_line([warned, ill]).startswith("1 to mend")
+    assert ill.as_text().splitlines() == ["problem  c: y", "         -> do z"]
 
 
 def run(*arguments: str, **variables: str) -> subprocess.CompletedProcess[str]:

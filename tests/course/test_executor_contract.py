@@ -37,7 +37,7 @@ from test_msgs.action import Fibonacci
 
 import course
 from course.domains.leases import lease_domain
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 
 PATIENCE = 30.0
 
@@ -124,7 +124,7 @@ def host(request: pytest.FixtureRequest) -> Iterator[Host]:
 
 def wait(condition: Callable[[], object], what: str = "the condition") -> None:
     """Return when `condition` holds."""
-    assert poll(condition, PATIENCE, Pulse()), f"waited in vain for {what}"
+    assert poll_condition(condition, PATIENCE, Pulse()), f"waited in vain for {what}"
 
 
 def executor_of(node: Node) -> Executor:

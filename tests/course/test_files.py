@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from course.util.files import replacing, write_text
+from course.util.files import replace_file, write_text
 
 
 def test_a_file_that_cannot_be_finished_leaves_the_old_one(tmp_path: Path) -> None:
@@ -14,7 +14,7 @@ def test_a_file_that_cannot_be_finished_leaves_the_old_one(tmp_path: Path) -> No
     write_text(path, "old\n")
 
     def write_half() -> None:
-        with replacing(path) as file:
+        with replace_file(path) as file:
             file.write(b"half of the n")
             file.write("\ud800".encode())
 

@@ -28,7 +28,7 @@ def running(body: Callable[[threading.Event], None]) -> Iterator[tuple[Idleness,
 def looks(idleness: Idleness, nap: threading.Event) -> Iterator[bool]:
     """Look again and again, and let go of the interpreter's lock in between."""
     while True:
-        yield idleness.blocked()
+        yield idleness.is_blocked()
         nap.wait(0.0005)
 
 
@@ -70,7 +70,7 @@ def test_a_thread_that_wants_the_interpreter_is_not_though_it_sleeps_at_every_lo
 
 def test_one_look_proves_nothing() -> None:
     with running(wait) as (idleness, _):
-        assert not idleness.blocked()
+        assert not idleness.is_blocked()
 
 
 def test_a_blocked_thread_that_goes_on_is_not_blocked_any_more() -> None:

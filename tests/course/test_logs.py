@@ -352,12 +352,12 @@ def test_the_store_is_bounded_in_loggers_and_bytes_and_errors_stay_longest():
     store.add(0.0, "ERROR", "robot", "first", home)
     for number in range(1000):
         store.add(float(number), "INFO", f"robot.child_{number}", "x", home)
-    rows = [row for _, row in store.rows(home, 0.0)]
+    rows = [row for _, row in store.rows_of(home, 0.0)]
     assert rows[0].message == "first"
     assert len(rows) <= 400
     for number in range(200):
         store.add(2000.0 + number, "INFO", "robot", "y" * 2**20, home)
-    rows = [row for _, row in store.rows(home, 0.0)]
+    rows = [row for _, row in store.rows_of(home, 0.0)]
     assert sum(len(row.message) for row in rows) <= 16 * 2**20
     assert rows[-1].stamp == 2199.0
     assert rows[0].message == "first"

@@ -91,7 +91,7 @@ def test_a_recording_is_read_back_in_order(session: Session, tmp_path: Path) -> 
     ids=lambda message: type(message).__name__,
 )  # fmt: skip
 def test_every_kind_of_field_survives(message: object, tmp_path: Path) -> None:
-    path = mcap_file.write(tmp_path / "x.mcap", {"/x": (type(message), [(1, message)])})
+    path = mcap_file.write_recordings(tmp_path / "x.mcap", {"/x": (type(message), [(1, message)])})
     ((_, _, _, decoded),) = read(path)
     assert as_data(decoded) == to_data(message, None)
 
@@ -100,14 +100,14 @@ def test_every_kind_of_field_survives(message: object, tmp_path: Path) -> None:
 def test_own_interfaces_are_written_with_their_definition(tmp_path: Path) -> None:
     own = course.interfaces.define("mcap_msgs/msg/Reading", "float64 value\nstring[] names\n")
     message = own(value=1.5, names=["a"])
-    path = mcap_file.write(tmp_path / "x.mcap", {"/x": (own, [(1, message)])})
+    path = mcap_file.write_recordings(tmp_path / "x.mcap", {"/x": (own, [(1, message)])})
     ((_, _, _, decoded),) = read(path)
     assert (decoded.value, list(decoded.names)) == (1.5, ["a"])
 
 
 def test_a_place_that_cannot_be_written_is_a_sentence(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match=r"cannot be written to .*nowhere/x\.mcap"):
-        mcap_file.write(tmp_path / "nowhere" / "x", {})
+        mcap_file.write_recordings(tmp_path / "nowhere" / "x", {})
 
 
 @pytest.mark.parametrize("path", ["", ".", "/", "a\0b", "x" * 300])

@@ -16,7 +16,7 @@ from std_msgs.msg import Empty, String
 
 import course
 from course.errors import SessionError, WaitTimeout
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 
 
 class Sensors(Node):
@@ -336,7 +336,9 @@ def test_a_nudge_is_heard_and_waits_for_no_callback(lab):
     lab.sim.advance(1.0)
     fired = {rate: len(times) for rate, times in node.fired.items()}
     lab.sim.nudge()
-    assert poll(lambda: node.get_clock().now().nanoseconds == lab.sim.now_ns, 5.0, Pulse())
+    assert poll_condition(
+        lambda: node.get_clock().now().nanoseconds == lab.sim.now_ns, 5.0, Pulse()
+    )
     assert lab.sim.now_ns == 1_000_000_001
     assert fired == {rate: len(times) for rate, times in node.fired.items()}
 
@@ -349,7 +351,7 @@ def test_a_nudge_is_heard_and_waits_for_no_callback(lab):
     node.create_subscription(Clock, "/clock", block, qos_profile_sensor_data)
     try:
         # In the thread that calls, the callback would wait for what comes after the nudge.
-        assert poll(lambda: lab.sim.nudge() or begun.is_set(), 5.0, Pulse())
+        assert poll_condition(lambda: lab.sim.nudge() or begun.is_set(), 5.0, Pulse())
     finally:
         go_on.set()
 
@@ -366,11 +368,11 @@ def test_a_nudge_resumes_a_callback_that_awaits_in_the_group_of_the_clock(lab):
 
     node.create_subscription(Empty, "work", work, 10)
     publisher = node.create_publisher(Empty, "work", 10)
-    assert poll(lambda: publisher.get_subscription_count(), 30.0, Pulse())
+    assert poll_condition(lambda: publisher.get_subscription_count(), 30.0, Pulse())
     publisher.publish(Empty())
     assert begun.wait(30.0)
     awaited.set_result(None)  # from another thread, and in an executor that knows nothing of it
-    assert poll(lambda: lab.sim.nudge() or done.is_set(), 30.0, Pulse())
+    assert poll_condition(lambda: lab.sim.nudge() or done.is_set(), 30.0, Pulse())
 
 
 def test_patience_bounds_what_a_callback_may_hold_up():

@@ -81,7 +81,7 @@ def test_a_gate_that_an_interrupt_left_is_open() -> None:
     gate = Gate(lambda: None)
 
     def hold() -> None:
-        with gate.held():
+        with gate.hold_closed():
             gate.wait(0.001)
 
     for _ in interrupted(hold):

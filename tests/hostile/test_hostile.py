@@ -43,7 +43,7 @@ from autograder.corpus.trials import notebooks_of
 from autograder.examination import points
 from autograder.examination.program import Program
 from autograder.gradebook.course_gradebook import CourseGradebook
-from autograder.gradebook.release import release
+from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from autograder.running import runner
 from autograder.running.runner import CELL_TIMEOUT, Outcome
@@ -100,14 +100,14 @@ class Class:
 
     def program(self, base: str, attack: str = "", exercise: str = "qos") -> Program:
         source, released = self.notebooks[exercise]
-        notebook = self.cases[exercise, base].submission(source, released)
+        notebook = self.cases[exercise, base].make_submission(source, released)
         if attack:
             place = next(
                 number for number, cell in enumerate(notebook.cells)
                 if submission.grade_id(cell) == f"{exercise}-visible"
             )  # fmt: skip
             notebook.cells.insert(place, new_code_cell(attack))
-        return submission.program(submission.restore(notebook, source, released)[0])
+        return submission.extract_program(submission.restore_cells(notebook, source, released)[0])
 
 
 @pytest.fixture(scope="module")
@@ -119,13 +119,15 @@ def class_in(folder: Path) -> Class:
     exercises = sorted({attack.exercise for attack in attacks()} | {"qos"})
     root = notebooks_of(folder, exercises, "ch05")
     build(root)
-    release(root, "ch05")
+    make_release(root, "ch05")
     notebooks, cases = {}, {}
     for name in exercises:
         file = f"ch05/{points.table()[name].notebook}.ipynb"
-        source, released = (submission.read(root / step / file) for step in ("source", "release"))
+        source, released = (
+            submission.read_notebook(root / step / file) for step in ("source", "release")
+        )
         notebooks[name] = source, released
-        cases.update({(name, c.name): c for c in corpus.load(name)})
+        cases.update({(name, c.name): c for c in corpus.load_cases(name)})
     return Class(root, notebooks, cases)
 
 
@@ -260,7 +262,7 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
     for fragment in attack.prints:
         assert fragment in shown
     assert "Traceback" not in said
-    assert not outcome.spoilt, said
+    assert not outcome.has_grader_error, said
     assert len(shown) < 2_000_000
     assert len(namespaces) >= 4  # each of the two and its examiner, and plain programs of theirs
     # What was killed takes the kernel a moment to clear away; what was not stays.
@@ -273,7 +275,7 @@ def test_an_attack_is_contained_and_explained_and_hurts_nobody(
 
 
 def test_odd_files_in_a_submission_folder(class_: Class) -> None:
-    right = class_.cases["qos", "right-chapter"].submission(*class_.notebooks["qos"])
+    right = class_.cases["qos", "right-chapter"].make_submission(*class_.notebooks["qos"])
 
     def folder(student: str) -> Path:
         path = class_.root / "submitted" / student / "ch05"
@@ -290,7 +292,7 @@ def test_odd_files_in_a_submission_folder(class_: Class) -> None:
     (climbing / "up").symlink_to("../../..")
 
     graded = {g.student: g for g in engine.grade(class_.root, "ch05")}
-    grades = {g.student: g for g in CourseGradebook(class_.root).grades("ch05")}
+    grades = {g.student: g for g in CourseGradebook(class_.root).read_grades("ch05")}
 
     assert {name: grade.score for name, grade in grades.items()} == {
         "honest": FULL, "climbing": FULL, "link": 0, "large": 0, "nested": 0,

@@ -121,12 +121,12 @@ def day(tmp_path_factory: pytest.TempPathFactory) -> Day:
     began = time.monotonic()
     graded = {g.student: g for g in engine.grade(class_.root, "ch05")}
     seconds = time.monotonic() - began
-    scores = {g.student: g.score for g in CourseGradebook(class_.root).grades("ch05")}
+    scores = {g.student: g.score for g in CourseGradebook(class_.root).read_grades("ch05")}
     return Day(class_.root, graded, scores, seconds)
 
 
 def hand_in(class_: Class, student: str, cells: Iterable[NotebookNode]) -> None:
-    notebook = class_.cases["qos", "right-chapter"].submission(*class_.notebooks["qos"])
+    notebook = class_.cases["qos", "right-chapter"].make_submission(*class_.notebooks["qos"])
     notebook.cells[1:1] = cells
     folder = class_.root / "submitted" / student / "ch05"
     folder.mkdir(parents=True)

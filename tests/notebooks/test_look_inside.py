@@ -49,7 +49,7 @@ def test_every_notebook_that_must_show_something_says_how_to_look_at_it() -> Non
 
 @pytest.mark.parametrize("path", BUILT, ids=str)
 def test_what_an_exercise_says_to_look_at_can_be_looked_at(path: Path, kernel: Kernel) -> None:
-    notebook = submission.read(content_root() / "source" / path)
+    notebook = submission.read_notebook(content_root() / "source" / path)
     for cell in notebook.cells:
         if cell.cell_type == "code" and "check(" not in cell.source:
             status, said = kernel.run(without_markers(cell.source))

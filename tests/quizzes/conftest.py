@@ -38,7 +38,7 @@ def make_quiz(bank: Bank, tmp_path: Path) -> MakeQuiz:
 
 def wrong(item: Item) -> Answer:
     """Return an answer that is complete and earns nothing."""
-    kind, key = item.variant.kind, model.key(item)
+    kind, key = item.variant.kind, model.right_answer(item)
     if kind == "numeric":
         return float(key) + 50
     letters = str(key)
@@ -50,4 +50,4 @@ def wrong(item: Item) -> Answer:
 def answer_all(quiz: Quiz, *, right: int) -> None:
     """Answer the first ``right`` questions rightly and the others wrongly."""
     for item in quiz.items:
-        quiz.answer(item.number, model.key(item) if item.number <= right else wrong(item))
+        quiz.answer(item.number, model.right_answer(item) if item.number <= right else wrong(item))

@@ -36,7 +36,7 @@ def items(bank: Bank) -> dict[str, Item]:
 def test_an_answer_gets_its_saved_form(
     items: dict[str, Item], kind: str, given: Any, answer: Answer
 ) -> None:
-    assert answers.normal(items[kind], given) == answer
+    assert answers.normalize_answer(items[kind], given) == answer
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,7 @@ def test_what_does_not_fit_is_refused_and_says_what_does(
     items: dict[str, Item], kind: str, given: Any
 ) -> None:
     with pytest.raises(AnswerError) as caught:
-        answers.normal(items[kind], given)
+        answers.normalize_answer(items[kind], given)
     assert f"uestion {items[kind].number}" in str(caught.value)
     assert len(str(caught.value)) < 250
 
@@ -66,11 +66,11 @@ def test_what_does_not_fit_is_refused_and_says_what_does(
 def test_a_number_beyond_all_bounds_is_refused(items: dict[str, Item]) -> None:
     for given in (10**400, 10**5000):
         with pytest.raises(AnswerError, match="answer with a number in s"):
-            answers.normal(items["numeric"], given)
+            answers.normalize_answer(items["numeric"], given)
 
 
 def test_an_answer_is_complete_when_nothing_is_left_open(items: dict[str, Item]) -> None:
-    assert not any(answers.complete(item, "") for item in items.values())
-    assert not answers.complete(items["matching"], "a-b")
-    assert answers.complete(items["matching"], "acb")
-    assert answers.complete(items["numeric"], 0.0)
+    assert not any(answers.is_complete(item, "") for item in items.values())
+    assert not answers.is_complete(items["matching"], "a-b")
+    assert answers.is_complete(items["matching"], "acb")
+    assert answers.is_complete(items["numeric"], 0.0)

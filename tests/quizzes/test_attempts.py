@@ -16,7 +16,7 @@ import pytest
 
 from quizzes.attempts import AttemptsFile
 from quizzes.errors import AttemptsError, UnwritableError
-from quizzes.record import Attempt, Given, parse
+from quizzes.record import Attempt, Given, parse_attempts
 
 WRITER = """
 import sys
@@ -287,6 +287,6 @@ def test_windows_that_answer_at_the_same_time_lose_nothing(tmp_path: Path) -> No
 
 def test_a_huge_file_is_read_in_part_and_not_mistaken_for_whole() -> None:
     line = attempt(1).to_json().encode() + b"\n"
-    attempts, damaged = parse(line * (5 * 1024 * 1024 // len(line)))
+    attempts, damaged = parse_attempts(line * (5 * 1024 * 1024 // len(line)))
     assert attempts
     assert damaged

@@ -108,7 +108,7 @@ def test_every_wrong_answer_can_be_shown() -> None:
 
 
 def test_the_lint_finds_nothing() -> None:
-    assert [str(finding) for finding in lint.findings(BANK)] == []
+    assert [str(finding) for finding in lint.list_findings(BANK)] == []
 
 
 def test_every_proof_exists_and_every_proof_is_named_by_a_variant() -> None:

@@ -26,7 +26,7 @@ from .conftest import wrong
 from .test_view import other_keys
 
 KINDS = ("single", "predict", "multiple", "numeric", "ordering", "matching")
-FILE = closing.filename(sample.NAME)
+FILE = closing.sheet_filename(sample.NAME)
 
 
 def closed(**changes: Any) -> dict[str, Any]:
@@ -47,8 +47,8 @@ def work(bank: Bank, tmp_path: Path) -> Path:
 
 def handed_out(bank: Bank, folder: Path) -> Path:
     (folder / "assets").mkdir(parents=True)
-    (folder / FILE).write_text(closing.sheet(bank), encoding="utf-8")
-    for name in closing.pictures(bank):
+    (folder / FILE).write_text(closing.make_sheet(bank), encoding="utf-8")
+    for name in closing.picture_files(bank):
         (folder / name).write_bytes((bank.folder / name).read_bytes())
     return folder
 
@@ -56,22 +56,22 @@ def handed_out(bank: Bank, folder: Path) -> Path:
 def answer(quiz: Quiz, bank: Bank, *, right: int) -> None:
     """Answer with the instructor's keys: the first ``right`` rightly, the others wrongly."""
     for item in model.draw(bank, quiz.student, quiz.attempt).items:
-        quiz.answer(item.number, model.key(item) if item.number <= right else wrong(item))
+        quiz.answer(item.number, model.right_answer(item) if item.number <= right else wrong(item))
 
 
 def marked(bank: Bank, folder: Path) -> regrade.Marked:
-    return regrade.mark_file(bank, (folder / record.filename(bank.quiz)).read_bytes())
+    return regrade.mark_file(bank, (folder / record.attempts_filename(bank.quiz)).read_bytes())
 
 
 def test_nothing_of_the_key_is_in_the_questions(bank: Bank) -> None:
-    text = closing.sheet(bank)
+    text = closing.make_sheet(bank)
     assert not re.search(sample.SECRET, text, re.IGNORECASE)
     assert re.search(sample.SECRET, yaml.safe_dump(closed())), "the mark is one that is found"
 
 
 def test_the_questions_are_the_same_whatever_the_key_is(tmp_path: Path) -> None:
     one, other = (
-        closing.sheet(read_bank(sample.write(tmp_path / name, content)))
+        closing.make_sheet(read_bank(sample.write(tmp_path / name, content)))
         for name, content in (("these", closed()), ("others", other_keys(closed())))
     )
     assert one == other
@@ -84,7 +84,7 @@ def test_the_order_in_a_bank_is_not_handed_out(tmp_path: Path) -> None:
             if "options" in variant:
                 variant["options"].reverse()
     one, other = (
-        closing.sheet(read_bank(sample.write(tmp_path / name, content)))
+        closing.make_sheet(read_bank(sample.write(tmp_path / name, content)))
         for name, content in (("these", closed()), ("turned", turned))
     )
     assert one == other
@@ -94,14 +94,16 @@ def test_the_order_in_a_bank_is_not_handed_out(tmp_path: Path) -> None:
 def test_letters_stand_for_the_same_in_the_questions_and_in_the_bank(
     bank: Bank, work: Path, attempt: int
 ) -> None:
-    sheet = closing.read(work / FILE, sample.NAME)
+    sheet = closing.read_sheet(work / FILE, sample.NAME)
     assert sheet.edition == bank.edition
     for student in (f"student-{n}" for n in range(20)):
         dealt, known = (model.draw(one, student, attempt).items for one in (sheet, bank))
         for mine, theirs in zip(dealt, known, strict=True):
             assert mine.variant.id == theirs.variant.id
             assert mine.letters == theirs.letters
-            assert [mine.text(c) for c in mine.letters] == [theirs.text(c) for c in theirs.letters]
+            assert [mine.text_of(c) for c in mine.letters] == [
+                theirs.text_of(c) for c in theirs.letters
+            ]
             if isinstance(mine.variant, Matching) and isinstance(theirs.variant, Matching):
                 lefts = [[pair.left for pair in v.pairs] for v in (mine.variant, theirs.variant)]
                 assert lefts[0] == lefts[1]
@@ -115,7 +117,7 @@ def test_answers_to_the_questions_are_marked_with_the_keys_of_the_bank(
     answer(quiz, bank, right=right)
     result = quiz.submit()
     assert repr(result) == "**Handed in: your instructor marks it.**"
-    best = marked(bank, work).best
+    best = marked(bank, work).best_result
     assert best is not None
     assert best.right == right
 
@@ -127,8 +129,8 @@ def test_nothing_is_said_about_the_answers(bank: Bank, work: Path) -> None:
         answer(quiz, bank, right=right)
         quiz.submit()
         widget = QuizWidget(quiz)
-        states.append({"result": widget.result, "standing": view.paper(quiz)["standing"]})
-        (work / record.filename(sample.NAME)).unlink()
+        states.append({"result": widget.result, "standing": view.paper_data(quiz)["standing"]})
+        (work / record.attempts_filename(sample.NAME)).unlink()
     assert states[0] == states[1]
     assert states[0]["result"]["marks"] == []
     assert states[0]["standing"] == "Handed in: 1 of 1."
@@ -149,13 +151,13 @@ def test_there_are_as_many_attempts_as_the_bank_says(tmp_path: Path) -> None:
             assert quiz.more
             quiz.retry()
     assert not quiz.more
-    assert not view.paper(quiz)["more"]
+    assert not view.paper_data(quiz)["more"]
     with pytest.raises(QuizError, match="2 attempts, and you have handed in the last"):
         quiz.retry()
     again = quizzes.load(sample.NAME, student="ada", folder=work)
     assert again.result is not None
     assert again.given == quiz.given
-    best = marked(bank, work).best
+    best = marked(bank, work).best_result
     assert best is not None
     assert best.right == 5
 
@@ -164,10 +166,10 @@ def test_an_attempt_too_many_does_not_count_and_is_for_a_person(bank: Bank, work
     quiz = quizzes.load(sample.NAME, student="ada", folder=work)
     answer(quiz, bank, right=1)
     quiz.submit()
-    path = work / record.filename(sample.NAME)
+    path = work / record.attempts_filename(sample.NAME)
     second = json.loads(path.read_text())
     for item in model.draw(bank, "ada", 2).items:
-        given = {"variant": item.variant.id, "answer": model.key(item)}
+        given = {"variant": item.variant.id, "answer": model.right_answer(item)}
         second["answers"][item.concept.id] = given
     path.write_text(path.read_text() + json.dumps({**second, "attempt": 2}) + "\n")
     found = marked(bank, work)
@@ -181,14 +183,14 @@ EXAM = loader.BANKS.parent / "examples" / "exam.yaml"
 def test_three_questions_with_one_variant_each_are_a_closed_quiz(tmp_path: Path) -> None:
     bank = read_bank(EXAM)
     assert [len(concept.variants) for concept in bank.concepts] == [1, 1, 1]
-    assert lint.findings(bank) == []
+    assert lint.list_findings(bank) == []
     folder = tmp_path / "work"
     folder.mkdir()
-    (folder / closing.filename("exam")).write_text(closing.sheet(bank), encoding="utf-8")
+    (folder / closing.sheet_filename("exam")).write_text(closing.make_sheet(bank), encoding="utf-8")
     quiz = quizzes.load("exam", student="ada", folder=folder)
     answer(quiz, bank, right=2)
     quiz.submit()
-    best = marked(bank, folder).best
+    best = marked(bank, folder).best_result
     assert best is not None
     assert best.right == 2
     assert "None" not in repr(best)
@@ -226,12 +228,12 @@ def test_few_variants_are_dealt_by_turns(count: int) -> None:
 
 def test_the_questions_hold_nothing_that_only_teaching_needs(bank: Bank) -> None:
     for field in ("proof", "misconception", "feedback", "show"):
-        assert f"{field}:" not in closing.sheet(bank)
+        assert f"{field}:" not in closing.make_sheet(bank)
 
 
 def test_an_open_quiz_has_no_question_sheet() -> None:
     with pytest.raises(BankError, match=r"'ch05' is not closed.*write 'closed: true'"):
-        closing.sheet(load_bank("ch05"))
+        closing.make_sheet(load_bank("ch05"))
 
 
 def test_a_bank_without_keys_must_be_of_a_closed_quiz(tmp_path: Path) -> None:

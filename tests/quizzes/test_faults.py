@@ -244,7 +244,7 @@ def test_a_text_is_what_it_looks_like(written: str, means: str, tmp_path: Path) 
     path.write_text(text.replace('title: "Midterm"', f"title: {written}"))
     bank = read_bank(path)
     assert bank.title == means
-    assert means in bank.concepts[2].variants[0].texts
+    assert means in bank.concepts[2].variants[0].lettered_texts
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ QUESTIONS = st.one_of(choice_questions(), number_questions(), match_questions())
 
 @given(st.lists(QUESTIONS, min_size=1, max_size=4, unique_by=lambda question: question.name))
 def test_questions_survive_the_round_trip(written: list[questions.Question]) -> None:
-    assert gift.read(gift.write(written, "A title"), "x.gift") == written
+    assert gift.read_gift(gift.format_gift(written, "A title"), "x.gift") == written
 
 
 @given(SOME_TEXT)
@@ -90,17 +90,17 @@ def test_questions_survive_the_round_trip(written: list[questions.Question]) -> 
 @example("\\")
 @example("\\\\n~")
 def test_an_escaped_text_is_one_line_and_comes_back(text: str) -> None:
-    escaped = gift.escape(text)
+    escaped = gift.escape_text(text)
     assert "\n" not in escaped
     question = ChoiceQuestion("q", "c", text, (Choice(text, 100.0, text), Choice(text, 0.0, text)))
-    [read] = gift.read(gift.write([question]), "x.gift")
+    [read] = gift.read_gift(gift.format_gift([question]), "x.gift")
     assert read == question
 
 
 def problem_of(content: str) -> str:
     """What is wrong with a file, in a sentence; "" if it has questions."""
     try:
-        return "" if gift.read(content, "x.gift") else "no questions, and no error"
+        return "" if gift.read_gift(content, "x.gift") else "no questions, and no error"
     except ExchangeError as error:
         return str(error)
 
@@ -120,15 +120,15 @@ def test_so_does_what_looks_like_gift(content: str) -> None:
 
 def test_the_bank_survives_export_and_import_untouched() -> None:
     found = questions.of_bank(BANK)
-    content = gift.write(found, BANK.title)
-    merged = merge.merge(BANK, gift.read(content, "ch05.gift"), "ch05.gift")
+    content = gift.format_gift(found, BANK.title)
+    merged = merge.merge_questions(BANK, gift.read_gift(content, "ch05.gift"), "ch05.gift")
     assert merged.bank == BANK
     assert (merged.changed, merged.notes) == (0, [])
 
 
 def test_yaml_that_is_written_is_the_same_bank(tmp_path: Path) -> None:
     path = tmp_path / "ch05.yaml"
-    path.write_text(merge.dump(BANK), encoding="utf-8")
+    path.write_text(merge.dump_bank(BANK), encoding="utf-8")
     shutil.copytree(BANK.folder / "assets", tmp_path / "assets")
     assert loader.read_bank(path).model_dump() == BANK.model_dump()
 
@@ -136,9 +136,11 @@ def test_yaml_that_is_written_is_the_same_bank(tmp_path: Path) -> None:
 def changed(old: str, new: str) -> merge.Merged:
     """Export, edit as somebody would in Moodle, and import."""
     found = questions.of_bank(BANK)
-    content = gift.write(found)
+    content = gift.format_gift(found)
     assert content.count(old) == 1
-    return merge.merge(BANK, gift.read(content.replace(old, new), "x.gift"), "x.gift")
+    return merge.merge_questions(
+        BANK, gift.read_gift(content.replace(old, new), "x.gift"), "x.gift"
+    )
 
 
 def variant(bank: Bank, name: str) -> dict[str, Any]:
@@ -181,10 +183,10 @@ def test_an_edited_prediction_keeps_its_code() -> None:
 def test_a_new_question_says_what_it_still_needs() -> None:
     found = questions.of_bank(BANK)
     content = (
-        f"{gift.write(found)}\n\n$CATEGORY: ch05/qos-purpose\n\n"
+        f"{gift.format_gift(found)}\n\n$CATEGORY: ch05/qos-purpose\n\n"
         "// by hand\n::qos-purpose-6::Is depth announced?{FALSE#Wrong\\: it is not.#Right.}\n"
     )
-    merged = merge.merge(BANK, gift.read(content, "x.gift"), "x.gift")
+    merged = merge.merge_questions(BANK, gift.read_gift(content, "x.gift"), "x.gift")
     now = variant(merged.bank, "qos-purpose-6")
     assert [(o["text"], o["correct"], o["feedback"]) for o in now["options"]] == [
         ("True", False, "Wrong: it is not."),
@@ -197,7 +199,9 @@ def test_a_new_question_says_what_it_still_needs() -> None:
 
 def test_questions_that_a_file_leaves_out_stay() -> None:
     found = questions.of_bank(BANK)
-    merged = merge.merge(BANK, gift.read(gift.write(found[1:]), "x.gift"), "x.gift")
+    merged = merge.merge_questions(
+        BANK, gift.read_gift(gift.format_gift(found[1:]), "x.gift"), "x.gift"
+    )
     assert merged.bank == BANK
     assert merged.notes == ["x.gift does not have qos-purpose-1: kept as they are."]
 
@@ -244,7 +248,7 @@ QUESTION = "::q::Why?{=a ~b}\n"
 )
 def test_a_bad_file_is_one_sentence_with_file_line_and_question(content: str, problem: str) -> None:
     with pytest.raises(ExchangeError) as caught:
-        gift.read(content, "x.gift")
+        gift.read_gift(content, "x.gift")
     assert str(caught.value).startswith("x.gift")
     assert problem in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -271,19 +275,19 @@ def test_a_bad_file_is_one_sentence_with_file_line_and_question(content: str, pr
 )  # fmt: skip
 def test_what_does_not_fit_the_bank_is_one_sentence(content: str, problem: str) -> None:
     with pytest.raises(ExchangeError) as caught:
-        merge.merge(BANK, gift.read(content, "x.gift"), "x.gift")
+        merge.merge_questions(BANK, gift.read_gift(content, "x.gift"), "x.gift")
     assert str(caught.value).startswith(f"x.gift, {problem}")
 
 
 def test_a_file_as_windows_writes_it_is_read() -> None:
     content = "\ufeff// a comment\r\n::q::Why?{\r\n\t=a#yes\r\n\t~b\r\n}\r\n\r\n"
-    [question] = gift.read(content, "x.gift")
+    [question] = gift.read_gift(content, "x.gift")
     assert question.name == "q"
 
 
 def test_numbers_in_all_their_forms() -> None:
     content = "::a::How many?{#3:0.5}\n\n::b::How many?{#2.5..3.5#ok}\n\n::c::How many?{#3}"
-    numbers = [question.numbers for question in gift.read(content, "x.gift")]  # type: ignore[union-attr]
+    numbers = [question.numbers for question in gift.read_gift(content, "x.gift")]  # type: ignore[union-attr]
     assert numbers == [(Number(3, 0.5, 100),), (Number(3, 0.5, 100, "ok"),), (Number(3, 0, 100),)]
 
 
@@ -322,5 +326,5 @@ def test_somebody_elses_reader_accepts_the_file(tmp_path: Path) -> None:
             assert kind == kinds[one.kind]
             assert count == (1 + len(one.traps) if one.kind == "numeric" else
                              len(one.pairs) + len(one.extras) if one.kind == "matching" else
-                             len(one.texts))  # fmt: skip
+                             len(one.lettered_texts))  # fmt: skip
     assert read == {}

@@ -27,7 +27,7 @@ def option(number: int, **changes: Any) -> list[dict[str, Any]]:
 
 
 def problems(bank: Bank) -> list[str]:
-    return [str(finding) for finding in lint.findings(bank)]
+    return [str(finding) for finding in lint.list_findings(bank)]
 
 
 def test_a_sound_bank_has_no_findings() -> None:

@@ -130,9 +130,9 @@ def test_no_variant_of_the_real_quiz_can_lose_its_proofs(proof: Any) -> None:
     for target in [one for concept in data["concepts"] for one in concept["variants"]]:
         before, target["proof"] = target["proof"], proof
         with pytest.raises(BankError, match=rf"^ch05\.yaml, item '{target['id']}', field proof"):
-            loader.sound(data, "ch05.yaml", "ch05", loader.BANKS)
+            loader.validate_bank(data, "ch05.yaml", "ch05", loader.BANKS)
         target["proof"] = before
-    loader.sound(data, "ch05.yaml", "ch05", loader.BANKS)
+    loader.validate_bank(data, "ch05.yaml", "ch05", loader.BANKS)
 
 
 @pytest.mark.parametrize(

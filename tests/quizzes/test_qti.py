@@ -51,7 +51,7 @@ CHILDREN = {
 
 @pytest.fixture(scope="module")
 def package() -> zipfile.ZipFile:
-    content, _ = qti.package(BANK)
+    content, _ = qti.make_package(BANK)
     archive = zipfile.ZipFile(io.BytesIO(content))
     assert archive.testzip() is None
     return archive
@@ -147,7 +147,7 @@ def test_attempts_and_how_they_count_are_in_the_package(package: zipfile.ZipFile
 
 def test_a_closed_quiz_shows_no_results_in_canvas() -> None:
     bank = loader.read_bank(loader.BANKS.parent / "examples" / "exam.yaml")
-    archive = zipfile.ZipFile(io.BytesIO(qti.package(bank)[0]))
+    archive = zipfile.ZipFile(io.BytesIO(qti.make_package(bank)[0]))
     assert meta(archive, "points_possible") == ["3.0", "3.0"]
     assert meta(archive, "allowed_attempts") == ["1"]
     assert meta(archive, "show_correct_answers") == ["false"]
@@ -237,7 +237,7 @@ def test_the_picture_is_inside(package: zipfile.ZipFile) -> None:
 
 
 def test_the_exporter_says_what_qti_cannot_hold() -> None:
-    said = " ".join(qti.package(BANK)[1])
+    said = " ".join(qti.make_package(BANK)[1])
     for part in ("misconceptions", "pass mark", "pattern-navigation-2", "pattern-camera-3"):
         assert part in said
 
@@ -254,7 +254,7 @@ def changed(**changes: Any) -> Bank:
 
 def test_what_text2qti_refuses_is_one_sentence_that_names_the_item() -> None:
     with pytest.raises(ExchangeError) as caught:
-        qti.package(changed(answer=0.0, tolerance=0.0, traps=[]))
+        qti.make_package(changed(answer=0.0, tolerance=0.0, traps=[]))
     assert str(caught.value).startswith(
         "ch05.yaml, item 'pattern-camera-3' cannot be written as QTI: "
     )
@@ -269,7 +269,7 @@ def test_two_questions_in_the_same_words_are_named() -> None:
     bank = Bank.model_validate(data)
     bank._folder = BANK.folder
     with pytest.raises(ExchangeError, match=rf"items '{twin.id}' and '.*' ask the same thing"):
-        qti.package(bank)
+        qti.make_package(bank)
 
 
 @pytest.mark.parametrize(
@@ -283,7 +283,7 @@ def test_two_questions_in_the_same_words_are_named() -> None:
     ],
 )
 def test_no_text_is_taken_for_a_command(stem: str) -> None:
-    content, _ = qti.package(changed(stem=stem))
+    content, _ = qti.make_package(changed(stem=stem))
     archive = zipfile.ZipFile(io.BytesIO(content))
     [name] = [n for n in archive.namelist() if n.endswith(".xml") and n.count("text2qti_") == 2
               and "meta" not in n]  # fmt: skip

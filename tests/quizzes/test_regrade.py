@@ -41,10 +41,10 @@ def marked(bank: Bank, lines: list[Line]) -> Marked:
 
 def test_the_best_and_the_first_attempt_are_found(bank: Bank, honest: list[Line]) -> None:
     found = marked(bank, honest)
-    assert found.best is not None
-    assert found.first is not None
-    assert (found.best.paper.attempt, found.best.score) == (2, 4.0)
-    assert (found.first.paper.attempt, found.first.score) == (1, 1.0)
+    assert found.best_result is not None
+    assert found.first_result is not None
+    assert (found.best_result.paper.attempt, found.best_result.score) == (2, 4.0)
+    assert (found.first_result.paper.attempt, found.first_result.score) == (1, 1.0)
     assert (found.students, found.problems, found.damaged) == (("ada",), (), 0)
 
 
@@ -92,8 +92,8 @@ def test_an_attempt_that_was_never_dealt_does_not_count(
 ) -> None:
     forge(honest[1])
     found = marked(bank, honest[:2])
-    assert found.best is not None
-    assert found.best.score == 1.0
+    assert found.best_result is not None
+    assert found.best_result.score == 1.0
     assert "answers questions that were not asked in it" in found.problems[0]
 
 
@@ -116,8 +116,8 @@ def test_of_two_attempts_with_one_number_the_first_counts(bank: Bank, honest: li
         honest[1]["answers"]["predict"]["answer"], ""
     )[0]
     found = marked(bank, [honest[1], better])
-    assert found.best is not None
-    assert found.best.score == 3.0
+    assert found.best_result is not None
+    assert found.best_result.score == 3.0
     assert "is there more than once" in found.problems[0]
 
 
@@ -130,7 +130,7 @@ def test_attempts_on_another_edition_are_counted_but_not_marked(
 
 def test_attempts_on_another_quiz_do_not_count(bank: Bank, honest: list[Line]) -> None:
     found = marked(bank, [{**line, "quiz": "ch06"} for line in honest])
-    assert found.best is None
+    assert found.best_result is None
     assert "belongs to the quiz 'ch06'" in found.problems[0]
 
 
@@ -160,8 +160,8 @@ def test_thousands_of_guesses_earn_no_full_marks_and_are_for_a_person(
 ) -> None:
     bank = read_bank(sample.write(tmp_path, sample.data(("single", "predict", "multiple"))))
     content = guesses(bank, 1000, seconds=600, logins=logins, first=first)
-    attempts, damaged = record.parse(content)
-    everything = [regrade.again(bank, attempt) for attempt in attempts]
+    attempts, damaged = record.parse_attempts(content)
+    everything = [regrade.mark_again(bank, attempt) for attempt in attempts]
     assert damaged == 0
     assert max(result.score for result in everything if result) == 3.0, "guesses do come true"
     found = regrade.mark_file(bank, content)
@@ -202,4 +202,4 @@ def test_a_learner_who_tries_often_is_not_doubted(bank: Bank) -> None:
 @pytest.mark.parametrize("content", [b"", b"\n\n", b"\x00" * 1000, b"null\n3\n", b"{}" * 9])
 def test_rubbish_is_no_attempt(bank: Bank, content: bytes) -> None:
     found = regrade.mark_file(bank, content)
-    assert (found.best, found.first, found.students) == (None, None, ())
+    assert (found.best_result, found.first_result, found.students) == (None, None, ())

@@ -19,13 +19,13 @@ EXAMPLES = sorted(schema.EXAMPLES.glob("*.yaml"))
 
 
 def test_the_page_is_what_the_command_prints() -> None:
-    assert PAGE.read_text(encoding="utf-8") == schema.markdown(), (
+    assert PAGE.read_text(encoding="utf-8") == schema.as_markdown(), (
         "run `autograder quiz schema > notebooks/authoring/quizzes.md`"
     )
 
 
 def test_each_field_of_each_part_is_on_the_page_with_what_it_means() -> None:
-    page = schema.markdown()
+    page = schema.as_markdown()
     for model in (Bank, Concept, Option, Trap, Pair, *KINDS.values()):
         for name, field in model.model_fields.items():
             assert field.description, f"{model.__name__}.{name} has no docstring"
@@ -49,14 +49,14 @@ def test_each_field_of_each_part_is_on_the_page_with_what_it_means() -> None:
     ],
 )
 def test_bounds_defaults_and_who_needs_a_field_are_on_the_page(row: str) -> None:
-    assert row in schema.markdown()
+    assert row in schema.as_markdown()
 
 
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_is_sound_and_clean(path: Path) -> None:
     bank = loader.read_bank(path)
-    assert lint.findings(bank) == []
-    assert f"`{path.name}`:\n\n```yaml\n{path.read_text().rstrip()}\n```" in schema.markdown()
+    assert lint.list_findings(bank) == []
+    assert f"`{path.name}`:\n\n```yaml\n{path.read_text().rstrip()}\n```" in schema.as_markdown()
     for answer in lint.wrong_answers(bank):
         if answer.show:
             exec(compile(answer.show, answer.where, "exec"), {})
@@ -68,7 +68,7 @@ def test_there_is_an_example_of_each_sort() -> None:
 
 def test_the_proofs_of_the_example_exist() -> None:
     proofs = Path(__file__).parent / "proofs"
-    for name in re.findall(r"(test_\w+\.py)::(\w+)", schema.markdown()):
+    for name in re.findall(r"(test_\w+\.py)::(\w+)", schema.as_markdown()):
         assert f"def {name[1]}(" in (proofs / name[0]).read_text()
 
 

@@ -32,10 +32,10 @@ def test_nothing_secret_is_in_the_state_before_submission(make_quiz: MakeQuiz) -
     state = json.dumps(widget.get_state(), default=str)
     assert not re.search(sample.SECRET, state, re.IGNORECASE)
     answer_all(quiz, right=4)
-    widget._update()
+    widget._update_traits()
     assert not re.search(sample.SECRET, traits(widget), re.IGNORECASE)
     quiz.submit()
-    widget._update()
+    widget._update_traits()
     assert sample.SECRET in traits(widget), "the mark is one that would be found"
 
 
@@ -64,7 +64,7 @@ def other_keys(data: dict[str, Any]) -> dict[str, Any]:
 
 def turned(bank: Bank, student: str) -> bool:
     """Whether an ordering was turned by one, as those are that would show the right order."""
-    item = model.draw(bank, student, 1).item("ordering")
+    item = model.draw(bank, student, 1).find_item("ordering")
     assert item is not None
     return [item.order[-1], *item.order[:-1]] == sorted(item.order)
 
@@ -84,7 +84,7 @@ def test_the_state_is_the_same_whatever_the_key_is(tmp_path: Path) -> None:
         for number, bank in enumerate(banks):
             quiz = Quiz(bank, student=student, folder=tmp_path / str(number))
             states.add(traits(QuizWidget(quiz)))
-            keys.update((item.concept.id, model.key(item)) for item in quiz.items)
+            keys.update((item.concept.id, model.right_answer(item)) for item in quiz.items)
         assert len(states) == 1
         assert len(keys) == 2 * len(kinds)
 
@@ -99,7 +99,7 @@ def test_no_feedback_of_a_real_bank_is_in_the_state(name: str, tmp_path: Path) -
             for part in (fields, *fields.get("options", []), *fields.get("traps", [])):
                 for field in ("feedback", "wrong_feedback", "show"):
                     if part.get(field) and part[field] != variant.code:
-                        secrets.add(rendering.plain(part[field]))
+                        secrets.add(rendering.render_plain(part[field]))
     for student in range(8):
         quiz = Quiz(bank, student=f"student-{student}", folder=tmp_path)
         shown = traits(QuizWidget(quiz))
@@ -110,7 +110,7 @@ def test_no_feedback_of_a_real_bank_is_in_the_state(name: str, tmp_path: Path) -
 
 
 def test_html_in_a_bank_is_text(make_quiz: MakeQuiz) -> None:
-    paper = view.paper(make_quiz())
+    paper = view.paper_data(make_quiz())
     html = [q[field] for q in paper["questions"] for field in ("stem", "code")]
     html += [one["html"] for q in paper["questions"] for one in (*q["options"], *q["lefts"])]
     text = " ".join(html)
@@ -121,7 +121,7 @@ def test_html_in_a_bank_is_text(make_quiz: MakeQuiz) -> None:
 
 
 def test_a_question_brings_all_it_needs(make_quiz: MakeQuiz) -> None:
-    stem = view.paper(make_quiz())["questions"][0]["stem"]
+    stem = view.paper_data(make_quiz())["questions"][0]["stem"]
     assert '<span class="k">for</span>' in stem
     assert "<mfrac>" in stem
     assert 'src="data:image/svg+xml;base64,' in stem
@@ -139,7 +139,7 @@ def test_a_question_brings_all_it_needs(make_quiz: MakeQuiz) -> None:
     ],
 )
 def test_inline_markdown(markdown: str, html: str, tmp_path: Path) -> None:
-    assert rendering.inline(markdown, tmp_path) == html
+    assert rendering.render_inline(markdown, tmp_path) == html
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_inline_markdown(markdown: str, html: str, tmp_path: Path) -> None:
 )
 def test_latex_that_is_no_formula_is_refused(latex: str, says: str, tmp_path: Path) -> None:
     with pytest.raises(RenderError) as caught:
-        rendering.block(f"${latex}$", tmp_path)
+        rendering.render_block(f"${latex}$", tmp_path)
     assert says in str(caught.value)
 
 
@@ -166,18 +166,18 @@ def test_latex_that_is_no_formula_is_refused(latex: str, says: str, tmp_path: Pa
      r"\begin{pmatrix}a&b\\c&d\end{pmatrix}", r"\mathbb{R} \ge \Delta t"],
 )  # fmt: skip
 def test_latex_becomes_mathml(latex: str, tmp_path: Path) -> None:
-    assert "<math " in rendering.block(f"${latex}$ and\n\n$$\n{latex}\n$$\n", tmp_path)
+    assert "<math " in rendering.render_block(f"${latex}$ and\n\n$$\n{latex}\n$$\n", tmp_path)
 
 
 def test_code_in_an_option_keeps_its_lines(tmp_path: Path) -> None:
-    shown = rendering.inline("```python\na = 1\nb = '<'\n```", tmp_path)
+    shown = rendering.render_inline("```python\na = 1\nb = '<'\n```", tmp_path)
     assert shown.startswith("<pre ")
     assert "\n" in shown
     assert "&lt;" in shown
 
 
 def test_plain_text_has_no_marks() -> None:
-    assert rendering.plain("**a** `b` [c](d) $x^2$\n\nnext\nline") == "a b c x^2 next line"
+    assert rendering.render_plain("**a** `b` [c](d) $x^2$\n\nnext\nline") == "a b c x^2 next line"
 
 
 @pytest.mark.parametrize(
@@ -236,7 +236,7 @@ def test_what_the_page_shows_is_submitted_even_if_an_answer_is_on_its_way(
 ) -> None:
     quiz = make_quiz()
     widget = QuizWidget(quiz)
-    keys = {item.number: model.key(item) for item in quiz.items}
+    keys = {item.number: model.right_answer(item) for item in quiz.items}
     for order, (number, key) in enumerate(list(keys.items())[:-1], start=1):
         widget._on_message(widget, sent(quiz, order, type="answer", number=number, answer=key), [])
     shown = {str(number): key for number, key in keys.items()}

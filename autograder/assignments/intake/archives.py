@@ -78,7 +78,7 @@ def look_into(path: Path) -> Archive:
         raise ArchiveError(f"it cannot be read ({error.strerror or error})") from None
     if len(content) > MAX_ARCHIVE:
         raise ArchiveError(f"it has more than {MAX_ARCHIVE // 2**20} MB")
-    _bound(content)
+    _check_index(content)
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             entries = archive.infolist()
@@ -86,10 +86,10 @@ def look_into(path: Path) -> Archive:
         raise ArchiveError(f"it is damaged ({str(error)[:100]})") from None
     if len(entries) > MAX_MEMBERS:
         raise ArchiveError(f"it has more than {MAX_MEMBERS} members")
-    return Archive(content, {_name(entry): entry for entry in entries if _is_file(entry)})
+    return Archive(content, {_member_name(entry): entry for entry in entries if _is_file(entry)})
 
 
-def _bound(content: bytes) -> None:
+def _check_index(content: bytes) -> None:
     """Refuse an archive whose table of contents is too large, before it is read."""
     size, mark = _ENDS
     at = content.rfind(mark, -(_LONGEST_COMMENT + size))
@@ -106,7 +106,7 @@ def _is_file(entry: zipfile.ZipInfo) -> bool:
     return stat.S_IFMT(mode) in (0, stat.S_IFREG) and not entry.is_dir()
 
 
-def _name(entry: zipfile.ZipInfo) -> str:
+def _member_name(entry: zipfile.ZipInfo) -> str:
     """Return a member's name; many programs write UTF-8 without saying so (`zipfile`: CP437)."""
     if entry.flag_bits & _UTF8_FLAG:
         return entry.filename

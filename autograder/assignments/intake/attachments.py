@@ -6,8 +6,8 @@ import stat
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from autograder.assignments.intake.file_names import normal, shown
-from autograder.files import MAX_FILES, walk
+from autograder.assignments.intake.file_names import normalise_name, printable_name
+from autograder.files import MAX_FILES, walk_files
 
 MAX_BYTES = 10 * 1024 * 1024
 """Bytes of other files that are given to a submission's code."""
@@ -34,7 +34,7 @@ def files_beside(folder: Path) -> Attachments:
     Hidden files belong to nobody's work and are passed over. Links, what is over `MAX_BYTES` in
     all, and files beyond the first `MAX_FILES` are left out with a note.
     """
-    paths = walk(folder)
+    paths = walk_files(folder)
     beside, too_large, links, room = Attachments(), [], [], MAX_BYTES
     for path in sorted(paths):
         name = path.relative_to(folder)
@@ -48,16 +48,18 @@ def files_beside(folder: Path) -> Attachments:
                 too_large.append(str(name))
             else:
                 # What macOS writes decomposed, code names as it is typed.
-                beside.files[normal(str(name))] = path.read_bytes()
+                beside.files[normalise_name(str(name))] = path.read_bytes()
                 room -= status.st_size
     if too_large:
         beside.notes.append(
-            f"Your code was run without {named(too_large)}: the files beside the notebooks may "
+            f"Your code was run without {summarise_names(too_large)}: the files beside the "
+            "notebooks may "
             f"have {MAX_BYTES // 2**20} MB together. Hand in smaller ones."
         )
     if links:
         beside.notes.append(
-            f"Your code was run without {named(links)}: a link leads out of the submission. Hand "
+            f"Your code was run without {summarise_names(links)}: a link leads out of the "
+            "submission. Hand "
             "in the file itself."
         )
     if len(paths) >= MAX_FILES:
@@ -73,8 +75,8 @@ def _is_passed_over(name: Path) -> bool:
     return hidden or name.suffix == ".ipynb" or name == Path("timestamp.txt")
 
 
-def named(names: list[str]) -> str:
+def summarise_names(names: list[str]) -> str:
     """Return the first few ``names`` of a stranger's files, and how many more there are."""
-    quoted = [f"'{shown(name)[:100]}'" for name in names]
+    quoted = [f"'{printable_name(name)[:100]}'" for name in names]
     more = len(quoted) - _MOST_NAMED
     return ", ".join(quoted[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -16,7 +16,13 @@ from pathlib import Path
 
 from autograder.assignments.intake import claim_records
 from autograder.assignments.intake.archives import ArchiveError
-from autograder.assignments.intake.file_names import entry, listed, normal, quoted, shown
+from autograder.assignments.intake.file_names import (
+    find_entry,
+    join_names,
+    normalise_name,
+    printable_name,
+    quote_name,
+)
 from autograder.assignments.intake.handed_in import NOTEBOOK, Item, handed_out, look_through
 from quizzes import record
 
@@ -56,14 +62,14 @@ class _Holding:
 
 def with_attempts(items: Iterable[Item]) -> Iterator[tuple[Item, list[record.Attempt]]]:
     """Yield the files that hold attempts at any quiz, and the attempts."""
-    marked = ((item, _read(item)) for item in islice(items, MAX_OPENED))
+    marked = ((item, _read_item(item)) for item in islice(items, MAX_OPENED))
     likely = ((item, content) for item, content in marked if _MARK in content)
     for item, content in islice(likely, MAX_READ):
-        if attempts := record.parse(content)[0]:
+        if attempts := record.parse_attempts(content)[0]:
             yield item, attempts
 
 
-def find(
+def find_attempts(
     folder: Path, quiz: str, student: str, root: Path, roster: Collection[str] = ()
 ) -> Attempts:
     """Return a student's attempts at a quiz that lie in a submission.
@@ -79,78 +85,84 @@ def find(
         OSError: the file is there and cannot be read.
         ClaimError: the file of claims is damaged.
     """
-    name, key = record.filename(quiz), f"quiz-{quiz}"
-    command = f"autograder claim {quoted(folder.name)} {quoted(student)} {quoted(key)}"
+    name, key = record.attempts_filename(quiz), f"quiz-{quiz}"
+    command = f"autograder claim {quote_name(folder.name)} {quote_name(student)} {quote_name(key)}"
     claim = claim_records.of_student(root, folder.name, student).get(key)
     if claim is not None:
         handed_in = look_through(folder)
-        if claim.state == claim_records.state(folder, handed_in, name, claim.file):
-            item = handed_in.at(claim.file) if claim.file else None
+        if claim.state == claim_records.digest_state(folder, handed_in, name, claim.file):
+            item = handed_in.find_item(claim.file) if claim.file else None
             if item is None:
                 return Attempts(nothing=True)
-            return Attempts(_read(item), f"'{shown(item.place)}' counts, as a person has said.")
-    class_ = _with_folders(root) | {normal(name) for name in roster}
-    return _of_the_student(_unclaimed(folder, quiz, command, root), student, class_)
+            return Attempts(
+                _read_item(item), f"'{printable_name(item.place)}' counts, as a person has said."
+            )
+    class_ = _with_folders(root) | {normalise_name(name) for name in roster}
+    return _of_the_student(_find_unclaimed(folder, quiz, command, root), student, class_)
 
 
-def _unclaimed(folder: Path, quiz: str, command: str, root: Path) -> Attempts:
+def _find_unclaimed(folder: Path, quiz: str, command: str, root: Path) -> Attempts:
     """Return what counts, or may count, if no person has said it."""
-    name = record.filename(quiz)
-    path = entry(folder, name)
+    name = record.attempts_filename(quiz)
+    path = find_entry(folder, name)
     given = handed_out(root / "release" / folder.name)
     others = [
-        item for item in look_through(folder).unclaimed(given)
+        item for item in look_through(folder).unclaimed_items(given)
         if item.path != path and NOTEBOOK not in item.name.lower()
     ]  # fmt: skip
     if path.is_symlink() or path.exists():
-        return _proper(path, others, quiz, command)
-    found = _distinct(others, quiz)
+        return _read_proper_file(path, others, quiz, command)
+    found = _distinct_files(others, quiz)
     if len(found) == 1:
         item = found[0].item
-        said = f"There was no {name}, but '{shown(item.place)}' holds attempts, so it counts."
-        return Attempts(_read(item), said, command=f"{command} {quoted(item.place)}")
-    return _asked(f"There is no {name}", found, others, command)
+        said = (
+            f"There was no {name}, but '{printable_name(item.place)}' holds attempts, so it counts."
+        )
+        return Attempts(_read_item(item), said, command=f"{command} {quote_name(item.place)}")
+    return _ask_about_files(f"There is no {name}", found, others, command)
 
 
-def _proper(path: Path, others: list[Item], quiz: str, command: str) -> Attempts:
+def _read_proper_file(path: Path, others: list[Item], quiz: str, command: str) -> Attempts:
     """Return the attempts in the file of their own, unless others are more likely meant."""
-    name = record.filename(quiz)
+    name = record.attempts_filename(quiz)
     try:
         content = record.read_plain(path, record.MAX_FILE + 1)
     except OSError:
         if not others:
             raise
         content = b""
-    own = _hashes(record.parse(content)[0], quiz)
-    found = [file for file in _distinct(others, quiz) if not file.attempts <= own]
+    own = _hash_attempts(record.parse_attempts(content)[0], quiz)
+    found = [file for file in _distinct_files(others, quiz) if not file.attempts <= own]
     if not own:
-        asked = _asked(f"{name} holds no attempt at the quiz", found, others, command)
+        asked = _ask_about_files(f"{name} holds no attempt at the quiz", found, others, command)
         return asked if asked.question else Attempts(content)
     if not found:
-        return Attempts(content, command=f"{command} {quoted(name)}")
+        return Attempts(content, command=f"{command} {quote_name(name)}")
     return Attempts(
         content,
-        question=f"Beside {name} there is {_places(found)}, too, with other attempts: a person has "
-        "to say what counts.",
-        command=f"{command} {quoted(found[0].item.place)}",
+        question=f"Beside {name} there is {_list_places(found)}, too, with other attempts: "
+        "a person has to say what counts.",
+        command=f"{command} {quote_name(found[0].item.place)}",
     )
 
 
-def _asked(said: str, found: list[_Holding], others: list[Item], command: str) -> Attempts:
+def _ask_about_files(
+    said: str, found: list[_Holding], others: list[Item], command: str
+) -> Attempts:
     """Ask a person about the files that hold attempts, or else about all that may."""
     places = [file.item.place for file in found] or [item.place for item in others]
     if not places:
         return Attempts()
     verb = "is" if len(places) == 1 else "are"
     return Attempts(
-        question=f"{said}, but there {verb} {listed(places)}: a person has to say what counts.",
-        command=f"{command} {quoted(found[0].item.place) if found else 'FILE'}",
+        question=f"{said}, but there {verb} {join_names(places)}: a person has to say what counts.",
+        command=f"{command} {quote_name(found[0].item.place) if found else 'FILE'}",
     )
 
 
-def _distinct(items: Iterable[Item], quiz: str) -> list[_Holding]:
+def _distinct_files(items: Iterable[Item], quiz: str) -> list[_Holding]:
     """Return the files with attempts at a quiz, but none whose attempts are all in another."""
-    found = [_Holding(item, _hashes(made, quiz)) for item, made in with_attempts(items)]
+    found = [_Holding(item, _hash_attempts(made, quiz)) for item, made in with_attempts(items)]
     distinct: list[_Holding] = []
     for file in sorted(found, key=lambda file: -len(file.attempts)):
         if file.attempts and not any(file.attempts <= other.attempts for other in distinct):
@@ -158,24 +170,26 @@ def _distinct(items: Iterable[Item], quiz: str) -> list[_Holding]:
     return distinct
 
 
-def _hashes(attempts: Iterable[record.Attempt], quiz: str) -> frozenset[int]:
+def _hash_attempts(attempts: Iterable[record.Attempt], quiz: str) -> frozenset[int]:
     return frozenset(hash(attempt.to_json()) for attempt in attempts if attempt.quiz == quiz)
 
 
-def _places(found: list[_Holding]) -> str:
-    return listed(file.item.place for file in found)
+def _list_places(found: list[_Holding]) -> str:
+    return join_names(file.item.place for file in found)
 
 
 def _of_the_student(found: Attempts, student: str, class_: Collection[str]) -> Attempts:
     """Ask a person if attempts carry the login of somebody else in the class."""
     if found.content is None:
         return found
-    logins = dict.fromkeys(normal(a.student) for a in record.parse(found.content)[0])
-    others = [login for login in logins if login != normal(student)]
+    logins = dict.fromkeys(
+        normalise_name(a.student) for a in record.parse_attempts(found.content)[0]
+    )
+    others = [login for login in logins if login != normalise_name(student)]
     known = [login for login in others if login in class_]
     if not known:
         return found
-    who = listed(known)
+    who = join_names(known)
     said = (
         f"The attempts were made under the login of {who}, who is in the class, too: a person has "
         "to say whether they count."
@@ -186,18 +200,18 @@ def _of_the_student(found: Attempts, student: str, class_: Collection[str]) -> A
 def _with_folders(root: Path) -> frozenset[str]:
     submitted = root / "submitted"
     try:
-        return _names(submitted, submitted.stat().st_mtime_ns)
+        return _folder_names(submitted, submitted.stat().st_mtime_ns)
     except OSError:
         return frozenset()
 
 
 @lru_cache(maxsize=2)
-def _names(submitted: Path, changed_ns: int) -> frozenset[str]:
+def _folder_names(submitted: Path, changed_ns: int) -> frozenset[str]:
     """Return the students who have a folder; it is read again once ``changed_ns`` is another."""
-    return frozenset(normal(path.name) for path in submitted.iterdir() if path.is_dir())
+    return frozenset(normalise_name(path.name) for path in submitted.iterdir() if path.is_dir())
 
 
-def _read(item: Item) -> bytes:
+def _read_item(item: Item) -> bytes:
     try:
         return item.read(record.MAX_FILE + 1)
     except (OSError, ArchiveError):

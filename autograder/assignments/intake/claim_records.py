@@ -16,7 +16,7 @@ from typing import Any
 from filelock import FileLock
 
 from autograder.assignments.intake import folder_digest
-from autograder.assignments.intake.file_names import entry, normal
+from autograder.assignments.intake.file_names import find_entry, normalise_name
 from autograder.assignments.intake.handed_in import HandedIn
 from autograder.assignments.submission import MAX_NOTEBOOK
 from autograder.files import write_whole
@@ -38,14 +38,14 @@ class Claim:
 
     Attributes:
         file: where it lies in the submission; empty if nothing was handed in.
-        state: digest of what the claim is about (see `state`).
+        state: digest of what the claim is about (see `digest_state`).
     """
 
     file: str
     state: str
 
 
-def state(folder: Path, handed_in: HandedIn, proper: str, file: str) -> str:
+def digest_state(folder: Path, handed_in: HandedIn, proper: str, file: str) -> str:
     """Return a digest of what a claim depends on.
 
     That is the file itself, and what lies at its ``proper`` place; for the claim that there is
@@ -53,10 +53,12 @@ def state(folder: Path, handed_in: HandedIn, proper: str, file: str) -> str:
     """
     if not file:
         return folder_digest.of_folder(folder)
-    item = handed_in.at(file)
+    item = handed_in.find_item(file)
     content = item.digest(MAX_NOTEBOOK + 1) if item else ""
     there = (
-        folder_digest.of_folder(entry(folder, proper)) if entry(folder, proper).is_file() else ""
+        folder_digest.of_folder(find_entry(folder, proper))
+        if find_entry(folder, proper).is_file()
+        else ""
     )
     return hashlib.sha256(f"{content} {there}".encode()).hexdigest()
 
@@ -69,11 +71,11 @@ def of_student(root: Path, assignment: str, student: str) -> dict[str, Claim]:
     Raises:
         ClaimError: the file of claims is damaged.
     """
-    claims = _load(root).get(assignment, {}).get(normal(student), {})
+    claims = _load_claims(root).get(assignment, {}).get(normalise_name(student), {})
     return {name: Claim(data["file"], data["state"]) for name, data in claims.items()}
 
 
-def keep(root: Path, assignment: str, student: str, name: str, claim: Claim | None) -> None:
+def keep_claim(root: Path, assignment: str, student: str, name: str, claim: Claim | None) -> None:
     """Keep a claim in place of an earlier one; None takes it back.
 
     Raises:
@@ -83,8 +85,8 @@ def keep(root: Path, assignment: str, student: str, name: str, claim: Claim | No
     lock = root / ".autograder" / "claims.lock"
     lock.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(lock):
-        found = _load(root)
-        of_student = found.setdefault(assignment, {}).setdefault(normal(student), {})
+        found = _load_claims(root)
+        of_student = found.setdefault(assignment, {}).setdefault(normalise_name(student), {})
         of_student.pop(name, None)
         if claim is not None:
             of_student[name] = asdict(claim)
@@ -92,7 +94,7 @@ def keep(root: Path, assignment: str, student: str, name: str, claim: Claim | No
         write_whole(root / FILE, json.dumps(data, indent=1, sort_keys=True) + "\n")
 
 
-def _load(root: Path) -> dict[str, Any]:
+def _load_claims(root: Path) -> dict[str, Any]:
     path = root / FILE
     try:
         data = json.loads(path.read_text(encoding="utf-8"))

@@ -17,27 +17,29 @@ LONGEST_SHOWN = 300
 _MOST_NAMED = 4
 
 
-def normal(name: str) -> str:
+def normalise_name(name: str) -> str:
     """Return a name in the composed form, in which equal names are equal strings."""
     return unicodedata.normalize("NFC", name)
 
 
-def same(one: str, other: str) -> bool:
+def is_same_name(one: str, other: str) -> bool:
     """Whether two names read the same."""
-    return normal(one) == normal(other)
+    return normalise_name(one) == normalise_name(other)
 
 
-def meant(name: str, known: Collection[str]) -> str:
+def match_name(name: str, known: Collection[str]) -> str:
     """Return which of the ``known`` names one means: that, or else one that reads the same.
 
     A name that means none of them comes back in the composed form.
     """
     if name in known:
         return name
-    return next((other for other in sorted(known) if same(other, name)), normal(name))
+    return next(
+        (other for other in sorted(known) if is_same_name(other, name)), normalise_name(name)
+    )
 
 
-def entry(folder: Path, name: str) -> Path:
+def find_entry(folder: Path, name: str) -> Path:
     """Return where ``name`` lies in a folder, in whichever form it is written there.
 
     What lies there under exactly this name comes first; if there is nothing, that is its place.
@@ -46,31 +48,36 @@ def entry(folder: Path, name: str) -> Path:
     if place.is_symlink() or place.exists():
         return place
     try:
-        return next((path for path in sorted(folder.iterdir()) if same(path.name, name)), place)
+        return next(
+            (path for path in sorted(folder.iterdir()) if is_same_name(path.name, name)), place
+        )
     except OSError:
         return place
 
 
-def shown(name: str) -> str:
+def printable_name(name: str) -> str:
     """Return a name as it can be shown: line breaks and other control characters as escapes."""
-    text = "".join(_escaped(letter) for letter in normal(name))
+    text = "".join(_escape_letter(letter) for letter in normalise_name(name))
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}…"
 
 
-def listed(names: Iterable[str]) -> str:
+def join_names(names: Iterable[str]) -> str:
     """Return names as part of a sentence, in quotes; of many only the first."""
-    some = [f"'{shown(name)}'" for name in names]
+    some = [f"'{printable_name(name)}'" for name in names]
     if len(some) > _MOST_NAMED:
         return f"{', '.join(some[:_MOST_NAMED])} and {len(some) - _MOST_NAMED} more"
     return " and ".join(filter(None, [", ".join(some[:-1]), *some[-1:]]))
 
 
-def quoted(name: str) -> str:
-    """Return a name as it is typed in a shell; `shown` if it has characters that nobody types."""
-    return shlex.quote(shown(name))
+def quote_name(name: str) -> str:
+    """Return a name as it is typed in a shell.
+
+    It is the `printable_name` if it has characters that nobody types.
+    """
+    return shlex.quote(printable_name(name))
 
 
-def _escaped(letter: str) -> str:
+def _escape_letter(letter: str) -> str:
     if letter.isprintable():
         return letter
     return letter.encode("unicode_escape", "surrogatepass").decode("ascii")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from autograder.assignments.intake.attachments import MAX_BYTES
 from autograder.assignments.submission import MAX_NOTEBOOK
-from autograder.files import walk
+from autograder.files import walk_files
 
 MAX_FILE = MAX_NOTEBOOK + MAX_BYTES
 """Bytes of one file beyond which only its size and date are looked at: it is not read anyway."""
@@ -18,14 +18,14 @@ MAX_FILE = MAX_NOTEBOOK + MAX_BYTES
 def of_folder(folder: Path) -> str:
     """Return a digest of a file or of a folder's files: names, kinds and contents."""
     state = hashlib.sha256()
-    paths = [folder] if folder.is_file() else sorted(walk(folder))
+    paths = [folder] if folder.is_file() else sorted(walk_files(folder))
     for path in paths:
         name = os.fsencode(path.relative_to(folder) if path != folder else path.name)
-        state.update(name + b"\0" + _content(path) + b"\0")
+        state.update(name + b"\0" + _digest_file(path) + b"\0")
     return state.hexdigest()
 
 
-def _content(path: Path) -> bytes:
+def _digest_file(path: Path) -> bytes:
     try:
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) or status.st_size > MAX_FILE:

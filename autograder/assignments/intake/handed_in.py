@@ -9,8 +9,8 @@ from pathlib import Path, PurePosixPath
 
 from autograder.assignments.intake import archives
 from autograder.assignments.intake.archives import Archive, ArchiveError
-from autograder.assignments.intake.file_names import normal, shown
-from autograder.files import walk
+from autograder.assignments.intake.file_names import normalise_name, printable_name
+from autograder.files import walk_files
 from quizzes.record import read_plain
 
 NBGRADERS = ("timestamp.txt", "submission_secret.txt")
@@ -78,13 +78,13 @@ class HandedIn:
     items: tuple[Item, ...]
     closed: dict[str, str]
 
-    def at(self, place: str) -> Item | None:
+    def find_item(self, place: str) -> Item | None:
         """Return the file that lies at ``place``, written or shown in whichever way."""
         exact = (item for item in self.items if item.place == place)
-        alike = (item for item in self.items if shown(item.place) == normal(place))
+        alike = (item for item in self.items if printable_name(item.place) == normalise_name(place))
         return next(exact, None) or next(alike, None)
 
-    def unclaimed(self, given: Collection[str]) -> list[Item]:
+    def unclaimed_items(self, given: Collection[str]) -> list[Item]:
         """Return the files that may hold work: all but those ``given``, wherever they lie now.
 
         What lies in a zip file stands for it, if it could be opened.
@@ -93,10 +93,10 @@ class HandedIn:
         return [
             item for item in self.items
             if not (item.archive is None and item.path in opened)
-            and not any(f"/{normal(item.place)}".endswith(f"/{place}") for place in given)
+            and not any(f"/{normalise_name(item.place)}".endswith(f"/{place}") for place in given)
         ]  # fmt: skip
 
-    def beside(self, item: Item) -> Iterator[tuple[str, Item]]:
+    def items_beside(self, item: Item) -> Iterator[tuple[str, Item]]:
         """Yield (path as seen from there, file) of what lies in the folder of ``item``."""
         for other in self.items:
             together = other.path == item.path if item.archive else other.archive is None
@@ -109,7 +109,7 @@ def look_through(folder: Path) -> HandedIn:
     items: list[Item] = []
     closed: dict[str, str] = {}
     opened = 0
-    for path in walk(folder):
+    for path in walk_files(folder):
         place = path.relative_to(folder).as_posix()
         if is_junk(place):
             continue
@@ -131,7 +131,7 @@ def look_through(folder: Path) -> HandedIn:
 
 def handed_out(release: Path) -> frozenset[str]:
     """Return the places of the files that an assignment gives to students beside its notebooks."""
-    places = (normal(path.relative_to(release).as_posix()) for path in walk(release))
+    places = (normalise_name(path.relative_to(release).as_posix()) for path in walk_files(release))
     return frozenset(place for place in places if not place.endswith(NOTEBOOK))
 
 

@@ -11,7 +11,7 @@ import nbformat
 from nbformat import NotebookNode
 
 from autograder.assignments import questions
-from autograder.assignments.submission import grade_id, is_locked, metadata
+from autograder.assignments.submission import grade_id, is_locked, nbgrader_metadata
 
 LONGEST_ANSWER = 100_000
 """Characters of a written answer."""
@@ -55,7 +55,7 @@ class Cells:
         self.answers = [name for name, cell in self.reference.items() if is_answer(cell)]
         self.work = [
             name for name, cell in self.reference.items()
-            if metadata(cell).get("solution") and name not in self.answers
+            if nbgrader_metadata(cell).get("solution") and name not in self.answers
         ]  # fmt: skip
         self.taken: list[str] = []
         self.moved: list[str] = []
@@ -67,21 +67,21 @@ class Cells:
         cells: list[NotebookNode] = self.submitted.cells
         return cells
 
-    def called(self, name: str) -> str:
+    def cell_title(self, name: str) -> str:
         """Return what a cell is called: by its question, or by its grade id if it has none."""
         question = questions.of_notebook(self._released, "").get(name)
         return question.title if question else name
 
-    def known(self) -> set[str]:
+    def known_ids(self) -> set[str]:
         """Return the grade ids that are there."""
         return {grade_id(cell) for cell in self.cells} & self.reference.keys()
 
-    def missing(self) -> list[str]:
+    def missing_ids(self) -> list[str]:
         """Return the grade ids that are not, in their order."""
-        known = self.known()
+        known = self.known_ids()
         return [name for name in self.reference if name not in known]
 
-    def unknown(self) -> list[NotebookNode]:
+    def unknown_cells(self) -> list[NotebookNode]:
         """Return the cells that are none of the assignment's, and hold something."""
         return [
             cell for cell in self.cells
@@ -94,9 +94,11 @@ class Cells:
 
     def is_given(self, cell: NotebookNode) -> bool:
         """Whether a cell holds nothing but a text that was handed out."""
-        return plain(cell.source) in {plain(given.source) for given in self.reference.values()}
+        return strip_line_ends(cell.source) in {
+            strip_line_ends(given.source) for given in self.reference.values()
+        }
 
-    def added(self, cell: NotebookNode) -> str:
+    def added_lines(self, cell: NotebookNode) -> str:
         """Return the lines that a student has added to a given cell."""
         own = self.reference.get(grade_id(cell))
         if own is None or not is_locked(own):
@@ -104,13 +106,13 @@ class Cells:
         lines = {line.strip() for line in own.source.splitlines()}
         return "\n".join(line for line in cell.source.splitlines() if line.strip() not in lines)
 
-    def take(self, name: str, cell: NotebookNode, *, said: bool = True) -> None:
+    def take_cell(self, name: str, cell: NotebookNode, *, said: bool = True) -> None:
         """Give a cell the grade id ``name``; ``said``: the student is told."""
         cell.metadata = nbformat.from_dict({"nbgrader": {"grade_id": name}})  # type: ignore[no-untyped-call]
         if said:
             self.taken.append(name)
 
-    def doubt(self, names: list[str], why: str) -> None:
+    def doubt_cells(self, names: list[str], why: str) -> None:
         """Have a person look at some cells, and why."""
         for name in names:
             self.said.doubts.setdefault(name, why)
@@ -118,23 +120,23 @@ class Cells:
 
 def is_answer(cell: NotebookNode) -> bool:
     """Whether a cell is for a written answer."""
-    data = metadata(cell)
+    data = nbgrader_metadata(cell)
     return bool(data.get("solution") and data.get("grade")) and cell.cell_type == "markdown"
 
 
 def is_code(cell: NotebookNode) -> bool:
     """Whether a cell holds code; a cell of text may, if its type was changed by mistake."""
-    return bool(cell.cell_type == "code" or (defined(cell.source) and parses(cell.source)))
+    return bool(cell.cell_type == "code" or (defined_names(cell.source) and is_python(cell.source)))
 
 
 def is_text(cell: NotebookNode) -> bool:
     """Whether a cell may hold an answer: text, or code that is none or says nothing but text."""
     if not cell.source.strip():
         return False
-    return bool(cell.cell_type != "code" or not parses(cell.source) or _only_says(cell.source))
+    return bool(cell.cell_type != "code" or not is_python(cell.source) or _only_says(cell.source))
 
 
-def parses(source: str) -> bool:
+def is_python(source: str) -> bool:
     """Whether a text is sound Python; what nobody would write as an answer is not looked at."""
     if len(source) > LONGEST_ANSWER:
         return True
@@ -165,11 +167,11 @@ def _only_says(source: str) -> bool:
     )
 
 
-def defined(source: str) -> set[str]:
+def defined_names(source: str) -> set[str]:
     """Return the names that code defines at its top level, whether or not it is sound."""
     return {name for found in _DEFINED.findall(source) for name in found if name}
 
 
-def plain(source: str) -> str:
+def strip_line_ends(source: str) -> str:
     """Return a text without what editors change by themselves at the ends of lines."""
     return "\n".join(line.rstrip() for line in source.strip().splitlines())

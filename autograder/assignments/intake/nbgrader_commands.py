@@ -14,18 +14,18 @@ from nbgrader.api import Gradebook
 from nbgrader.coursedir import CourseDirectory
 
 from autograder.assignments.intake import claim_records, open_questions
-from autograder.assignments.intake.file_names import entry, quoted
+from autograder.assignments.intake.file_names import find_entry, quote_name
 from autograder.assignments.intake.handed_in import handed_out
 from autograder.assignments.intake.notebooks import Intake, UnclearError
 from autograder.assignments.submission import SubmissionError
 
 
-def submitted(coursedir: CourseDirectory, assignment: str, student: str) -> Path:
+def submitted_folder(coursedir: CourseDirectory, assignment: str, student: str) -> Path:
     """Return the folder of a submission, as nbgrader's configuration has it."""
     return Path(coursedir.format_path(coursedir.submitted_directory, student, assignment))
 
 
-def students(coursedir: CourseDirectory) -> frozenset[str]:
+def known_students(coursedir: CourseDirectory) -> frozenset[str]:
     """Return the students whom the gradebook knows."""
     with Gradebook(coursedir.db_url, coursedir.course_id) as gradebook:
         return frozenset(student.id for student in gradebook.students)
@@ -39,17 +39,17 @@ def look_into(
 ) -> Intake:
     """Return the intake of one submission; ``released`` are the assignment's notebooks."""
     return Intake(
-        submitted(coursedir, assignment, student),
+        submitted_folder(coursedir, assignment, student),
         released,
         claim_records.of_student(Path(coursedir.root), assignment, student),
-        whose=f"{quoted(assignment)} {quoted(student)}",
+        whose=f"{quote_name(assignment)} {quote_name(student)}",
         given=handed_out(Path(coursedir.format_path(coursedir.release_directory, ".", assignment))),
     )
 
 
-def missing(folder: Path, names: list[str]) -> list[str]:
+def missing_notebooks(folder: Path, names: list[str]) -> list[str]:
     """Return which notebooks nbgrader does not find in a submission."""
-    return [name for name in names if not entry(folder, f"{name}.ipynb").is_file()]
+    return [name for name in names if not find_entry(folder, f"{name}.ipynb").is_file()]
 
 
 def ask_about(
@@ -63,8 +63,8 @@ def ask_about(
     """Have a person look at the notebooks ``names``, which nbgrader has not found, if need be."""
     for name in names:
         try:
-            found = intake.notebook(name)
-            why = " ".join((*found.notes, f"`autograder grade {quoted(assignment)}` takes it."))
+            found = intake.find_notebook(name)
+            why = " ".join((*found.notes, f"`autograder grade {quote_name(assignment)}` takes it."))
         except UnclearError as error:
             why = f"{error} {error.suggestion}"
         except SubmissionError:
@@ -73,5 +73,5 @@ def ask_about(
         for grade in grades:
             grade.needs_manual_grade = True
         question = open_questions.Question(why, tuple(grade.name for grade in grades))
-        open_questions.keep(work, assignment, student, name, question)
+        open_questions.keep_question(work, assignment, student, name, question)
     gradebook.db.commit()

@@ -21,7 +21,13 @@ from autograder.assignments.intake import attempts, cell_matching, claim_records
 from autograder.assignments.intake.archives import ArchiveError
 from autograder.assignments.intake.attachments import MAX_BYTES, Attachments, files_beside
 from autograder.assignments.intake.claim_records import Claim
-from autograder.assignments.intake.file_names import entry, listed, normal, quoted, shown
+from autograder.assignments.intake.file_names import (
+    find_entry,
+    join_names,
+    normalise_name,
+    printable_name,
+    quote_name,
+)
 from autograder.assignments.intake.handed_in import (
     NOTEBOOK,
     HandedIn,
@@ -90,12 +96,12 @@ def of_student(
     """
     release = root / "release" / assignment
     return Intake(
-        roster.folder(root, student) / assignment,
+        roster.student_folder(root, student) / assignment,
         released,
         claim_records.of_student(root, assignment, student),
-        whose=f"{quoted(assignment)} {quoted(student)}",
+        whose=f"{quote_name(assignment)} {quote_name(student)}",
         given=handed_out(release),
-        around=lambda: roster.unclaimed(roster.folder(root, student), (assignment,)),
+        around=lambda: roster.unclaimed_names(roster.student_folder(root, student), (assignment,)),
     )
 
 
@@ -106,7 +112,7 @@ class _Candidate:
     of: str = ""
 
     @property
-    def texts(self) -> list[tuple[str, str]]:
+    def cell_texts(self) -> list[tuple[str, str]]:
         assert self.notebook is not None
         return [(cell.cell_type, cell.source) for cell in self.notebook.cells]
 
@@ -146,7 +152,7 @@ class Intake:
         """All that lies there."""
         return look_through(self._folder)
 
-    def notebook(self, name: str) -> Found:
+    def find_notebook(self, name: str) -> Found:
         """Return a student's notebook.
 
         Raises:
@@ -156,37 +162,38 @@ class Intake:
         """
         remarks: tuple[str, ...] = ()
         if (claim := self._claims.get(name)) is not None:
-            if (void := self._void(name, claim)) is None:
-                return self._claimed(name, claim)
+            if (void := self._void_reason(name, claim)) is None:
+                return self._find_claimed(name, claim)
             remarks = (void,)
-        path = self.proper(name)
+        path = self.proper_path(name)
         if path.is_symlink() or path.exists():
-            found = self._proper(name, path)
+            found = self._find_in_place(name, path)
         else:
-            found = self._elsewhere(name, " ".join(remarks))
+            found = self._find_elsewhere(name, " ".join(remarks))
         return Found(found.notebook, found.item, found.notes, (*remarks, *found.remarks))
 
-    def proper(self, name: str) -> Path:
+    def proper_path(self, name: str) -> Path:
         """Return where a notebook belongs."""
-        return entry(self._folder, f"{name}.ipynb")
+        return find_entry(self._folder, f"{name}.ipynb")
 
-    def content(self, name: str) -> bytes:
-        """Return what the file holds that counts as a notebook; raises as `notebook`, or OSError.
+    def read_content(self, name: str) -> bytes:
+        """Return what the file holds that counts as a notebook.
 
-        Of one that is larger than any notebook, no more than that.
+        Of one that is larger than any notebook, no more than that. It raises as `find_notebook`,
+        or OSError.
         """
-        found = self.notebook(name)
+        found = self.find_notebook(name)
         if found.item is not None:
             return found.item.read(MAX_NOTEBOOK + 1)
-        return read_plain(self.proper(name), MAX_NOTEBOOK + 1)
+        return read_plain(self.proper_path(name), MAX_NOTEBOOK + 1)
 
-    def beside(self, found: Found) -> Attachments:
+    def find_attachments(self, found: Found) -> Attachments:
         """Return the files that a notebook's code finds: also those of the folder it lay in."""
         every = files_beside(self._folder)
         if found.item is None:
             return every
         files, room = dict(every.files), MAX_BYTES
-        for place, item in self.handed_in.beside(found.item):
+        for place, item in self.handed_in.items_beside(found.item):
             if item is found.item or place.endswith(".ipynb"):
                 continue
             try:
@@ -194,95 +201,107 @@ class Intake:
             except (OSError, ArchiveError):
                 continue
             if len(content) <= room and _is_plain_path(place):
-                files[normal(place)] = content
+                files[normalise_name(place)] = content
                 room -= len(content)
         return Attachments(files, every.notes)
 
     @property
     def has_others(self) -> bool:
         """Whether any notebook of the assignment is there."""
-        there = any(self.proper(name).is_file() for name in self._released)
+        there = any(self.proper_path(name).is_file() for name in self._released)
         return there or any(candidate.of for candidate in self._candidates)
 
-    def _void(self, name: str, claim: Claim) -> str | None:
+    def _void_reason(self, name: str, claim: Claim) -> str | None:
         """Return why a claim no longer holds, or None if it does."""
-        now = claim_records.state(self._folder, self.handed_in, f"{name}.ipynb", claim.file)
+        now = claim_records.digest_state(self._folder, self.handed_in, f"{name}.ipynb", claim.file)
         if now == claim.state:
             return None
-        what = f"'{shown(claim.file)}' was claimed" if claim.file else "nothing was claimed"
-        gone = claim.file and self.handed_in.at(claim.file) is None
+        what = (
+            f"'{printable_name(claim.file)}' was claimed" if claim.file else "nothing was claimed"
+        )
+        gone = claim.file and self.handed_in.find_item(claim.file) is None
         return (
             f"{what} as {name}.ipynb, but {'is gone' if gone else 'the submission has changed'} "
             "since: the claim no longer holds."
         )
 
-    def _claimed(self, name: str, claim: Claim) -> Found:
+    def _find_claimed(self, name: str, claim: Claim) -> Found:
         if not claim.file:
             raise NotHandedInError(f"{name}.ipynb was not handed in, as a person has said.")
-        item = self.handed_in.at(claim.file)
+        item = self.handed_in.find_item(claim.file)
         assert item is not None  # its state would be another
-        notebook = _parsed(item)
+        notebook = _parse_item(item)
         if item.place == f"{name}.ipynb":
             return Found(notebook, claimed=True)
-        said = f"'{shown(item.place)}' was {GRADED_AS} {name}.ipynb, as a person has said."
+        said = f"'{printable_name(item.place)}' was {GRADED_AS} {name}.ipynb, as a person has said."
         return Found(notebook, item, (said,), claimed=True)
 
-    def _proper(self, name: str, path: Path) -> Found:
+    def _find_in_place(self, name: str, path: Path) -> Found:
         """Return the notebook in its own place, unless another one is more likely meant."""
         others = [c for c in self._candidates if c.of == name and not self._is_stub(name, c)]
         try:
-            notebook = submission.read(path)
+            notebook = submission.read_notebook(path)
         except SubmissionError as error:
             if others:
-                raise self._unclear(name, f"{error} But there is {_places(others)}, too:", others) \
-                    from None  # fmt: skip
+                raise self._unclear_error(
+                    name, f"{error} But there is {_list_places(others)}, too:", others
+                ) from None  # fmt: skip
             if like := self._like_work(name):
-                raise self._unclear(name, f"{error} But there is {like}, too:") from None
+                raise self._unclear_error(name, f"{error} But there is {like}, too:") from None
             raise
-        others = [c for c in others if c.texts != _Candidate(c.item, notebook).texts]
+        others = [c for c in others if c.cell_texts != _Candidate(c.item, notebook).cell_texts]
         if not others:
             untouched = cell_matching.is_untouched(notebook, self._released[name])
             if untouched and (like := self._like_work(name)):
                 said = f"{name}.ipynb is as it was handed out, but there is {like}, too:"
-                raise self._unclear(name, said)
+                raise self._unclear_error(name, said)
             return Found(notebook)
         if cell_matching.is_untouched(notebook, self._released[name]):
-            said = f"{name}.ipynb is as it was handed out, but there is {_places(others)}, too:"
-            raise self._unclear(name, said, others)
+            said = (
+                f"{name}.ipynb is as it was handed out, but there is {_list_places(others)}, too:"
+            )
+            raise self._unclear_error(name, said, others)
         return Found(
-            notebook, remarks=(f"{name}.ipynb was graded; there is {_places(others)}, too.",)
+            notebook, remarks=(f"{name}.ipynb was graded; there is {_list_places(others)}, too.",)
         )
 
-    def _elsewhere(self, name: str, before: str) -> Found:
+    def _find_elsewhere(self, name: str, before: str) -> Found:
         """Return a notebook that is not in its own place."""
-        found = self._distinct([c for c in self._candidates if c.of == name], name)
+        found = self._distinct_candidates([c for c in self._candidates if c.of == name], name)
         if len(found) == 1:
             item, notebook = found[0].item, found[0].notebook
             assert notebook is not None
             said = (
-                f"There was no {name}.ipynb, but '{shown(item.place)}' holds its cells, so it was "
+                f"There was no {name}.ipynb, but '{printable_name(item.place)}' holds its cells, "
+                "so it was "
                 f"{GRADED_AS} that."
             )
             return Found(notebook, item, (said,), (said,))
         missing = f"There is no {name}.ipynb in the submission"
         if found:
-            raise self._unclear(name, f"{missing}, but there are {_places(found)}:", found)
-        if (other := self._misnamed(name)) is not None:
-            said = f"{missing}, but {shown(other.item.place)} holds its cells:"
-            raise self._unclear(name, said, [other])
-        if strange := self._strange():
-            names = listed(item.place for item in strange)
+            raise self._unclear_error(
+                name, f"{missing}, but there are {_list_places(found)}:", found
+            )
+        if (other := self._find_misnamed(name)) is not None:
+            said = f"{missing}, but {printable_name(other.item.place)} holds its cells:"
+            raise self._unclear_error(name, said, [other])
+        if strange := self._unexplained_items():
+            names = join_names(item.place for item in strange)
             verb = "is" if len(strange) == 1 else "are"
-            raise self._unclear(name, f"{missing}, but there {verb} {names}{self._why(strange)}:")
+            raise self._unclear_error(
+                name, f"{missing}, but there {verb} {names}{self._closed_reasons(strange)}:"
+            )
         if before:  # what a person had said was there is not
-            raise self._unclear(name, f"{missing}; {before} So")
+            raise self._unclear_error(name, f"{missing}; {before} So")
         if around := self._around():
             raise self._beside_the_folder(name, missing, around)
         raise SubmissionError(f"{missing}.")
 
-    def _unclear(self, name: str, said: str, found: list[_Candidate] | None = None) -> UnclearError:
-        place = quoted(found[0].item.place) if found else "FILE"
-        command = f"autograder claim {self._whose} {quoted(name)}"
+    def _unclear_error(
+        self, name: str, said: str, found: list[_Candidate] | None = None
+    ) -> UnclearError:
+        place = quote_name(found[0].item.place) if found else "FILE"
+        command = f"autograder claim {self._whose} {quote_name(name)}"
         return UnclearError(
             f"{said} a person has to say what counts.",
             f"Say it with `{command} {place}`, or with `{command} --nothing` if it was not handed "
@@ -292,19 +311,20 @@ class Intake:
     def _beside_the_folder(self, name: str, missing: str, around: list[str]) -> UnclearError:
         verb, them = ("lies", "it") if len(around) == 1 else ("lie", "them")
         return UnclearError(
-            f"{missing}, but next to the submission's folder {verb} {listed(around)}: a "
+            f"{missing}, but next to the submission's folder {verb} {join_names(around)}: a "
             "person has to say what counts.",
             f"Move {them} into that folder if that is this assignment's work, and to another place "
-            f"if not, or say with `autograder claim {self._whose} {quoted(name)} --nothing` that "
+            f"if not, or say with `autograder claim {self._whose} {quote_name(name)} --nothing` "
+            "that "
             "it was not handed in; then grade again.",
         )
 
-    def _distinct(self, found: list[_Candidate], name: str) -> list[_Candidate]:
+    def _distinct_candidates(self, found: list[_Candidate], name: str) -> list[_Candidate]:
         """Leave out copies, and stubs beside what was worked on."""
         worked_on = [c for c in found if not self._is_stub(name, c)]
         distinct: list[_Candidate] = []
         for candidate in worked_on or found[:1]:
-            if all(candidate.texts != other.texts for other in distinct):
+            if all(candidate.cell_texts != other.cell_texts for other in distinct):
                 distinct.append(candidate)
         return distinct
 
@@ -318,37 +338,37 @@ class Intake:
         own = {f"{name}.ipynb" for name in self._released}
         likely = [
             item for item in self.handed_in.items
-            if _may_be_notebook(item.name) and normal(item.place) not in own
+            if _may_be_notebook(item.name) and normalise_name(item.place) not in own
         ]  # fmt: skip
         found = []
         for number, item in enumerate(likely):
             try:
-                notebook = _parsed(item) if number < MAX_READ else None
+                notebook = _parse_item(item) if number < MAX_READ else None
             except SubmissionError:
                 notebook = None
             if notebook is not None or NOTEBOOK in item.name.lower():
-                found.append(_Candidate(item, notebook, self._match(notebook)))
+                found.append(_Candidate(item, notebook, self._match_notebook(notebook)))
         return found
 
-    def _match(self, notebook: NotebookNode | None) -> str:
+    def _match_notebook(self, notebook: NotebookNode | None) -> str:
         """Return which of the assignment's notebooks one is, by its given cells."""
         if notebook is None:
             return ""
         alike = {
-            name: cell_matching.likeness(notebook, released)
+            name: cell_matching.measure_likeness(notebook, released)
             for name, released in self._released.items()
         }
         best = max(alike, key=lambda name: alike[name])
         return best if alike[best] >= ALIKE else ""
 
-    def _strange(self) -> list[Item]:
+    def _unexplained_items(self) -> list[Item]:
         """Return what may stand for a missing notebook: all that is known to be nothing else."""
         own = {f"{name}.ipynb" for name in self._released}
         taken = {candidate.item.place for candidate in self._candidates if candidate.of}
         taken |= {claim.file for claim in self._claims.values()}
         unclaimed = [
-            item for item in self.handed_in.unclaimed(self._given)
-            if normal(item.place) not in own and item.place not in taken
+            item for item in self.handed_in.unclaimed_items(self._given)
+            if normalise_name(item.place) not in own and item.place not in taken
         ]  # fmt: skip
         of_quizzes = {item.place for item, _ in attempts.with_attempts(unclaimed)}
         return [item for item in unclaimed if item.place not in of_quizzes]
@@ -358,33 +378,33 @@ class Intake:
 
         A picture or a module in the same folder does not count: other notebooks use those, too.
         """
-        return listed(
-            item.place for item in self._strange()
+        return join_names(
+            item.place for item in self._unexplained_items()
             if _may_be_notebook(item.name) or item.name.lower().endswith(ARCHIVES)
-            or normal(item.name).lower().startswith(f"{name}.")
+            or normalise_name(item.name).lower().startswith(f"{name}.")
         )  # fmt: skip
 
-    def _misnamed(self, name: str) -> _Candidate | None:
+    def _find_misnamed(self, name: str) -> _Candidate | None:
         """Return the notebook that lies in the place of another one, and holds this one's cells."""
         for other in self._released:
-            item = self.handed_in.at(f"{other}.ipynb") if other != name else None
+            item = self.handed_in.find_item(f"{other}.ipynb") if other != name else None
             if item is not None:
                 with suppress(SubmissionError):
-                    notebook = _parsed(item)
-                    if self._match(notebook) == name and not self._is_stub(
+                    notebook = _parse_item(item)
+                    if self._match_notebook(notebook) == name and not self._is_stub(
                         name, found := _Candidate(item, notebook, name)
                     ):
                         return found
         return None
 
-    def _why(self, strange: list[Item]) -> str:
+    def _closed_reasons(self, strange: list[Item]) -> str:
         reasons = [self.handed_in.closed.get(item.place, "") for item in strange]
         return "".join(f" ({reason})" for reason in dict.fromkeys(reasons) if reason)
 
 
-def _parsed(item: Item) -> NotebookNode:
+def _parse_item(item: Item) -> NotebookNode:
     """Return the notebook in a file; raises SubmissionError if there is none."""
-    name = shown(item.place)
+    name = printable_name(item.place)
     try:
         content = item.read(MAX_NOTEBOOK + 1)
     except (OSError, ArchiveError) as error:
@@ -394,7 +414,7 @@ def _parsed(item: Item) -> NotebookNode:
             f"{name} has more than the {MAX_NOTEBOOK // 2**20} MB that are read: clear its outputs "
             "and hand it in again."
         )
-    return submission.parse(submission.decoded(content, name), name)
+    return submission.parse(submission.decode_text(content, name), name)
 
 
 def _may_be_notebook(name: str) -> bool:
@@ -409,5 +429,5 @@ def _is_plain_path(place: str) -> bool:
     return plain and ".." not in path.parts and not path.name.startswith(".")
 
 
-def _places(found: list[_Candidate]) -> str:
-    return listed(candidate.item.place for candidate in found)
+def _list_places(found: list[_Candidate]) -> str:
+    return join_names(candidate.item.place for candidate in found)

@@ -25,7 +25,7 @@ class Question:
     cells: tuple[str, ...]
 
 
-def keep(
+def keep_question(
     work: Path, assignment: str, student: str, notebook: str, question: Question | None
 ) -> None:
     """Keep the question about a notebook, or that there is none; raises OSError if it cannot."""

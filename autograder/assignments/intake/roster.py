@@ -9,10 +9,15 @@ from datetime import datetime
 from pathlib import Path
 
 from autograder.assignments.intake import times
-from autograder.assignments.intake.file_names import entry, listed, meant, shown
+from autograder.assignments.intake.file_names import (
+    find_entry,
+    join_names,
+    match_name,
+    printable_name,
+)
 from autograder.assignments.intake.handed_in import is_junk
 from autograder.assignments.intake.times import UnclearTimeError
-from autograder.files import walk
+from autograder.files import walk_files
 from course.util.close_matches import is_it
 from quizzes.record import read_plain
 
@@ -41,15 +46,15 @@ class Roster:
     known: frozenset[str] = frozenset()
     closed: bool = False
 
-    def student(self, name: str) -> str:
+    def student_id(self, name: str) -> str:
         """Return the id that a name means, of a folder or as typed: macOS writes letters otherwise.
 
         Every command takes names by this, so that all of them mean the same student.
         """
-        return meant(name, self.known)
+        return match_name(name, self.known)
 
 
-def submissions(
+def find_submissions(
     root: Path, assignment: str, roster: Roster, assignments: Collection[str] = ()
 ) -> tuple[list[str], dict[str, str]]:
     """Return the students whose submissions can be graded, and {folder: what is wrong with it}.
@@ -57,15 +62,16 @@ def submissions(
     ``assignments`` are those that the gradebook knows.
     """
     good: dict[str, str] = {}
-    wrong = _nobodys(root / "submitted", assignment)
-    for folder in _folders(root / "submitted"):
-        problem = _misplaced(folder, assignment, assignments)
+    wrong = _stray_notebooks(root / "submitted", assignment)
+    for folder in _student_folders(root / "submitted"):
+        problem = _placement_problem(folder, assignment, assignments)
         if not problem and (folder / assignment).is_dir():
-            student = roster.student(folder.name)
-            problem = _bad_id(folder.name) or _stranger(student, roster)
+            student = roster.student_id(folder.name)
+            problem = _bad_id(folder.name) or _stranger_problem(student, roster)
             if not problem and student in good:
                 problem = wrong[good[student]] = (
-                    f"There are two folders whose names read '{shown(student)}': put what the "
+                    f"There are two folders whose names read '{printable_name(student)}': put what "
+                    "the "
                     "student handed in into one of them, and remove the other."
                 )
             elif not problem:
@@ -75,9 +81,9 @@ def submissions(
     return sorted(s for s, name in good.items() if name not in wrong), wrong
 
 
-def folder(root: Path, student: str) -> Path:
+def student_folder(root: Path, student: str) -> Path:
     """Return the folder of what a student handed in, in whichever form the name is written."""
-    return entry(root / "submitted", student)
+    return find_entry(root / "submitted", student)
 
 
 def remarks(folder: Path, zone: str = "") -> list[str]:
@@ -100,7 +106,7 @@ def remarks(folder: Path, zone: str = "") -> list[str]:
     file = folder / "timestamp.txt"
     if os.path.lexists(file):
         try:
-            _time(file, zone)
+            _read_time(file, zone)
         except UnclearTimeError as error:
             found.append(
                 f"timestamp.txt is not clear: {error}. So the time of submission is unknown, and "
@@ -112,22 +118,22 @@ def remarks(folder: Path, zone: str = "") -> list[str]:
     return found
 
 
-def timestamp(file: Path, zone: str = "") -> str | None:
+def read_timestamp(file: Path, zone: str = "") -> str | None:
     """Return a time of submission as nbgrader reads it, or None if there is none that is clear.
 
-    ``zone`` is the course's own time zone (see `times.read`).
+    ``zone`` is the course's own time zone (see `times.parse_time`).
     """
     try:
-        return times.for_nbgrader(_time(file, zone))
+        return times.for_nbgrader(_read_time(file, zone))
     except (OSError, ValueError):
         return None
 
 
-def _time(file: Path, zone: str) -> datetime:
+def _read_time(file: Path, zone: str) -> datetime:
     content = read_plain(file, LONGEST_TIME + 1)
     if len(content) > LONGEST_TIME:
         raise ValueError("too long")
-    return times.read(content.decode("utf-8-sig").strip(), zone)
+    return times.parse_time(content.decode("utf-8-sig").strip(), zone)
 
 
 def of_people(people: Mapping[str, bool], create: bool) -> Roster:
@@ -140,17 +146,17 @@ def of_people(people: Mapping[str, bool], create: bool) -> Roster:
     return Roster(frozenset(people), not create or any(people.values()))
 
 
-def _folders(submitted: Path) -> Iterator[Path]:
+def _student_folders(submitted: Path) -> Iterator[Path]:
     if submitted.is_dir():
         yield from sorted(
             path for path in submitted.iterdir() if path.is_dir() and not is_junk(path.name)
         )
 
 
-def _nobodys(submitted: Path, assignment: str) -> dict[str, str]:
+def _stray_notebooks(submitted: Path, assignment: str) -> dict[str, str]:
     """Return what is wrong with notebooks that lie in no student's folder, by their names."""
     return {
-        path.name: f"submitted/{shown(path.name)} is in no student's folder: move it to "
+        path.name: f"submitted/{printable_name(path.name)} is in no student's folder: move it to "
         f"submitted/STUDENT/{assignment} if somebody handed it in, or out of submitted if not; "
         "then grade again."
         for path in (sorted(submitted.glob("*.ipynb")) if submitted.is_dir() else [])
@@ -158,28 +164,29 @@ def _nobodys(submitted: Path, assignment: str) -> dict[str, str]:
     }
 
 
-def _misplaced(folder: Path, assignment: str, assignments: Collection[str] = ()) -> str:
+def _placement_problem(folder: Path, assignment: str, assignments: Collection[str] = ()) -> str:
     """Return what is wrong if a student's work is not where nbgrader looks for it.
 
     ``assignments`` are those that the gradebook knows: what lies in their folders is theirs.
     """
     place = folder / assignment
     if place.is_dir():
-        return _elsewhere(folder, place)
-    there = f"submitted/{shown(folder.name)}"
+        return _link_problem(folder, place)
+    there = f"submitted/{printable_name(folder.name)}"
     if place.exists() or place.is_symlink():
         return f"{there}/{assignment} is no folder: put the submission's files in one."
-    if names := unclaimed(folder, assignments):
+    if names := unclaimed_names(folder, assignments):
         verb, them = ("is", "it") if len(names) == 1 else ("are", "them")
         return (
-            f"There is no {there}/{assignment}, but there {verb} {listed(names)} in {there}: move "
+            f"There is no {there}/{assignment}, but there {verb} {join_names(names)} in {there}: "
+            "move "
             f"{them} to {there}/{assignment} if that is this assignment's work, or out of {there} "
             "if not; then grade again."
         )
     return ""
 
 
-def unclaimed(folder: Path, assignments: Collection[str] = ()) -> list[str]:
+def unclaimed_names(folder: Path, assignments: Collection[str] = ()) -> list[str]:
     """Return what lies in a student's folder and is no assignment's.
 
     ``assignments`` are those that the gradebook knows; others have a source or a release.
@@ -194,11 +201,12 @@ def unclaimed(folder: Path, assignments: Collection[str] = ()) -> list[str]:
         return []
     return [
         path.name for path in there
-        if path.name not in known and not is_junk(path.name) and (not path.is_dir() or walk(path))
+        if path.name not in known and not is_junk(path.name)
+        and (not path.is_dir() or walk_files(path))
     ]  # fmt: skip
 
 
-def _elsewhere(folder: Path, place: Path) -> str:
+def _link_problem(folder: Path, place: Path) -> str:
     """Return what is wrong if a link leads from a student's folder to what others handed in.
 
     That all of ``submitted`` or a student's folder is a link to another disk, say, is an
@@ -241,7 +249,7 @@ def _bad_id(student: str) -> str:
     return ""
 
 
-def _stranger(student: str, roster: Roster) -> str:
+def _stranger_problem(student: str, roster: Roster) -> str:
     if not roster.closed or student in roster.known:
         return ""
     return (

@@ -39,7 +39,7 @@ class UnclearTimeError(ValueError):
     """A time that may be several, or is not whole; the message says why, for a person."""
 
 
-def read(text: str, zone: str = "") -> datetime:
+def parse_time(text: str, zone: str = "") -> datetime:
     """Return the time that a text names, in UTC; one without a zone is UTC, as in nbgrader.
 
     Args:
@@ -69,7 +69,7 @@ def _without_comment(text: str) -> str:
     """
     bare = _COMMENT.sub("", text)
     words = re.findall(r"[A-Za-z]{1,5}", bare)
-    if _offset(bare) is not None or _NAMED.search(bare) or any(map(_is_zone, words)):
+    if _split_offset(bare) is not None or _NAMED.search(bare) or any(map(_is_zone, words)):
         return bare
     return text.replace("(", " ").replace(")", " ")
 
@@ -85,36 +85,36 @@ def _year_first(text: str) -> str:
         month, day = first, second
     else:
         raise UnclearTimeError(
-            f"'{found[0]}' can be {_spoken(first, second)} or {_spoken(second, first)}"
+            f"'{found[0]}' can be {_format_date(first, second)} or {_format_date(second, first)}"
         )
     return f"{text[: found.start()]}{year}-{month:02}-{day:02}{text[found.end() :]}"
 
 
-def _spoken(day: int, month: int) -> str:
+def _format_date(day: int, month: int) -> str:
     return f"{day} {datetime(2000, month, 1):%B}"
 
 
 def _split_zone(text: str, zone: str) -> tuple[datetime, tzinfo]:
     """Return the time in a text, and the zone that it names; UTC if it names none."""
-    if (found := _offset(text)) is not None:
+    if (found := _split_offset(text)) is not None:
         rest, where = found
-        return _date(rest), where
+        return _parse_date(rest), where
     if named := _NAMED.search(text):
         try:
-            return _date(text[: named.start()]), ZoneInfo(named["zone"])
+            return _parse_date(text[: named.start()]), ZoneInfo(named["zone"])
         except (ZoneInfoNotFoundError, ValueError, OSError):
             raise UnclearTimeError(f"the time zone '{named['zone']}' is not known") from None
     written = [word for word in re.findall(r"[A-Za-z]{1,5}", text) if _is_zone(word)]
     if not written:
-        return _date(text), UTC
+        return _parse_date(text), UTC
     if len(set(written)) > 1:
         raise UnclearTimeError(f"it names several time zones: {', '.join(written)}")
     rest = re.sub(rf"(?<![A-Za-z]){written[0]}(?![A-Za-z])", " ", text)
-    moment = _date(rest)
-    return moment, _zone(written[0], moment, zone)
+    moment = _parse_date(rest)
+    return moment, _find_zone(written[0], moment, zone)
 
 
-def _offset(text: str) -> tuple[str, tzinfo] | None:
+def _split_offset(text: str) -> tuple[str, tzinfo] | None:
     found = _OFFSET.search(text)
     # In "2026-11-27" the last number is no offset: one follows a clock time or a word.
     if found is None or not _CLOCK.search(text[: found.start()]):
@@ -133,8 +133,8 @@ def _is_zone(word: str) -> bool:
     return info.weekday(word) is None and info.month(word) is None and word.isupper()
 
 
-def _zone(word: str, moment: datetime, zone: str) -> tzinfo:
-    for own in _own(zone):
+def _find_zone(word: str, moment: datetime, zone: str) -> tzinfo:
+    for own in _course_zones(zone):
         local = moment.replace(tzinfo=own)
         for fold in (0, 1):  # the hour that is there twice when summer ends
             if local.replace(fold=fold).tzname() == word:
@@ -146,7 +146,7 @@ def _zone(word: str, moment: datetime, zone: str) -> tzinfo:
     return timezone(timedelta(hours=ZONES[word]))
 
 
-def _own(zone: str) -> Iterator[ZoneInfo]:
+def _course_zones(zone: str) -> Iterator[ZoneInfo]:
     try:
         if zone:
             yield ZoneInfo(zone)
@@ -154,7 +154,7 @@ def _own(zone: str) -> Iterator[ZoneInfo]:
         return
 
 
-def _date(text: str) -> datetime:
+def _parse_date(text: str) -> datetime:
     """Return the date and time in a text without a zone; both have to be there."""
     # With two defaults that differ in all parts, what is not in the text differs, too.
     defaults = datetime(2001, 2, 3, 4, 5), datetime(2012, 11, 10, 9, 8)

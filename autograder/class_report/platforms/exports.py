@@ -36,7 +36,7 @@ class Export:
     """One file: its text, how many students have points in it, and whose cell is empty, and why.
 
     ``waiting`` are those whose grades are not complete, ``absent`` those who handed in nothing;
-    ``guarded`` are ids that were written with an apostrophe in front (see `guarded`).
+    ``guard_text`` are ids that were written with an apostrophe in front (see `guarded`).
     """
 
     text: str
@@ -46,7 +46,7 @@ class Export:
     guarded: tuple[str, ...]
 
 
-def canvas(
+def export_canvas(
     data: ClassData, column: str = "", *, provisional: bool = False, zero_absent: bool = False
 ) -> Export:
     """Return the grades for the import of Canvas's gradebook.
@@ -60,23 +60,26 @@ def canvas(
         zero_absent: write 0 for those who have handed in nothing.
     """
     rows: list[Sequence[str]] = [
-        (*CANVAS_COLUMNS, _header(data, column)),
+        (*CANVAS_COLUMNS, _column_header(data, column)),
         (POINTS_POSSIBLE, "", "", "", "", f"{data.max_score:g}"),
     ]
-    points = _points(data, provisional, zero_absent)
-    for person in _everybody(data):
-        cells = (_sortable(person), person.lms_user_id, "", person.student, "")
-        rows.append((*map(guarded, cells), points[person.student]))
-    return _export(data, rows, points)
+    points = _point_texts(data, provisional, zero_absent)
+    for person in _known_people(data):
+        cells = (_sortable_name(person), person.lms_user_id, "", person.student, "")
+        rows.append((*map(guard_text, cells), points[person.student]))
+    return _make_export(data, rows, points)
 
 
-def moodle(
+def export_moodle(
     data: ClassData, column: str = "", *, provisional: bool = False, zero_absent: bool = False
 ) -> Export:
-    """Return the grades for Moodle's import of a CSV file, in points; arguments as in `canvas`."""
-    rows: list[Sequence[str]] = [(*MOODLE_COLUMNS, _header(data, column))]
-    points = _points(data, provisional, zero_absent)
-    for person in _everybody(data):
+    """Return the grades for Moodle's import of a CSV file, in points.
+
+    The arguments are as in `export_canvas`.
+    """
+    rows: list[Sequence[str]] = [(*MOODLE_COLUMNS, _column_header(data, column))]
+    points = _point_texts(data, provisional, zero_absent)
+    for person in _known_people(data):
         cells = (
             person.student,
             person.lms_user_id,
@@ -84,11 +87,11 @@ def moodle(
             person.last_name,
             person.email,
         )
-        rows.append((*map(guarded, cells), points[person.student]))
-    return _export(data, rows, points)
+        rows.append((*map(guard_text, cells), points[person.student]))
+    return _make_export(data, rows, points)
 
 
-def guarded(text: str) -> str:
+def guard_text(text: str) -> str:
     """Return ``text`` with an apostrophe in front if a spreadsheet would run it as a formula.
 
     See OWASP, "CSV Injection" (CWE-1236).
@@ -108,7 +111,7 @@ def as_csv(rows: Iterable[Sequence[str]]) -> str:
     return buffer.getvalue()
 
 
-def _export(data: ClassData, rows: list[Sequence[str]], points: Mapping[str, str]) -> Export:
+def _make_export(data: ClassData, rows: list[Sequence[str]], points: Mapping[str, str]) -> Export:
     empty = [student for student, shown in points.items() if not shown]
     absent = set(data.absent)
     return Export(
@@ -117,13 +120,13 @@ def _export(data: ClassData, rows: list[Sequence[str]], points: Mapping[str, str
     )  # fmt: skip
 
 
-def _everybody(data: ClassData) -> list[Person]:
+def _known_people(data: ClassData) -> list[Person]:
     """Return whom the gradebook knows; a folder of somebody else is no participant anywhere."""
     graded = {grade.student: Person(grade.student) for grade in data.grades}
     return [person for _, person in sorted({**graded, **data.people}.items())]
 
 
-def _points(data: ClassData, provisional: bool, zero_absent: bool) -> dict[str, str]:
+def _point_texts(data: ClassData, provisional: bool, zero_absent: bool) -> dict[str, str]:
     """Return {student: what stands in the cell}, for everybody."""
     shown = {
         grade.student: f"{round(grade.score, 2):g}"
@@ -132,23 +135,23 @@ def _points(data: ClassData, provisional: bool, zero_absent: bool) -> dict[str, 
     }
     if zero_absent:
         shown |= dict.fromkeys(data.absent, "0")
-    return {person.student: shown.get(person.student, "") for person in _everybody(data)}
+    return {person.student: shown.get(person.student, "") for person in _known_people(data)}
 
 
 def _is_exported(grade: Grade, provisional: bool) -> bool:
     """Whether a grade is passed on; never while it is not clear what was handed in."""
-    return not grade.asked and (provisional or not _waits(grade))
+    return not grade.asked and (provisional or not _is_waiting(grade))
 
 
-def _waits(grade: Grade) -> bool:
+def _is_waiting(grade: Grade) -> bool:
     cells = (points for notebook in grade.cells.values() for points in notebook.values())
     return grade.needs_manual_grade or any(points is None for points in cells)
 
 
-def _sortable(person: Person) -> str:
+def _sortable_name(person: Person) -> str:
     names = [name for name in (person.last_name, person.first_name) if name]
     return ", ".join(names) or person.student
 
 
-def _header(data: ClassData, column: str) -> str:
-    return guarded(column or data.assignment)
+def _column_header(data: ClassData, column: str) -> str:
+    return guard_text(column or data.assignment)

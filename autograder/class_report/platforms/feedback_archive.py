@@ -31,7 +31,7 @@ from autograder.class_report.platforms.platform_names import NamesError, Partici
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.feedback import sheets
 from autograder.gradebook.feedback.sheets import Sheet
-from course.util.files import replacing
+from course.util.files import replace_file
 
 Platform = Literal["moodle", "canvas"]
 Member = tuple[str, bytes]
@@ -46,7 +46,7 @@ class Packed:
     left_out: Mapping[str, tuple[str, ...]]
 
 
-def pack(root: Path, assignment: str, platform: Platform, names: Path, to: Path) -> Packed:
+def pack_feedback(root: Path, assignment: str, platform: Platform, names: Path, to: Path) -> Packed:
     """Write the feedback on an assignment as an archive for a platform.
 
     Args:
@@ -61,18 +61,18 @@ def pack(root: Path, assignment: str, platform: Platform, names: Path, to: Path)
         InsightError: there is no such assignment, or nothing of it is graded.
         OSError: the archive cannot be written; what stood there before still does.
     """
-    data = collect.collect(root, assignment)
+    data = collect.collect_class(root, assignment)
     graded = [grade.student for grade in data.grades]
     read = {"moodle": platform_names.of_moodle, "canvas": platform_names.of_canvas}[platform]
     submitted = {student: _handed_in(root, student, assignment) for student in graded}
-    matched = platform_names.match(read(names), data.people, submitted)
+    matched = platform_names.match_participants(read(names), data.people, submitted)
     make = {"moodle": _for_moodle, "canvas": _for_canvas}[platform](root, assignment)
     packed: list[str] = []
     without: list[str] = []
     to.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(to) as file, zipfile.ZipFile(file, "w") as archive:
+    with replace_file(to) as file, zipfile.ZipFile(file, "w") as archive:
         for student, participant in sorted(matched.who.items()):
-            number = sum(_add(archive, *member) for member in make(student, participant))
+            number = sum(_add_member(archive, *member) for member in make(student, participant))
             (packed if number else without).append(student)
         if not packed:
             raise NamesError(
@@ -90,7 +90,7 @@ def pack(root: Path, assignment: str, platform: Platform, names: Path, to: Path)
 
 def _for_moodle(root: Path, assignment: str) -> Callable[[str, Participant], Iterator[Member]]:
     def make(student: str, participant: Participant) -> Iterator[Member]:
-        for page in _pages(root, student, assignment):
+        for page in _feedback_pages(root, student, assignment):
             yield f"{participant.label}/{page.name}", page.read_bytes()
 
     return make
@@ -100,12 +100,12 @@ def _for_canvas(root: Path, assignment: str) -> Callable[[str, Participant], Ite
     gradebook = CourseGradebook(root)
 
     def make(student: str, participant: Participant) -> Iterator[Member]:
-        pages = _pages(root, student, assignment)
+        pages = _feedback_pages(root, student, assignment)
         if not pages:
             return
-        with gradebook.opened() as book:
-            sheet = sheets.read(book, gradebook.coursedir, assignment, student)
-        taken = _taken(root, sheet)
+        with gradebook.open_gradebook() as book:
+            sheet = sheets.read_sheet(book, gradebook.coursedir, assignment, student)
+        taken = _notebooks_by_digest(root, sheet)
         for file in participant.files:
             name = PurePosixPath(file.name).name
             notebook = next((taken[d] for d in file.digests & taken.keys()), "")
@@ -113,31 +113,31 @@ def _for_canvas(root: Path, assignment: str) -> Callable[[str, Participant], Ite
                 inner = io.BytesIO()
                 with zipfile.ZipFile(inner, "w") as archive:
                     for page in pages:
-                        _add(archive, page.name, page.read_bytes())
+                        _add_member(archive, page.name, page.read_bytes())
                 yield name, inner.getvalue()
-            elif content := _with_marks(root, sheet, notebook or _named(name, sheet)):
+            elif content := _with_marks(root, sheet, notebook or _exercise_by_name(name, sheet)):
                 yield name, content
 
     return make
 
 
-def _taken(root: Path, sheet: Sheet) -> dict[str, str]:
+def _notebooks_by_digest(root: Path, sheet: Sheet) -> dict[str, str]:
     """Return {digest of a file: notebook} of what counts as a student's, whatever its name."""
     release = root / "release" / sheet.assignment
     released = {}
     for exercise in sheet.exercises:
         with suppress(SubmissionError):  # then names have to do
             name = exercise.notebook
-            released[name] = submission.read(release / f"{name}.ipynb")
+            released[name] = submission.read_notebook(release / f"{name}.ipynb")
     found = notebooks.of_student(root, sheet.assignment, sheet.student, released)
     taken: dict[str, str] = {}
     for name in released:
         with suppress(SubmissionError, ArchiveError, OSError):
-            taken.setdefault(hashlib.sha256(found.content(name)).hexdigest(), name)
+            taken.setdefault(hashlib.sha256(found.read_content(name)).hexdigest(), name)
     return taken
 
 
-def _named(name: str, sheet: Sheet) -> str:
+def _exercise_by_name(name: str, sheet: Sheet) -> str:
     """Return which exercise a file of a Canvas download is by name: `…_qos-design-1.ipynb`, say."""
     if not name.lower().endswith(".ipynb"):
         return ""
@@ -152,15 +152,15 @@ def _with_marks(root: Path, sheet: Sheet, notebook: str) -> bytes | None:
     exercise = next((e for e in sheet.exercises if e.notebook == notebook), None)
     path = root / "autograded" / sheet.student / sheet.assignment / f"{notebook}.ipynb"
     try:
-        graded = submission.read(path) if exercise else None
+        graded = submission.read_notebook(path) if exercise else None
     except SubmissionError:
         graded = None
     if graded is None or exercise is None:
         return None
-    late = sheets.late(sheet.seconds_late, exercise.penalty)
+    late = sheets.describe_lateness(sheet.seconds_late, exercise.penalty)
     rows = [f"| {line.title.replace('|', '')} | {line.said} |" for line in exercise.lines]
     table = "\n".join(["| | |", "|---|---|", *rows])
-    parts = (f"# {exercise.title}: feedback", exercise.total, late, table)
+    parts = (f"# {exercise.title}: feedback", exercise.score_sentence, late, table)
     top = "\n\n".join(part for part in parts if part)
     cells = [new_markdown_cell(top)]  # type: ignore[no-untyped-call]
     by_id = {line.grade_id: line for line in exercise.lines}
@@ -177,17 +177,17 @@ def _with_marks(root: Path, sheet: Sheet, notebook: str) -> bytes | None:
     return str(nbformat.writes(graded)).encode()  # type: ignore[no-untyped-call]
 
 
-def _pages(root: Path, student: str, assignment: str) -> list[Path]:
+def _feedback_pages(root: Path, student: str, assignment: str) -> list[Path]:
     return sorted((root / "feedback" / student / assignment).glob("*.html"))
 
 
 def _handed_in(root: Path, student: str, assignment: str) -> list[Path]:
-    folder = roster.folder(root, student) / assignment
+    folder = roster.student_folder(root, student) / assignment
     files = (path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
     return [path for path in files if path.stat().st_size <= platform_names.MAX_FILE]
 
 
-def _add(archive: zipfile.ZipFile, name: str, content: bytes) -> int:
+def _add_member(archive: zipfile.ZipFile, name: str, content: bytes) -> int:
     # A fixed time: the same feedback makes the same archive.
     archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
     return 1

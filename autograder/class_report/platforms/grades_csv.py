@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from autograder.class_report.platforms.exports import as_csv, guarded
+from autograder.class_report.platforms.exports import as_csv, guard_text
 from autograder.files import write_whole
 from autograder.gradebook.course_gradebook import Grade
 
@@ -14,7 +14,7 @@ LATE = ("total_seconds_late", "late_submission_penalty")
 """Columns at the end, as nbgrader calls them; the score is less the penalty already."""
 
 
-def write(grades: Mapping[str, list[Grade]], path: Path) -> None:
+def write_grades(grades: Mapping[str, list[Grade]], path: Path) -> None:
     """Write one line a student and assignment; a cell that waits for a manual grade is empty.
 
     The score is empty, too, while a person is asked what was handed in at all (`Grade.asked`).
@@ -27,13 +27,13 @@ def write(grades: Mapping[str, list[Grade]], path: Path) -> None:
     """
     lines = [(assignment, grade) for assignment, found in grades.items() for grade in found]
     columns = sorted({(n, c) for _, g in lines for n, cells in g.cells.items() for c in cells})
-    rows = [[*HEAD, *(guarded(f"{notebook}:{cell}") for notebook, cell in columns), *LATE]]
+    rows = [[*HEAD, *(guard_text(f"{notebook}:{cell}") for notebook, cell in columns), *LATE]]
     for assignment, grade in lines:
         points = [grade.cells.get(notebook, {}).get(cell) for notebook, cell in columns]
         # What may be zero only because nobody knows yet what was handed in is no number.
         score = "" if grade.asked else grade.score
         found = (score, grade.max_score, grade.needs_manual_grade)
-        texts = [guarded(assignment), guarded(grade.student), *map(str, found)]
+        texts = [guard_text(assignment), guard_text(grade.student), *map(str, found)]
         late = (str(grade.seconds_late), str(grade.penalty))
         rows.append([*texts, *("" if p is None else str(p) for p in points), *late])
     write_whole(path, as_csv(rows))

@@ -79,18 +79,18 @@ def of_moodle(path: Path) -> list[Participant]:
         NamesError: it cannot be read, or is none of them.
     """
     if path.suffix.lower() == ".csv":
-        found = list(_worksheet(path))
+        found = list(_read_worksheet(path))
     else:
         by_label: defaultdict[str, list[File]] = defaultdict(list)
-        for name, file in _files(path):
+        for name, file in _read_files(path):
             for part in PurePosixPath(name).parts:
                 cut = part.split("_", 4)
                 if len(cut) >= 4 and cut[1].isdecimal() and cut[2].startswith("assign"):
                     by_label["_".join(cut[:4]) + "_"].append(file)
                     break
         found = [
-            Participant(label.split("_")[1], label, frozenset({_same(label.split("_")[0])}),
-                        tuple(files))
+            Participant(label.split("_")[1], label,
+                        frozenset({_comparable_name(label.split("_")[0])}), tuple(files))
             for label, files in by_label.items()
         ]  # fmt: skip
     if not found:
@@ -105,7 +105,7 @@ def of_moodle(path: Path) -> list[Participant]:
 def of_canvas(path: Path) -> list[Participant]:
     """Return the participants of a downloaded archive or its unpacked folder; raises as above."""
     by_number: defaultdict[str, list[File]] = defaultdict(list)
-    for name, file in _files(path):
+    for name, file in _read_files(path):
         numbers = [part for part in PurePosixPath(name).name.split("_") if part.isdecimal()]
         if len(numbers) >= 2:
             by_number[numbers[0]].append(file)
@@ -115,12 +115,12 @@ def of_canvas(path: Path) -> list[Participant]:
             "“Download Submissions” as it is."
         )
     return [
-        Participant(number, "", frozenset({_same(number)}), tuple(files))
+        Participant(number, "", frozenset({_comparable_name(number)}), tuple(files))
         for number, files in by_number.items()
     ]
 
 
-def match(
+def match_participants(
     participants: Iterable[Participant],
     people: Mapping[str, Person],
     submitted: Mapping[str, Iterable[Path]],
@@ -135,17 +135,17 @@ def match(
     by_digest: defaultdict[str, set[str]] = defaultdict(set)
     for student, paths in submitted.items():
         for path in paths:
-            by_digest[_digest(path.read_bytes())].add(student)
+            by_digest[_digest_content(path.read_bytes())].add(student)
     by_name: defaultdict[str, set[str]] = defaultdict(set)
     for student, person in people.items():
         for name in (person.name, person.email, person.lms_user_id, student):
-            by_name[_same(name)].add(student)
+            by_name[_comparable_name(name)].add(student)
     by_name.pop("", None)
     who: dict[str, Participant] = {}
     unknown = []
     for participant in participants:
         digests = (digest for file in participant.files for digest in file.digests)
-        meant = _one(by_digest, digests) or _one(by_name, participant.names)
+        meant = _only_student(by_digest, digests) or _only_student(by_name, participant.names)
         if meant and meant not in who:
             who[meant] = participant
         else:
@@ -153,7 +153,7 @@ def match(
     return Matched(who, tuple(unknown))
 
 
-def _one(known: Mapping[str, set[str]], keys: Iterable[str]) -> str | None:
+def _only_student(known: Mapping[str, set[str]], keys: Iterable[str]) -> str | None:
     """Return the one student whom keys name; None if they name nobody, or several."""
     found: set[str] = set()
     for key in keys:
@@ -163,7 +163,7 @@ def _one(known: Mapping[str, set[str]], keys: Iterable[str]) -> str | None:
     return found.pop() if len(found) == 1 else None
 
 
-def _worksheet(path: Path) -> Iterator[Participant]:
+def _read_worksheet(path: Path) -> Iterator[Participant]:
     try:
         rows = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig"), newline="")))
     except (OSError, UnicodeError, csv.Error) as error:
@@ -173,17 +173,17 @@ def _worksheet(path: Path) -> Iterator[Participant]:
         if len(row) > 1 and (number := _PARTICIPANT.search(row[0])):
             name = row[1].replace("_", " ").replace("/", " ").strip()
             label = f"{name}_{number[1]}_assignsubmission_file_"
-            yield Participant(number[1], label, frozenset(map(_same, row[1:])))
+            yield Participant(number[1], label, frozenset(map(_comparable_name, row[1:])))
 
 
-def _files(path: Path) -> Iterator[tuple[str, File]]:
+def _read_files(path: Path) -> Iterator[tuple[str, File]]:
     """Yield (name, file) of what is in an archive or a folder."""
     try:
         if path.is_dir():
             for file in sorted(p for p in path.rglob("*") if p.is_file() and not p.is_symlink()):
                 content = file.read_bytes() if file.stat().st_size <= MAX_FILE else b""
                 name = file.relative_to(path).as_posix()
-                yield name, File(name, _digests(content))
+                yield name, File(name, _packed_digests(content))
             return
         with zipfile.ZipFile(path) as archive:
             members = [m for m in archive.infolist() if not m.is_dir()]
@@ -191,28 +191,28 @@ def _files(path: Path) -> Iterator[tuple[str, File]]:
                 raise NamesError(f"{path.name} has more than {MAX_MEMBERS} files.")
             for member in members:
                 content = archive.read(member) if member.file_size <= MAX_FILE else b""
-                yield member.filename, File(member.filename, _digests(content))
+                yield member.filename, File(member.filename, _packed_digests(content))
     except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError) as error:
         raise NamesError(f"{path} cannot be read as a zip archive or folder ({error}).") from None
 
 
-def _digests(content: bytes) -> frozenset[str]:
+def _packed_digests(content: bytes) -> frozenset[str]:
     """Return the digest of a file, and those of what is packed in it."""
-    found = {_digest(content)} if content else set()
+    found = {_digest_content(content)} if content else set()
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             for member in archive.infolist()[:1000]:
                 if not member.is_dir() and member.file_size <= MAX_FILE:
-                    found.add(_digest(archive.read(member)))
+                    found.add(_digest_content(archive.read(member)))
     except Exception:  # noqa: BLE001 - a stranger's file, which need be no archive
         return frozenset(found)
     return frozenset(found)
 
 
-def _digest(content: bytes) -> str:
+def _digest_content(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-def _same(name: str) -> str:
+def _comparable_name(name: str) -> str:
     """Return a name in the form in which equal ones are equal."""
     return " ".join(unicodedata.normalize("NFC", name).casefold().split())

@@ -51,7 +51,7 @@ def tell_when_asked(fd: int) -> None:
     faulthandler.register(ASK, file=fd, all_threads=True)
 
 
-def ask(pid: int, channel: Channel) -> list[Frame]:
+def ask_frames(pid: int, channel: Channel) -> list[Frame]:
     """Return where the first thread of the subject ``pid`` is, the innermost frame first.
 
     Empty if it does not say. Its ``channel`` is of no use afterwards.
@@ -60,7 +60,7 @@ def ask(pid: int, channel: Channel) -> list[Frame]:
         return []
     with suppress(ProcessLookupError, PermissionError):
         os.kill(pid, ASK)
-    said = channel.leftovers(PATIENCE, SILENCE).decode(errors="replace")
+    said = channel.read_leftovers(PATIENCE, SILENCE).decode(errors="replace")
     dump = "".join(c if c.isprintable() or c == "\n" else "?" for c in said)
     return of_first_thread(dump, SUBJECT)
 
@@ -79,12 +79,12 @@ def of_first_thread(dump: str, runs: tuple[str, str]) -> list[Frame]:
     return []
 
 
-def told(frames: list[Frame]) -> str:
+def describe_frames(frames: list[Frame]) -> str:
     """Return the innermost of some frames in a line, for whoever looks for our own mistake."""
     return " < ".join(f"{Path(f.file).name}:{f.line} {f.function}" for f in frames[:6])
 
 
-def students(frames: list[Frame]) -> Frame | None:
+def student_frame(frames: list[Frame]) -> Frame | None:
     """Return the innermost frame that is of the student's code."""
     return next((frame for frame in frames if is_students(frame.file)), None)
 

@@ -32,7 +32,7 @@ _PLAIN_VALUE = re.compile(r"[\w.% -]{0,40}")
 _DATA_TYPES = ("display_data", "execute_result")
 
 
-def stream(text: str, name: str = "stdout") -> Output:
+def stream_output(text: str, name: str = "stdout") -> Output:
     """Return an output that is text of a stream."""
     return {"output_type": "stream", "name": name, "text": text}
 
@@ -42,25 +42,25 @@ def shortened_text(text: str, dropped: int) -> str:
     return f"{text}\n[{dropped} more characters were cut off here]\n" if dropped else text
 
 
-def error(name: Any, value: Any, lines: Iterable[Any]) -> Output:
+def error_output(name: Any, value: Any, lines: Iterable[Any]) -> Output:
     """Return an output that is an error: its type, its message, and its traceback."""
     kept, room = [], MAX_TEXT
     for line in map(str, lines):
-        kept.append(_cut(line, room))
+        kept.append(_shorten_text(line, room))
         room -= len(line)
         if room < 0:
             break
     return {
-        "output_type": "error", "ename": str(name)[:200], "evalue": _cut(str(value), MAX_TEXT),
-        "traceback": kept,
+        "output_type": "error", "ename": str(name)[:200],
+        "evalue": _shorten_text(str(value), MAX_TEXT), "traceback": kept,
     }  # fmt: skip
 
 
-def _cut(text: str, room: int) -> str:
+def _shorten_text(text: str, room: int) -> str:
     return shortened_text(text[:room], max(len(text) - room, 0))
 
 
-def shown(data: Any, metadata: Any) -> tuple[dict[str, Any], dict[str, Any]]:
+def displayable_data(data: Any, metadata: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return what a notebook can hold of a display's data by MIME type, and of what is said of it.
 
     Of that, only simple values such as a width are kept: they go into a page as they are.
@@ -104,7 +104,7 @@ def is_error(output: Output) -> bool:
     return bool(output["output_type"] == "error")
 
 
-def size(output: Output) -> int:
+def json_size(output: Output) -> int:
     """Return how many bytes an output has as JSON."""
     return len(json.dumps(output, ensure_ascii=False).encode(errors="replace"))
 
@@ -150,7 +150,7 @@ class Notebook:
         self.cut = False
         self._sizes = [0] * len(cells)
 
-    def put(self, number: int, outputs: list[Output]) -> None:
+    def put_outputs(self, number: int, outputs: list[Output]) -> None:
         """Have a cell show these outputs; of those that are too many, what it raised is left."""
         self._sizes[number] = len(json.dumps(outputs))
         if sum(self._sizes) > MAX_NOTEBOOK:
@@ -162,7 +162,7 @@ class Notebook:
 
 def _is_shown(output: Output) -> bool:
     data, metadata = output["data"], output["metadata"]
-    return shown(data, metadata) == (data, metadata)
+    return displayable_data(data, metadata) == (data, metadata)
 
 
 def _is_data(mime: Any, value: Any) -> bool:

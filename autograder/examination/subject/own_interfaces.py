@@ -29,14 +29,14 @@ float32 distance_left
 _lock = threading.Lock()
 
 
-def build() -> None:
+def build_interfaces() -> None:
     """Build what is not in the cache; without a compiler, programs get stand-ins as elsewhere."""
     with _lock:
-        _build()
+        _build_once()
 
 
 @functools.cache
-def _build() -> None:
+def _build_once() -> None:
     try:
         for package in PACKAGES:
             interfaces.ensure(package)

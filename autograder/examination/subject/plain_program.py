@@ -65,22 +65,27 @@ def run(
     )
     raised: list[BaseException] = []
     before: list[Any] = []
-    for life in _lives(wanted):
+    for life in _iter_lives(wanted):
         times = 2 if wanted["twice"] and life["nodes"] not in before else 1
         before.append(life["nodes"])
         of_life = {**wanted, "nodes": life["nodes"], "times": times}
-        _live(namespace, of_life, interrupts, partial(_try, namespace, life["tried"], raised, up))
+        _run_life(
+            namespace,
+            of_life,
+            interrupts,
+            partial(_try_nodes, namespace, life["tried"], raised, up),
+        )
         interrupts.wait()
-        up = _nothing
+        up = _do_nothing
 
 
-def _lives(wanted: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+def _iter_lives(wanted: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
     first = {"nodes": wanted["nodes"], "tried": []}
     lives = [first, *wanted["then"]]
     return chain(lives, repeat(lives[-1]))
 
 
-def _try(
+def _try_nodes(
     namespace: Mapping[str, Any],
     tried: Sequence[Any],
     raised: list[BaseException],
@@ -98,7 +103,7 @@ def _try(
     up()
 
 
-def _live(
+def _run_life(
     namespace: Mapping[str, Any],
     wanted: Mapping[str, Any],
     interrupts: _Interrupts,
@@ -111,7 +116,7 @@ def _live(
         for name, arguments in wanted["nodes"]:
             with suppress(Exception):  # one that cannot be made is nothing to the others
                 nodes.append(namespace[name](*arguments))
-        interrupt = interrupts.next()
+        interrupt = interrupts.next_interrupt()
         alone = [
             Thread(target=_spin_alone, args=(node, threads, interrupt, times)) for node in nodes
         ]
@@ -123,21 +128,21 @@ def _live(
     else:
         nodes = [namespace[name](*arguments) for name, arguments in wanted["nodes"]]
         up()
-        first = interrupts.next()
-        shut_down_until = interrupts.next if wanted["shut_down"] else None
-        _spin(nodes, threads, first, times, shut_down_until, goes_on=wanted["goes_on"])
+        first = interrupts.next_interrupt()
+        shut_down_until = interrupts.next_interrupt if wanted["shut_down"] else None
+        _spin_nodes(nodes, threads, first, times, shut_down_until, goes_on=wanted["goes_on"])
 
 
 def _spin_alone(node: Any, threads: int, until: Future, times: int) -> None:
     """Spin a node, which is destroyed when something leaves one of its callbacks, too."""
     try:
-        _spin([node], threads, until, times)
+        _spin_nodes([node], threads, until, times)
     except BaseException:
         node.destroy_node()
         raise
 
 
-def _spin(
+def _spin_nodes(
     nodes: Sequence[Any],
     threads: int,
     until: Future,
@@ -187,7 +192,7 @@ class _Interrupts:
         signal.signal(signal.SIGINT, lambda *_: None)
         signal.set_wakeup_fd(write)
 
-    def next(self) -> Future:
+    def next_interrupt(self) -> Future:
         """Return what is done at the next one."""
         come = Future()
 
@@ -204,5 +209,5 @@ class _Interrupts:
             pass
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     pass

@@ -44,7 +44,7 @@ def run(engine: Channel, control: Channel, domain_id: int) -> None:
     """Run the engine's program cell by cell, and serve the examiner where it says so."""
     kernel, recording = make_kernel(), Recording()
     # Up to here standard error told the grader why a subject does not start.
-    kernel.begin(recording)
+    kernel.begin_recording(recording)
     hang_report.tell_when_asked(engine.fileno())
     engine.send({"ready": True})
 
@@ -52,26 +52,26 @@ def run(engine: Channel, control: Channel, domain_id: int) -> None:
         return CoreSession(domain_id=domain_id, threads=threads, sim_time=sim_time)
 
     def serve() -> None:
-        SubjectServer(open_session, kernel.cells.user_ns).serve(control)
+        SubjectServer(open_session, kernel.cell_shell.user_ns).serve(control)
 
     process, exams = os.getpid(), set()
     for number, cell in enumerate(engine.receive()["cells"]):
         if cell["exam"]:
             exams.add(number)
-            _tell(engine, {"exam": number}, recording, exams)
+            _send_changes(engine, {"exam": number}, recording, exams)
             kernel.run_beside(number, serve)
-            _tell(engine, {"ran": number}, recording, exams)
+            _send_changes(engine, {"ran": number}, recording, exams)
         else:
             kernel.run_cell(cell["source"], number)
             if os.getpid() != process:
                 os._exit(0)  # a cell has forked, and this is not the process that is graded
-            _tell(engine, {"ran": number}, recording, exams)
+            _send_changes(engine, {"ran": number}, recording, exams)
 
 
 def run_program(engine: Channel, domain_id: int) -> None:
     """Run the engine's cells, and then nodes of theirs as a plain program, with nobody to ask."""
     kernel = make_kernel()
-    kernel.begin(Recording())
+    kernel.begin_recording(Recording())
     engine.send({"ready": True})
     told, process = engine.receive(), os.getpid()
     for number, source in enumerate(told["cells"]):
@@ -83,12 +83,14 @@ def run_program(engine: Channel, domain_id: int) -> None:
         engine.send({"up": True})
         engine.close()
 
-    plain_program.run(kernel.cells.user_ns, told["program"], domain_id, up)
+    plain_program.run(kernel.cell_shell.user_ns, told["program"], domain_id, up)
 
 
-def _tell(engine: Channel, message: dict[str, int], recording: Recording, exams: set[int]) -> None:
+def _send_changes(
+    engine: Channel, message: dict[str, int], recording: Recording, exams: set[int]
+) -> None:
     """Send what cells show that showed something else, or nothing, before; then a message."""
-    for number, outputs in recording.changed().items():
+    for number, outputs in recording.take_changes().items():
         if number not in exams:
             engine.send({"shows": number, "outputs": outputs})
     engine.send(message)

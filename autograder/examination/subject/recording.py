@@ -18,14 +18,14 @@ from autograder.examination.subject.outputs import (
     MAX_SHOWN,
     MAX_TEXT,
     Output,
-    error,
+    displayable_data,
+    error_output,
     is_data,
     is_error,
+    json_size,
     only_error,
     shortened_text,
-    shown,
-    size,
-    stream,
+    stream_output,
 )
 
 _OVERHEAD = 1000  # bytes that an output counts as, beside what is in it
@@ -67,7 +67,7 @@ class _Area:
         """Clear when something new comes."""
         self._clear_first = True
 
-    def fitting(self, name: str, length: int) -> int:
+    def reserve_room(self, name: str, length: int) -> int:
         """Return how many of so many characters of a stream are kept; the others are counted."""
         if self._clear_first and length:
             self.clear()
@@ -80,7 +80,7 @@ class _Area:
     def write(self, name: str, text: str) -> None:
         """Add text of a stream that was found to fit."""
         if not self.entries or self.entries[-1].output.get("name") != name:
-            self.add(_Entry(stream("", name)))
+            self.add(_Entry(stream_output("", name)))
         if self.entries and self.entries[-1].output.get("name") == name:
             self.entries[-1].parts.append(text)
             self.changed = True
@@ -90,7 +90,7 @@ class _Area:
         if self._clear_first:
             self.clear()
         self.changed = True
-        self._room -= _OVERHEAD + size(entry.output)
+        self._room -= _OVERHEAD + json_size(entry.output)
         if self._room >= 0:
             self.entries.append(entry)
             return
@@ -98,26 +98,28 @@ class _Area:
         if is_error(entry.output):
             self._last_error = entry  # whatever else is dropped: it was not right
 
-    def update(self, display_id: Any, data: dict[str, Any], metadata: dict[str, Any]) -> None:
+    def update_display(
+        self, display_id: Any, data: dict[str, Any], metadata: dict[str, Any]
+    ) -> None:
         """Show something else where ``display_id`` is shown."""
         for entry in self.entries:
             if entry.display_id == display_id and self._room >= 0:
-                before = size(entry.output)
+                before = json_size(entry.output)
                 entry.output = {**entry.output, "data": data, "metadata": metadata}
-                self._room += before - size(entry.output)
+                self._room += before - json_size(entry.output)
                 self.changed = True
 
-    def shown(self) -> Iterator[_Entry]:
+    def shown_entries(self) -> Iterator[_Entry]:
         """Yield what is shown, and that something was cut off."""
         last = {entry.output.get("name"): entry for entry in self.entries}
         for entry in self.entries:
             name = entry.output.get("name")
             if name is not None:
                 dropped = self._dropped[name] if entry is last[name] else 0
-                entry = _Entry(stream(shortened_text("".join(entry.parts), dropped), name))
+                entry = _Entry(stream_output(shortened_text("".join(entry.parts), dropped), name))
             yield entry
         if self._cut:
-            yield _Entry(stream(CUT))
+            yield _Entry(stream_output(CUT))
         if self._last_error is not None:
             yield self._last_error
 
@@ -134,31 +136,31 @@ class Recording:
         self._widgets: dict[str, _Area] = {}  # by the id of an `Output` widget
         self._within: dict[str, list[str]] = defaultdict(list)  # the widgets that a cell prints in
 
-    def begin(self, number: int, request: str) -> None:
+    def begin_cell(self, number: int, request: str) -> None:
         """Have what ``request``, the id of a message, leads to shown under a cell."""
         with self._lock:
             self._numbers[request], self._areas[request] = number, _Area()
 
-    def changed(self) -> dict[int, list[Output]]:
+    def take_changes(self) -> dict[int, list[Output]]:
         """Return the outputs of those cells that have changed since this was last asked."""
         with self._lock:
-            news = {id(area) for area in self._everywhere() if area.changed}
+            news = {id(area) for area in self._all_areas() if area.changed}
             found = {
-                number: _outputs(self._areas[request], self._widgets)
+                number: _bounded_outputs(self._areas[request], self._widgets)
                 for request, number in self._numbers.items()
                 if news.intersection(_seen_in(self._areas[request], self._widgets))
             }
-            for area in self._everywhere():
+            for area in self._all_areas():
                 area.changed = False
             return found
 
-    def fitting(self, name: str, request: str, length: int) -> int:
+    def reserve_room(self, name: str, request: str, length: int) -> int:
         """Return how many of so many characters that a cell prints are kept."""
         with self._lock:
-            area = self._area(request)
-            return area.fitting(name, length) if area is not None else 0
+            area = self._find_area(request)
+            return area.reserve_room(name, length) if area is not None else 0
 
-    def take(self, message: Message) -> None:
+    def take_message(self, message: Message) -> None:
         """Add what a message is about. A process that a cell has forked shows nothing here."""
         if os.getpid() != self._process:
             return
@@ -168,15 +170,15 @@ class Recording:
             if kind in ("comm_open", "comm_msg"):
                 self._note_widget(content, request)
             elif kind == "update_display_data":
-                self._update(content)
-            elif (area := self._area(request)) is not None:
-                _add(area, kind, content)
+                self._update_displays(content)
+            elif (area := self._find_area(request)) is not None:
+                _add_message(area, kind, content)
 
-    def _area(self, request: str) -> _Area | None:
+    def _find_area(self, request: str) -> _Area | None:
         within = self._within.get(request)
         return self._widgets[within[-1]] if within else self._areas.get(request)
 
-    def _everywhere(self) -> Iterator[_Area]:
+    def _all_areas(self) -> Iterator[_Area]:
         yield from self._areas.values()
         yield from self._widgets.values()
 
@@ -196,11 +198,11 @@ class Recording:
             if state["msg_id"]:
                 self._within[str(state["msg_id"])].append(widget)
 
-    def _update(self, content: dict[str, Any]) -> None:
+    def _update_displays(self, content: dict[str, Any]) -> None:
         display_id = (content.get("transient") or {}).get("display_id")
-        data, metadata = shown(content["data"], content["metadata"])
-        for area in self._everywhere() if display_id else ():
-            area.update(display_id, data, metadata)
+        data, metadata = displayable_data(content["data"], content["metadata"])
+        for area in self._all_areas() if display_id else ():
+            area.update_display(display_id, data, metadata)
 
 
 def _seen_in(area: _Area, widgets: Mapping[str, _Area]) -> set[int]:
@@ -215,44 +217,46 @@ def _seen_in(area: _Area, widgets: Mapping[str, _Area]) -> set[int]:
     return seen
 
 
-def _outputs(area: _Area, widgets: Mapping[str, _Area]) -> list[Output]:
+def _bounded_outputs(area: _Area, widgets: Mapping[str, _Area]) -> list[Output]:
     """Return the outputs of an area as one list that is not too long for a message."""
     outputs: list[Output] = []
     room = MAX_SHOWN + 2 * MAX_TEXT
-    for one in _flat(area, widgets, ()):
-        room -= size(one)
+    for one in _flatten_outputs(area, widgets, ()):
+        room -= json_size(one)
         if room < 0:
-            errors = [entry.output for entry in area.shown() if is_error(entry.output)]
+            errors = [entry.output for entry in area.shown_entries() if is_error(entry.output)]
             missing = [] if any(map(is_error, outputs)) else only_error(errors)
-            return [*outputs, stream(CUT), *missing]
+            return [*outputs, stream_output(CUT), *missing]
         outputs.append(one)
     return outputs
 
 
-def _flat(area: _Area, widgets: Mapping[str, _Area], within: tuple[_Area, ...]) -> Iterator[Output]:
+def _flatten_outputs(
+    area: _Area, widgets: Mapping[str, _Area], within: tuple[_Area, ...]
+) -> Iterator[Output]:
     """Yield the outputs of an area, those of a widget where it is shown."""
-    for entry in area.shown():
+    for entry in area.shown_entries():
         yield entry.output
         inner = widgets.get(entry.view)
         if inner is not None and inner not in (*within, area):
-            yield from _flat(inner, widgets, (*within, area))
+            yield from _flatten_outputs(inner, widgets, (*within, area))
 
 
-def _add(area: _Area, kind: str, content: dict[str, Any]) -> None:
+def _add_message(area: _Area, kind: str, content: dict[str, Any]) -> None:
     """Add what a message of this kind says, if it is an output."""
     if kind == "execute_reply":
         pages = [page["data"] for page in content["payload"] if page["source"] == "page"]
         for data in pages[:1]:  # as JupyterLab shows help
-            _add(area, "display_data", {"data": data, "metadata": {}})
+            _add_message(area, "display_data", {"data": data, "metadata": {}})
     elif kind == "clear_output":
         (area.clear_later if content.get("wait") else area.clear)()
     elif kind == "stream":
         area.write(content["name"], content["text"])
     elif kind == "error":
-        area.add(_Entry(error(content["ename"], content["evalue"], content["traceback"])))
+        area.add(_Entry(error_output(content["ename"], content["evalue"], content["traceback"])))
     elif is_data({"output_type": kind}):
         view = content["data"].get(_VIEW)
-        data, metadata = shown(content["data"], content["metadata"])
+        data, metadata = displayable_data(content["data"], content["metadata"])
         # The state of widgets is in no notebook that was graded: without it, a view is an error.
         data.pop(_VIEW, None)
         output: Output = {"output_type": kind, "data": data, "metadata": metadata}

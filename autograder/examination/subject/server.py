@@ -22,16 +22,16 @@ from std_msgs.msg import String
 from autograder.examination.subject.student_errors import (
     MUST_NOT_SPIN,
     ThreadErrors,
-    described,
+    describe_error,
+    is_spin_error,
     own_line,
-    spins,
     student_trace,
 )
 from autograder.examination.subject.wall_waits import wall_waits
 from autograder.processes.channel import Channel, ChannelClosed
 from course.runtime.context.context import default_context_beside
 from course.runtime.core_session import CoreSession
-from course.runtime.teardown import sweep
+from course.runtime.teardown import destroy_leftovers
 
 MAX_VALUE = 64 * 1024
 """Characters of JSON that a value or a returned object may have."""
@@ -92,15 +92,15 @@ class SubjectServer:
         except (Exception, SystemExit) as error:  # noqa: BLE001 - student's code may raise anything
             return {
                 "ok": False,
-                "error": described(error)[:2000],
+                "error": describe_error(error)[:2000],
                 "trace": student_trace(error),
             }
 
     @property
-    def _hosting(self) -> CoreSession:
-        return self._session or self._begin(1, False)
+    def _hosting_session(self) -> CoreSession:
+        return self._session or self._begin_session(1, False)
 
-    def _begin(self, threads: int, sim_time: bool) -> CoreSession:
+    def _begin_session(self, threads: int, sim_time: bool) -> CoreSession:
         session = self._open_session(threads, sim_time)
         self._session = session
         self._beside.enter_context(default_context_beside(session.domain_id, sim_time=sim_time))
@@ -112,16 +112,16 @@ class SubjectServer:
         self._threads.items.clear()
         session, self._session = self._session, None
         if session is not None:
-            _close(session)
+            _close_session(session)
             self._beside.close()
             gc.collect()
 
     def _open(self, request: dict[str, Any]) -> dict[str, Any]:
         self._close()
-        self._begin(int(request["threads"]), bool(request["sim_time"]))
+        self._begin_session(int(request["threads"]), bool(request["sim_time"]))
         return {}
 
-    def _find(self, name: str) -> Any:
+    def _find_variable(self, name: str) -> Any:
         try:
             return self._namespace[name]
         except KeyError:
@@ -131,14 +131,14 @@ class SubjectServer:
 
     def _start(self, request: dict[str, Any]) -> dict[str, Any]:
         name = request["name"]
-        factory = self._find(name)
+        factory = self._find_variable(name)
         if request["args"]:
             factory = partial(factory, *request["args"])
-        return {"node": self._run(name, factory)}
+        return {"node": self._run_node(name, factory)}
 
     def _declare(self, request: dict[str, Any]) -> dict[str, Any]:
         name = request["name"]
-        design = self._find(name)
+        design = self._find_variable(name)
         if not hasattr(design, "node_factories"):
             kind = type(design).__name__
             raise TypeError(f"{name} is of type {kind}, which has no nodes; a course.Design has")
@@ -148,12 +148,12 @@ class SubjectServer:
 
     def _start_declared(self, request: dict[str, Any]) -> dict[str, Any]:
         label = request["label"]
-        return {"node": self._run(f"{request['name']}.{label}", self._declared[label])}
+        return {"node": self._run_node(f"{request['name']}.{label}", self._declared[label])}
 
-    def _run(self, name: str, factory: Any) -> str:
+    def _run_node(self, name: str, factory: Any) -> str:
         # Two classes may share a node name, or come out of one function: both have to run.
         try:
-            node = self._hosting.run_beside(factory)
+            node = self._hosting_session.run_beside(factory)
         except (Exception, SystemExit) as error:
             self._raised.append(error)
             raise
@@ -161,7 +161,7 @@ class SubjectServer:
         return str(node.get_fully_qualified_name())
 
     def _mark(self, request: dict[str, Any]) -> dict[str, Any]:
-        self._hosting.run_beside(partial(_marker, request["name"]))
+        self._hosting_session.run_beside(partial(_marker_node, request["name"]))
         return {}
 
     def _stop(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -169,16 +169,16 @@ class SubjectServer:
         if request["bare"]:
             self._destroy_unaided(self._nodes[name])
         elif (node := self._nodes.pop(name, None)) is not None:
-            self._hosting.stop(node)
-            sweep(node)  # a session does not know what it has let go of
+            self._hosting_session.stop(node)
+            destroy_leftovers(node)  # a session does not know what it has let go of
         return {}
 
     def _destroy_unaided(self, node: Any) -> None:
-        self._hosting.let_go(node)
+        self._hosting_session.let_go(node)
         try:
             node.destroy_node()
         except BaseException:
-            sweep(node)
+            destroy_leftovers(node)
             raise
 
     def _collect(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -186,20 +186,20 @@ class SubjectServer:
         return {}
 
     def _pause(self, request: dict[str, Any]) -> dict[str, Any]:
-        self._hosting.pause(self._nodes[request["name"]])
+        self._hosting_session.pause(self._nodes[request["name"]])
         return {}
 
     def _resume(self, request: dict[str, Any]) -> dict[str, Any]:
-        self._hosting.resume(self._nodes[request["name"]])
+        self._hosting_session.resume(self._nodes[request["name"]])
         return {}
 
     def _advance(self, request: dict[str, Any]) -> dict[str, Any]:
         seconds, step, patience = (float(request[k]) for k in ("seconds", "step", "patience"))
-        self._hosting.sim.advance(seconds, step, patience)
-        return {"goes_on": bool(self._hosting.blocked_callbacks(0.0))}
+        self._hosting_session.sim.advance(seconds, step, patience)
+        return {"goes_on": bool(self._hosting_session.blocked_callbacks(0.0))}
 
     def _nudge(self, _: dict[str, Any]) -> dict[str, Any]:
-        self._hosting.sim.nudge()
+        self._hosting_session.sim.nudge()
         return {}
 
     def _call(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -214,7 +214,7 @@ class SubjectServer:
             return {"value": repr(returned)[:1000]}
 
     def _value(self, request: dict[str, Any]) -> dict[str, Any]:
-        found = self._find(request["name"])
+        found = self._find_variable(request["name"])
         try:
             return {"value": _as_json(found)}
         except (TypeError, ValueError, RecursionError):
@@ -237,22 +237,22 @@ class SubjectServer:
         }
 
     def _wall_waits(self, request: dict[str, Any]) -> dict[str, Any]:
-        waits = wall_waits(self._hosting.blocked_callbacks(0.0))
+        waits = wall_waits(self._hosting_session.blocked_callbacks(0.0))
         return {"waits": [told[:500] for told in waits]}
 
     def _errors(self, request: dict[str, Any]) -> dict[str, Any]:
-        recent = self._hosting.errors[-5:]
+        recent = self._hosting_session.errors[-5:]
         return {
             "errors": [
-                f"{e.callback} of {e.node}: {described(e.exception)}"[:500]
-                + (MUST_NOT_SPIN if spins(e.exception) else "")
+                f"{e.callback} of {e.node}: {describe_error(e.exception)}"[:500]
+                + (MUST_NOT_SPIN if is_spin_error(e.exception) else "")
                 for e in recent
             ],
             "of_threads": [str(error)[:500] for error in self._threads.items[-5:]],
         }
 
     def _own_errors(self, request: dict[str, Any]) -> dict[str, Any]:
-        found = [(error, own_line(error.exception)) for error in self._hosting.errors]
+        found = [(error, own_line(error.exception)) for error in self._hosting_session.errors]
         return {
             "errors": [
                 {"told": f"{e.callback} {e.problem} (at {line})"[:500], "count": e.count}
@@ -277,7 +277,7 @@ def _as_in_a_program() -> Iterator[None]:
         asyncio.events._set_running_loop(running)
 
 
-def _marker(name: str) -> Node:
+def _marker_node(name: str) -> Node:
     node = Node(name, start_parameter_services=False, enable_rosout=False)
     node.create_publisher(String, name, 1)
     node.create_subscription(String, name, lambda _: None, 1)
@@ -299,10 +299,10 @@ def _cell_error(missing: str) -> str:
     if error is None or (isinstance(error, NameError) and error.name == missing):
         return ""
     which = "last" if error is last else "first"
-    return f" The {which} error of a cell was {described(error)[:MAX_TOLD].rstrip('.')}."
+    return f" The {which} error of a cell was {describe_error(error)[:MAX_TOLD].rstrip('.')}."
 
 
-def _close(session: CoreSession) -> None:
+def _close_session(session: CoreSession) -> None:
     """Close a session, whatever the student's cleanups raise."""
     for _ in range(MOST_CLEANUPS):
         with suppress(

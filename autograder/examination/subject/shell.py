@@ -27,7 +27,7 @@ from traitlets import Instance, Type
 from traitlets.config import Config
 
 from autograder.examination.subject.recording import Message, Recording
-from autograder.examination.subject.streams import Publisher, streams
+from autograder.examination.subject.streams import Publisher, replace_streams
 
 # Nobody debugs at grading. ipykernel would import debugpy: 30 MB, and half a second.
 sys.modules.setdefault("debugpy", None)  # type: ignore[arg-type]  # what Python takes for missing
@@ -128,7 +128,7 @@ class _Session(Session):
         message = msg_or_type
         if isinstance(message, str):
             message = self.msg(message, content, parent, header, metadata)
-        self.recording.take(message)
+        self.recording.take_message(message)
         return message
 
 
@@ -152,33 +152,33 @@ class Kernel(IPythonKernel):
         )
         self._execute_sleep = 0.0  # it gives its publishing thread a moment, which is none here
 
-    def begin(self, recording: Recording) -> None:
+    def begin_recording(self, recording: Recording) -> None:
         """Get ready to run cells, and publish to a recording what they show.
 
         Standard output and error are the kernel's from now on.
         """
         self._recording = recording
         self.session = _Session(recording=recording)
-        shell: Any = self.cells
+        shell: Any = self.cell_shell
         shell.displayhook.session = shell.display_pub.session = self.session
-        self._descriptors = streams(self.session, self._publisher, recording)
+        self._descriptors = replace_streams(self.session, self._publisher, recording)
         self._loop = asyncio.new_event_loop()
         asyncio.set_event_loop(self._loop)
         self._context = contextvars.copy_context()
         app: Any = self.parent
         # It may have been made where no home of a student's was.
-        self.cells.init_ipython_dir(None)
-        self.cells.init_profile_dir(None)
+        self.cell_shell.init_ipython_dir(None)
+        self.cell_shell.init_profile_dir(None)
         app.init_signal()
         _put_folder_on_path()
-        self._finish(self._begin())
+        self._run_until_done(self._start_kernel())
 
-    async def _begin(self) -> None:
+    async def _start_kernel(self) -> None:
         self.start()
         self._forward_input()  # for the tasks of cells, and what the examiner starts, as well
 
     @property
-    def cells(self) -> ZMQInteractiveShell:
+    def cell_shell(self) -> ZMQInteractiveShell:
         """The shell that runs the cells."""
         assert self.shell is not None
         return self.shell  # type: ignore[no-any-return]
@@ -190,22 +190,22 @@ class Kernel(IPythonKernel):
             source: the cell's text.
             number: which of the notebook's code cells it is, from 0.
         """
-        self.cells.execution_count = number + 1
-        self._finish(self._request(source, number))
+        self.cell_shell.execution_count = number + 1
+        self._run_until_done(self._request_cell(source, number))
         if asyncio.all_tasks(self._loop):
-            self._finish(asyncio.sleep(BETWEEN_CELLS_S))
+            self._run_until_done(asyncio.sleep(BETWEEN_CELLS_S))
 
     def run_beside(self, number: int, call: Any) -> None:
         """Call something in place of a cell: the loop runs meanwhile, as it does for a cell."""
 
         async def called() -> None:
-            self._ask("", number)
+            self._make_request("", number)
             call()
 
-        self._finish(called())
+        self._run_until_done(called())
 
-    async def _request(self, source: str, number: int) -> None:
-        request = self._ask(source, number)
+    async def _request_cell(self, source: str, number: int) -> None:
+        request = self._make_request(source, number)
         self.pre_handler_hook()
         try:
             await self.execute_request(None, [], request)
@@ -214,9 +214,9 @@ class Kernel(IPythonKernel):
             self.send_response(self.iopub_socket, "error", failed)
         finally:
             self.post_handler_hook()
-            self._descriptors.read(wait=True)  # what is in there is still this cell's
+            self._descriptors.read_pipes(wait=True)  # what is in there is still this cell's
 
-    def _ask(self, source: str, number: int) -> Message:
+    def _make_request(self, source: str, number: int) -> Message:
         """Make the message that asks for a cell, from which on what is shown is that cell's."""
         content = {
             "code": source, "silent": False, "store_history": True, "user_expressions": {},
@@ -224,11 +224,11 @@ class Kernel(IPythonKernel):
         }  # fmt: skip
         assert self.session is not None
         request: Message = self.session.msg("execute_request", content)
-        self._recording.begin(number, request["header"]["msg_id"])
+        self._recording.begin_cell(number, request["header"]["msg_id"])
         self.set_parent([], request)
         return request
 
-    def _finish(self, coroutine: Coroutine[Any, Any, None]) -> None:
+    def _run_until_done(self, coroutine: Coroutine[Any, Any, None]) -> None:
         """Run the loop until something is done, whatever a cell does to the loop."""
         task = self._loop.create_task(coroutine, context=self._context)
         task.add_done_callback(lambda _: self._loop.stop())
@@ -265,5 +265,5 @@ def make_kernel() -> Kernel:
     app.init_shell()
     app.init_gui_pylab()
     app.init_extensions()
-    kernel.cells.user_ns_hidden.update(kernel.cells.user_ns)
+    kernel.cell_shell.user_ns_hidden.update(kernel.cell_shell.user_ns)
     return kernel

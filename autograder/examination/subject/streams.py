@@ -66,14 +66,14 @@ class Stream(OutStream):
             os.write(self._descriptor, string.encode(errors="replace"))
             return len(string)
         if self.descriptors is not None:
-            self.descriptors.read()  # what was written there before comes before it
-        self.show(string)
+            self.descriptors.read_pipes()  # what was written there before comes before it
+        self.show_text(string)
         return len(string)
 
-    def show(self, text: str) -> None:
+    def show_text(self, text: str) -> None:
         """Show as much of a text as there is room for."""
         request = self.parent_header.get("msg_id", "")
-        if kept := self._recording.fitting(self.name, request, len(text)):
+        if kept := self._recording.reserve_room(self.name, request, len(text)):
             super().write(text[:kept])
 
     def _schedule_flush(self) -> None:
@@ -97,19 +97,19 @@ class Descriptors:
             with suppress(OSError):  # more than this user may have in all: it is only less room
                 fcntl.fcntl(reads, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
             self._pipes[reads] = (stream, codecs.getincrementaldecoder("utf-8")("replace"))
-        threading.Thread(target=self._follow, name="descriptors", daemon=True).start()
+        threading.Thread(target=self._follow_pipes, name="descriptors", daemon=True).start()
 
-    def read(self, *, wait: bool = False) -> None:
+    def read_pipes(self, *, wait: bool = False) -> None:
         """Show what has been written by now; if another thread is at it, only with ``wait``."""
         if os.getpid() != self._process or not self._reading.acquire(blocking=wait):
             return
         try:
             for number, (stream, decoder) in self._pipes.items():
-                _show(number, stream, decoder)
+                _show_pipe(number, stream, decoder)
         finally:
             self._reading.release()
 
-    def _follow(self) -> None:
+    def _follow_pipes(self) -> None:
         poll = select.poll()
         for number in self._pipes:
             poll.register(number, select.POLLIN)
@@ -117,21 +117,21 @@ class Descriptors:
         while left:
             for number, event in poll.poll():
                 if event & select.POLLIN:
-                    self.read(wait=True)
+                    self.read_pipes(wait=True)
                 else:  # nobody can write to it any more
                     poll.unregister(number)
                     left.discard(number)
 
 
-def _show(number: int, stream: Stream, decoder: codecs.IncrementalDecoder) -> None:
+def _show_pipe(number: int, stream: Stream, decoder: codecs.IncrementalDecoder) -> None:
     read = 0
     with suppress(OSError):  # there is no more, or a cell has closed it
         while read < MOST_AT_ONCE and (data := os.read(number, 65536)):
             read += len(data)
-            stream.show(decoder.decode(data))
+            stream.show_text(decoder.decode(data))
 
 
-def streams(session: Any, publisher: Publisher, recording: Recording) -> Descriptors:
+def replace_streams(session: Any, publisher: Publisher, recording: Recording) -> Descriptors:
     """Put streams of this module in the place of this process's."""
     sys.stdout, sys.stderr = (
         Stream(session, publisher, name, recording) for name in ("stdout", "stderr")

@@ -30,7 +30,7 @@ _BUILT_AT = re.compile(r",? at /\S+\.(?:c|cpp|h|hpp):\d+")
 """Where rcl and rmw were compiled, which they add to their messages."""
 
 
-def described(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """Return what was raised, and its message if it has one."""
     name, message = type(error).__name__, _BUILT_AT.sub("", str(error))
     if isinstance(error, SyntaxError) and error.lineno:
@@ -39,7 +39,7 @@ def described(error: BaseException) -> str:
     return f"{name}: {message}" if message else name
 
 
-def spins(error: BaseException) -> bool:
+def is_spin_error(error: BaseException) -> bool:
     """Return whether ``error`` came out of one of rclpy's own functions that spin."""
     return any(
         frame.filename == rclpy.__file__ and frame.name.startswith("spin")
@@ -49,14 +49,17 @@ def spins(error: BaseException) -> bool:
 
 def student_trace(error: BaseException) -> str:
     """Return the last frames of ``error`` that are the student's: not Python's, rclpy's or ours."""
-    frames = _frames(error)[-TRACE_LINES:]
-    told = (f"  {_place(f)}, in {f.name}\n" + (f"    {f.line}\n" if f.line else "") for f in frames)
+    frames = _student_frames(error)[-TRACE_LINES:]
+    told = (
+        f"  {_describe_place(f)}, in {f.name}\n" + (f"    {f.line}\n" if f.line else "")
+        for f in frames
+    )
     return "".join(told)[:4000]
 
 
 def student_line(error: BaseException) -> str:
     """Return the last line of the student's on the way to ``error``, or ""."""
-    return _line(_frames(error)[-1:])
+    return _describe_line(_student_frames(error)[-1:])
 
 
 def own_line(error: BaseException) -> str:
@@ -68,14 +71,14 @@ def own_line(error: BaseException) -> str:
     frames = traceback.extract_tb(error.__traceback__)
     while frames and _of_python(frames[-1].filename):
         frames.pop()
-    return _line([frame for frame in frames[-1:] if is_students(frame.filename)])
+    return _describe_line([frame for frame in frames[-1:] if is_students(frame.filename)])
 
 
-def _line(frames: list[traceback.FrameSummary]) -> str:
-    return "".join(f"{_place(frame)}: {frame.line}".removesuffix(": ") for frame in frames)
+def _describe_line(frames: list[traceback.FrameSummary]) -> str:
+    return "".join(f"{_describe_place(frame)}: {frame.line}".removesuffix(": ") for frame in frames)
 
 
-def _place(frame: traceback.FrameSummary) -> str:
+def _describe_place(frame: traceback.FrameSummary) -> str:
     """Return which line of which cell or file a frame is in, without the way to a file.
 
     A cell has the number that stands beside it. Where a notebook is run to be graded, from top to
@@ -93,7 +96,7 @@ def _place(frame: traceback.FrameSummary) -> str:
     return f"line {frame.lineno} of {name}"
 
 
-def _frames(error: BaseException) -> list[traceback.FrameSummary]:
+def _student_frames(error: BaseException) -> list[traceback.FrameSummary]:
     frames = traceback.extract_tb(error.__traceback__)
     return [frame for frame in frames if is_students(frame.filename)]
 
@@ -120,7 +123,7 @@ class ThreadError(NamedTuple):
         """Return the error, and the student's line where it came from, if it is known."""
         line = student_line(self.exception)
         where = f" (at {line})" if line else ""
-        return f"{described(self.exception)}{where}"
+        return f"{describe_error(self.exception)}{where}"
 
 
 class ThreadErrors:
@@ -136,7 +139,7 @@ class ThreadErrors:
 
     def __enter__(self) -> ThreadErrors:
         """Begin to listen."""
-        self._before, threading.excepthook = threading.excepthook, self._note
+        self._before, threading.excepthook = threading.excepthook, self._note_error
         return self
 
     def __exit__(
@@ -146,10 +149,10 @@ class ThreadErrors:
         trace: TracebackType | None,
     ) -> None:
         """Stop listening; a hook that was set meanwhile stays."""
-        if threading.excepthook == self._note:
+        if threading.excepthook == self._note_error:
             threading.excepthook = self._before
 
-    def _note(self, args: threading.ExceptHookArgs) -> None:
+    def _note_error(self, args: threading.ExceptHookArgs) -> None:
         if args.exc_value is not None and len(self.items) < _KEPT:
             name = args.thread.name if args.thread is not None else ""
             self.items.append(ThreadError(name, time.time(), args.exc_value))

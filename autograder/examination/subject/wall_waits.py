@@ -53,7 +53,7 @@ def wall_waits(callbacks: Iterable[BlockedCallback]) -> list[str]:
     while asleep and time.monotonic() < deadline:
         over.wait(_LOOK_S)
         asleep = [(one, thread, look) for one, thread, look in asleep if _sleeps_on(thread, look)]
-    return [_told(one) for one in (*named, *(one for one, _, _ in asleep))]
+    return [_describe_wait(one) for one in (*named, *(one for one, _, _ in asleep))]
 
 
 def _sleeps_on(native_id: int, before: Look) -> bool:
@@ -77,5 +77,5 @@ def is_timed(native_id: int) -> bool:
     return place is None or arguments[place] not in _FOR_EVER
 
 
-def _told(one: BlockedCallback) -> str:
+def _describe_wait(one: BlockedCallback) -> str:
     return f"{one.wall_wait}: {one.what}" if one.wall_wait else one.what

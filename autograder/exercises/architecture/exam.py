@@ -10,13 +10,13 @@ from __future__ import annotations
 from autograder.examination.check_context import StudentError
 from autograder.examination.exam import Exam, Failed
 from autograder.exercises.architecture.link_faults import (
-    alike,
-    every,
-    instead,
+    describe_substitute,
     is_carried,
+    join_names,
     link_faults,
-    listed,
-    nodes,
+    name_all_nodes,
+    name_nodes,
+    similar_name,
     why_no_obstacles,
     why_no_planner,
     why_no_pose,
@@ -31,10 +31,10 @@ from autograder.exercises.architecture.robot_roles import (
     WHEELS,
 )
 from autograder.exercises.architecture.traces import (
-    raised,
+    describe_lost_mark,
+    error_note,
     require_plans,
     see_scan_arrive,
-    stranded,
 )
 from autograder.exercises.architecture.tracing import POURS, GoalRejectedError
 from autograder.observe.marked_types import UnknownTypeError, load_type
@@ -70,14 +70,14 @@ def design_runs(rig: ArchitectureRig) -> str:
     except StudentError as error:
         raise Failed(
             expected="The notebook has a `design` whose nodes all come up.",
-            actual=error.told,
+            actual=error.feedback_text,
         ) from None
     if not rig.graph.nodes:
         raise Failed(
             expected="The notebook has a `design` whose nodes all come up.",
             actual="No node appeared on the ROS graph.",
         )
-    return f"On the graph: {nodes(rig.graph.nodes)}."
+    return f"On the graph: {name_nodes(rig.graph.nodes)}."
 
 
 @EXAM.check(
@@ -97,9 +97,9 @@ def drivers_publish(rig: ArchitectureRig) -> None:
     """
     faults = []
     for name, wanted in SENSORS.items():
-        types = {end.type for end in rig.graph.topic(name).writers}
+        types = {end.type for end in rig.graph.get_topic(name).writers}
         if not types:
-            faults.append(f"Nobody publishes on {name}{alike(name, rig.graph)}.")
+            faults.append(f"Nobody publishes on {name}{similar_name(name, rig.graph)}.")
         elif wanted not in types:
             faults.append(f"{name} is published as {', '.join(sorted(types))}, not as {wanted}.")
     if faults:
@@ -128,13 +128,17 @@ def navigation_action(rig: ArchitectureRig) -> None:
     expected = "One node is the server of /navigate_to, and topics bring it what the sensors see."
     servers = rig.jobs.navigators
     if not servers:
-        raise Failed(expected=expected, actual=f"No node is its server{instead(rig.graph)}.")
+        raise Failed(
+            expected=expected, actual=f"No node is its server{describe_substitute(rig.graph)}."
+        )
     if len(servers) > 1:
-        raise Failed(expected=expected, actual=f"It has {len(servers)} servers: {nodes(servers)}.")
-    if not rig.jobs.informed:
+        raise Failed(
+            expected=expected, actual=f"It has {len(servers)} servers: {name_nodes(servers)}."
+        )
+    if not rig.jobs.informed_navigators:
         raise Failed(
             expected=expected,
-            actual=f"{nodes(servers)} is the server, but no topic brings it readings, "
+            actual=f"{name_nodes(servers)} is the server, but no topic brings it readings, "
             "obstacle information or the pose: it would drive blind.",
         )
 
@@ -189,11 +193,11 @@ def pose_published(rig: ArchitectureRig) -> None:
             actual=why_no_pose(rig.jobs),
         )
     poses = [topic.name for topic in rig.jobs.pose_topics]
-    if rig.jobs.pose_of_wheels and not rig.estimates(poses):
+    if rig.jobs.pose_of_wheels and not rig.has_pose_estimate(poses):
         raise Failed(
             expected="While the wheel encoders report, the pose is published.",
             actual=f"Odometry came in on {WHEELS}, and nothing was ever published on "
-            f"{listed(poses, 'or')}{raised(rig)}.",
+            f"{join_names(poses, 'or')}{error_note(rig)}.",
         )
 
 
@@ -239,22 +243,25 @@ def motors_driven(rig: ArchitectureRig) -> None:
     """
     expected = "One node publishes /motors/command as Twist, and navigation leads to it."
     drivers = rig.jobs.controllers
-    types = {end.type for end in rig.graph.topic(MOTORS).writers}
+    types = {end.type for end in rig.graph.get_topic(MOTORS).writers}
     if not drivers:
         raise Failed(
-            expected=expected, actual=f"Nobody publishes on {MOTORS}{alike(MOTORS, rig.graph)}."
+            expected=expected,
+            actual=f"Nobody publishes on {MOTORS}{similar_name(MOTORS, rig.graph)}.",
         )
     if types != {MOTORS_TYPE}:
-        raise Failed(expected=expected, actual=f"It is published as {listed(sorted(types))}.")
+        raise Failed(expected=expected, actual=f"It is published as {join_names(sorted(types))}.")
     if len(drivers) > 1:
-        raise Failed(expected=expected, actual=f"{every(drivers)} command the motors.")
+        raise Failed(expected=expected, actual=f"{name_all_nodes(drivers)} command the motors.")
     if twins := drivers & rig.graph.namesakes:
-        raise Failed(expected=expected, actual=f"Two nodes called {nodes(twins)} command them.")
+        raise Failed(
+            expected=expected, actual=f"Two nodes called {name_nodes(twins)} command them."
+        )
     if not drivers & rig.jobs.goal_reaches:
         raise Failed(
             expected=expected,
-            actual=f"{nodes(drivers)} drives the motors, but nothing leads there from the server "
-            f"of {ACTION}.",
+            actual=f"{name_nodes(drivers)} drives the motors, but nothing leads there from the "
+            f"server of {ACTION}.",
         )
 
 
@@ -275,7 +282,7 @@ def links_connect(rig: ArchitectureRig) -> None:
     the mistake everywhere else.
     """
     faults = link_faults(rig.graph)
-    if not any(rig.graph.flows(("topic",))):
+    if not any(rig.graph.iterate_links(("topic",))):
         faults.append("No topic leads from one node to another.")
     if faults:
         more = f" And {len(faults) - 4} more." if len(faults) > 4 else ""
@@ -304,8 +311,8 @@ def streams_are_topics(rig: ArchitectureRig) -> None:
         raise Failed(
             expected=f"From the obstacle information to {MOTORS} there are topics (or action "
             "goals) all the way.",
-            actual=f"{listed([t.name for t in rig.jobs.obstacle_topics])} gets there only by "
-            f"way of the service {listed(rig.jobs.services_on_the_way(), 'or')}.",
+            actual=f"{join_names([t.name for t in rig.jobs.obstacle_topics])} gets there only by "
+            f"way of the service {join_names(rig.jobs.services_on_the_way(), 'or')}.",
         )
 
 
@@ -335,7 +342,7 @@ def jobs_divided(rig: ArchitectureRig) -> None:
         raise Failed(
             expected="No node drives sensors, estimates, detects, plans, navigates and controls: "
             "two of these jobs at most.",
-            actual=" ".join(f"{nodes([n])} {listed(jobs)}." for n, jobs in busy.items()),
+            actual=" ".join(f"{name_nodes([n])} {join_names(jobs)}." for n, jobs in busy.items()),
         )
 
 
@@ -355,7 +362,7 @@ def goal_reaches_motors(rig: ArchitectureRig) -> None:
     at the motors. Lines on a drawing carry nothing; links do.
     """
     expected = f"The mark of a goal sent to {ACTION} is seen on {MOTORS}."
-    name = rig.graph.action(ACTION).type
+    name = rig.graph.get_action(ACTION).type
     try:
         action_type = load_type(name)
     except UnknownTypeError:
@@ -376,7 +383,7 @@ def goal_reaches_motors(rig: ArchitectureRig) -> None:
             "coming in between.",
         ) from None
     if not poured.enough and not (poured.arrived and poured.turned_away):
-        raise Failed(expected=expected, actual=stranded(rig, poured, [MOTORS]))
+        raise Failed(expected=expected, actual=describe_lost_mark(rig, poured, [MOTORS]))
     if poured.turned_away:
         raise Failed(
             expected=f"The server of {ACTION} takes a goal whenever the one before is over.",
@@ -401,12 +408,12 @@ def scan_reaches_motors(rig: ArchitectureRig) -> None:
 
     The second dye test: a scan that never gets to the motors is an obstacle that the robot hits.
     """
-    topics = {topic.name: topic for topic in rig.jobs.obstacle_topics if rig.knows(topic)}
+    topics = {topic.name: topic for topic in rig.jobs.obstacle_topics if rig.knows_type(topic)}
     if not topics:
         topic = rig.jobs.obstacle_topics[0]
         raise Failed(
             expected="Obstacle information has a message type that is installed.",
-            actual=f"{topic.name} is of type {listed(topic.types)}, unknown to the examiner.",
+            actual=f"{topic.name} is of type {join_names(topic.types)}, unknown to the examiner.",
         )
     see_scan_arrive(rig, topics)
     if faults := rig.new_faults():

@@ -5,9 +5,9 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any
 
-from autograder.observe.phrases import ended
+from autograder.observe.phrases import end_phrase
 from course.design import dye
-from course.design.lifelike import AHEAD, lifelike
+from course.design.lifelike import AHEAD, lifelike_message
 from course.errors import WaitTimeout
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.actions import GoalRun, GoalState
@@ -52,8 +52,8 @@ class Errands:
         first = not self._runs
         if not self.answers:
             return False
-        over = not first and self._over()
-        goal = marked(self._type.Goal, tag, ahead)
+        over = not first and self._all_done()
+        goal = marked_message(self._type.Goal, tag, ahead)
         try:
             run = self._session.send_goal(
                 self._type, self._name, goal, timeout=SETTLE if first else PATIENCE
@@ -71,7 +71,7 @@ class Errands:
         return run.accepted
 
     @property
-    def aside(self) -> str:
+    def rejection_remark(self) -> str:
         """What became of goals that were not taken; empty if there were none."""
         if not self.answers:
             return f"while that goal went on, {self._name} did not answer to another"
@@ -79,13 +79,13 @@ class Errands:
         return f"another goal was rejected, {times}" if self._rejected else ""
 
     @property
-    def aborted(self) -> str:
+    def aborted_goals(self) -> str:
         """How many goals ended as aborted; empty if none did."""
         count = sum(run.status == GoalState.ABORTED for run in self._runs)
         goals = "a goal" if count == 1 else f"{count} goals"
-        return f"{goals} {ended('aborted')}" if count else ""
+        return f"{goals} {end_phrase('aborted')}" if count else ""
 
-    def end(self) -> None:
+    def end_goal(self) -> None:
         """Cancel the goal before, and wait until it is over; it may go on all the same."""
         run = self._runs[-1] if self._runs else None
         if self.answers and run is not None and not run.done_within(GRACE):
@@ -93,15 +93,15 @@ class Errands:
                 if run.cancel(PATIENCE):
                     self.cancelled += 1
                     run.done_within(PATIENCE)
-        self.outlasts = not self._over()
+        self.outlasts = not self._all_done()
 
-    def wait(self) -> None:
+    def wait_for_end(self) -> None:
         """Wait for goals to end by themselves, as long as one that is cancelled may take."""
         with suppress(WaitTimeout):
-            self._session.until(self._over, PATIENCE, "the end of a goal")
-        self.outlasts = not self._over()
+            self._session.until(self._all_done, PATIENCE, "the end of a goal")
+        self.outlasts = not self._all_done()
 
-    def _over(self) -> bool:
+    def _all_done(self) -> bool:
         return all(run.done for run in self._runs)
 
     def keep_one(self, tag: int) -> None:
@@ -111,8 +111,8 @@ class Errands:
                 self.send(tag)
 
 
-def marked(msg_type: Any, tag: int, ahead: float = AHEAD) -> Any:
+def marked_message(msg_type: Any, tag: int, ahead: float = AHEAD) -> Any:
     """Return a message as a robot would send it, with a mark in it."""
-    message = lifelike(msg_type, ahead)
+    message = lifelike_message(msg_type, ahead)
     dye.mark(message, tag)
     return message

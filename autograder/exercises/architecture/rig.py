@@ -13,13 +13,19 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from autograder.examination.check_context import Bench, StudentError
 from autograder.examination.exam import Failed
-from autograder.exercises.architecture.goal_sender import SETTLE, WAYPOINT, marked
-from autograder.exercises.architecture.link_faults import every, link_faults, nodes
+from autograder.exercises.architecture.goal_sender import SETTLE, WAYPOINT, marked_message
+from autograder.exercises.architecture.link_faults import link_faults, name_all_nodes, name_nodes
 from autograder.exercises.architecture.robot_graph import Offer, RobotGraph, Topic, read_graph
 from autograder.exercises.architecture.robot_roles import ACTION, MOTORS, SENSORS, WHEELS, Jobs
 from autograder.exercises.architecture.tracing import Poured, Pours
 from autograder.observe.marked_types import UnknownTypeError, load_type
-from autograder.observe.participants import NO_NODE, count_listening, known, node_of, of_others
+from autograder.observe.participants import (
+    NO_NODE,
+    count_listening,
+    known_participants,
+    node_of,
+    of_others,
+)
 from autograder.observe.patience import Patience
 from autograder.observe.quiet_node import QuietNode
 from autograder.observe.stillness import Stillness
@@ -67,7 +73,7 @@ class ArchitectureRig:
         self.jobs = Jobs(self.graph)
         for topic in self.graph.topics.values():
             if topic.writers:
-                self._tap(topic)
+                self._tap_topic(topic)
 
     def _read_graph(self) -> RobotGraph:
         """Read the graph when all is on it that the subject's nodes have by now."""
@@ -90,21 +96,21 @@ class ArchitectureRig:
     def _discover_others(self) -> None:
         """Wait for what is in participants of other contexts: the mark tells of its own alone."""
         domain_id = self._session.domain_id
-        self.wait(lambda: len(known(self.node)) >= count_listening(domain_id))
-        if len(known(self.node)) > USUAL_PARTICIPANTS:
-            Stillness(self._outside).reached(timeout=AT_REST_S)
+        self.wait(lambda: len(known_participants(self.node)) >= count_listening(domain_id))
+        if len(known_participants(self.node)) > USUAL_PARTICIPANTS:
+            Stillness(self._outside).wait_for_rest(timeout=AT_REST_S)
 
     def new_faults(self) -> list[str]:
         """Return what is wrong with endpoints that have come since the start, a sentence each."""
         if self._unread is not None:
             raise self._unread
         now = self._read_graph()
-        drivers = now.topic(MOTORS).written_by
-        faults = link_faults(now.since(self.graph))
+        drivers = now.get_topic(MOTORS).written_by
+        faults = link_faults(now.added_since(self.graph))
         if len(drivers) > 1 and drivers - self.jobs.controllers:
-            faults.insert(0, f"{every(drivers)} command the motors.")
+            faults.insert(0, f"{name_all_nodes(drivers)} command the motors.")
         elif passing := self._drove - self.jobs.controllers - drivers - {NO_NODE}:
-            faults.insert(0, f"{nodes(passing)} commanded the motors for a while.")
+            faults.insert(0, f"{name_nodes(passing)} commanded the motors for a while.")
         return faults
 
     def _has_seen(self, mark: str) -> bool:
@@ -114,26 +120,26 @@ class ArchitectureRig:
         )
         return all(any(end.node_name == mark for end in side) for side in ends)
 
-    def _tap(self, topic: Topic) -> None:
+    def _tap_topic(self, topic: Topic) -> None:
         """Note the tags that go over a topic; of a type that we know."""
         with suppress(UnknownTypeError):
             for name in topic.types:
                 self.node.create_subscription(
                     load_type(name),
                     topic.name,
-                    partial(self._note, topic.name),
+                    partial(self._note_message, topic.name),
                     QoSProfile(
                         history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT
                     ),
                 )
 
-    def _note(self, topic: str, message: Any) -> None:
+    def _note_message(self, topic: str, message: Any) -> None:
         tags = dye.read_all(message)
         self._heard.add(topic)
         self.seen[topic].update(tags)
         if topic == MOTORS and tags:
             self._note_drivers()
-        self._pours.overheard(topic, tags)
+        self._pours.answer_overheard(topic, tags)
 
     def _note_drivers(self) -> None:
         """Note who can command the motors now; what cannot be read is for `new_faults` to tell."""
@@ -144,7 +150,7 @@ class ArchitectureRig:
         else:
             self._drove |= {node_of(end) for end in ends}
 
-    def knows(self, topic: Topic) -> bool:
+    def knows_type(self, topic: Topic) -> bool:
         """Whether a topic's type is installed here."""
         try:
             return bool([load_type(name) for name in topic.types])
@@ -163,11 +169,11 @@ class ArchitectureRig:
             return True
         return False
 
-    def answers(self, offer: Offer) -> bool:
+    def gets_answer(self, offer: Offer) -> bool:
         """Whether a service answers a lifelike request; one of a type unknown here is not asked."""
         with suppress(UnknownTypeError):
             kind = load_type(offer.type)
-            request = marked(kind.Request, dye.fresh_tag(), WAYPOINT)
+            request = marked_message(kind.Request, dye.fresh_tag(), WAYPOINT)
             try:
                 self._session.call(kind, offer.name, request, SETTLE)
             except WaitTimeout:
@@ -176,37 +182,37 @@ class ArchitectureRig:
 
     # Dye.
 
-    def estimates(self, poses: Collection[str]) -> bool:
+    def has_pose_estimate(self, poses: Collection[str]) -> bool:
         """Whether anything comes on one of ``poses`` while wheels and LIDAR report."""
         self._wait_for_taps()
-        topics = [topic for topic in self._sensors() if topic.name in (WHEELS, "/scan")]
+        topics = [topic for topic in self._sensor_topics() if topic.name in (WHEELS, "/scan")]
         return self._pours.roll_until(topics, lambda: bool(self._heard & set(poses)))
 
     def colour_goal(self, action: str, action_type: Any, arrived_on: Collection[str]) -> Poured:
-        """Send marked navigation goals: see `Pours.goals`."""
+        """Send marked navigation goals: see `Pours.pour_goals`."""
         self._wait_for_taps()
-        return self._pours.goals(action, action_type, self._sensors(), arrived_on)
+        return self._pours.pour_goals(action, action_type, self._sensor_topics(), arrived_on)
 
     def colour_topics(self, topics: Collection[Topic], arrived_on: Collection[str]) -> Poured:
-        """Publish marked messages, with a goal under way: see `Pours.topics`.
+        """Publish marked messages, with a goal under way: see `Pours.pour_topics`.
 
         A robot that stands still without a goal is right, and nothing would arrive at its motors.
         """
         self._wait_for_taps()
         with suppress(UnknownTypeError):
             if self.jobs.navigators:
-                self._pours.under_way(ACTION, load_type(self.graph.action(ACTION).type))
+                self._pours.under_way(ACTION, load_type(self.graph.get_action(ACTION).type))
         poured = {topic.name for topic in topics}
-        others = [topic for topic in self._sensors() if topic.name not in poured]
-        return self._pours.topics(topics, others, arrived_on)
+        others = [topic for topic in self._sensor_topics() if topic.name not in poured]
+        return self._pours.pour_topics(topics, others, arrived_on)
 
-    def _sensors(self) -> list[Topic]:
-        topics = [self.graph.topic(name) for name in SENSORS]
-        return [topic for topic in topics if topic.readers and self.knows(topic)]
+    def _sensor_topics(self) -> list[Topic]:
+        topics = [self.graph.get_topic(name) for name in SENSORS]
+        return [topic for topic in topics if topic.readers and self.knows_type(topic)]
 
     def _wait_for_taps(self) -> None:
         """Wait until the design's nodes know who listens: what is sent before is not seen here."""
-        tapped = [t for t in self.graph.topics.values() if t.writers and self.knows(t)]
+        tapped = [t for t in self.graph.topics.values() if t.writers and self.knows_type(t)]
         wanted = {topic.name: len(topic.readers) + 1 for topic in tapped}
 
         def known() -> bool:

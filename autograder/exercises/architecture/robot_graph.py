@@ -90,15 +90,15 @@ class RobotGraph:
     namesakes: frozenset[str] = frozenset()
     """Full names that more than one node has."""
 
-    def topic(self, name: str) -> Topic:
+    def get_topic(self, name: str) -> Topic:
         """Return a topic; one without endpoints if it is not there."""
         return self.topics.get(name, Topic(name))
 
-    def action(self, name: str) -> Offer:
+    def get_action(self, name: str) -> Offer:
         """Return an action; one without nodes if it is not there."""
         return self.actions.get(name, Offer(name, ""))
 
-    def since(self, earlier: RobotGraph) -> RobotGraph:
+    def added_since(self, earlier: RobotGraph) -> RobotGraph:
         """Return the part of it with endpoints that were not there earlier."""
         before: dict[str, set[End]] = {
             name: {*topic.writers, *topic.readers} for name, topic in earlier.topics.items()
@@ -111,34 +111,34 @@ class RobotGraph:
         return RobotGraph(
             self.nodes - earlier.nodes,
             new,
-            _more(self.services, earlier.services),
-            _more(self.actions, earlier.actions),
+            _new_offers(self.services, earlier.services),
+            _new_offers(self.actions, earlier.actions),
             self.namesakes - earlier.namesakes,
         )
 
-    def writes(self, node: str) -> list[Topic]:
+    def published_topics(self, node: str) -> list[Topic]:
         """Return the topics that a node publishes on."""
         return [topic for topic in self.topics.values() if node in topic.written_by]
 
-    def flows(self, kinds: Collection[str]) -> Iterator[tuple[str, str, str]]:
+    def iterate_links(self, kinds: Collection[str]) -> Iterator[tuple[str, str, str]]:
         """Yield (from, to, name of the link) for pairs of nodes; ``kinds`` are some of `KINDS`."""
         if "topic" in kinds:
             for topic in self.topics.values():
-                yield from _pairs(topic.written_by, topic.read_by, topic.name)
+                yield from _node_pairs(topic.written_by, topic.read_by, topic.name)
         for offers, there, back in (
             (self.services, "request", "response"),
             (self.actions, "goal", "feedback"),
         ):
             for offer in offers.values():
                 if there in kinds:
-                    yield from _pairs(offer.clients, offer.servers, offer.name)
+                    yield from _node_pairs(offer.clients, offer.servers, offer.name)
                 if back in kinds:
-                    yield from _pairs(offer.servers, offer.clients, offer.name)
+                    yield from _node_pairs(offer.servers, offer.clients, offer.name)
 
-    def reached(self, start: Iterable[str], kinds: Collection[str]) -> set[str]:
+    def reachable_nodes(self, start: Iterable[str], kinds: Collection[str]) -> set[str]:
         """Return `start` and every node that information from there can get to."""
         onward: dict[str, set[str]] = {}
-        for source, target, _ in self.flows(kinds):
+        for source, target, _ in self.iterate_links(kinds):
             onward.setdefault(source, set()).add(target)
         found, waiting = set(start), deque(start)
         while waiting:
@@ -148,7 +148,7 @@ class RobotGraph:
         return found
 
 
-def _more(offers: dict[str, Offer], earlier: dict[str, Offer]) -> dict[str, Offer]:
+def _new_offers(offers: dict[str, Offer], earlier: dict[str, Offer]) -> dict[str, Offer]:
     def grew(offer: Offer) -> bool:
         old = earlier.get(offer.name, Offer(offer.name, ""))
         return not (offer.servers <= old.servers and offer.clients <= old.clients)
@@ -156,7 +156,7 @@ def _more(offers: dict[str, Offer], earlier: dict[str, Offer]) -> dict[str, Offe
     return {name: offer for name, offer in offers.items() if grew(offer)}
 
 
-def _pairs(
+def _node_pairs(
     sources: Iterable[str], targets: Iterable[str], by: str
 ) -> Iterator[tuple[str, str, str]]:
     targets = tuple(targets)
@@ -173,7 +173,7 @@ def read_graph(node: Node, marks: Collection[str] = ()) -> RobotGraph:
     graph = RobotGraph()
     for topic, _ in node.get_topic_names_and_types():
         if topic not in INFRASTRUCTURE and topic not in marks and not _OF_ACTION.fullmatch(topic):
-            found = reader.topic(topic, topic)
+            found = reader.read_topic(topic, topic)
             if found.readers or found.types not in ((), (_TRANSITIONS,)):
                 graph.topics[topic] = found
     for raw, _ in node.get_topic_names_and_types(no_demangle=True):
@@ -209,15 +209,15 @@ class _Reader:
         self._node = node
         self._participants: dict[str, set[bytes]] = {}
 
-    def topic(self, name: str, raw: str, *, no_mangle: bool = False) -> Topic:
+    def read_topic(self, name: str, raw: str, *, no_mangle: bool = False) -> Topic:
         """Return a topic as ``name``; ``raw`` is what it is called, on DDS with ``no_mangle``."""
         return Topic(
             name,
-            self._ends(self._node.get_publishers_info_by_topic(raw, no_mangle)),
-            self._ends(self._node.get_subscriptions_info_by_topic(raw, no_mangle)),
+            self._read_ends(self._node.get_publishers_info_by_topic(raw, no_mangle)),
+            self._read_ends(self._node.get_subscriptions_info_by_topic(raw, no_mangle)),
         )
 
-    def _ends(self, infos: Iterable[TopicEndpointInfo]) -> tuple[End, ...]:
+    def _read_ends(self, infos: Iterable[TopicEndpointInfo]) -> tuple[End, ...]:
         ends = []
         for info in of_others(infos):
             node = node_of(info)
@@ -248,8 +248,8 @@ def _add_offer(graph: RobotGraph, reader: _Reader, name: str) -> None:
     if name.endswith(_OTHER_SERVICES_OF_ACTION):
         return
     ways = (
-        reader.topic(name, f"rq{name}Request", no_mangle=True),
-        reader.topic(name, f"rr{name}Reply", no_mangle=True),
+        reader.read_topic(name, f"rq{name}Request", no_mangle=True),
+        reader.read_topic(name, f"rr{name}Reply", no_mangle=True),
     )
     requests = ways[0]
     types = [_service_type(end.type) for end in (*requests.readers, *requests.writers)]

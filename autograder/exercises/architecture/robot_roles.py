@@ -77,25 +77,25 @@ class Jobs:
     @cached_property
     def navigators(self) -> set[str]:
         """The nodes that are the action's server."""
-        return self.graph.action(ACTION).servers
+        return self.graph.get_action(ACTION).servers
 
     @cached_property
     def controllers(self) -> frozenset[str]:
         """The nodes that publish on the motors' topic."""
-        return self.graph.topic(MOTORS).written_by
+        return self.graph.get_topic(MOTORS).written_by
 
     @cached_property
     def drivers(self) -> set[str]:
         """The nodes that publish a sensor's readings."""
-        return {node for name in SENSORS for node in self.graph.topic(name).written_by}
+        return {node for name in SENSORS for node in self.graph.get_topic(name).written_by}
 
     @cached_property
-    def seeing(self) -> set[str]:
+    def eye_readers(self) -> set[str]:
         """The nodes that read the LIDAR or the camera."""
-        return self.reading(EYES, IMAGES | CLOUDS)
+        return self.find_readers(EYES, IMAGES | CLOUDS)
 
     @cached_property
-    def readings(self) -> set[str]:
+    def sensor_topics(self) -> set[str]:
         """The topics of sensors: the three, and what others a design has."""
         return set(SENSORS) | {
             topic.name
@@ -104,20 +104,22 @@ class Jobs:
         }
 
     @cached_property
-    def sensing(self) -> set[str]:
+    def sensing_nodes(self) -> set[str]:
         """The nodes that know of some sensor: they read one, or drive one."""
-        read = self.reading(self.readings, IMAGES | CLOUDS | OTHER_READINGS)
-        return read | {node for name in self.readings for node in self.graph.topic(name).written_by}
+        read = self.find_readers(self.sensor_topics, IMAGES | CLOUDS | OTHER_READINGS)
+        return read | {
+            node for name in self.sensor_topics for node in self.graph.get_topic(name).written_by
+        }
 
     @cached_property
-    def informed(self) -> set[str]:
+    def informed_navigators(self) -> set[str]:
         """The navigation nodes to which topics bring what a sensor sees.
 
         The last of these topics must be able to say it: that somebody is alive is no reading. Where
         no pose is estimated, one that another node makes up stands in: that node is at fault.
         """
-        read = {node for name in self.readings for node in self.graph.topic(name).read_by}
-        aware = self.graph.reached(read | self.sensing - self.navigators, ("topic",))
+        read = {node for name in self.sensor_topics for node in self.graph.get_topic(name).read_by}
+        aware = self.graph.reachable_nodes(read | self.sensing_nodes - self.navigators, ("topic",))
         return {
             node
             for topic in self.graph.topics.values()
@@ -127,16 +129,16 @@ class Jobs:
             for node in topic.read_by & self.navigators
         } | (read & self.navigators)
 
-    def reading(self, topics: Collection[str], readings: Collection[str]) -> set[str]:
+    def find_readers(self, topics: Collection[str], readings: Collection[str]) -> set[str]:
         """Return who reads ``topics``, also where a node filters and hands on raw readings."""
         found: set[str] = set()
         names = set(topics)
-        while new := {n for name in names for n in self.graph.topic(name).read_by} - found:
+        while new := {n for name in names for n in self.graph.get_topic(name).read_by} - found:
             found |= new
             names = {
                 topic.name
                 for node in new
-                for topic in self.graph.writes(node)
+                for topic in self.graph.published_topics(node)
                 if set(topic.types) & set(readings)
             }
         return found
@@ -144,7 +146,7 @@ class Jobs:
     @cached_property
     def detectors(self) -> set[str]:
         """The nodes that read LIDAR or camera and are neither navigation nor control."""
-        return self.seeing - self.navigators - self.controllers
+        return self.eye_readers - self.navigators - self.controllers
 
     @cached_property
     def obstacle_topics(self) -> list[Topic]:
@@ -158,29 +160,30 @@ class Jobs:
             and self.leads_to_motors(topic, ONWARD)
         ]
 
-    def eye(self, topics: Iterable[Topic]) -> str:
+    def source_sensor(self, topics: Iterable[Topic]) -> str:
         """Return the sensor that these topics are made from: the LIDAR where it is one of them."""
         writers = {node for topic in topics for node in topic.written_by}
-        made = [eye for eye in EYES if writers & self.reading([eye], IMAGES | CLOUDS)]
+        made = [eye for eye in EYES if writers & self.find_readers([eye], IMAGES | CLOUDS)]
         return (made or EYES)[0]
 
     def leads_to_motors(self, topic: Topic, kinds: Collection[str]) -> bool:
         """Whether what is on a topic can get to the motors' node, or anywhere if there is none."""
-        reached = self.graph.reached(topic.read_by - topic.written_by, kinds)
+        reached = self.graph.reachable_nodes(topic.read_by - topic.written_by, kinds)
         return bool(reached & (self.controllers or reached))
 
     def services_on_the_way(self) -> list[str]:
         """Return the services without which no obstacle information gets to the motors."""
-        streamed = self.graph.reached(
+        streamed = self.graph.reachable_nodes(
             {node for topic in self.obstacle_topics for node in topic.read_by}, STREAMS
         )
         return sorted(
             {
                 name
-                for source, target, name in self.graph.flows(("request", "response"))
+                for source, target, name in self.graph.iterate_links(("request", "response"))
                 if source in streamed
                 and target not in streamed
-                and self.graph.reached({target}, ("topic", "request", "goal")) & self.controllers
+                and self.graph.reachable_nodes({target}, ("topic", "request", "goal"))
+                & self.controllers
             }
         )
 
@@ -192,7 +195,7 @@ class Jobs:
             for topic in self.graph.topics.values()
             if set(topic.types) & POSES
             and topic.name not in SENSORS
-            and topic.written_by & (self.sensing - self.navigators)
+            and topic.written_by & (self.sensing_nodes - self.navigators)
         ]
 
     @cached_property
@@ -220,12 +223,12 @@ class Jobs:
             for topic in self.graph.topics.values()
             if MAP_TYPE in topic.types and (topic.name == MAP or topic.written_by & asking)
         }
-        return self.reading(maps, [MAP_TYPE]) | asking
+        return self.find_readers(maps, [MAP_TYPE]) | asking
 
     @cached_property
     def knowing_map(self) -> set[str]:
         """The nodes that know the map: who reads it, and who publishes it or hands it out."""
-        publishers = {end.node for end in self.graph.topic(MAP).writers if end.type == MAP_TYPE}
+        publishers = {end.node for end in self.graph.get_topic(MAP).writers if end.type == MAP_TYPE}
         offers = [offer for offer in self.graph.services.values() if offer.type == GET_MAP]
         return self.map_readers.union(publishers, *(offer.servers for offer in offers))
 
@@ -237,8 +240,8 @@ class Jobs:
         it is then every node to which anything leads from another.
         """
         if not self.navigators:
-            return {target for _, target, _ in self.graph.flows(ONWARD)}
-        return self.graph.reached(self.navigators, ONWARD)
+            return {target for _, target, _ in self.graph.iterate_links(ONWARD)}
+        return self.graph.reachable_nodes(self.navigators, ONWARD)
 
     @cached_property
     def planning_services(self) -> list[Offer]:
@@ -274,7 +277,9 @@ class Jobs:
 
         doing = {
             "drives sensors": certain["drives sensors"],
-            "estimates the state": least_busy(self.pose_topics, self.sensing - self.navigators),
+            "estimates the state": least_busy(
+                self.pose_topics, self.sensing_nodes - self.navigators
+            ),
             "detects obstacles": least_busy(self.obstacle_topics, self.detectors),
             **certain,
         }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from autograder.examination.exam import Failed
-from autograder.exercises.architecture.link_faults import listed, nodes
+from autograder.exercises.architecture.link_faults import join_names, name_nodes
 from autograder.exercises.architecture.rig import ArchitectureRig
 from autograder.exercises.architecture.robot_graph import Topic
 from autograder.exercises.architecture.robot_roles import MOTORS
@@ -15,10 +15,10 @@ from autograder.observe.phrases import callback_raised
 READINGS = {"/scan": "a scan", "/camera/image": "an image"}
 
 
-def stranded(rig: ArchitectureRig, poured: Poured, wanted: Iterable[str]) -> str:
+def describe_lost_mark(rig: ArchitectureRig, poured: Poured, wanted: Iterable[str]) -> str:
     """Return how far the dye got instead, and what the student's callbacks raised."""
-    there = listed(wanted, "or")
-    way = f"{listed(poured.lost_on)}, but" if poured.lost_on else "no topic, and so"
+    there = join_names(wanted, "or")
+    way = f"{join_names(poured.lost_on)}, but" if poured.lost_on else "no topic, and so"
     where = f"It was seen on {way} never on {there}"
     if poured.arrived:
         others = (
@@ -27,10 +27,10 @@ def stranded(rig: ArchitectureRig, poured: Poured, wanted: Iterable[str]) -> str
         where = f"Of {poured.marks} marks {poured.arrived} was seen on {there}{others}"
     if poured.aside:
         where += f"; {poured.aside}"
-    return f"{where}{raised(rig)}."
+    return f"{where}{error_note(rig)}."
 
 
-def raised(rig: ArchitectureRig) -> str:
+def error_note(rig: ArchitectureRig) -> str:
     """Return what the student's callbacks raised, as the end of a sentence."""
     errors = rig.subject.errors()
     return f"; {callback_raised(errors[-1])}" if errors else ""
@@ -43,7 +43,7 @@ def require_plans(rig: ArchitectureRig) -> None:
     that raised before it had a map, say, can answer.
     """
     services = rig.jobs.planning_services
-    if not services or any(rig.answers(offer) for offer in services):
+    if not services or any(rig.gets_answer(offer) for offer in services):
         return
     errors = rig.subject.errors()
     faults = [e for e in errors for o in services for n in o.servers if f" of {n}: " in e]
@@ -51,7 +51,7 @@ def require_plans(rig: ArchitectureRig) -> None:
     raise Failed(
         expected="Path planning answers each request: its callback returns the response that "
         "it was given.",
-        actual=f"{listed([offer.name for offer in services])} did not answer a request{why}.",
+        actual=f"{join_names([offer.name for offer in services])} did not answer a request{why}.",
     )
 
 
@@ -63,12 +63,13 @@ def see_scan_arrive(rig: ArchitectureRig, topics: dict[str, Topic]) -> None:
     """
     lost: Failed | None = None
     while topics:
-        eye = rig.jobs.eye(topics.values())
-        poured = rig.colour_topics([rig.graph.topic(eye)], topics)
+        eye = rig.jobs.source_sensor(topics.values())
+        poured = rig.colour_topics([rig.graph.get_topic(eye)], topics)
         if not poured.enough:
             raise lost or Failed(
-                expected=f"The mark of {READINGS[eye]} on {eye} is seen on {listed(topics, 'or')}.",
-                actual=stranded(rig, poured, topics),
+                expected=f"The mark of {READINGS[eye]} on {eye} is seen on "
+                f"{join_names(topics, 'or')}.",
+                actual=describe_lost_mark(rig, poured, topics),
             )
         reached = [topic for name, topic in topics.items() if rig.seen[name] & poured.tags]
         names = [topic.name for topic in reached]
@@ -77,8 +78,8 @@ def see_scan_arrive(rig: ArchitectureRig, topics: dict[str, Topic]) -> None:
             _see_stream(rig, poured, names)
             return
         lost = lost or Failed(
-            expected=f"The mark of a message on {listed(names, 'or')} is seen on {MOTORS}.",
-            actual=stranded(rig, poured, [MOTORS]),
+            expected=f"The mark of a message on {join_names(names, 'or')} is seen on {MOTORS}.",
+            actual=describe_lost_mark(rig, poured, [MOTORS]),
         )
         topics = {name: topic for name, topic in topics.items() if name not in names}
     assert lost is not None
@@ -92,13 +93,14 @@ def _see_stream(rig: ArchitectureRig, poured: Poured, names: list[str]) -> None:
     """
     last = [topic for topic in rig.graph.topics.values() if topic.read_by & rig.jobs.controllers]
     by_goal = any(rig.jobs.controllers & offer.servers for offer in rig.graph.actions.values())
-    if by_goal or not last or not all(rig.knows(topic) for topic in last):
+    if by_goal or not last or not all(rig.knows_type(topic) for topic in last):
         return
     if not rig.wait(lambda: any(rig.seen[topic.name] & poured.tags for topic in last)):
         raise Failed(
-            expected=f"What is on {listed(names, 'or')} gets to {MOTORS} over topics or action "
+            expected=f"What is on {join_names(names, 'or')} gets to {MOTORS} over topics or action "
             "goals.",
             actual=f"Its mark was seen on {MOTORS}, but on no topic that "
-            f"{nodes(rig.jobs.controllers)} reads ({listed([t.name for t in last], 'and')}): it "
+            f"{name_nodes(rig.jobs.controllers)} reads "
+            f"({join_names([t.name for t in last], 'and')}): it "
             "came with a request of a service, or an answer, only when somebody asked.",
         )

@@ -17,12 +17,18 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 
-from autograder.exercises.architecture.goal_sender import NEARER, SETTLE, WAYPOINT, Errands, marked
+from autograder.exercises.architecture.goal_sender import (
+    NEARER,
+    SETTLE,
+    WAYPOINT,
+    Errands,
+    marked_message,
+)
 from autograder.exercises.architecture.robot_graph import Topic
 from autograder.exercises.architecture.robot_roles import EYES
 from autograder.observe.marked_types import load_type
 from course.design import dye
-from course.design.lifelike import FAR, lifelike
+from course.design.lifelike import FAR, lifelike_message
 from course.errors import WaitTimeout
 from course.runtime.core_session import CoreSession
 
@@ -66,7 +72,7 @@ class Poured:
     turned_away: int = 0
     """Goals that were rejected although one had been taken before, and was over."""
 
-    def then(self, later: Poured) -> Poured:
+    def combine_with(self, later: Poured) -> Poured:
         """Return what became of both this and ``later``, of which enough must have arrived, too."""
         marks, arrived = self.marks + later.marks, self.arrived + later.arrived
         return replace(later, marks=marks, arrived=arrived, tags=self.tags | later.tags)
@@ -85,7 +91,7 @@ class Pours:
         self._errands: Errands | None = None
         self._stream: _Stream | None = None
 
-    def overheard(self, topic: str, tags: Collection[int]) -> None:
+    def answer_overheard(self, topic: str, tags: Collection[int]) -> None:
         """Answer a message that took the place of a marked one as the newest on its topic.
 
         A driver of the student's own goes on publishing, and a node that looks at the newest now
@@ -99,7 +105,7 @@ class Pours:
         """From now on have a goal of this action under way while topics are coloured."""
         self._errands = self._errands or Errands(self._session, name, action_type)
 
-    def goals(
+    def pour_goals(
         self, name: str, action_type: Any, sensors: Iterable[Topic], arrived_on: Collection[str]
     ) -> Poured:
         """Send marked goals until marks are seen on one of ``arrived_on``, while sensors go on.
@@ -119,34 +125,34 @@ class Pours:
         errands = self._errands
         assert errands is not None
         every = list(sensors)
-        blind = self._waking(topic for topic in every if topic.name not in EYES)
-        seeing = self._waking(every)
+        blind = self._make_waker(topic for topic in every if topic.name not in EYES)
+        seeing = self._make_waker(every)
         sent, ahead = 0, WAYPOINT
         wake = _Every(WAKE, lambda: blind() if sent <= BLIND else seeing())
 
         def send(tag: int) -> bool:
             nonlocal sent
             sent += 1
-            errands.end()
+            errands.end_goal()
             taken = errands.send(tag, ahead)
             # A controller may look at the newest ten times a second: readings wait until it has.
             wake.put_off()
             return taken
 
-        poured = self._pour(send, wake, arrived_on, lambda: errands.outlasts, PLANNING)
+        poured = self._pour_tags(send, wake, arrived_on, lambda: errands.outlasts, PLANNING)
         if poured.enough:
-            errands.end()
+            errands.end_goal()
             if errands.outlasts and not errands.cancelled:
-                errands.wait()
+                errands.wait_for_end()
             if poured.arrived < ARRIVALS and errands.answers and not errands.outlasts:
                 sent, ahead = 0, NEARER
                 with suppress(GoalRejectedError):  # it is told how many were turned away
-                    poured = poured.then(self._pour(send, wake, arrived_on, needed=1))
+                    poured = poured.combine_with(self._pour_tags(send, wake, arrived_on, needed=1))
             elif not errands.outlasts:
-                errands.send(self._fresh())
-        aside = errands.aside
+                errands.send(self._fresh_tag())
+        aside = errands.rejection_remark
         if not poured.arrived:
-            aside = aside or errands.aborted
+            aside = aside or errands.aborted_goals
         if errands.cancelled and not poured.arrived:
             aside = aside or (
                 f"nothing came of the first goals within {SETTLE / POURS:g} s, nor of the last "
@@ -154,7 +160,7 @@ class Pours:
             )
         return replace(poured, aside=aside, turned_away=errands.turned_away)
 
-    def topics(
+    def pour_topics(
         self, topics: Iterable[Topic], others: Iterable[Topic], arrived_on: Collection[str]
     ) -> Poured:
         """Publish marked messages on topics until marks are seen on one of ``arrived_on``.
@@ -164,7 +170,7 @@ class Pours:
         Raises:
             UnknownTypeError: a topic's type is not installed here.
         """
-        inlets = [(self._inlet(topic), topic) for topic in topics]
+        inlets = [(self._get_inlet(topic), topic) for topic in topics]
         # The examiner's own tap is a subscription, too. Who is late all the same gets a later pour.
         with suppress(WaitTimeout):
             self._session.until(
@@ -173,11 +179,11 @@ class Pours:
                 "the readers of a topic",
             )
         stream = _Stream({topic.name: inlet for inlet, topic in inlets})
-        again, wake = _Every(REPEAT, stream.publish), _Every(WAKE, self._waking(others))
+        again, wake = _Every(REPEAT, stream.publish), _Every(WAKE, self._make_waker(others))
 
         def pour(tag: int) -> bool:
             if self._errands is not None:
-                self._errands.keep_one(self._fresh())
+                self._errands.keep_one(self._fresh_tag())
             stream.tag = tag
             stream.publish()
             wake.put_off()  # as for goals
@@ -189,7 +195,7 @@ class Pours:
             wake()
 
         try:
-            return self._pour(pour, meanwhile, arrived_on)
+            return self._pour_tags(pour, meanwhile, arrived_on)
         finally:
             self._stream = None
 
@@ -199,12 +205,14 @@ class Pours:
         Only the wheels' readings bear marks: what the library's nodes make of a mark may be an
         obstacle, and a robot that has seen one may stand still from then on.
         """
-        inlets = [(self._inlet(topic), topic.name in EYES) for topic in sensors]
+        inlets = [(self._get_inlet(topic), topic.name in EYES) for topic in sensors]
 
         def report() -> None:
             for inlet, sees in inlets:
                 kind = inlet.msg_type
-                inlet.publish(lifelike(kind, FAR) if sees else marked(kind, self._fresh()))
+                inlet.publish(
+                    lifelike_message(kind, FAR) if sees else marked_message(kind, self._fresh_tag())
+                )
 
         on = _Every(0.1, report)
 
@@ -217,7 +225,7 @@ class Pours:
             self._session.until(look, SETTLE, "a message")
         return heard()
 
-    def _pour(
+    def _pour_tags(
         self,
         pour: Callable[[int], bool],
         meanwhile: Callable[[], object],
@@ -230,17 +238,17 @@ class Pours:
         tags: set[int] = set()
         slow = 0
         for left in reversed(range(POURS)):
-            if pour(tag := self._fresh()):
+            if pour(tag := self._fresh_tag()):
                 tags.add(tag)
-            known = len(self._at(arrived_on, tags))
+            known = len(self._tags_seen(arrived_on, tags))
             if tag in tags or not (known and goes_on()):
                 slow += tag in tags and left < SLOW and (not known or slow > 0)
-                self._wait(
-                    lambda n=known: len(self._at(arrived_on, tags)) > n,  # type: ignore[misc]
+                self._wait_for_mark(
+                    lambda n=known: len(self._tags_seen(arrived_on, tags)) > n,  # type: ignore[misc]
                     meanwhile,
                     patience if slow else SETTLE / POURS,
                 )
-            arrived = self._at(arrived_on, tags)
+            arrived = self._tags_seen(arrived_on, tags)
             if len(arrived) >= needed or (slow >= ARRIVALS and not arrived):
                 break
             if arrived and goes_on() and not self._made_up(arrived_on):
@@ -253,7 +261,7 @@ class Pours:
         enough = len(arrived) >= needed
         return Poured(enough, len(tags), len(arrived), lost_on, frozenset(arrived))
 
-    def _wait(
+    def _wait_for_mark(
         self, arrived: Callable[[], bool], meanwhile: Callable[[], object], seconds: float
     ) -> None:
         def look() -> bool:
@@ -263,33 +271,33 @@ class Pours:
         with suppress(WaitTimeout):
             self._session.until(look, seconds, "a mark")
 
-    def _at(self, topics: Collection[str], tags: set[int]) -> set[int]:
+    def _tags_seen(self, topics: Collection[str], tags: set[int]) -> set[int]:
         return {tag for name in topics for tag in tags & self._seen.get(name, set())}
 
     def _made_up(self, topics: Collection[str]) -> bool:
         """Whether more marks were seen there than anybody can have got from here."""
         return any(len(self._seen.get(name, set()) - self._tags) > FEW for name in topics)
 
-    def _fresh(self) -> int:
+    def _fresh_tag(self) -> int:
         tag = dye.fresh_tag()
         self._tags.add(tag)
         return tag
 
-    def _waking(self, sensors: Iterable[Topic]) -> Callable[[], None]:
-        inlets = [self._inlet(topic) for topic in sensors]
+    def _make_waker(self, sensors: Iterable[Topic]) -> Callable[[], None]:
+        inlets = [self._get_inlet(topic) for topic in sensors]
 
         def wake() -> None:
             for inlet in inlets:
-                inlet.publish(marked(inlet.msg_type, self._fresh()))
+                inlet.publish(marked_message(inlet.msg_type, self._fresh_tag()))
 
         return wake
 
-    def _inlet(self, topic: Topic) -> Any:
+    def _get_inlet(self, topic: Topic) -> Any:
         if topic.name not in self._inlets:
             self._inlets[topic.name] = self._node.create_publisher(
                 load_type(topic.types[0]),
                 topic.name,
-                _serving(topic),
+                _matching_profile(topic),
             )
         return self._inlets[topic.name]
 
@@ -305,7 +313,7 @@ class _Stream:
 
     def publish(self) -> None:
         for inlet in self._inlets.values():
-            inlet.publish(marked(inlet.msg_type, self.tag))
+            inlet.publish(marked_message(inlet.msg_type, self.tag))
 
 
 class _Every:
@@ -326,7 +334,7 @@ class _Every:
         self._last = time.monotonic()
 
 
-def _serving(topic: Topic) -> QoSProfile:
+def _matching_profile(topic: Topic) -> QoSProfile:
     """Return a profile that every reader of a topic connects to."""
     asked = [end.qos for end in topic.readers]
     manual = any(qos.liveliness == LivelinessPolicy.MANUAL_BY_TOPIC for qos in asked)
@@ -334,12 +342,14 @@ def _serving(topic: Topic) -> QoSProfile:
         depth=10,
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL,
-        deadline=_shortest([qos.deadline for qos in asked]),
+        deadline=_shortest_duration([qos.deadline for qos in asked]),
         liveliness=LivelinessPolicy.MANUAL_BY_TOPIC if manual else LivelinessPolicy.AUTOMATIC,
-        liveliness_lease_duration=_shortest([qos.liveliness_lease_duration for qos in asked]),
+        liveliness_lease_duration=_shortest_duration(
+            [qos.liveliness_lease_duration for qos in asked]
+        ),
     )
 
 
-def _shortest(durations: list[Duration]) -> Duration:
+def _shortest_duration(durations: list[Duration]) -> Duration:
     return min((d for d in durations if d.nanoseconds > 0), key=lambda d: d.nanoseconds,
                default=Duration())  # fmt: skip

@@ -21,13 +21,13 @@ NEAR, BEFORE_GOAL = 0.1, 0.6
 station, and for how many seconds of the node's clock."""
 
 
-def hold(drive: Drive) -> None:
+def block_aisle(drive: Drive) -> None:
     """Let the aisle be blocked before the next station, whatever the robot is told.
 
     Raises:
         Failed: the feedback goes on, so it does not look where the robot is, or not closely.
     """
-    drive.leave()
+    drive.leave_station()
     stretch = camera_stream.Stretch(drive.rig)
     if drive.rig.films:
         stretch.run(BLOCKED, sum(unaffected_during_drive.FILMED) / 2)
@@ -48,8 +48,8 @@ def hold_before_goal(drive: Drive) -> None:
     Raises:
         Failed: the goal counts as reached, or the robot drives no further.
     """
-    drive.leave()
-    drive.move(drive.goal - NEAR)
+    drive.leave_station()
+    drive.move_to(drive.goal - NEAR)
     drive.go_by(BEFORE_GOAL, COARSE)
     _wait_on_the_wall(drive)
     require_no_further(drive)
@@ -58,17 +58,17 @@ def hold_before_goal(drive: Drive) -> None:
 
 def _wait_on_the_wall(drive: Drive) -> None:
     """Give those who look by the wall's clock the time to get ahead of the robot."""
-    drive.rig.wait(lambda: drive.latest > drive.station or drive.run.done, BLOCKED_WALL)
+    drive.rig.wait(lambda: drive.latest_station > drive.station or drive.run.done, BLOCKED_WALL)
 
 
 def _require_the_rest(drive: Drive, stretch: camera_stream.Stretch) -> None:
     """Fail if the drive, of which ``stretch`` is a part, holds up what worked without one."""
-    where = drive.where.replace("while", "While", 1)
+    where = drive.moment_phrase.replace("while", "While", 1)
     unaffected_during_drive.require_pictures(drive.rig, stretch, where)
     # Twice: a position that is looked up now and then may be right by chance, but then it has
     # just been looked up.
     for part in FURTHER:
-        drive.move(drive.station + part)
+        drive.move_to(drive.station + part)
         unaffected_during_drive.require_position(drive.rig, drive.position, where)
     unaffected_during_drive.require_battery(drive.rig, where)
     unaffected_during_drive.require_parameters(drive.rig, where)

@@ -48,13 +48,13 @@ class Stretch:
         self._budget = PATIENCE
 
     @property
-    def seconds(self) -> float:
+    def elapsed_seconds(self) -> float:
         """How long it is by now, in the node's time."""
         return round(self._rig.elapsed - self._since, 3)
 
     @property
-    def numbered(self) -> bool:
-        """Whether `rates` knew of each picture, those that were lost on the way among them."""
+    def is_numbered(self) -> bool:
+        """Whether `measure_rates` knew of each picture, also of those that were lost on the way."""
         return self._numbered
 
     def run(self, seconds: float, hertz: float) -> None:
@@ -62,59 +62,61 @@ class Stretch:
 
         So a publisher in a thread of its own gets its turn as well as a timer does.
         """
-        pictures, before, first = self._pictures, self._newest(), self._rig.elapsed
+        pictures, before, first = self._pictures, self._count_published(), self._rig.elapsed
         for _ in range(round(seconds / STEP)):
             self._rig.step()
             spent = self._rig.elapsed - first
             due = before + math.floor(spent * hertz + 1e-6) - 1  # one may be on its way
-            lossy = pictures and self._newest() > len(pictures)
+            lossy = pictures and self._count_published() > len(pictures)
             patience = Deadline(LOST if lossy else self._budget)
-            self._await(due, patience)
+            self._await_pictures(due, patience)
             if not lossy:
-                self._budget = patience.left
+                self._budget = patience.seconds_left
 
-    def _await(self, due: int, patience: Deadline) -> None:
+    def _await_pictures(self, due: int, patience: Deadline) -> None:
         """Wait until so many pictures have been published, the clock standing still.
 
         A thread that rclpy put to sleep just when its time came sleeps until time moves again.
         """
-        while not self._rig.wait(lambda: self._newest() >= due, min(NUDGE, patience.left)):
-            if not patience.left:
+        while not self._rig.wait(
+            lambda: self._count_published() >= due, min(NUDGE, patience.seconds_left)
+        ):
+            if not patience.seconds_left:
                 return
             self._rig.nudge()
 
-    def _newest(self) -> int:
+    def _count_published(self) -> int:
         """Return how many pictures have been published since the first that was heard."""
         pictures = self._pictures
         if not pictures:
             return 0
         return max(len(pictures), pictures[-1].number - pictures[0].number + 1)
 
-    def rates(self) -> tuple[float, float] | None:
+    def measure_rates(self) -> tuple[float, float] | None:
         """Return how many pictures a second there have been, at least and at most.
 
         The next one, for which the clock goes on, proves that all before it have come or are lost.
         None if none comes any more.
         """
-        ended, seconds = time.time_ns(), self.seconds
-        if not another(self._rig, ended):
+        ended, seconds = time.time_ns(), self.elapsed_seconds
+        if not wait_for_picture(self._rig, ended):
             return None
         before = [picture for picture in self._pictures if picture.published < self._began][-1:]
         since = [picture for picture in self._pictures if picture.published >= self._began]
         self._seen = [picture for picture in since if picture.published < ended]
         next_one = since[len(self._seen)]
         fewest = most = len(self._seen)
-        self._numbered = self._counts([*before, *self._seen, next_one])
+        self._numbered = self._are_numbered([*before, *self._seen, next_one])
         if self._numbered:
             fewest = self._seen[-1].number - self._seen[0].number + 1 if self._seen else 0
             most = next_one.number - (before[0].number if before else 0) - 1
         return fewest / seconds, most / seconds
 
-    def pace(self) -> tuple[float, float]:
+    def measure_pace(self) -> tuple[float, float]:
         """Return how many there were a second, at least and at most, from the first seen on.
 
-        Where many are lost this says more than `rates`, which do not know what was lost at the
-        ends. It needs these to have been found out.
+        Where many are lost this says more than `measure_rates`, which do not know what was lost at
+        the ends. It needs these to have been found out.
         """
         if not self._numbered or len(self._seen) < 2:
             return 0.0, math.inf
@@ -124,20 +126,22 @@ class Stretch:
         many, shortest = last.number - first.number, late - early
         return many / (latest - earliest), many / shortest if shortest > 0 else math.inf
 
-    def _counts(self, pictures: list[Picture]) -> bool:
+    def _are_numbered(self, pictures: list[Picture]) -> bool:
         """Return whether the numbers count the pictures: a second writer counts for itself."""
         numbers = [picture.number for picture in pictures]
         growing = all(one < other for one, other in pairwise(numbers))
         return growing and numbers[0] > 0 and self._rig.node.count_publishers(NAMES["camera"]) == 1
 
 
-def another(rig: RobotRig, moment: int) -> bool:
+def wait_for_picture(rig: RobotRig, moment: int) -> bool:
     """Let the clock go on until a picture comes that was published after a ``moment`` (ns)."""
     pictures = rig.node.pictures
-    return rig.wait_stepping(lambda: pictures and pictures[-1].published > moment, patience(rig))
+    return rig.wait_stepping(
+        lambda: pictures and pictures[-1].published > moment, picture_timeout(rig)
+    )
 
 
-def patience(rig: RobotRig) -> float:
+def picture_timeout(rig: RobotRig) -> float:
     """Return within how many seconds of the node's time a picture comes, if any does."""
     offers = rig.node.get_publishers_info_by_topic(NAMES["camera"])
     reliable = all(o.qos_profile.reliability == ReliabilityPolicy.RELIABLE for o in offers)
@@ -153,15 +157,15 @@ def require_rate(rig: RobotRig, seconds: float, allowed: tuple[float, float]) ->
         allowed: how many a second there must be, and may be.
     """
     stretch = Stretch(rig)
-    while stretch.seconds < LONGEST:
+    while stretch.elapsed_seconds < LONGEST:
         stretch.run(seconds, sum(allowed) / 2)
-        rates = stretch.rates()
+        rates = stretch.measure_rates()
         least, greatest = allowed
         if rates is None:
             raise Failed(
                 expected=f"{least:g} to {greatest:g} pictures a second, for as long as it is on.",
-                actual=f"Some came, and then not one more in {patience(rig):g} s of the node's time"
-                f"{rig.because()}.",
+                actual=f"Some came, and then not one more in {picture_timeout(rig):g} s of the "
+                f"node's time{rig.error_note()}.",
             )
         fewest, most = rates
         if wrong := rate_fault(rates, allowed):
@@ -169,7 +173,7 @@ def require_rate(rig: RobotRig, seconds: float, allowed: tuple[float, float]) ->
                 expected=f"{least:g} to {greatest:g} pictures a second, by the node's clock.",
                 actual=f"They came at {wrong} a second.",
             )
-        slowest, fastest = stretch.pace()
+        slowest, fastest = stretch.measure_pace()
         if least <= max(fewest, slowest) and min(most, fastest) <= greatest:
             return
 

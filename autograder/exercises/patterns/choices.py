@@ -15,7 +15,7 @@ READ = "Chapter 5, “When to use what”"
 WORDS = ", ".join(f'"{pattern}"' for pattern in PATTERNS)
 
 
-def read(rig: RobotRig) -> dict[Scenario, str]:
+def read_choices(rig: RobotRig) -> dict[Scenario, str]:
     """Return {scenario: pattern} as the notebook has it.
 
     Raises:
@@ -26,13 +26,15 @@ def read(rig: RobotRig) -> dict[Scenario, str]:
         value = rig.subject.value(VARIABLE)
     except StudentError as error:
         if error.missing:
-            raise Failed(expected=expected, actual=error.told) from None
+            raise Failed(expected=expected, actual=error.feedback_text) from None
         reason = str(error).partition(": ")[2] or str(error)  # without the exception's name
         raise Failed(
             expected=expected, actual=f"It could not be read: {reason.rstrip('.')}."
         ) from None
     if not isinstance(value, dict):
-        raise Failed(expected=expected, actual=f"choices is not a dictionary but {_few(value)}.")
+        raise Failed(
+            expected=expected, actual=f"choices is not a dictionary but {_short_repr(value)}."
+        )
     chosen: dict[Scenario, str] = {}
     wrong = []
     for scenario in SCENARIOS:
@@ -45,13 +47,13 @@ def read(rig: RobotRig) -> dict[Scenario, str]:
         elif word is None:
             wrong.append(f"{scenario} is still open")
         else:
-            wrong.append(f"{scenario} is {_few(word)}")
+            wrong.append(f"{scenario} is {_short_repr(word)}")
     if wrong:
         raise Failed(expected=expected, actual=f"In choices, {'; '.join(wrong)}.")
     return chosen
 
 
-def compare(rig: RobotRig, scenario: Scenario) -> str:
+def compare_choice(rig: RobotRig, scenario: Scenario) -> str:
     """Return a remark if the choice for a scenario is right.
 
     Raises:
@@ -73,7 +75,7 @@ def compare(rig: RobotRig, scenario: Scenario) -> str:
     return meaning
 
 
-def _few(value: object) -> str:
+def _short_repr(value: object) -> str:
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:60]}…"
 
@@ -138,7 +140,7 @@ _QUESTIONS: dict[Scenario, _Question] = {
 def add_checks(exam: Exam[RobotRig], needs: tuple[str, ...]) -> None:
     """Give ``exam`` a check for each scenario, called ``<scenario>_choice``."""
     for scenario, question in _QUESTIONS.items():
-        check = partial(compare, scenario=scenario)
+        check = partial(compare_choice, scenario=scenario)
         check.__name__ = f"{scenario}_choice"  # type: ignore[attr-defined]
         check.__doc__ = f"{question.title}\n\n{question.why}"
         exam.check(needs=needs, hints=question.hints, read=READ)(check)

@@ -37,18 +37,18 @@ class LateJoiner:
         rig.node.listen(msg_type, topic, self.heard.append, durable=self.durable, reliable=reliable)
 
 
-def numbers(text: str) -> list[float]:
+def find_numbers(text: str) -> list[float]:
     """Return the numbers that stand in a text."""
     return [float(number) for number in re.findall(_NUMBER, text[:1000])]
 
 
-def acquaint(rig: RobotRig) -> None:
+def wait_for_discovery(rig: RobotRig) -> None:
     """Return when the subject knows every endpoint that the examiner has made so far.
 
     DDS makes endpoints known in the order in which they were made. So once a client that is newer
     than all of them gets an answer, the subject's writers know the earlier readers, too.
     """
-    if name := _answering(rig):
+    if name := _answering_service(rig):
         client = rig.node.create_client(GetParameters, name)
         if rig.wait(client.service_is_ready):
             rig.wait(client.call_async(GetParameters.Request()).done)
@@ -57,11 +57,13 @@ def acquaint(rig: RobotRig) -> None:
 
 def hear_out(rig: RobotRig) -> None:
     """Return when what the subject has sent so far has come in: it has answered since."""
-    if name := _answering(rig):
+    if name := _answering_service(rig):
         rig.call(GetParameters, name, GetParameters.Request())
 
 
-def arrives(rig: RobotRig, condition: Callable[[], bool], seconds: float, step: float) -> bool:
+def wait_for_arrival(
+    rig: RobotRig, condition: Callable[[], bool], seconds: float, step: float
+) -> bool:
     """Let the student's clock run until what was sent makes ``condition`` hold; return if it did.
 
     For a moment from which another is reckoned: on a busy machine `RobotRig.wait_stepping` may
@@ -77,7 +79,7 @@ def arrives(rig: RobotRig, condition: Callable[[], bool], seconds: float, step: 
     return True
 
 
-def _answering(rig: RobotRig) -> str | None:
+def _answering_service(rig: RobotRig) -> str | None:
     """Return a service that every node of the subject's has, unless it was made without."""
     for name, types in rig.node.get_service_names_and_types():
         if types == ["rcl_interfaces/srv/GetParameters"] and rig.node.count_services(name):

@@ -6,13 +6,13 @@ import time
 from concurrent.futures import Future
 
 from autograder.examination.exam import Failed
-from autograder.exercises.patterns.blocked_aisle import hold, hold_before_goal
-from autograder.exercises.patterns.discovery import acquaint
+from autograder.exercises.patterns.blocked_aisle import block_aisle, hold_before_goal
+from autograder.exercises.patterns.discovery import wait_for_discovery
 from autograder.exercises.patterns.driving import Drive
 from autograder.exercises.patterns.rig import SETTLE, STEP
 from autograder.exercises.patterns.stations import require_report
 from autograder.observe.patience import IDLE_S
-from autograder.observe.phrases import ended
+from autograder.observe.phrases import end_phrase
 from course.errors import WaitTimeout
 from course.runtime.requests.actions import GoalState
 
@@ -45,7 +45,7 @@ def to_the_end(drive: Drive, *, blocked: bool = False) -> None:
         if drive.station < drive.goal:
             require_report(drive)
         if blocked and drive.station == drive.start + 1:
-            hold(drive)
+            block_aisle(drive)
     arrived = "At the station named the robot has arrived."
     require_end(drive, GoalState.SUCCEEDED, arrived, stopped=True)
 
@@ -65,8 +65,8 @@ def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool 
     rig = drive.rig
     rig.wait_stepping(lambda: drive.run.done)
     if not drive.run.done or drive.run.status != state:
-        how = ended(drive.run.status.name) if drive.run.done else "went on and on"
-        stood = drive.stood
+        how = end_phrase(drive.run.status.name) if drive.run.done else "went on and on"
+        stood = drive.standstill_note
         if stood and not drive.run.done and state == GoalState.CANCELED:
             stood = (
                 " It stood there all the time: does your node look whether a drive is called off "
@@ -74,7 +74,7 @@ def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool 
             )
         raise Failed(
             expected=f"{expected} The goal ends as {state.name}.",
-            actual=f"The goal {how}, with the robot {drive.place}{rig.because()}.{stood}",
+            actual=f"The goal {how}, with the robot {drive.place_phrase}{rig.error_note()}.{stood}",
         )
     # Which of two messages comes first is the transport's affair: a stop may be under way.
     late = stopped and not rig.wait(lambda: rig.speed == 0, UNDER_WAY)
@@ -83,7 +83,7 @@ def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool 
     if state == GoalState.CANCELED:
         rig.step(WATCHED, SELDOM)
     rig.step(STANDS, SELDOM)
-    acquaint(rig)  # whatever was on its way has come in by now
+    wait_for_discovery(rig)  # whatever was on its way has come in by now
     if not rig.node.speeds or rig.speed != 0:
         raise Failed(
             expected=f"{expected} The robot is told to stop: hardware/speed is 0.0.",
@@ -98,7 +98,7 @@ def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool 
         )
 
 
-def cancel(drive: Drive, seconds: float, looking: float = LOOKING) -> int:
+def cancel_drive(drive: Drive, seconds: float, looking: float = LOOKING) -> int:
     """Ask for the goal to be cancelled, and let the robot have the time to be told to stop.
 
     The time counts from the request on: the answer, too, may wait for the node's clock.
@@ -119,7 +119,7 @@ def cancel(drive: Drive, seconds: float, looking: float = LOOKING) -> int:
     def stopped() -> bool:
         return rig.speed == 0
 
-    answer, began = rig.ask("to cancel", lambda: drive.run.cancel(SETTLE)), rig.elapsed
+    answer, began = rig.submit_request("to cancel", lambda: drive.run.cancel(SETTLE)), rig.elapsed
     if answer.done():
         _require_agreed(drive, answer)
     else:
@@ -128,7 +128,7 @@ def cancel(drive: Drive, seconds: float, looking: float = LOOKING) -> int:
     rig.wait(stopped, looking)
     while not stopped() and seconds - (rig.elapsed - began) > STEP / 2:
         rig.step(STEP)
-    rig.patience(STOPPING, stepped=IDLE_S).wait(rig.session, stopped)
+    rig.start_patience(STOPPING, stepped=IDLE_S).wait(rig.session, stopped)
     over = time.time_ns()
     rig.await_answer(answer, "to cancel")
     _require_agreed(drive, answer)
@@ -147,10 +147,10 @@ def _require_agreed(drive: Drive, answer: Future[bool]) -> None:
     except WaitTimeout:
         raise Failed(
             expected="A request to cancel a drive is answered.",
-            actual=f"It got no answer, {drive.where}{drive.rig.because()}.",
+            actual=f"It got no answer, {drive.moment_phrase}{drive.rig.error_note()}.",
         ) from None
     if not agreed:
         raise Failed(
             expected="A request to cancel a drive is accepted.",
-            actual=f"It was refused, {drive.where}{drive.rig.because()}.",
+            actual=f"It was refused, {drive.moment_phrase}{drive.rig.error_note()}.",
         )

@@ -9,11 +9,11 @@ from rclpy.qos import ReliabilityPolicy
 
 from autograder.examination.check_context import SubjectGone
 from autograder.examination.exam import Failed
-from autograder.exercises.patterns.discovery import acquaint, hear_out
+from autograder.exercises.patterns.discovery import hear_out, wait_for_discovery
 from autograder.exercises.patterns.rig import GRAIN, STEP, RobotRig
 from autograder.exercises.patterns.scenarios import NAMES
 from autograder.observe.marked_types import load_type
-from autograder.observe.phrases import ended
+from autograder.observe.phrases import end_phrase
 from course.errors import WaitTimeout
 from course.runtime.requests.actions import GoalRun
 
@@ -57,13 +57,13 @@ class Drive:
         self.goal = goal
         self.heard: list[list[int]] = []
         self.rig = rig
-        self.move(float(position))
+        self.move_to(float(position))
         action = load_type(rig.memory["offers"]["navigation"]["action"])
-        self._listener = rig.node.listen(action.Impl.FeedbackMessage, FEEDBACK, self._hear)
-        acquaint(rig)
+        self._listener = rig.node.listen(action.Impl.FeedbackMessage, FEEDBACK, self._note_feedback)
+        wait_for_discovery(rig)
         rig.node.speeds.clear()
         try:
-            run = rig.answer(
+            run = rig.run_request(
                 "a goal",
                 lambda: rig.session.send_goal(
                     action, NAME, action.Goal(order=goal), timeout=rig.settle
@@ -73,16 +73,16 @@ class Drive:
             _require_feedback_for_all(rig)
             raise Failed(
                 expected=f"A goal on {NAME} is accepted at once; the drive itself comes after.",
-                actual=f"The goal (station {goal}) got no answer{rig.because()}.",
+                actual=f"The goal (station {goal}) got no answer{rig.error_note()}.",
             ) from None
         if not run.accepted:
             raise Failed(
                 expected=f"A goal on {NAME} for a station further along the line is accepted.",
-                actual=f"With the robot {self.place}, station {goal} was rejected.",
+                actual=f"With the robot {self.place_phrase}, station {goal} was rejected.",
             )
         self.run: GoalRun = run
 
-    def _hear(self, message: Any) -> None:
+    def _note_feedback(self, message: Any) -> None:
         self.heard.append([int(number) for number in message.feedback.sequence])
 
     def __enter__(self) -> Drive:
@@ -93,34 +93,34 @@ class Drive:
         """Leave nothing behind that the next drive would stumble over."""
         with suppress(Failed, SubjectGone):
             if not self.run.done:
-                self.move(self.goal + BEYOND)
+                self.move_to(self.goal + BEYOND)
                 self.rig.wait_stepping(lambda: self.run.done, 1.0, CLEARING)
         self.rig.node.destroy_subscription(self._listener)
 
     @property
-    def where(self) -> str:
+    def moment_phrase(self) -> str:
         """When something was seen, by the robot's place, as a phrase."""
-        return f"while the robot was {self.place} on the way to {self.goal}"
+        return f"while the robot was {self.place_phrase} on the way to {self.goal}"
 
     @property
-    def place(self) -> str:
+    def place_phrase(self) -> str:
         """The robot's place, between the stations or at one, as a phrase."""
-        if not self.between:
+        if not self.is_between_stations:
             return f"at station {self.station}"
         if (left := self.station + 1 - self.position) < CLOSE:
             return f"{left:.2g} m before station {self.station + 1}"
         return f"between stations {self.station} and {self.station + 1}"
 
     @property
-    def between(self) -> bool:
+    def is_between_stations(self) -> bool:
         """Whether the robot is between two stations."""
         return self.position - self.station > PART_OF_THE_WAY - ROUNDING
 
     @property
-    def stood(self) -> str:
+    def standstill_note(self) -> str:
         """For how long a blocked aisle has held the robot up by now, as a sentence; or nothing."""
         seconds = self.rig.elapsed - self.since
-        if not self.between or seconds < STOOD:
+        if not self.is_between_stations or seconds < STOOD:
             return ""
         return (
             f" The robot had stood there for {seconds:.0f} s of the node's time, as in a blocked "
@@ -135,7 +135,10 @@ class Drive:
         Raises:
             Failed: it is not, or the goal has ended.
         """
-        rig, stood = self.rig, self.stood  # from now on it stands if it is not told to drive
+        rig, stood = (
+            self.rig,
+            self.standstill_note,
+        )  # from now on it stands if it is not told to drive
         for _ in range(HALTS):
             drives = rig.wait_stepping(lambda: rig.speed > 0 or self.run.done)
             rig.step(0.01)
@@ -148,7 +151,7 @@ class Drive:
         speeds = f"said {rig.speed:g} m/s" if rig.node.speeds else "said nothing"
         raise Failed(
             expected="The robot drives until it is there: hardware/speed is more than 0.",
-            actual=f"Speed {self.where}: hardware/speed {speeds}{rig.because()}.{stood}",
+            actual=f"Speed {self.moment_phrase}: hardware/speed {speeds}{rig.error_note()}.{stood}",
         )
 
     def top_speed(self, limit: float) -> float:
@@ -167,30 +170,31 @@ class Drive:
             said = f"went up to {found:g} m/s" if found > limit else f"said {found:g} m/s"
             raise Failed(
                 expected=f"{expected} the robot drives at {limit:g} m/s.",
-                actual=f"Speed {self.where}: hardware/speed {said}.",
+                actual=f"Speed {self.moment_phrase}: hardware/speed {said}.",
             )
 
     def require_going_on(self) -> None:
         """Fail if the goal has ended."""
         if self.run.done:
-            waits = " While the aisle is blocked, the robot waits." if self.stood else ""
-            how = ended(self.run.status.name)
+            waits = " While the aisle is blocked, the robot waits." if self.standstill_note else ""
+            how = end_phrase(self.run.status.name)
             raise Failed(
                 expected=f"The goal ends when the robot is there.{waits}",
-                actual=f"It {how} {self.where}{self.rig.because()}.{self.stood}",
+                actual=f"It {how} "
+                f"{self.moment_phrase}{self.rig.error_note()}.{self.standstill_note}",
             )
 
     def roll_on(self) -> None:
         """Let the robot drive to the next station."""
-        self.leave()
+        self.leave_station()
         self.station += 1
-        self.move(self.station + BEYOND)
+        self.move_to(self.station + BEYOND)
 
-    def leave(self) -> None:
+    def leave_station(self) -> None:
         """Let the robot drive most of the way to the next station, if it has not yet."""
-        self.move(max(self.position, self.station + PART_OF_THE_WAY))
+        self.move_to(max(self.position, self.station + PART_OF_THE_WAY))
 
-    def move(self, position: float) -> None:
+    def move_to(self, position: float) -> None:
         """Have the hardware report a ``position`` (m)."""
         self.position, self.since = position, self.rig.elapsed
         self.rig.report("position", position)
@@ -203,7 +207,7 @@ class Drive:
         hear_out(self.rig)
 
     @property
-    def latest(self) -> int:
+    def latest_station(self) -> int:
         """The furthest station that the feedback has told of; -1 if there was none."""
         return max((number for stations in list(self.heard) for number in stations), default=-1)
 

@@ -27,7 +27,7 @@ from autograder.exercises.patterns import (
     stations,
     unaffected_during_drive,
 )
-from autograder.exercises.patterns.discovery import LateJoiner, acquaint, arrives
+from autograder.exercises.patterns.discovery import LateJoiner, wait_for_arrival, wait_for_discovery
 from autograder.exercises.patterns.driving import ACTIONS, SPEED_MARGIN, Drive
 from autograder.exercises.patterns.rig import LEVEL_MARGIN, NODE, RobotRig, robot_rig
 from autograder.exercises.patterns.scenarios import NAMES, SCENARIOS, Scenario
@@ -83,9 +83,9 @@ def node_starts(rig: RobotRig) -> str:
     except StudentError as error:
         raise Failed(
             expected=f"{NODE}() makes a node without an error.",
-            actual=error.told,
+            actual=error.feedback_text,
         ) from None
-    found = interface_patterns.settle(
+    found = interface_patterns.wait_for_patterns(
         rig, {scenario: tuple(WORKING[scenario]) for scenario in SCENARIOS}
     )
     rig.memory["offers"] = found
@@ -107,7 +107,7 @@ def choices_made(rig: RobotRig) -> None:
 
     A designer who leaves it open has others decide, usually for a topic.
     """
-    rig.memory["choices"] = choices.read(rig)
+    rig.memory["choices"] = choices.read_choices(rig)
 
 
 @EXAM.check(
@@ -127,7 +127,7 @@ def camera_streams(rig: RobotRig) -> None:
     Wi-Fi is full.
     """
     needed = "Pictures come by themselves, 10 a second, for any number of viewers."
-    interface_patterns.require(rig, "camera", WORKING["camera"], needed)
+    interface_patterns.require_pattern(rig, "camera", WORKING["camera"], needed)
     pictures = rig.node.pictures
     since = rig.still
     left = FROZEN - (time.time_ns() - since) / 1e9
@@ -137,16 +137,16 @@ def camera_streams(rig: RobotRig) -> None:
             expected=f"{needed} The node's clock sets the pace, as a timer of the node does.",
             actual="Pictures were published while the node's clock stood still.",
         )
-    if not camera_stream.another(rig, since):
+    if not camera_stream.wait_for_picture(rig, since):
         raise Failed(
             expected=needed,
-            actual=f"Not one picture came in {camera_stream.patience(rig):g} s of the node's time"
-            f"{rig.because()}.",
+            actual=f"Not one picture came in {camera_stream.picture_timeout(rig):g} s of the "
+            f"node's time{rig.error_note()}.",
         )
     camera_stream.require_rate(rig, RATE_WINDOW, camera_stream.RATE)
     if fault := camera_stream.picture_fault(pictures[-1]):
         raise Failed(expected="A message on robot/camera holds a picture.", actual=fault)
-    plain_program_times.require(rig, "camera")
+    plain_program_times.require_trial(rig, "camera")
     rig.films = rig.memory["films"] = True
 
 
@@ -167,26 +167,28 @@ def position_answered(rig: RobotRig) -> str:
     """
     needed = "Whoever wants to know the position gets it in metres, "
     needed += f"at most {odometry.AGE:g} s old, also while the robot stands still."
-    pattern = interface_patterns.require(rig, "position", WORKING["position"], needed)
+    pattern = interface_patterns.require_pattern(rig, "position", WORKING["position"], needed)
     if not rig.listens_to("position"):
         raise Failed(expected=needed, actual="Your node does not listen to hardware/position.")
     asker = odometry.asker_by(rig, pattern)
     for number, metres in enumerate(POSITIONS):  # the robot never goes back
         position = rig.draws.number(f"position {number}", *metres)
         rig.report("position", position)
-        if answer := odometry.fault(rig, asker, position):
+        if answer := odometry.position_fault(rig, asker, position):
             raise Failed(
                 expected=needed,
                 actual=f"With the robot at {position:g} m, {answer}",
             )
     # Who begins to listen while the robot stands wants to know as well.
-    if pattern == "topic" and (answer := odometry.fault(rig, odometry.Overhearing(rig), position)):
+    if pattern == "topic" and (
+        answer := odometry.position_fault(rig, odometry.Overhearing(rig), position)
+    ):
         raise Failed(
             expected=needed,
             actual=f"To somebody who began to listen while the robot stood at {position:g} m, "
             f"{answer}",
         )
-    plain_program_times.require(rig, "position")
+    plain_program_times.require_trial(rig, "position")
     rig.asker = asker
     rig.memory["position"] = pattern
     if pattern == "topic":
@@ -216,7 +218,7 @@ def parameter_changes(rig: RobotRig) -> str:
     Somebody mistypes 5 for 0.5 m/s: the robot has to say no, and say why.
     """
     needed = "Whoever changes max_speed hears whether the new value holds, or why it does not."
-    interface_patterns.require(rig, "parameters", WORKING["parameters"], needed)
+    interface_patterns.require_pattern(rig, "parameters", WORKING["parameters"], needed)
     prefix = interface_patterns.parameter_node(rig)
     # Where only a service knows it, the first drive tells: see speed_takes_effect.
     if prefix is not None and rig.untouched:
@@ -226,7 +228,7 @@ def parameter_changes(rig: RobotRig) -> str:
                 expected=f"max_speed is {SPEED_AT_START:g} m/s at the start.",
                 actual=f"Before anybody has changed it, it is {first:g} m/s.",
             )
-    with unaffected_during_drive.standing(rig):
+    with unaffected_during_drive.require_standing(rig):
         for good in _good_speeds(rig):
             taken, reason = interface_patterns.set_speed_limit(rig, good)
             if not taken:
@@ -267,7 +269,7 @@ def parameter_changes(rig: RobotRig) -> str:
 def _good_speeds(rig: RobotRig) -> tuple[float, ...]:
     """Return speed limits in m/s: both bounds, one that is not round, and the one that stays."""
     odd = rig.draws.number("a good speed", 0.37, 0.21, 0.89)
-    return HIGHEST, LOWEST, odd, _limits(rig)[0][0]
+    return HIGHEST, LOWEST, odd, _speed_limits(rig)[0][0]
 
 
 def _bad_speeds(rig: RobotRig) -> tuple[float, ...]:
@@ -281,14 +283,14 @@ def _bad_speeds(rig: RobotRig) -> tuple[float, ...]:
     )
 
 
-def _limits(rig: RobotRig) -> tuple[tuple[float, float], ...]:
+def _speed_limits(rig: RobotRig) -> tuple[tuple[float, float], ...]:
     """Return speed limits in m/s, each with one that is refused after it."""
     slow = rig.draws.number("a low speed limit", 0.3, 0.2, 0.4)
     fast = rig.draws.number("a high speed limit", 0.8, 0.6, 0.9)
     return (slow, MISTYPED), (fast, _bad_speeds(rig)[2])
 
 
-def _levels(rig: RobotRig) -> tuple[float, ...]:
+def _battery_levels(rig: RobotRig) -> tuple[float, ...]:
     """Return battery levels: great changes and a small one, falling and rising."""
     high = rig.draws.number("a high level", 0.6, 0.55, 0.69)
     low = rig.draws.number("a low level", 0.4, 0.3, 0.45)
@@ -311,19 +313,19 @@ def battery_broadcast(rig: RobotRig) -> None:
     The planner, the display and the log all need it; whoever is forgotten strands the robot.
     """
     needed = f"Whoever listens to robot/battery knows a new level within {LEVEL_AGE:g} s."
-    interface_patterns.require(rig, "battery", WORKING["battery"], needed)
+    interface_patterns.require_pattern(rig, "battery", WORKING["battery"], needed)
     if not rig.listens_to("charge"):
         raise Failed(expected=needed, actual="Your node does not listen to hardware/charge.")
-    acquaint(rig)
-    for level in _levels(rig):
+    wait_for_discovery(rig)
+    for level in _battery_levels(rig):
         rig.report("charge", level)
         if not rig.wait_stepping(lambda level=level: rig.told_level(level), LEVEL_AGE):  # type: ignore[misc]
             raise Failed(
                 expected=f"{needed} Its percentage is 0.0 to 1.0.",
                 actual=f"{LEVEL_AGE:g} s after the level had become {level:g}, "
-                f"{unaffected_during_drive.last_level(rig)}{rig.because()}.",
+                f"{unaffected_during_drive.last_level(rig)}{rig.error_note()}.",
             )
-    plain_program_times.require(rig, "level")
+    plain_program_times.require_trial(rig, "level")
     rig.broadcasts = rig.memory["broadcasts"] = True
 
 
@@ -363,10 +365,10 @@ def battery_late_joiner(rig: RobotRig) -> str:
         for tolerance in (0.0, TICK):
             joined = time.time_ns()
             late = LateJoiner(rig, BatteryState, NAMES["battery"])
-            acquaint(rig)
-            if not arrives(
+            wait_for_discovery(rig)
+            if not wait_for_arrival(
                 rig,
-                lambda joined=joined: rig.node.levels.newest > joined,  # type: ignore[misc]
+                lambda joined=joined: rig.node.levels.newest_time > joined,  # type: ignore[misc]
                 LEVEL_AGE + tolerance,
                 TICK,
             ):
@@ -379,7 +381,7 @@ def battery_late_joiner(rig: RobotRig) -> str:
     if not told():
         said = f"{late.heard[-1].percentage:.4g}" if late.heard else "nothing"
         raise Failed(expected=needed, actual=f"With the level at {level:g}, it was told {said}.")
-    plain_program_times.require(rig, "late")
+    plain_program_times.require_trial(rig, "late")
     return f"{how}: right. A durable publisher and one that repeats itself both serve late joiners."
 
 
@@ -399,7 +401,7 @@ def navigation_drives(rig: RobotRig) -> None:
     A drive takes minutes: whoever sent the robot wants to know how far it is, and that it is there.
     """
     needed = "Somebody names a station, hears of each one that is passed, and learns how it ended."
-    interface_patterns.require(rig, "navigation", WORKING["navigation"], needed)
+    interface_patterns.require_pattern(rig, "navigation", WORKING["navigation"], needed)
     start = _next_start(rig)
     with Drive(rig, start, start + WAY) as drive:
         if rig.untouched:
@@ -409,7 +411,7 @@ def navigation_drives(rig: RobotRig) -> None:
         stations.require_result(drive)
     rig.memory["waits"] = True
     _drive_again(rig, drive.position, "a drive")
-    plain_program_times.require(rig, "aisle")
+    plain_program_times.require_trial(rig, "aisle")
 
 
 def _next_start(rig: RobotRig) -> int:
@@ -463,7 +465,7 @@ def speed_takes_effect(rig: RobotRig) -> None:
             f"up to {first:g} m/s.",
         )
     position = float(_next_start(rig))
-    for limit, refused in _limits(rig):
+    for limit, refused in _speed_limits(rig):
         interface_patterns.set_speed_limit(rig, limit)
         interface_patterns.set_speed_limit(rig, refused)  # the good one stays
         expected = f"With max_speed at {limit:g} m/s, and {refused:g} m/s refused after that,"
@@ -500,7 +502,7 @@ def navigation_cancel(rig: RobotRig) -> None:
         drive.roll_on()
         stations.require_report(drive)
         drive.require_driving()
-        drive.leave()
+        drive.leave_station()
         _call_off(drive)
     before = "a drive that was called off"
     unaffected_during_drive.require_the_same_after(rig, drive.position, before)
@@ -508,11 +510,11 @@ def navigation_cancel(rig: RobotRig) -> None:
         drive.require_driving()  # and not yet at any station
         _call_off(drive)
     _drive_again(rig, drive.position, before)
-    plain_program_times.require(rig, "cancel")
+    plain_program_times.require_trial(rig, "cancel")
 
 
 def _call_off(drive: Drive) -> None:
-    over = drive_ends.cancel(drive, drive_ends.STOPS)
+    over = drive_ends.cancel_drive(drive, drive_ends.STOPS)
     drive_ends.require_end(
         drive, GoalState.CANCELED, "A drive that is called off ends there and then."
     )

@@ -47,15 +47,21 @@ class ExaminerNode(QuietNode):
         self.speeds = Ears[float]()
         self.levels = Ears[float]()
         self.pictures = Ears[Picture]()
-        self._both(Float64, "hardware/speed", self.speeds, lambda msg, _: msg.data)
-        self._both(BatteryState, "robot/battery", self.levels, lambda msg, _: msg.percentage)
-        self._both(Image, "robot/camera", self.pictures, _picture)
+        self._listen_twice(Float64, "hardware/speed", self.speeds, lambda msg, _: msg.data)
+        self._listen_twice(
+            BatteryState, "robot/battery", self.levels, lambda msg, _: msg.percentage
+        )
+        self._listen_twice(Image, "robot/camera", self.pictures, _make_picture)
 
-    def _both(self, msg_type: Any, topic: str, ears: Ears[T], value: Callable[..., T]) -> None:
+    def _listen_twice(
+        self, msg_type: Any, topic: str, ears: Ears[T], value: Callable[..., T]
+    ) -> None:
         """Listen with two subscriptions; ``value`` says what is kept of a message and its info."""
 
         def note(message: Any, info: dict[str, Any]) -> None:
-            ears.hear(published_at(info), value(message, info), int(info["source_timestamp"]))
+            ears.add_message(
+                published_at(info), value(message, info), int(info["source_timestamp"])
+            )
 
         for reliable in (False, True):
             self.listen(msg_type, topic, note, reliable=reliable)
@@ -79,6 +85,6 @@ class ExaminerNode(QuietNode):
         return self.create_subscription(msg_type, topic, heard, qos)
 
 
-def _picture(image: Image, info: dict[str, Any]) -> Picture:
+def _make_picture(image: Image, info: dict[str, Any]) -> Picture:
     published, number = published_at(info), int(info["publication_sequence_number"] or 0)
     return Picture(published, number, image.height, image.width, image.step, len(image.data))

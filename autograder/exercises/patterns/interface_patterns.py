@@ -26,7 +26,7 @@ Patterns = dict[str, str]
 """{pattern: type on the graph} of one name."""
 
 
-def seen(rig: RobotRig, scenario: Scenario) -> Patterns:
+def find_patterns(rig: RobotRig, scenario: Scenario) -> Patterns:
     """Return the patterns that the subject offers for a scenario now, with their types."""
     name = f"/{NAMES[scenario]}"
     found = {}
@@ -49,7 +49,9 @@ def seen(rig: RobotRig, scenario: Scenario) -> Patterns:
     return found
 
 
-def settle(rig: RobotRig, wanted: dict[Scenario, tuple[str, ...]]) -> dict[Scenario, Patterns]:
+def wait_for_patterns(
+    rig: RobotRig, wanted: dict[Scenario, tuple[str, ...]]
+) -> dict[Scenario, Patterns]:
     """Return what is seen of every scenario, once all that is wanted is there or had its time.
 
     What never came the last time is not waited for again while the notebook has not moved on.
@@ -60,20 +62,20 @@ def settle(rig: RobotRig, wanted: dict[Scenario, tuple[str, ...]]) -> dict[Scena
     def missing() -> list[Scenario]:
         for scenario in SCENARIOS:
             if not set(found.get(scenario, ())) & set(wanted[scenario]):
-                found[scenario] = seen(rig, scenario)
+                found[scenario] = find_patterns(rig, scenario)
         return [s for s in SCENARIOS if not set(found[s]) & set(wanted[s])]
 
     if not rig.wait(lambda: known.issuperset(missing()), SETTLE_AT_ONCE):
-        wake(rig)
+        trigger_creation(rig)
         if not rig.wait(lambda: known.issuperset(missing()), SETTLE_OTHER - SETTLE_AT_ONCE):
             # Where something else is offered under the name, the wanted one has had its time.
-            patience = rig.patience(SETTLE - SETTLE_OTHER, stepped=SETTLE_OTHER)
+            patience = rig.start_patience(SETTLE - SETTLE_OTHER, stepped=SETTLE_OTHER)
             patience.wait(rig.session, lambda: all(found[s] for s in missing()))
     known.update(missing())
     return found
 
 
-def wake(rig: RobotRig) -> None:
+def trigger_creation(rig: RobotRig) -> None:
     """Give what is made a moment later, or when it is first needed, a reason to be made."""
     with suppress(Failed):  # a callback that holds the clock up is another check's affair
         rig.report("charge", CHARGE_AT_START)
@@ -81,7 +83,7 @@ def wake(rig: RobotRig) -> None:
         rig.step(WAKES, COARSE)
 
 
-def require(rig: RobotRig, scenario: Scenario, wanted: dict[str, str], needed: str) -> str:
+def require_pattern(rig: RobotRig, scenario: Scenario, wanted: dict[str, str], needed: str) -> str:
     """Return which of the ``wanted`` {pattern: type or types} it is; the first of several.
 
     Raises:
@@ -94,19 +96,19 @@ def require(rig: RobotRig, scenario: Scenario, wanted: dict[str, str], needed: s
             continue
         if found[pattern] not in types.split(" or "):
             raise Failed(
-                expected=f"Made as {_a(pattern)}, {name} has the type {types}.",
-                actual=f"On the ROS graph it is {_a(pattern)} of type {found[pattern]}.",
+                expected=f"Made as {_a_or_an(pattern)}, {name} has the type {types}.",
+                actual=f"On the ROS graph it is {_a_or_an(pattern)} of type {found[pattern]}.",
             )
         return pattern
     if not found and scenario == "parameters":
         actual = f"No node has a parameter {SPEED} with a number as its value, and there is no "
-        actual += f"service or topic {name}{rig.because()}.{_near_miss(rig, name)}"
+        actual += f"service or topic {name}{rig.error_note()}.{_near_miss(rig, name)}"
     elif not found:
-        actual = f"Nothing of the name {name} is on the ROS graph{rig.because()}."
+        actual = f"Nothing of the name {name} is on the ROS graph{rig.error_note()}."
         actual += _near_miss(rig, name)
     else:
         pattern = next(iter(found))
-        actual = f"On the ROS graph {name} is {_a(pattern)}. {would_mean(scenario, pattern)}"
+        actual = f"On the ROS graph {name} is {_a_or_an(pattern)}. {would_mean(scenario, pattern)}"
     raise Failed(expected=needed, actual=actual)
 
 
@@ -126,7 +128,7 @@ def _near_miss(rig: RobotRig, name: str) -> str:
     return ""
 
 
-def _a(pattern: str) -> str:
+def _a_or_an(pattern: str) -> str:
     return "an action" if pattern == "action" else f"a {pattern}"
 
 
@@ -184,7 +186,7 @@ def set_speed_limit(rig: RobotRig, value: float) -> tuple[bool, str]:
         what = "did not answer" if answer is None else f"gave {len(answer.results)} results"
         raise Failed(
             expected="A request to set max_speed gets one answer: taken, or refused with a reason.",
-            actual=f"Asked for {value:g} m/s, {service} {what}{rig.because()}.",
+            actual=f"Asked for {value:g} m/s, {service} {what}{rig.error_note()}.",
         )
     (result,) = answer.results
     return bool(result.successful), str(result.reason)

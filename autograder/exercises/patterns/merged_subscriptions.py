@@ -23,7 +23,7 @@ class Ears(Sequence[T]):
         self._known: set[int] = set()
         self._forgotten = 0
 
-    def hear(self, published: int, item: T, stamp: int) -> None:
+    def add_message(self, published: int, item: T, stamp: int) -> None:
         """Note what was published at ``published`` (ns), unless it has been heard before.
 
         By its ``stamp`` it is known again: the writer's, which is the same for both subscriptions.
@@ -34,7 +34,7 @@ class Ears(Sequence[T]):
             self._heard.insert(at, (published, item))
 
     @property
-    def newest(self) -> int:
+    def newest_time(self) -> int:
         """When the newest was published (ns), or 0: it says what came after a moment.
 
         To count says less: what is still under way at that moment comes in later.

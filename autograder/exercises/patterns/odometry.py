@@ -5,7 +5,7 @@ from __future__ import annotations
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from autograder.exercises.patterns.discovery import LateJoiner, acquaint, numbers
+from autograder.exercises.patterns.discovery import LateJoiner, find_numbers, wait_for_discovery
 from autograder.exercises.patterns.rig import Asker, RobotRig
 from autograder.exercises.patterns.scenarios import NAMES
 
@@ -18,7 +18,7 @@ MOST_NUMBERS = 12
 LONGEST = 200  # characters of an answer that are shown
 
 
-def fault(rig: RobotRig, asker: Asker, position: float, age: float = AGE) -> str:
+def position_fault(rig: RobotRig, asker: Asker, position: float, age: float = AGE) -> str:
     """Return what whoever wants to know the position learns if it is wrong, or an empty string.
 
     It is the end of a sentence, with its full stop. The hardware has reported the ``position``, and
@@ -35,20 +35,20 @@ def fault(rig: RobotRig, asker: Asker, position: float, age: float = AGE) -> str
     rig.wait_stepping(known, age)
     if right:
         return ""
-    return answer if answer.endswith("?") else f"{answer}{rig.because()}."
+    return answer if answer.endswith("?") else f"{answer}{rig.error_note()}."
 
 
 def asker_by(rig: RobotRig, pattern: str) -> Asker:
     """Return a new way of finding out the position, by a service or a topic."""
-    return ask if pattern == "service" else Overhearing(rig)
+    return ask_position if pattern == "service" else Overhearing(rig)
 
 
-def ask(rig: RobotRig) -> tuple[str, list[float]]:
+def ask_position(rig: RobotRig) -> tuple[str, list[float]]:
     """Ask by the service."""
     answer = rig.call(Trigger, NAMES["position"], Trigger.Request())
     if answer is None:
         return NO_ANSWER, []
-    found = numbers(answer.message) if answer.success else []
+    found = find_numbers(answer.message) if answer.success else []
     if len(found) > MOST_NUMBERS:
         return f"the answer holds {len(found)} numbers: which one is the position?", []
     text = answer.message[:LONGEST]
@@ -61,7 +61,7 @@ class Overhearing:
     def __init__(self, rig: RobotRig) -> None:
         """Subscribe, and be known to the publisher."""
         self._late = LateJoiner(rig, Float64, NAMES["position"])
-        acquaint(rig)
+        wait_for_discovery(rig)
 
     def __call__(self, _: RobotRig) -> tuple[str, list[float]]:
         """Tell the newest message."""

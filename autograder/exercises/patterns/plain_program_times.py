@@ -22,7 +22,7 @@ from autograder.examination.check_context import Bench
 from autograder.examination.exam import Failed, NotExaminable
 from autograder.examination.plain_programs import Program, Programs
 from autograder.exercises.patterns import camera_stream, drive_ends, interface_patterns, odometry
-from autograder.exercises.patterns.discovery import LateJoiner, acquaint
+from autograder.exercises.patterns.discovery import LateJoiner, wait_for_discovery
 from autograder.exercises.patterns.driving import ACTIONS, Drive
 from autograder.exercises.patterns.rig import (
     LEAST_IDLE,
@@ -71,11 +71,11 @@ class ProgramRig(RobotRig):
         self.clock = SimulatedClock(program.session)
         self.settle, self._idle = (HASTY, HASTY_IDLE) if hasty else (SETTLE, IDLE_S)
 
-    def _advance(self, seconds: float, grain: float) -> None:
+    def _advance_clock(self, seconds: float, grain: float) -> None:
         stride = min(seconds, grain)
         for _ in range(round(seconds / stride)):
             self.clock.move(stride)
-            self._threads.reached()
+            self._threads.wait_for_rest()
 
     def wait_stepping(
         self,
@@ -99,11 +99,11 @@ class ProgramRig(RobotRig):
         """Tell the node that hardly any time has passed."""
         self.clock.move(0.0)
 
-    def patience(self, seconds: float, stepped: float = 0.0) -> Patience:
+    def start_patience(self, seconds: float, stepped: float = 0.0) -> Patience:
         """Return for how long something is waited for that may never come."""
         return Patience(self._threads, seconds, max(LEAST_IDLE, self._idle - stepped))
 
-    def because(self) -> str:
+    def error_note(self) -> str:
         """Return nothing: nobody is asked what a callback raised."""
         return ""
 
@@ -116,7 +116,7 @@ class _Findings:
     wrong: dict[str, Failed] = field(default_factory=dict)
     patient: set[str] = field(default_factory=set)
 
-    def note(self, outcomes: dict[str, Failed | None]) -> None:
+    def note_outcomes(self, outcomes: dict[str, Failed | None]) -> None:
         for name, outcome in outcomes.items():
             self.wrong.pop(name, None)
             if outcome is None:
@@ -125,7 +125,7 @@ class _Findings:
                 self.wrong[name] = outcome
 
 
-def require(rig: RobotRig, name: str) -> None:
+def require_trial(rig: RobotRig, name: str) -> None:
     """Fail unless a trial is passed in a plain program; nothing where there are no such programs.
 
     Args:
@@ -142,18 +142,18 @@ def require(rig: RobotRig, name: str) -> None:
         rig.memory[__name__] = _Findings()
         # The checks come in this order: what those before this one are about has failed already.
         names = list(TRIALS)[list(TRIALS).index(name) :]
-        rig.memory[__name__].note(_look(rig.bench, programs, names, hasty=True))
+        rig.memory[__name__].note(_run_trials(rig.bench, programs, names, hasty=True))
     found: _Findings = rig.memory[__name__]
     if name not in found.right and name not in found.patient:
         found.patient.add(name)
-        found.note(_look(rig.bench, programs, [name], hasty=False))
+        found.note_outcomes(_run_trials(rig.bench, programs, [name], hasty=False))
     if name in found.wrong:
         raise found.wrong[name]
     if name not in found.right:
         raise NotExaminable(UNTOLD)
 
 
-def _look(
+def _run_trials(
     bench: Bench, programs: Programs, names: Iterable[str], *, hasty: bool
 ) -> dict[str, Failed | None]:
     """Return of each trial how it was failed, or None; what could not be seen is missing."""
@@ -163,10 +163,12 @@ def _look(
         if not program.up:
             return outcomes
         with closing(ProgramRig(bench, program, hasty=hasty)) as rig:
-            trials = {name: TRIALS[name] for name in names if _offers(rig, TRIALS[name].scenario)}
-            _meet(rig, {trial.scenario for trial in trials.values()})
+            trials = {
+                name: TRIALS[name] for name in names if _has_pattern(rig, TRIALS[name].scenario)
+            }
+            _await_interface(rig, {trial.scenario for trial in trials.values()})
             for name, trial in trials.items():
-                if program.ended():
+                if program.has_ended():
                     break  # something in it has: an exit, say
                 outcome = None
                 try:
@@ -175,12 +177,12 @@ def _look(
                     outcome = failed
                 except NotExaminable:
                     continue
-                if not program.ended():
+                if not program.has_ended():
                     outcomes[name] = outcome
     return outcomes
 
 
-def _offers(rig: ProgramRig, scenario: Scenario) -> bool:
+def _has_pattern(rig: ProgramRig, scenario: Scenario) -> bool:
     """Whether a scenario has the pattern that its trial is about, as far as the graph tells."""
     found: interface_patterns.Patterns = rig.memory["offers"][scenario]
     if scenario == "navigation":
@@ -188,21 +190,23 @@ def _offers(rig: ProgramRig, scenario: Scenario) -> bool:
     return "topic" in found or (scenario == "position" and "service" in found)
 
 
-def _meet(rig: ProgramRig, scenarios: set[Scenario]) -> None:
+def _await_interface(rig: ProgramRig, scenarios: set[Scenario]) -> None:
     def met() -> bool:
-        return rig.clock.is_followed and all(interface_patterns.seen(rig, s) for s in scenarios)
+        return rig.clock.is_followed and all(
+            interface_patterns.find_patterns(rig, s) for s in scenarios
+        )
 
     if rig.wait(met, AT_ONCE):
         return
     # A timer may make all this, and a level may not come before it has.
     rig.step(interface_patterns.WAKES, interface_patterns.COARSE)
     if not rig.wait(met, AT_ONCE):
-        interface_patterns.wake(rig)
+        interface_patterns.trigger_creation(rig)
         rig.wait(met)
 
 
 @contextmanager
-def _untold() -> Iterator[None]:
+def _as_not_examinable() -> Iterator[None]:
     """Where the block fails, nothing can be told of what comes after it."""
     try:
         yield
@@ -228,7 +232,7 @@ def _require_late(rig: ProgramRig) -> None:
             MORE * LEVEL_AGE, interface_patterns.COARSE
         )  # until what this change set off is over
     late = LateJoiner(rig, BatteryState, NAMES["battery"])
-    acquaint(rig)
+    wait_for_discovery(rig)
 
     def told() -> bool:
         return bool(late.heard) and abs(late.heard[-1].percentage - level) < LEVEL_MARGIN
@@ -246,12 +250,12 @@ def _require_late(rig: ProgramRig) -> None:
 def _require_position(rig: ProgramRig) -> None:
     pattern = "service" if "service" in rig.memory["offers"]["position"] else "topic"
     rig.report("position", rig.draws.number("the first position in a program", 0.1, 0.1, 0.2))
-    if pattern == "service" and not odometry.ask(rig)[1]:
+    if pattern == "service" and not odometry.ask_position(rig)[1]:
         raise NotExaminable(UNTOLD)
     position = rig.draws.number("the position in a program", 0.4, 0.3, 0.6)
     rig.report("position", position)
     asker = odometry.asker_by(rig, pattern)
-    if answer := odometry.fault(rig, asker, position, MORE * odometry.AGE):
+    if answer := odometry.position_fault(rig, asker, position, MORE * odometry.AGE):
         raise Failed(
             expected=f"{WHEN} whoever wants to know the position gets it, at most "
             f"{odometry.AGE:g} s old.",
@@ -261,12 +265,12 @@ def _require_position(rig: ProgramRig) -> None:
 
 
 def _require_rate(rig: ProgramRig) -> None:
-    if not camera_stream.another(rig, 0):
+    if not camera_stream.wait_for_picture(rig, 0):
         raise NotExaminable(UNTOLD)
     least, most = camera_stream.RATE
     stretch = camera_stream.Stretch(rig)
     stretch.run(FILMED, (least + most) / 2)
-    if (rates := stretch.rates()) is None or not stretch.numbered:
+    if (rates := stretch.measure_rates()) is None or not stretch.is_numbered:
         raise NotExaminable(UNTOLD)
     if wrong := camera_stream.rate_fault(rates, (LESS * least, MORE * most)):
         raise Failed(
@@ -278,11 +282,11 @@ def _require_rate(rig: ProgramRig) -> None:
 def _under_way(rig: ProgramRig) -> Drive:
     """Return a drive, with the robot on its way to the next station."""
     if rig.drive is None or rig.drive.run.done:
-        with _untold():
+        with _as_not_examinable():
             start = max(1, math.ceil(rig.position))
             rig.drive = Drive(rig, start, start + FAR)
             rig.drive.require_driving()
-            rig.drive.leave()
+            rig.drive.leave_station()
     return rig.drive
 
 
@@ -301,8 +305,8 @@ def _require_patience(rig: ProgramRig) -> None:
 
 def _require_stop(rig: ProgramRig) -> None:
     drive = _under_way(rig)
-    with _untold():
-        over = drive_ends.cancel(drive, MORE * drive_ends.STOPS, looking=0.0)
+    with _as_not_examinable():
+        over = drive_ends.cancel_drive(drive, MORE * drive_ends.STOPS, looking=0.0)
     if not drive_ends.stopped_by(drive, over):
         raise Failed(
             expected=f"{WHEN} a drive that is called off stops the robot within "
@@ -327,4 +331,4 @@ TRIALS = {
     "aisle": Trial("navigation", _require_patience),
     "cancel": Trial("navigation", _require_stop),
 }
-"""By the name that `require` knows each by, in the order in which they come."""
+"""By the name that `require_trial` knows each by, in the order in which they come."""

@@ -116,12 +116,12 @@ class RobotRig:
 
         ``grain`` is the time (s) between two moments that the student's nodes get to see.
         """
-        self._advance(seconds, grain)
+        self._advance_clock(seconds, grain)
         self.elapsed = round(self.elapsed + seconds, 6)
         self.stands_still()
         self._steps.append((self.still, self.elapsed))
 
-    def _advance(self, seconds: float, grain: float) -> None:
+    def _advance_clock(self, seconds: float, grain: float) -> None:
         try:
             self.subject.advance(seconds, grain)
         except StudentError as error:
@@ -148,13 +148,13 @@ class RobotRig:
         Without ``timeout`` (s) as long as it may come: see `Patience`.
         """
         if timeout is None:
-            return self.patience(self.settle).wait(self.session, condition)
+            return self.start_patience(self.settle).wait(self.session, condition)
         with suppress(WaitTimeout):
             self.session.until(condition, timeout=max(0.0, timeout), what="an observation")
             return True
         return False
 
-    def patience(self, seconds: float, stepped: float = 0.0) -> Patience:
+    def start_patience(self, seconds: float, stepped: float = 0.0) -> Patience:
         """Return for how long something is waited for that may never come: so many s at most.
 
         ``stepped`` is for how long (s of wall time) the clock has run meanwhile: all were at rest
@@ -186,7 +186,7 @@ class RobotRig:
                 return False
             if most - (self.elapsed - began) <= step / 2:
                 now = time.monotonic()
-                patience = self.patience(max(0.0, deadline - now), now - started)
+                patience = self.start_patience(max(0.0, deadline - now), now - started)
                 return patience.wait(self.session, condition)
             # What takes so long is no matter of moments any more.
             self.step(step, GRAIN if self.elapsed - began < FINE else step)
@@ -206,7 +206,7 @@ class RobotRig:
         if not self.wait(client.service_is_ready):
             return None
         future = client.call_async(request)
-        patience = self._patience(name)
+        patience = self._answer_patience(name)
         if self.wait(future.done, patience):
             return future.result()
         if self.wait_stepping(future.done, timeout=max(patience, self.settle - patience)):
@@ -215,23 +215,23 @@ class RobotRig:
         client.remove_pending_request(future)
         return None
 
-    def _patience(self, name: str) -> float:
+    def _answer_patience(self, name: str) -> float:
         """Return for how long the clock stands still for an answer (s of wall time)."""
         return AGAIN if name in self._by_the_clock else ANSWERED
 
-    def ask(self, name: str, function: Callable[[], T]) -> Future[T]:
+    def submit_request(self, name: str, function: Callable[[], T]) -> Future[T]:
         """Run a function that waits for an answer beside the check; return what it will return.
 
         Most answers are there at once. One that is not may wait for the node's clock, so whoever
         needs it moves that on. ``name`` is what it asks for.
         """
         answer = self._beside.submit(function)
-        wait_for([answer], self._patience(name))
+        wait_for([answer], self._answer_patience(name))
         return answer
 
-    def answer(self, name: str, function: Callable[[], T]) -> T:
+    def run_request(self, name: str, function: Callable[[], T]) -> T:
         """Return what a function that waits for an answer returns, or raise what it raises."""
-        answer = self.ask(name, function)
+        answer = self.submit_request(name, function)
         self.await_answer(answer, name)
         return answer.result()
 
@@ -280,7 +280,7 @@ class RobotRig:
         """Return whether the last battery level that was heard is ``level``."""
         return bool(self.node.levels) and abs(self.node.levels[-1] - level) < LEVEL_MARGIN
 
-    def because(self) -> str:
+    def error_note(self) -> str:
         """Return what a callback of the student's raised, as the end of a sentence.
 
         Once each: what one check has told is not the next one's cause.

@@ -14,18 +14,20 @@ def require_report(drive: Drive) -> None:
     Raises:
         Failed: there is none, or it is ahead of the robot, or goes back, or some are left out.
     """
-    drive.rig.wait_stepping(lambda: drive.latest >= drive.station or drive.run.done)
+    drive.rig.wait_stepping(lambda: drive.latest_station >= drive.station or drive.run.done)
     drive.require_going_on()
-    if drive.latest != drive.station or drive.heard != sorted(drive.heard, key=_last):
-        _complain(drive)
+    if drive.latest_station != drive.station or drive.heard != sorted(
+        drive.heard, key=_last_station
+    ):
+        _fail_feedback(drive)
     if not _are_passed(drive, drive.heard[-1], drive.station):
-        _complain(drive)
+        _fail_feedback(drive)
 
 
 def require_no_further(drive: Drive) -> None:
     """Fail if the feedback is ahead of the robot, or the goal has ended."""
-    if drive.latest > drive.station:
-        _complain(drive)
+    if drive.latest_station > drive.station:
+        _fail_feedback(drive)
     drive.require_going_on()
 
 
@@ -40,7 +42,7 @@ def require_result(drive: Drive) -> None:
         )
 
 
-def _complain(drive: Drive) -> NoReturn:
+def _fail_feedback(drive: Drive) -> NoReturn:
     lists = ", ".join(str(stations) for stations in drive.heard[-4:])
     said = f"The feedback so far was {lists}" if lists else "There was no feedback at all"
     so_far = list(range(drive.start + 1, drive.station + 1))
@@ -48,7 +50,7 @@ def _complain(drive: Drive) -> NoReturn:
         expected="At each station the feedback tells all those that the robot has passed so "
         "far, in that order: the list grows, and its last number is that station. Here it is "
         f"{so_far}.",
-        actual=f"{said}, {drive.where}{drive.rig.because()}.",
+        actual=f"{said}, {drive.moment_phrase}{drive.rig.error_note()}.",
     )
 
 
@@ -61,5 +63,5 @@ def _are_passed(drive: Drive, stations: list[int], last: int) -> bool:
     return stations in (passed, [drive.start, *passed])
 
 
-def _last(stations: list[int]) -> int:
+def _last_station(stations: list[int]) -> int:
     return max(stations, default=-1)

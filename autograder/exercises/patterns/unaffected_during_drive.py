@@ -30,14 +30,14 @@ def require_pictures(rig: RobotRig, stretch: camera_stream.Stretch, where: str) 
     """
     if not rig.films:
         return
-    rates = stretch.rates()
+    rates = stretch.measure_rates()
     wrong = "" if rates is None else camera_stream.rate_fault(rates, FILMED)
     if wrong or rates is None:
         came = f"they came at {wrong} a second" if wrong else "no picture came"
         raise Failed(
             expected="While the robot drives, pictures come as they did before, 10 a second: "
             f"{HOLDS_UP}",
-            actual=f"{where}, {came}{rig.because()}.",
+            actual=f"{where}, {came}{rig.error_note()}.",
         )
 
 
@@ -45,7 +45,7 @@ def require_position(rig: RobotRig, position: float, where: str) -> None:
     """Fail if whoever wants to know a ``position`` that has just been reported does not get it."""
     if rig.asker is None:
         return
-    if answer := odometry.fault(rig, rig.asker, position):
+    if answer := odometry.position_fault(rig, rig.asker, position):
         raise Failed(
             expected="While the robot drives, whoever wants to know the position gets it, at most "
             f"{odometry.AGE:g} s old: {HOLDS_UP}",
@@ -64,7 +64,7 @@ def require_battery(rig: RobotRig, where: str) -> None:
             expected="While the robot drives, too, whoever listens to robot/battery knows a new "
             f"level within {LEVEL_AGE:g} s: {HOLDS_UP}",
             actual=f"{where}, the level became {level:g}, and {LEVEL_AGE:g} s later "
-            f"{last_level(rig)}{rig.because()}.",
+            f"{last_level(rig)}{rig.error_note()}.",
         )
 
 
@@ -86,7 +86,7 @@ def require_parameters(rig: RobotRig, where: str) -> None:
 
 
 @contextmanager
-def standing(rig: RobotRig) -> Iterator[None]:
+def require_standing(rig: RobotRig) -> Iterator[None]:
     """Have the speed limit changed while nobody has sent a goal; fail if the robot drives off."""
     rig.node.speeds.clear()
     yield
@@ -108,14 +108,14 @@ def require_the_same_after(rig: RobotRig, position: float, before: str) -> None:
     """
     limit = rig.limit if rig.obeyed is None else rig.obeyed  # the one that holds
     if limit is not None:
-        with standing(rig):
+        with require_standing(rig):
             interface_patterns.set_speed_limit(rig, limit)
     expected = f"After {before} pictures, position and battery level come as they did before."
-    if rig.memory.get("films") and not camera_stream.another(rig, time.time_ns()):
-        raise Failed(expected=expected, actual=f"No picture came any more{rig.because()}.")
+    if rig.memory.get("films") and not camera_stream.wait_for_picture(rig, time.time_ns()):
+        raise Failed(expected=expected, actual=f"No picture came any more{rig.error_note()}.")
     if pattern := rig.memory.get("position"):
         asker = rig.asker or odometry.asker_by(rig, pattern)
-        if answer := odometry.fault(rig, asker, position):
+        if answer := odometry.position_fault(rig, asker, position):
             raise Failed(expected=expected, actual=f"With the robot at {position:g} m, {answer}")
     if rig.memory.get("broadcasts"):
         level = rig.draws.number("the level after a drive", *LATER)
@@ -124,7 +124,7 @@ def require_the_same_after(rig: RobotRig, position: float, before: str) -> None:
             raise Failed(
                 expected=expected,
                 actual=f"The level became {level:g}, and {LEVEL_AGE:g} s later "
-                f"{last_level(rig)}{rig.because()}.",
+                f"{last_level(rig)}{rig.error_note()}.",
             )
 
 

@@ -39,33 +39,33 @@ class Backlog:
     omits: Share | None = None
 
     @property
-    def withheld(self) -> bool:
+    def is_withheld(self) -> bool:
         """Whether the driver kept some to itself; of stop events, any."""
         least = self.count if self.sensor is STOP else (self.count - 1) * THINNED
         return self.published < least
 
     @property
-    def unfinished(self) -> bool:
+    def is_unfinished(self) -> bool:
         """Whether the newest has not come out, nor one from after the pause."""
         return max(self.kept, default=-1) < self.count - 1
 
     @property
-    def stale(self) -> bool:
+    def is_stale(self) -> bool:
         """Whether the consumer acted on what was too old, by number and by age."""
         most = self.sensor.most
         return self.replayed > most and self.oldest > most / self.sensor.rate
 
     @property
-    def disordered(self) -> bool:
+    def is_disordered(self) -> bool:
         """Whether some came out after a newer one."""
         return self.kept != sorted(self.kept)
 
     @property
-    def decided(self) -> bool:
+    def is_decided(self) -> bool:
         """Whether it is wrong whatever comes after the pause: then nobody need wait for that."""
-        if self.early or self.altered or self.withheld:
+        if self.early or self.altered or self.is_withheld:
             return True
-        return not self.unfinished and (self.stale or self.disordered)
+        return not self.is_unfinished and (self.is_stale or self.is_disordered)
 
 
 @dataclass(frozen=True)
@@ -80,11 +80,11 @@ class Burst:
     aged: bool
 
     @property
-    def missing(self) -> int:
+    def missing_count(self) -> int:
         """How many readings were lost."""
         return BURST - len(set(self.kept))
 
     @property
-    def telling(self) -> bool:
+    def is_conclusive(self) -> bool:
         """Whether what is missing tells something of the consumer."""
-        return not self.missing or (self.published == BURST and not self.aged)
+        return not self.missing_count or (self.published == BURST and not self.aged)

@@ -55,11 +55,11 @@ class Handing:
     freshest: bool = False
 
     @property
-    def undecided(self) -> bool:
+    def is_undecided(self) -> bool:
         """Whether the machine was too busy to tell whether its consumer keeps up."""
         return self is UNKNOWN
 
-    def told(self, sensor: Sensor) -> str:
+    def describe_lag(self, sensor: Sensor) -> str:
         """Return in a sentence how far behind a sensor's consumer was."""
         while_they_came = f"while readings came in at {sensor.rate:.0f} Hz"
         if self.freshest:
@@ -85,7 +85,7 @@ class Share:
     published: int
     handed: int
 
-    def told(self) -> str:
+    def describe_omission(self) -> str:
         """Return in a sentence what a consumer left out."""
         return (
             f"While readings came in, it handed on {self.handed} of {self.published}, and left out "
@@ -94,7 +94,7 @@ class Share:
         )
 
 
-def pursue(
+def watch_consumers(
     rig: SensorRig,
     sensors: Iterable[Sensor],
     phase: str,
@@ -115,8 +115,8 @@ def pursue(
             watched.remove(pursuit)
         return not watched
 
-    rig.wait_in_traffic(lambda: over(Pursuit.settled), WATCHED + PATIENCE)
-    rig.wait_in_traffic(lambda: over(lambda pursuit: pursuit.settled() or pursuit.able), STAMINA)
+    rig.wait_in_traffic(lambda: over(Pursuit.is_settled), WATCHED + PATIENCE)
+    rig.wait_in_traffic(lambda: over(lambda pursuit: pursuit.is_settled() or pursuit.able), STAMINA)
     for pursuit in watched:
         pursuit.behind = UNKNOWN
     return {pursuit.sensor.name: pursuit for pursuit in pursuits}
@@ -144,31 +144,31 @@ class Pursuit:
         # Of readings that were published, and of those handed on: how many, and when (ns) the last.
         self._heard, self._heard_at = [0, 0], [time.time_ns()] * 2
 
-    def settled(self) -> bool:
+    def is_settled(self) -> bool:
         """Whether it has been seen that the consumer keeps up, or that it does not."""
         if not self._settled and (began := time.time_ns()) > self._look_at:
-            self._settled = self._look()
+            self._settled = self._examine_handings()
             ended = time.time_ns()
             self._look_at = ended + max(LOOKS * 1e9, SELDOM * (ended - began))
         return self._settled
 
-    def _look(self) -> bool:
-        published = self._rig.publications(self.sensor, self._phase)
+    def _examine_handings(self) -> bool:
+        published = self._rig.publication_times(self.sensor, self._phase)
         moments = sorted(published.values())
-        handings = self._handings(published, moments)
+        handings = self._list_handings(published, moments)
         if self._is_quiet(moments, handings):
             return True
         if not handings:
             return False
-        if self.sensor is IMU and (omits := self._omission(published)) is not None:
+        if self.sensor is IMU and (omits := self._find_omission(published)) is not None:
             self.omits = omits
             return True
         # A list of IMU readings that is emptied slowly bears their rate for a second, until it is
         # full: here only a spurt counts.
         rated = self.sensor is not IMU and self._at_rate(moments, moments[-1])
-        self._quick = self._quick or rated or self._spurts(handings)
-        self.able = self._quick and any(map(self._young, handings))
-        if self._fresh(handings[-1]) and self._at_rate(moments, handings[-1].when):
+        self._quick = self._quick or rated or self._has_spurt(handings)
+        self.able = self._quick and any(map(self._is_young, handings))
+        if self._is_fresh(handings[-1]) and self._at_rate(moments, handings[-1].when):
             return True
         late = list(self._late_at_last(handings, GENEROUS))
         if late and late[0].when - late[-1].when > LASTING * 1e9:
@@ -180,13 +180,13 @@ class Pursuit:
             self.behind = self.behind or replace(freshest, freshest=True)
         return self.behind is not None
 
-    def _fresh(self, handing: Handing) -> bool:
-        return self._watched(handing) and handing.age <= FRESH
+    def _is_fresh(self, handing: Handing) -> bool:
+        return self._is_watched(handing) and handing.age <= FRESH
 
-    def _young(self, handing: Handing) -> bool:
-        return self._watched(handing) and handing.age <= self.sensor.most / self.sensor.rate
+    def _is_young(self, handing: Handing) -> bool:
+        return self._is_watched(handing) and handing.age <= self.sensor.most / self.sensor.rate
 
-    def _watched(self, handing: Handing) -> bool:
+    def _is_watched(self, handing: Handing) -> bool:
         return handing.when > self._resumed + WATCHED * 1e9
 
     def _is_quiet(self, moments: list[int], handings: list[Handing]) -> bool:
@@ -216,9 +216,9 @@ class Pursuit:
         evenly = min(at[1] - at[0], at[2] - at[1]) >= EVENLY * expected / 2
         return evenly and at[2] - at[0] >= ENOUGH * expected
 
-    def _omission(self, published: Mapping[int, int]) -> Share | None:
+    def _find_omission(self, published: Mapping[int, int]) -> Share | None:
         """Return what is handed on of readings of which some are left out again and again."""
-        handed = {number for number, _ in self._rig.handed(self.sensor, self._phase)}
+        handed = {number for number, _ in self._rig.handed_readings(self.sensor, self._phase)}
         since = {number: when for number, when in published.items() if when > self._resumed}
         order = sorted(since, key=lambda number: since[number])
         begin, gaps, last = 0, 0, -1  # last: where the gap before was, in that order
@@ -235,7 +235,7 @@ class Pursuit:
                 return Share(len(some), len(handed.intersection(some)))
         return None
 
-    def _spurts(self, handings: list[Handing]) -> bool:
+    def _has_spurt(self, handings: list[Handing]) -> bool:
         when = [handing.when for handing in handings]
         within = SPURT / self.sensor.rate / 2 * 1e9
         return any(b - a < within for a, b in zip(when, when[SPURT - 1 :], strict=False))
@@ -248,13 +248,13 @@ class Pursuit:
                 return
             yield handing
 
-    def _handings(self, published: Mapping[int, int], moments: list[int]) -> list[Handing]:
+    def _list_handings(self, published: Mapping[int, int], moments: list[int]) -> list[Handing]:
         return [
             Handing(
                 when,
                 (when - published[number]) / 1e9,
                 bisect_right(moments, when) - bisect_right(moments, published[number]),
             )
-            for number, when in self._rig.handed(self.sensor, self._phase)
+            for number, when in self._rig.handed_readings(self.sensor, self._phase)
             if when > self._resumed and number in published
         ]

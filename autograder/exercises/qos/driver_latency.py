@@ -35,13 +35,13 @@ def each_at_once(rig: SensorRig) -> dict[str, tuple[int, int]]:
     """
     records = {sensor: _Record(rig, sensor) for sensor in SENSORS}
     for index in range(MOST):
-        open_ones = [r for r in records.values() if index < SINGLES or not r.known()]
-        if not _send(rig, [r for r in open_ones if len(r.missed) <= FORGIVEN], index):
+        open_ones = [r for r in records.values() if index < SINGLES or not r.is_known()]
+        if not _send_singles(rig, [r for r in open_ones if len(r.missed) <= FORGIVEN], index):
             break
         if any(record.is_slow() for record in records.values()):
             break
     for sensor in _held_for_the_next(rig, records):
-        raised = rig.raised()
+        raised = rig.error_note()
         why = f"{raised}." if raised else ": does the driver wait for the next one?"
         raise Failed(
             expected="The drivers publish each reading as soon as the hardware delivers it.",
@@ -50,16 +50,19 @@ def each_at_once(rig: SensorRig) -> dict[str, tuple[int, int]]:
         )
     for sensor, record in records.items():
         if record.is_slow():
-            late = record.late()
+            late = record.late_times()
             raise Failed(
                 expected="The drivers publish each reading as soon as the hardware delivers it, "
                 "within 0.1 s.",
-                actual=f"{len(record.times())} {sensor.name} readings came in one by one, and "
-                f"{len(late)} of them were published on {sensor.topic} {min(late.values()):.2f} s "
-                "later or more: what does the driver wait for?",
+                actual=f"{len(record.transit_times())} {sensor.name} readings came in one by one, "
+                f"and {len(late)} of them were published on {sensor.topic} "
+                f"{min(late.values()):.2f} s later or more: what does the driver wait for?",
             )
     return {
-        sensor.name: (len(rig.sent(sensor, _PHASE)), len(set(rig.witnessed(sensor, _PHASE))))
+        sensor.name: (
+            len(rig.delivery_times(sensor, _PHASE)),
+            len(set(rig.witnessed_indices(sensor, _PHASE))),
+        )
         for sensor in SENSORS
     }
 
@@ -79,49 +82,49 @@ class _Record:
     waited: set[int] = field(default_factory=set)
     held: set[int] = field(default_factory=set)
 
-    def unseen(self, index: int) -> bool:
-        return index not in self.rig.witnessed(self.sensor, _PHASE)
+    def is_unseen(self, index: int) -> bool:
+        return index not in self.rig.witnessed_indices(self.sensor, _PHASE)
 
-    def times(self) -> dict[int, float]:
+    def transit_times(self) -> dict[int, float]:
         """Return how long each single took from the hardware to its topic, in s."""
-        sent = self.rig.sent(self.sensor, _PHASE)
-        published = self.rig.publications(self.sensor, _PHASE)
+        sent = self.rig.delivery_times(self.sensor, _PHASE)
+        published = self.rig.publication_times(self.sensor, _PHASE)
         return {n: (when - sent[n]) / 1e9 for n, when in published.items() if n in sent}
 
-    def late(self) -> dict[int, float]:
+    def late_times(self) -> dict[int, float]:
         """Return how long those took that were published too late, and not by the machine.
 
         Those that were `held` took longer than `AT_ONCE`, whatever time the driver gives them.
         """
-        times = self.times()
+        times = self.transit_times()
         late = {n: s for n, s in times.items() if s > AT_ONCE and n in self.waited}
         return late | {n: max(times[n], AT_ONCE) for n in self.held & times.keys()}
 
-    def known(self) -> bool:
-        return self.is_slow() or (self._is_prompt() and not self.late())
+    def is_known(self) -> bool:
+        return self.is_slow() or (self._is_prompt() and not self.late_times())
 
     def is_slow(self) -> bool:
-        late = self.late()
+        late = self.late_times()
         return len(self.held & late.keys()) >= HELD or (len(late) >= SLOW and not self._is_prompt())
 
     def _is_prompt(self) -> bool:
-        return sum(seconds <= AT_ONCE for seconds in self.times().values()) >= PROMPT
+        return sum(seconds <= AT_ONCE for seconds in self.transit_times().values()) >= PROMPT
 
 
-def _send(rig: SensorRig, records: list[_Record], index: int) -> bool:
+def _send_singles(rig: SensorRig, records: list[_Record], index: int) -> bool:
     """Send one reading of each of these sensors; return whether there were any."""
     for record in records:
         rig.node.publish(record.sensor, _PHASE, index)
     sent = time.monotonic()
 
     def unseen() -> list[_Record]:
-        return [record for record in records if record.unseen(index)]
+        return [record for record in records if record.is_unseen(index)]
 
-    rig.rest()
+    rig.wait_for_rest()
     for record in unseen():
         record.waited.add(index)
     at_once = rig.wait(lambda: not unseen(), max(0.0, sent + AT_ONCE - time.monotonic()))
-    if not at_once and rig.rests():
+    if not at_once and rig.is_at_rest():
         for record in unseen():
             record.held.add(index)
     rig.wait(lambda: not unseen(), LAG)
@@ -141,11 +144,11 @@ def _held_for_the_next(rig: SensorRig, records: dict[Sensor, _Record]) -> list[S
         if len(record.missed) > 1 and record.missed[-1] - record.missed[-2] == 1
     ]
     # Perhaps it was the machine that did not come to it.
-    rig.wait(lambda: not any(record.unseen(last) for _, record, last in running))
-    return [sensor for sensor, record, last in running if record.unseen(last)]
+    rig.wait(lambda: not any(record.is_unseen(last) for _, record, last in running))
+    return [sensor for sensor, record, last in running if record.is_unseen(last)]
 
 
-def thinned(rig: SensorRig, sensor: Sensor) -> tuple[int, int] | None:
+def find_thinning(rig: SensorRig, sensor: Sensor) -> tuple[int, int] | None:
     """Return how many singles came in, and how many of them were published; None if enough."""
-    sent, seen = rig.once(each_at_once)[sensor.name]
+    sent, seen = rig.run_once(each_at_once)[sensor.name]
     return (sent, seen) if sent - seen > FORGIVEN else None

@@ -28,16 +28,16 @@ def require_told_apart(rig: SensorRig) -> None:
     for sent, number in enumerate(WORDS, 1):
         rig.node.publish(STOP, PRESSES, number)
         # Of stop events only one is ever on its way into a driver.
-        rig.wait(lambda n=sent: len(rig.witnessed(STOP, PRESSES)) >= n, LAG)  # type: ignore[misc]
-    rig.wait(lambda: len(rig.consumed(STOP, PRESSES)) >= len(WORDS))
-    if (got := rig.consumed(STOP, PRESSES)) != list(WORDS):
+        rig.wait(lambda n=sent: len(rig.witnessed_indices(STOP, PRESSES)) >= n, LAG)  # type: ignore[misc]
+    rig.wait(lambda: len(rig.consumed_indices(STOP, PRESSES)) >= len(WORDS))
+    if (got := rig.consumed_indices(STOP, PRESSES)) != list(WORDS):
         raise Failed(
             expected="A stop event is handled even if it bears the words of an earlier one, be it "
             "the one right before: one press of a button reads like another.",
             actual=f"{len(WORDS)} events came in, which read as pressed, released, pressed, "
             "pressed (at another button), released do. The driver published "
-            f"{len(rig.witnessed(STOP, PRESSES))} of them, and your consumer handed on "
-            f"{len(got)}{rig.raised()}.",
+            f"{len(rig.witnessed_indices(STOP, PRESSES))} of them, and your consumer handed on "
+            f"{len(got)}{rig.error_note()}.",
         )
 
 
@@ -45,7 +45,7 @@ def require_same_again(rig: SensorRig, sensor: Sensor) -> None:
     """Fail unless a consumer that acts on the newest acts on one that reads like the last, too."""
 
     def again() -> bool:
-        return len(rig.consumed(sensor, _PHASE)) > 1
+        return len(rig.consumed_indices(sensor, _PHASE)) > 1
 
     for _ in range(MOST):
         rig.node.publish(sensor, _PHASE, 0)
@@ -64,12 +64,12 @@ def require_each_of_the_same(rig: SensorRig) -> None:
         began = time.time_ns()
         for _ in range(SAME):
             rig.node.publish(IMU, _PHASE, number)
-        rig.wait(lambda n=number: rig.witnessed(IMU, _PHASE).count(n) >= SAME)  # type: ignore[misc]
-        rig.rest()
+        rig.wait(lambda n=number: rig.witnessed_indices(IMU, _PHASE).count(n) >= SAME)  # type: ignore[misc]
+        rig.wait_for_rest()
         aged = time.time_ns() - began > YOUNG * 1e9
         if _all_out(rig, number):
             return
-        if not aged or rig.witnessed(IMU, _PHASE).count(number) < SAME:
+        if not aged or rig.witnessed_indices(IMU, _PHASE).count(number) < SAME:
             raise _left_out(rig, IMU, number, SAME)
     raise NotExaminable(
         "This machine was too busy to tell IMU readings that were left out, as they read like the "
@@ -81,7 +81,7 @@ def _all_out(rig: SensorRig, number: int) -> bool:
     """Return whether all that read alike come out; who takes readings in batches is given more."""
 
     def out() -> bool:
-        return rig.consumed(IMU, _PHASE).count(number) >= SAME
+        return rig.consumed_indices(IMU, _PHASE).count(number) >= SAME
 
     for later in range(BATCH):
         if rig.wait(out, 1 / IMU.rate):
@@ -91,12 +91,12 @@ def _all_out(rig: SensorRig, number: int) -> bool:
 
 
 def _left_out(rig: SensorRig, sensor: Sensor, number: int, sent: int) -> Failed:
-    published = rig.witnessed(sensor, _PHASE).count(number)
-    handed = rig.consumed(sensor, _PHASE).count(number)
+    published = rig.witnessed_indices(sensor, _PHASE).count(number)
+    handed = rig.consumed_indices(sensor, _PHASE).count(number)
     return Failed(
         expected=f"{sensor.name} readings are acted on even if they read like the one before: a "
         "robot that stands still has many of them.",
         actual=f"{sent} came in that differ in nothing but their stamps. The driver published "
         f"{published} of them on {sensor.topic}, and the consumer handed on "
-        f"{handed or 'none'}{rig.raised()}.",
+        f"{handed or 'none'}{rig.error_note()}.",
     )

@@ -15,7 +15,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from autograder.examination.check_context import StudentError
 from autograder.examination.exam import Exam, Failed, NotExaminable
 from autograder.exercises.qos.backlog_checks import (
-    altered,
+    altered_failure,
     require_burst,
     require_fresh,
     require_open_scans,
@@ -33,14 +33,14 @@ from autograder.exercises.qos.packet_loss import Aftermath, radio_gap
 from autograder.exercises.qos.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Sensor
 from autograder.exercises.qos.rig import CONSUMERS, DRIVERS, SensorRig, sensor_rig
 from autograder.exercises.qos.stop_events import (
-    amiss,
-    around,
+    describe_fault,
+    faulty_numbers,
     require_all_handled,
     require_all_heard,
     require_no_repeats,
     require_only_events,
 )
-from autograder.observe.qos_refusal import Refusal, refusal
+from autograder.observe.qos_refusal import Refusal, find_refusal
 
 EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
 
@@ -68,14 +68,14 @@ def nodes_start(rig: SensorRig) -> None:
         except StudentError as error:
             raise Failed(
                 expected=f"{name}() makes a node without an error.",
-                actual=error.told,
+                actual=error.feedback_text,
             ) from None
         if name == DRIVERS:
             rig.have_stand_ins()
     faults: list[str] = []
 
     def all_there() -> bool:
-        faults[:] = _faults(rig)
+        faults[:] = _endpoint_faults(rig)
         return not any(line.startswith("There is no") for line in faults)
 
     rig.wait(all_there)
@@ -83,14 +83,14 @@ def nodes_start(rig: SensorRig) -> None:
         raise Failed(expected="Every topic of the task has its endpoint.", actual=" ".join(faults))
 
 
-def _faults(rig: SensorRig) -> Iterator[str]:
+def _endpoint_faults(rig: SensorRig) -> Iterator[str]:
     """Yield what is missing, or has another type than the task says, a sentence each."""
     for sensor in SENSORS:
         ends = (
-            ("subscription to", f"hardware/{sensor.name}", rig.requested),
-            ("publisher on", sensor.topic, rig.offered),
-            ("subscription to", sensor.topic, rig.requested),
-            ("publisher on", f"consumer/{sensor.name}", rig.offered),
+            ("subscription to", f"hardware/{sensor.name}", rig.find_subscriptions),
+            ("publisher on", sensor.topic, rig.find_publishers),
+            ("subscription to", sensor.topic, rig.find_subscriptions),
+            ("publisher on", f"consumer/{sensor.name}", rig.find_publishers),
         )
         wanted = f"{sensor.type.__module__.split('.')[0]}/msg/{sensor.type.__name__}"
         for what, topic, endpoints in ends:
@@ -116,18 +116,18 @@ def readings_flow(rig: SensorRig) -> None:
 
     Two incompatible profiles never connect, and nothing fails aloud: the robot is simply blind.
     """
-    rig.attend()
-    silent = rig.probe(SENSORS, rig.node.consumed, give_up=lambda s: _refusals(rig, s))
+    rig.listen_to_consumers()
+    silent = rig.probe(SENSORS, rig.node.consumed, give_up=lambda s: _qos_refusals(rig, s))
     if silent:
         raise Failed(
             expected="Each of the four sensors' readings comes out at the consumer.",
-            actual=_silence(rig, silent),
+            actual=_describe_silence(rig, silent),
         )
     rig.probe_stand_ins()
-    rig.once(each_at_once)
+    rig.run_once(each_at_once)
     for sensor in SENSORS:
         if sensor.topic in rig.node.altered:
-            raise altered(sensor)
+            raise altered_failure(sensor)
         if (target := f"consumer/{sensor.name}") in rig.node.blank:
             raise Failed(
                 expected="The consumers hand on what they act on, not only its header.",
@@ -135,38 +135,38 @@ def readings_flow(rig: SensorRig) -> None:
             )
 
 
-def _refusals(rig: SensorRig, sensor: Sensor) -> list[Refusal]:
+def _qos_refusals(rig: SensorRig, sensor: Sensor) -> list[Refusal]:
     """Return why DDS connects no driver to any consumer; empty if it does, or if there are none."""
     offers, requests = (
         [end.qos_profile for end in ends]
-        for ends in (rig.offered(sensor.topic), rig.requested(sensor.topic))
+        for ends in (rig.find_publishers(sensor.topic), rig.find_subscriptions(sensor.topic))
     )
-    found = [refusal(offered, requested) for offered in offers for requested in requests]
+    found = [find_refusal(offered, requested) for offered in offers for requested in requests]
     reasons = [reason for reason in found if reason is not None]
     return reasons if len(reasons) == len(found) else []
 
 
-def _silence(rig: SensorRig, silent: list[Sensor]) -> str:
+def _describe_silence(rig: SensorRig, silent: list[Sensor]) -> str:
     """Return why these are silent. What a callback raised is told once, at the end."""
-    refused_first = sorted(silent, key=lambda sensor: not _refusals(rig, sensor))
+    refused_first = sorted(silent, key=lambda sensor: not _qos_refusals(rig, sensor))
     told = " ".join(_why_silent(rig, sensor) for sensor in refused_first)
-    return f"{told.removesuffix('.')}{rig.raised()}."
+    return f"{told.removesuffix('.')}{rig.error_note()}."
 
 
 def _why_silent(rig: SensorRig, sensor: Sensor) -> str:
-    if reasons := _refusals(rig, sensor):
-        why = reasons[0].told("your publisher", "your subscription", sensor.topic)
+    if reasons := _qos_refusals(rig, sensor):
+        why = reasons[0].as_sentence("your publisher", "your subscription", sensor.topic)
         return f"Nothing of {sensor.name} arrives: {why}"
     if not rig.node.witnessed[sensor.name]:
         if sensor.topic in rig.node.foreign:
-            return _changed(sensor.topic, f"hardware/{sensor.name} delivered")
+            return _describe_change(sensor.topic, f"hardware/{sensor.name} delivered")
         return f"Nothing of {sensor.name} is published on {sensor.topic}."
     if (target := f"consumer/{sensor.name}") in rig.node.foreign:
-        return _changed(target, f"{sensor.topic} carried")
+        return _describe_change(target, f"{sensor.topic} carried")
     return f"{sensor.topic} carries readings, but none comes out on {target}."
 
 
-def _changed(topic: str, what: str) -> str:
+def _describe_change(topic: str, what: str) -> str:
     return f"{topic} carries messages, but not what {what}: their content was changed."
 
 
@@ -185,18 +185,18 @@ def camera_best_effort(rig: SensorRig) -> str:
     RELIABLE repairs a loss by sending the old frame again, in order: on Wi-Fi the picture freezes
     and then plays the past. A connection is reliable only if both sides ask for it.
     """
-    offered, requested = rig.offered(CAMERA.topic), rig.requested(CAMERA.topic)
-    if any(map(_reliable, offered)) and any(map(_reliable, requested)):
+    offered, requested = rig.find_publishers(CAMERA.topic), rig.find_subscriptions(CAMERA.topic)
+    if any(map(_is_reliable, offered)) and any(map(_is_reliable, requested)):
         raise Failed(
             expected="The link from driver to consumer on camera/image is best effort.",
             actual="The driver offers RELIABLE and the consumer requests it, so DDS re-sends.",
         )
-    if any(map(_reliable, offered)):
+    if any(map(_is_reliable, offered)):
         return "The driver offers RELIABLE, the consumer asks for less: the link is best effort."
     return "The price: a subscriber that insists on RELIABLE now receives no picture."
 
 
-def _reliable(endpoint: TopicEndpointInfo) -> bool:
+def _is_reliable(endpoint: TopicEndpointInfo) -> bool:
     return bool(endpoint.qos_profile.reliability == ReliabilityPolicy.RELIABLE)
 
 
@@ -238,11 +238,11 @@ def lidar_fresh(rig: SensorRig) -> str:
     require_fresh(rig, LIDAR, expected)
     require_open_scans(rig)
     require_same_again(rig, LIDAR)
-    return _practice(rig, LIDAR)
+    return _describe_practice(rig, LIDAR)
 
 
-def _practice(rig: SensorRig, sensor: Sensor) -> str:
-    if all(map(_reliable, rig.offered(sensor.topic))):
+def _describe_practice(rig: SensorRig, sensor: Sensor) -> str:
+    if all(map(_is_reliable, rig.find_publishers(sensor.topic))):
         return (
             "RELIABLE is the chapter's answer. Many drivers in the field publish best effort "
             "(SensorDataQoS) instead; both are right here."
@@ -280,7 +280,7 @@ def imu_burst(rig: SensorRig) -> str:
     require_burst(rig, expected)
     require_whole(rig)
     require_each_of_the_same(rig)
-    return _practice(rig, IMU)
+    return _describe_practice(rig, IMU)
 
 
 @EXAM.check(
@@ -298,12 +298,12 @@ def stop_reaches_all(rig: SensorRig) -> None:
     A safety node asks for RELIABLE, a logger on Wi-Fi perhaps for BEST_EFFORT: neither may miss a
     stop. Only a RELIABLE offer serves both.
     """
-    offers_all = all(map(_reliable, rig.offered(STOP.topic)))
-    with rig.node.guests():
+    offers_all = all(map(_is_reliable, rig.find_publishers(STOP.topic)))
+    with rig.node.temporary_listeners():
         listeners = require_all_heard(rig, give_up=not offers_all)
         require_no_repeats(rig, listeners)
     require_only_events(rig, STOP.topic)
-    if not any(map(_reliable, rig.requested(STOP.topic))):
+    if not any(map(_is_reliable, rig.find_subscriptions(STOP.topic))):
         raise Failed(
             expected="Your own consumer cannot lose a stop on a bad network either.",
             actual="It requests BEST_EFFORT, so DDS does not repair a lost event for it.",
@@ -324,7 +324,7 @@ def stop_complete(rig: SensorRig) -> str:
 
     Pressed, released, pressed again: whoever sees only the last event does not know what happened.
     """
-    if rig.expires(STOP):  # the cause of what may be lost: first
+    if rig.can_expire(STOP):  # the cause of what may be lost: first
         raise Failed(
             expected="A stop event waits for a busy consumer as long as it must.",
             actual="A lifespan on emergency/stop throws events away when they get old.",
@@ -335,7 +335,7 @@ def stop_complete(rig: SensorRig) -> str:
         require_only_events(rig, f"consumer/{STOP.name}")
     durable = any(
         e.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        for e in rig.offered(STOP.topic)
+        for e in rig.find_publishers(STOP.topic)
     )
     return "TRANSIENT_LOCAL also tells a node that starts late: well thought." if durable else ""
 
@@ -361,7 +361,7 @@ _UNHEARD = "A consumer at the far end of the link heard nothing, not even before
 
 
 def _after_gap(rig: SensorRig, sensor: Sensor) -> Aftermath:
-    found: dict[str, Aftermath] = rig.once(radio_gap)
+    found: dict[str, Aftermath] = rig.run_once(radio_gap)
     return found[sensor.name]
 
 
@@ -387,7 +387,7 @@ def stop_repaired(rig: SensorRig) -> None:
             "arrive, in order.",
             actual=_UNHEARD
             if got is None
-            else f"{amiss(got, found.count)}: it got {around(got, found.count)}.",
+            else f"{describe_fault(got, found.count)}: it got {faulty_numbers(got, found.count)}.",
         )
 
 

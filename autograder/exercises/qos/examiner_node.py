@@ -35,7 +35,7 @@ INSISTENT = 0.25
 """Seconds whose readings may be on their way in when they are to come in at their rate."""
 
 
-def lossless(durability: DurabilityPolicy = DurabilityPolicy.VOLATILE) -> QoSProfile:
+def lossless_profile(durability: DurabilityPolicy = DurabilityPolicy.VOLATILE) -> QoSProfile:
     """Return the profile of a cable: every reading, in order."""
     return QoSProfile(
         history=HistoryPolicy.KEEP_ALL,
@@ -44,7 +44,7 @@ def lossless(durability: DurabilityPolicy = DurabilityPolicy.VOLATILE) -> QoSPro
     )
 
 
-def undemanding() -> QoSProfile:
+def undemanding_profile() -> QoSProfile:
     """Return the profile of a reader that matches every writer and keeps all it gets."""
     return QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -64,7 +64,8 @@ class ExaminerNode(QuietNode):
         self._words: dict[tuple[str, Tag], Tag] = {}  # what a sensor's readings bear, by their tags
         self._tags: dict[tuple[str, Tag], Tag] = {}  # and the other way round
         self.hardware = {
-            s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless()) for s in SENSORS
+            s.name: self.create_publisher(s.type, f"hardware/{s.name}", lossless_profile())
+            for s in SENSORS
         }
         self._stand_ins: dict[str, Any] = {}
         self._offers: dict[str, QoSProfile] = {}  # of the stand-ins
@@ -87,7 +88,7 @@ class ExaminerNode(QuietNode):
         self._readings = {s.name: s.type() for s in SENSORS}  # one message a sensor, reused
         self._filling = threading.Lock()  # a stream may publish while a check does
         for sensor in SENSORS:
-            self.listen(sensor, sensor.topic, undemanding(), self.witnessed)
+            self.listen(sensor, sensor.topic, undemanding_profile(), self.witnessed)
 
     def listen(
         self,
@@ -109,17 +110,17 @@ class ExaminerNode(QuietNode):
             tag, message = delivered.get(serialized), None
             if tag is None:
                 message = deserialize_message(serialized, sensor.type)
-                tag = self._tag(sensor, message)
+                tag = self._find_tag(sensor, message)
             if tag is None:
                 self.foreign.add(topic)
             elif tag.nonce == self.nonce:
                 heard[sensor.name].append(tag)
                 when, kind = published_at(info), (sensor.name, tag.phase)
-                if message is not None and not sensor.unchanged(
+                if message is not None and not sensor.is_unchanged(
                     message, self._words[sensor.name, tag]
                 ):
                     self.altered.add(topic)
-                    if sensor.blank(message):
+                    if sensor.is_blank(message):
                         self.blank.add(topic)
                 if heard is self.witnessed:
                     self.published[kind].setdefault(tag.number, when)
@@ -140,7 +141,7 @@ class ExaminerNode(QuietNode):
         )
 
     @contextmanager
-    def guests(self) -> Iterator[None]:
+    def temporary_listeners(self) -> Iterator[None]:
         """Let whoever begins to listen in the block stop at its end, and cost nobody time then."""
         before = set(self.subscriptions)
         try:
@@ -169,23 +170,25 @@ class ExaminerNode(QuietNode):
         finally:
             self._ends = self.hardware
 
-    def phase(self, name: str) -> int:
+    def phase_number(self, name: str) -> int:
         """Return the number of a phase of the exam."""
         return self._phases.setdefault(name, len(self._phases) + 1)
 
     def publish(self, sensor: Sensor, phase: str, index: int) -> None:
         """Feed one reading, taken now, into a sensor's hardware, or stand in for its driver."""
-        tag = Tag(self.nonce, self.phase(phase), index)
+        tag = Tag(self.nonce, self.phase_number(phase), index)
         now = time.time_ns()
         self._stamps[sensor.name, now] = tag
         self.sent[sensor.name, tag.phase][index] = now
         with self._filling:
-            reading = sensor.fill(self._readings[sensor.name], self.words(sensor, tag), now)
+            reading = sensor.fill_message(
+                self._readings[sensor.name], self.replacement_tag(sensor, tag), now
+            )
             serialized = serialize_message(reading)
         self._delivered[sensor.name][serialized] = tag
         self._ends[sensor.name].publish(serialized)
 
-    def words(self, sensor: Sensor, tag: Tag) -> Tag:
+    def replacement_tag(self, sensor: Sensor, tag: Tag) -> Tag:
         """Return what a reading bears in place of its tag: drawn, the same each time.
 
         Its phase would tell who has seen an examination what comes next, and by its number those
@@ -204,12 +207,12 @@ class ExaminerNode(QuietNode):
                 self._words[key], self._tags[sensor.name, words] = words, tag
         return self._words[key]
 
-    def _tag(self, sensor: Sensor, message: Any) -> Tag | None:
+    def _find_tag(self, sensor: Sensor, message: Any) -> Tag | None:
         """Return the tag of a reading, by its stamp if nothing else is left of it.
 
         A stop event may be one of an earlier run, whose nonce is another.
         """
-        found = sensor.tags(message)
+        found = sensor.find_tags(message)
         known = (self._tags.get((sensor.name, words)) for words in found)
         own = next(filter(None, known), None)
         if own is not None or sensor is STOP:
@@ -234,9 +237,9 @@ class Stream:
         self._on_time: tuple[float, int] | None = None
         self._since = time.monotonic()
         self._turn = threading.Lock()
-        self._timer = node.create_timer(1 / sensor.rate, self._tick)
+        self._timer = node.create_timer(1 / sensor.rate, self._send_due)
 
-    def spare(self) -> None:
+    def slow_down(self) -> None:
         """Send the next only when the driver has published the one before, from now on.
 
         On a busy machine readings would keep the thread that it shares with the consumer from what
@@ -245,7 +248,7 @@ class Stream:
         with self._turn:
             self._ahead = 1
 
-    def insist(self) -> None:
+    def keep_rate(self) -> None:
         """Keep to the sensor's rate on average from now on, though the driver may lose some.
 
         A busy machine skips turns of a timer, so that readings come in more slowly than on a robot,
@@ -255,25 +258,25 @@ class Stream:
             self._ahead = max(AHEAD, int(INSISTENT * self.sensor.rate))
             self._on_time = time.monotonic(), self.sent
 
-    def _tick(self) -> None:
+    def _send_due(self) -> None:
         with self._turn:
-            for _ in range(self._due()):
-                if self.sent >= self._limit or self._waits():
+            for _ in range(self._count_due()):
+                if self.sent >= self._limit or self._is_waiting():
                     break
                 self._node.publish(self.sensor, self._phase, self.sent)
                 self.sent += 1
                 self._since = time.monotonic()
 
-    def _due(self) -> int:
+    def _count_due(self) -> int:
         """Return how many readings are to be sent in this turn."""
         if self._on_time is None:
             return 1
         since, sent = self._on_time
         return int((time.monotonic() - since) * self.sensor.rate) + sent - self.sent
 
-    def _waits(self) -> bool:
+    def _is_waiting(self) -> bool:
         """Whether the driver has not yet come to what was sent; one that drops it is not it."""
-        phase = self._node.phase(self._phase)
+        phase = self._node.phase_number(self._phase)
         heard = self._node.witnessed[self.sensor.name]
         newest = heard[-1].number if heard and heard[-1].phase == phase else -1
         if time.monotonic() - self._since > LAG:
@@ -283,7 +286,7 @@ class Stream:
         return not self._drops and self.sent - newest > self._ahead
 
     @contextmanager
-    def held(self) -> Iterator[None]:
+    def hold_back(self) -> Iterator[None]:
         """Send nothing for the length of the block."""
         with self._turn:
             limit, self._limit = self._limit, 0

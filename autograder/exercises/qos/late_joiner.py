@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from rclpy.qos import DurabilityPolicy
 
 from autograder.examination.exam import Failed
-from autograder.exercises.qos.examiner_node import lossless, undemanding
+from autograder.exercises.qos.examiner_node import lossless_profile, undemanding_profile
 from autograder.exercises.qos.readings import Heard, Sensor
 from autograder.exercises.qos.rig import DRIVERS, SensorRig
 
@@ -22,21 +22,21 @@ def require_no_past(rig: SensorRig, sensors: Sequence[Sensor]) -> None:
     Nothing is sent once they have begun: all that they hear is old, from whichever check.
     """
     for sensor in sensors:
-        rig.burst(sensor, "before", BEFORE)
-    known = _readers(rig, sensors)
+        rig.send_burst(sensor, "before", BEFORE)
+    known = _count_readers(rig, sensors)
     asking: Heard = defaultdict(list)
     plain: Heard = defaultdict(list)
     refused: dict[str, list[object]] = {sensor.name: [] for sensor in sensors}
-    with rig.node.guests():
+    with rig.node.temporary_listeners():
         for sensor in sensors:
-            profile = lossless(DurabilityPolicy.TRANSIENT_LOCAL)
+            profile = lossless_profile(DurabilityPolicy.TRANSIENT_LOCAL)
             rig.node.listen(sensor, sensor.topic, profile, asking, refused[sensor.name].append)
-            rig.node.listen(sensor, sensor.topic, undemanding(), plain)
+            rig.node.listen(sensor, sensor.topic, undemanding_profile(), plain)
         # Either DDS refuses to hand out the past, or the writer replays it at once.
         rig.wait(lambda: all(refused[s.name] or asking[s.name] for s in sensors))
         # A driver of which each reader is known has its chance to greet it, until all is at rest.
-        rig.wait(lambda: all(n >= known[t] + 2 for t, n in _readers(rig, sensors).items()))
-        rig.rest()
+        rig.wait(lambda: all(n >= known[t] + 2 for t, n in _count_readers(rig, sensors).items()))
+        rig.wait_for_rest()
         rig.wait(lambda: any(plain.values()), REPEATED)
     for sensor in sensors:
         if asking[sensor.name] and not plain[sensor.name]:
@@ -53,7 +53,7 @@ def require_no_past(rig: SensorRig, sensors: Sequence[Sensor]) -> None:
             )
 
 
-def _readers(rig: SensorRig, sensors: Sequence[Sensor]) -> dict[str, int]:
+def _count_readers(rig: SensorRig, sensors: Sequence[Sensor]) -> dict[str, int]:
     """Return how many subscriptions to each topic the driver's process knows of."""
     topics = [f"/{sensor.topic}" for sensor in sensors]
     return rig.subject.sees(DRIVERS, {"subscribers": topics})["subscribers"]

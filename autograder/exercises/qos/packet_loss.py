@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from rclpy.qos import ReliabilityPolicy
 
 from autograder.examination.exam import Failed
-from autograder.exercises.qos.examiner_node import lossless, undemanding
-from autograder.exercises.qos.radio_link import radio
+from autograder.exercises.qos.examiner_node import lossless_profile, undemanding_profile
+from autograder.exercises.qos.radio_link import open_radio
 from autograder.exercises.qos.readings import CAMERA, STOP, Heard, Sensor
 from autograder.exercises.qos.rig import SensorRig
 
@@ -40,20 +40,20 @@ class Aftermath:
 
 def radio_gap(rig: SensorRig) -> dict[str, Aftermath]:
     """Let the link break down while readings come in, and see what the far end gets of them."""
-    with radio(rig.bench, rig.node) as link:
-        link.listen(STOP, lossless())
+    with open_radio(rig.bench, rig.node) as link:
+        link.listen(STOP, lossless_profile())
         # The far consumer of pictures asks for what the student's own asks for.
         asks_reliable = all(
             end.qos_profile.reliability == ReliabilityPolicy.RELIABLE
-            for end in rig.requested(CAMERA.topic)
+            for end in rig.find_subscriptions(CAMERA.topic)
         )
-        link.listen(CAMERA, lossless() if asks_reliable else undemanding())
+        link.listen(CAMERA, lossless_profile() if asks_reliable else undemanding_profile())
         deaf = [sensor.name for sensor in rig.probe((STOP, CAMERA), link.heard)]
         sensors = [sensor for sensor in (STOP, CAMERA) if sensor.name not in deaf]
-        with link.gap():
+        with link.lose_packets():
             for sensor in sensors:
                 # Seen at the near end: the driver has sent them all.
-                rig.burst(sensor, "gap", LOST[sensor.name])
+                rig.send_burst(sensor, "gap", LOST[sensor.name])
             _require_silence(rig, link.heard)
         if CAMERA in sensors:
             rig.node.publish(CAMERA, "gap", LAST[CAMERA.name])
@@ -72,7 +72,7 @@ def _require_silence(rig: SensorRig, heard: Heard) -> None:
     Somebody has published them who knew what they would be.
     """
     for sensor in (STOP, CAMERA):
-        if got := rig.indices(heard, sensor, "gap"):
+        if got := rig.heard_indices(heard, sensor, "gap"):
             raise Failed(
                 expected=f"On {sensor.topic} comes what the hardware has delivered, and nothing "
                 "before it was.",
@@ -82,5 +82,5 @@ def _require_silence(rig: SensorRig, heard: Heard) -> None:
 
 
 def _heard_after(rig: SensorRig, sensor: Sensor, heard: Heard) -> list[int]:
-    rig.wait(lambda: LAST[sensor.name] in rig.indices(heard, sensor, "gap"))
-    return rig.indices(heard, sensor, "gap")
+    rig.wait(lambda: LAST[sensor.name] in rig.heard_indices(heard, sensor, "gap"))
+    return rig.heard_indices(heard, sensor, "gap")

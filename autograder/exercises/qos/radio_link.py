@@ -51,7 +51,7 @@ class Radio:
         self._near.listen(sensor, sensor.topic, qos, self.heard, on=self._node)
 
     @contextmanager
-    def gap(self) -> Iterator[None]:
+    def lose_packets(self) -> Iterator[None]:
         """Lose every packet to the far end for as long as the block lasts.
 
         Raises:
@@ -69,7 +69,7 @@ class Radio:
 
 
 @contextmanager
-def radio(bench: Bench, near: ExaminerNode) -> Iterator[Radio]:
+def open_radio(bench: Bench, near: ExaminerNode) -> Iterator[Radio]:
     """Give a radio link from the subject to a consumer far away.
 
     Raises:

@@ -47,7 +47,7 @@ class Tag(NamedTuple):
         return f"{self.nonce:08}/{self.phase:04}/{self.number:05}"
 
     @classmethod
-    def read(cls, text: str) -> Tag | None:
+    def from_text(cls, text: str) -> Tag | None:
         """Return the tag that ``text`` is, or None."""
         found = re.fullmatch(r"(\d{1,9})/(\d{1,9})/(\d{1,9})", text)
         return cls(*map(int, found.groups())) if found else None
@@ -66,11 +66,11 @@ class Sensor:
     rate: float
     most: int
 
-    def message(self, tag: Tag, stamp: int = 0) -> Any:
+    def make_message(self, tag: Tag, stamp: int = 0) -> Any:
         """Return a reading that carries ``tag`` and was taken at ``stamp`` (ns since 1970)."""
-        return self.fill(self.type(), tag, stamp)
+        return self.fill_message(self.type(), tag, stamp)
 
-    def fill(self, message: Any, tag: Tag, stamp: int) -> Any:
+    def fill_message(self, message: Any, tag: Tag, stamp: int) -> Any:
         """Make a reading, new or filled before, one that carries ``tag``; return it.
 
         To make a message takes longer than to fill it.
@@ -92,18 +92,18 @@ class Sensor:
             message.ranges = [*numbers, *(OPEN if is_open(tag.number) else CLOSED)]
             message.intensities = [*numbers, 0.0, 0.0]
         else:
-            for vector in _vectors(message):
+            for vector in _imu_vectors(message):
                 vector.x, vector.y, vector.z = numbers
         return message
 
-    def tags(self, message: Any) -> list[Tag]:
+    def find_tags(self, message: Any) -> list[Tag]:
         """Return all that looks like a tag of a reading.
 
         What was cleaned may do so, too: a rotation that was brought to length 1, say.
         """
-        return list(filter(None, map(Tag.read, self._places(message))))
+        return list(filter(None, map(Tag.from_text, self._tag_places(message))))
 
-    def _places(self, message: Any) -> list[str]:
+    def _tag_places(self, message: Any) -> list[str]:
         """Return what stands where a tag may stand."""
         if self.type is String:
             return [message.data]
@@ -113,19 +113,19 @@ class Sensor:
         if self.type is LaserScan:
             threes = [list(message.ranges)[:3], list(message.intensities)[:3]]
         else:
-            threes = [[vector.x, vector.y, vector.z] for vector in _vectors(message)]
+            threes = [[vector.x, vector.y, vector.z] for vector in _imu_vectors(message)]
         return [header, *("/".join(f"{number:.0f}" for number in three) for three in threes)]
 
-    def blank(self, message: Any) -> bool:
+    def is_blank(self, message: Any) -> bool:
         """Whether nothing is left of a reading but its header."""
         nothing = self.type()
         if self.type is not String:
             nothing.header = message.header
         return bool(message == nothing)
 
-    def unchanged(self, message: Any, tag: Tag) -> bool:
+    def is_unchanged(self, message: Any, tag: Tag) -> bool:
         """Whether a reading is what the hardware delivered; its header is the driver's to fill."""
-        delivered = self.message(tag)
+        delivered = self.make_message(tag)
         if self.type is not String:
             delivered.header = message.header
         if message == delivered:
@@ -134,7 +134,7 @@ class Sensor:
         return self.type is LaserScan and repr(message) == repr(delivered)
 
 
-def _vectors(imu: Imu) -> tuple[Any, Any, Any]:
+def _imu_vectors(imu: Imu) -> tuple[Any, Any, Any]:
     return imu.orientation, imu.angular_velocity, imu.linear_acceleration
 
 

@@ -20,7 +20,13 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.examination.check_context import Bench
 from autograder.examination.exam import NotExaminable
-from autograder.exercises.qos.examiner_node import AHEAD, LAG, ExaminerNode, lossless, undemanding
+from autograder.exercises.qos.examiner_node import (
+    AHEAD,
+    LAG,
+    ExaminerNode,
+    lossless_profile,
+    undemanding_profile,
+)
 from autograder.exercises.qos.readings import IMU, SENSORS, STOP, Heard, Sensor
 from autograder.observe.participants import of_others
 from autograder.observe.patience import Patience
@@ -62,34 +68,35 @@ class SensorRig:
         self._probes = 0  # how often probed
         self._still = Stillness(bench.outside)
 
-    def offered(self, topic: str) -> list[TopicEndpointInfo]:
+    def find_publishers(self, topic: str) -> list[TopicEndpointInfo]:
         """Return the publishers on ``topic`` that are not the examiner's."""
         return of_others(self.node.get_publishers_info_by_topic(topic))
 
-    def requested(self, topic: str) -> list[TopicEndpointInfo]:
+    def find_subscriptions(self, topic: str) -> list[TopicEndpointInfo]:
         """Return the subscriptions on ``topic`` that are not the examiner's."""
         return of_others(self.node.get_subscriptions_info_by_topic(topic))
 
-    def attend(self) -> None:
+    def listen_to_consumers(self) -> None:
         """Listen to the consumers' ends, with what they offer: lossless wherever it is possible."""
         for sensor in SENSORS:
             topic = f"consumer/{sensor.name}"
             reliable = all(
-                e.qos_profile.reliability == ReliabilityPolicy.RELIABLE for e in self.offered(topic)
+                e.qos_profile.reliability == ReliabilityPolicy.RELIABLE
+                for e in self.find_publishers(topic)
             )
-            qos = lossless() if reliable else undemanding()
+            qos = lossless_profile() if reliable else undemanding_profile()
             self.node.listen(sensor, topic, qos, self.node.consumed)
 
     @contextmanager
-    def busy(self, name: str) -> Iterator[Callable[[], bool]]:
+    def keep_busy(self, name: str) -> Iterator[Callable[[], bool]]:
         """Keep the node of a class busy for the length of the block; its endpoints go on.
 
         What is yielded lets it go on before the end of the block. It returns whether its endpoints
-        did not receive, by an accident that `Held.jams` tells of.
+        did not receive, by an accident that `Held.is_jammed` tells of.
         Where all its threads are held, the drivers are busy as well: see `have_stand_ins`.
         """
         if self.can_hold:
-            with self._held() as let_go, ExitStack() as standing_in:
+            with self._hold_subject() as let_go, ExitStack() as standing_in:
                 if name == CONSUMERS:
                     standing_in.enter_context(self.node.standing_in())
                 yield let_go
@@ -110,7 +117,7 @@ class SensorRig:
         return self.bench.outside.own_network
 
     @contextmanager
-    def _held(self) -> Iterator[Callable[[], bool]]:
+    def _hold_subject(self) -> Iterator[Callable[[], bool]]:
         """Hold the subject's threads for the length of the block; it is not asked."""
         outside = self.bench.outside
         try:
@@ -134,9 +141,9 @@ class SensorRig:
         """
         if not self.can_hold:
             return
-        self.wait(lambda: all(self.offered(sensor.topic) for sensor in SENSORS), FOUND)
-        there = [sensor for sensor in SENSORS if self.offered(sensor.topic)]
-        self.node.have_stand_ins({sensor.name: self._offer(sensor) for sensor in there})
+        self.wait(lambda: all(self.find_publishers(sensor.topic) for sensor in SENSORS), FOUND)
+        there = [sensor for sensor in SENSORS if self.find_publishers(sensor.topic)]
+        self.node.have_stand_ins({sensor.name: self._offered_profile(sensor) for sensor in there})
 
     def probe_stand_ins(self) -> None:
         """See the consumers hear the stand-ins, which offer what the drivers do by now."""
@@ -146,12 +153,12 @@ class SensorRig:
         with self.node.standing_in():
             self.probe(SENSORS, self.node.consumed)
 
-    def _offer(self, sensor: Sensor) -> QoSProfile:
+    def _offered_profile(self, sensor: Sensor) -> QoSProfile:
         """Return what the driver of a sensor offers: of several, the one that most can hear.
 
         How many readings a publisher keeps cannot be seen; a consumer's queue does not rest on it.
         """
-        offers = [end.qos_profile for end in self.offered(sensor.topic)]
+        offers = [end.qos_profile for end in self.find_publishers(sensor.topic)]
         best = max(offers, key=lambda qos: (-qos.reliability.value, -qos.durability.value))
         return QoSProfile(
             history=HistoryPolicy.KEEP_ALL, reliability=best.reliability,
@@ -166,30 +173,32 @@ class SensorRig:
         Without ``timeout`` (s) that is when it would have come: see `Patience`.
         """
         if timeout is None:
-            return self.patience().wait(self.spinner, condition)
-        return self._holds(condition, timeout)
+            return self.start_patience().wait(self.spinner, condition)
+        return self._wait_until(condition, timeout)
 
     def wait_in_traffic(self, condition: Callable[[], Any], timeout: float) -> bool:
         """Do the same while readings come in at their rate: 20 ms more or less do not matter."""
-        return self._holds(condition, timeout, often=False)
+        return self._wait_until(condition, timeout, often=False)
 
-    def _holds(self, condition: Callable[[], Any], timeout: float, *, often: bool = True) -> bool:
+    def _wait_until(
+        self, condition: Callable[[], Any], timeout: float, *, often: bool = True
+    ) -> bool:
         with suppress(WaitTimeout):
             self.spinner.until(condition, timeout, "an observation", often=often)
             return True
         return False
 
-    def patience(self) -> Patience:
+    def start_patience(self) -> Patience:
         """Return for how long something is waited for that may never come."""
         return Patience(self._still)
 
-    def rest(self, patience: float = RESTLESS) -> None:
+    def wait_for_rest(self, patience: float = RESTLESS) -> None:
         """Return when all that was sent has been dealt with, or after ``patience`` s of work."""
-        self._still.reached(patience, max(patience, HANGS))
+        self._still.wait_for_rest(patience, max(patience, HANGS))
 
-    def rests(self) -> bool:
+    def is_at_rest(self) -> bool:
         """Return whether all is at rest just now."""
-        return self._still.reached(timeout=NOW)
+        return self._still.wait_for_rest(timeout=NOW)
 
     def probe(
         self,
@@ -205,16 +214,16 @@ class SensorRig:
         self._probes += 1
         phase = f"probe{self._probes}"
         silent = list(sensors)
-        patience = self.patience()
+        patience = self.start_patience()
         for attempt in count():
-            self._round(silent, heard, phase, attempt)
-            silent = self._silent(silent, heard, phase)
+            self._send_probes(silent, heard, phase, attempt)
+            silent = self._silent_sensors(silent, heard, phase)
             hopeless = all(give_up is not None and give_up(sensor) for sensor in silent)
-            if hopeless or not patience.lasts():
+            if hopeless or not patience.has_time_left():
                 break
         return silent
 
-    def _round(self, sensors: list[Sensor], heard: Heard, phase: str, attempt: int) -> None:
+    def _send_probes(self, sensors: list[Sensor], heard: Heard, phase: str, attempt: int) -> None:
         """Send a reading of each sensor, of the IMU a few at its rate, until all were heard from.
 
         No two alike: what becomes of repeated words is another check's question.
@@ -222,7 +231,7 @@ class SensorRig:
         end = time.monotonic() + PROBE_PERIOD
         everyone = partial(self._all_heard, sensors, heard, phase)
         for number in range(attempt * ROUND, (attempt + 1) * ROUND):
-            silent = self._silent(sensors, heard, phase)
+            silent = self._silent_sensors(sensors, heard, phase)
             for sensor in silent:
                 if sensor is IMU or number % ROUND == 0:
                     self.node.publish(sensor, phase, number)
@@ -230,19 +239,22 @@ class SensorRig:
                 self.wait(everyone, 1 / IMU.rate)
         self.wait(everyone, max(0.0, end - time.monotonic()))
 
-    def probed(self, sensor: Sensor) -> str:
+    def describe_probes(self, sensor: Sensor) -> str:
         """Return what the driver did with the newest probes of a sensor, as a phrase."""
         phase = f"probe{self._probes}"
-        passed, sent = len(set(self.witnessed(sensor, phase))), len(self.sent(sensor, phase))
+        passed, sent = (
+            len(set(self.witnessed_indices(sensor, phase))),
+            len(self.delivery_times(sensor, phase)),
+        )
         return f"while the driver published {passed} of the {sent} that came in"
 
     def _all_heard(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> bool:
-        return not self._silent(sensors, heard, phase)
+        return not self._silent_sensors(sensors, heard, phase)
 
-    def _silent(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> list[Sensor]:
-        return [sensor for sensor in sensors if not self.indices(heard, sensor, phase)]
+    def _silent_sensors(self, sensors: Iterable[Sensor], heard: Heard, phase: str) -> list[Sensor]:
+        return [sensor for sensor in sensors if not self.heard_indices(heard, sensor, phase)]
 
-    def burst(self, sensor: Sensor, phase: str, count: int) -> bool:
+    def send_burst(self, sensor: Sensor, phase: str, count: int) -> bool:
         """Send ``count`` readings; return whether the last was seen on the sensor's topic.
 
         No faster than the driver takes them: its queue for the hardware need not be longer.
@@ -251,52 +263,52 @@ class SensorRig:
         for index in range(count):
             self.node.publish(sensor, phase, index)
             if takes:
-                takes = self.wait(partial(self.taken, sensor, phase, index + 1 - AHEAD), LAG)
-        return self.wait(partial(self.taken, sensor, phase, count - 1))
+                takes = self.wait(partial(self.is_taken, sensor, phase, index + 1 - AHEAD), LAG)
+        return self.wait(partial(self.is_taken, sensor, phase, count - 1))
 
-    def taken(self, sensor: Sensor, phase: str, index: int) -> bool:
+    def is_taken(self, sensor: Sensor, phase: str, index: int) -> bool:
         """Whether the driver has published a reading of a phase, or a later one."""
-        return max(self.publications(sensor, phase), default=-1) >= index
+        return max(self.publication_times(sensor, phase), default=-1) >= index
 
-    def witnessed(self, sensor: Sensor, phase: str) -> list[int]:
+    def witnessed_indices(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings as they went over the sensor's topic."""
-        return self.indices(self.node.witnessed, sensor, phase)
+        return self.heard_indices(self.node.witnessed, sensor, phase)
 
-    def publications(self, sensor: Sensor, phase: str) -> dict[int, int]:
+    def publication_times(self, sensor: Sensor, phase: str) -> dict[int, int]:
         """Return when the driver published the readings of a phase: {index: ns since 1970}."""
-        return self.node.published.get(self._filed(sensor, phase), {}).copy()
+        return self.node.published.get(self._phase_key(sensor, phase), {}).copy()
 
-    def sent(self, sensor: Sensor, phase: str) -> dict[int, int]:
+    def delivery_times(self, sensor: Sensor, phase: str) -> dict[int, int]:
         """Return when the hardware delivered the readings of a phase: {index: ns since 1970}."""
-        return self.node.sent.get(self._filed(sensor, phase), {}).copy()
+        return self.node.sent.get(self._phase_key(sensor, phase), {}).copy()
 
-    def published(self, sensor: Sensor, phase: str, index: int) -> int:
+    def publication_time(self, sensor: Sensor, phase: str, index: int) -> int:
         """Return when the driver published a reading, in ns since 1970; 0 if it was not seen."""
-        return self.node.published.get(self._filed(sensor, phase), {}).get(index, 0)
+        return self.node.published.get(self._phase_key(sensor, phase), {}).get(index, 0)
 
-    def handed(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
+    def handed_readings(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
         """Return which readings of a phase the consumer passed on, and when (ns since 1970)."""
-        return self.node.handed.get(self._filed(sensor, phase), []).copy()
+        return self.node.handed.get(self._phase_key(sensor, phase), []).copy()
 
-    def _filed(self, sensor: Sensor, phase: str) -> tuple[str, int]:
+    def _phase_key(self, sensor: Sensor, phase: str) -> tuple[str, int]:
         # What is read with `get` is not made: the executor's thread may be making it just now.
-        return sensor.name, self.node.phase(phase)
+        return sensor.name, self.node.phase_number(phase)
 
-    def consumed(self, sensor: Sensor, phase: str) -> list[int]:
+    def consumed_indices(self, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings in the order the consumer passed them on."""
-        return self.indices(self.node.consumed, sensor, phase)
+        return self.heard_indices(self.node.consumed, sensor, phase)
 
-    def indices(self, heard: Heard, sensor: Sensor, phase: str) -> list[int]:
+    def heard_indices(self, heard: Heard, sensor: Sensor, phase: str) -> list[int]:
         """Return the indices of a phase's readings in order of arrival."""
-        number = self.node.phase(phase)
+        number = self.node.phase_number(phase)
         return [tag.number for tag in list(heard[sensor.name]) if tag.phase == number]
 
-    def expires(self, sensor: Sensor) -> bool:
+    def can_expire(self, sensor: Sensor) -> bool:
         """Whether readings of a sensor are dropped when they get old: by a lifespan, at any end."""
-        ends = [*self.offered(sensor.topic), *self.requested(sensor.topic)]
+        ends = [*self.find_publishers(sensor.topic), *self.find_subscriptions(sensor.topic)]
         return any(0 < end.qos_profile.lifespan.nanoseconds < ENDLESS for end in ends)
 
-    def raised(self) -> str:
+    def error_note(self) -> str:
         """Return which error a callback raised last, as a phrase in brackets, or nothing."""
         raised = self.subject.errors()
         return f" ({callback_raised(raised[-1])})" if raised else ""
@@ -306,11 +318,11 @@ class SensorRig:
 
         Those that were sent with the words of earlier ones (`PRESSES`) do not count.
         """
-        presses = self.node.phase(PRESSES)
+        presses = self.node.phase_number(PRESSES)
         numbers = Counter(t for t in list(self.node.consumed[STOP.name]) if t.phase != presses)
         return sum(number > 1 for number in numbers.values())
 
-    def once(self, experiment: Callable[[SensorRig], Any]) -> Any:
+    def run_once(self, experiment: Callable[[SensorRig], Any]) -> Any:
         """Run an experiment that several checks, or parts, read, once a sitting."""
         name = experiment.__name__
         if name not in self._experiments:

@@ -9,8 +9,8 @@ from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 
 from autograder.examination.exam import Failed
-from autograder.exercises.qos.backlog_checks import backlog, few, lost
-from autograder.exercises.qos.examiner_node import LAG, lossless, undemanding
+from autograder.exercises.qos.backlog_checks import check_backlog, lost_phrase, readings_phrase
+from autograder.exercises.qos.examiner_node import LAG, lossless_profile, undemanding_profile
 from autograder.exercises.qos.readings import STOP, Heard
 from autograder.exercises.qos.rig import DRIVERS, SensorRig
 from autograder.observe.patience import SETTLE_S
@@ -24,27 +24,27 @@ def require_all_heard(rig: SensorRig, *, give_up: bool) -> Sequence[Heard]:
     ``give_up`` says that to wait for a silent one is pointless.
     """
     listeners = []
-    for who, profile in (("RELIABLE", lossless()), ("BEST_EFFORT", undemanding())):
-        if (found := _listener(rig, profile, give_up=give_up)) is None:
+    for who, profile in (("RELIABLE", lossless_profile()), ("BEST_EFFORT", undemanding_profile())):
+        if (found := _add_listener(rig, profile, give_up=give_up)) is None:
             raise Failed(
                 expected="A consumer that asks for RELIABLE and one for BEST_EFFORT both hear it.",
                 actual=f"A consumer that asks for {who} heard nothing on {STOP.topic}, "
-                f"{rig.probed(STOP)}{rig.raised()}.",
+                f"{rig.describe_probes(STOP)}{rig.error_note()}.",
             )
         listeners.append(found)
-    took = _press(rig)
+    took = _send_events(rig)
     for heard in listeners if took else ():  # else there is nothing left to wait for
-        rig.wait(lambda h=heard: len(rig.indices(h, STOP, "event")) >= EVENTS)  # type: ignore[misc]
+        rig.wait(lambda h=heard: len(rig.heard_indices(h, STOP, "event")) >= EVENTS)  # type: ignore[misc]
     published = {
         number
         for heard in (rig.node.witnessed, *listeners)
-        for number in rig.indices(heard, STOP, "event")
+        for number in rig.heard_indices(heard, STOP, "event")
     }
     for heard in listeners:
-        if (got := rig.indices(heard, STOP, "event")) != list(range(EVENTS)):
+        if (got := rig.heard_indices(heard, STOP, "event")) != list(range(EVENTS)):
             raise Failed(
                 expected=f"{EVENTS} stops arrive as {EVENTS} stops, in order.",
-                actual=f"A consumer heard {few(got)}."
+                actual=f"A consumer heard {readings_phrase(got)}."
                 if len(published) == EVENTS
                 else f"Of {EVENTS} that came in, the driver published {len(published)} on "
                 f"{STOP.topic}. {EVENTS - 1} had come in while it was busy: how many does its own "
@@ -53,7 +53,7 @@ def require_all_heard(rig: SensorRig, *, give_up: bool) -> Sequence[Heard]:
     return listeners
 
 
-def _listener(rig: SensorRig, profile: QoSProfile, *, give_up: bool = False) -> Heard | None:
+def _add_listener(rig: SensorRig, profile: QoSProfile, *, give_up: bool = False) -> Heard | None:
     """Return what a new consumer hears of the stop events, None if it hears nothing.
 
     Who hears nothing at once gets a second chance: that one endpoint of ours stayed deaf would say
@@ -67,23 +67,23 @@ def _listener(rig: SensorRig, profile: QoSProfile, *, give_up: bool = False) -> 
     return None
 
 
-def _press(rig: SensorRig) -> bool:
+def _send_events(rig: SensorRig) -> bool:
     """Send the events, all but the last while the driver is busy; return whether it took the last.
 
     How many of a few quick ones wait in its queue would otherwise be a matter of chance.
     """
-    with rig.busy(DRIVERS):
+    with rig.keep_busy(DRIVERS):
         for index in range(EVENTS - 1):
             rig.node.publish(STOP, "event", index)
         rig.node.hardware[STOP.name].wait_for_all_acked(Duration(seconds=SETTLE_S))
-    rig.wait(lambda: rig.taken(STOP, "event", EVENTS - 2), LAG)
+    rig.wait(lambda: rig.is_taken(STOP, "event", EVENTS - 2), LAG)
     rig.node.publish(STOP, "event", EVENTS - 1)
-    return rig.wait(lambda: rig.taken(STOP, "event", EVENTS - 1))
+    return rig.wait(lambda: rig.is_taken(STOP, "event", EVENTS - 1))
 
 
 def require_no_repeats(rig: SensorRig, listeners: Sequence[Heard]) -> None:
     """Fail if an event of before comes again, at any that were there, when one more joins."""
-    late = _listener(rig, lossless())
+    late = _add_listener(rig, lossless_profile())
     there = (*listeners, rig.node.witnessed, rig.node.consumed)
     # The late one hears the first after the driver has found it, so what the driver then does comes
     # before the second. All hear in order: who has heard what comes after that has heard it, too.
@@ -92,10 +92,10 @@ def require_no_repeats(rig: SensorRig, listeners: Sequence[Heard]) -> None:
             raise Failed(
                 expected="Every consumer hears the stops that come after it joined.",
                 actual=f"When one more had joined, one heard nothing on {STOP.topic} any more, "
-                f"{rig.probed(STOP)}.",
+                f"{rig.describe_probes(STOP)}.",
             )
     for heard in there:
-        if again := _repeated(rig.indices(heard, STOP, "event")):
+        if again := _repeated_numbers(rig.heard_indices(heard, STOP, "event")):
             if heard is rig.node.consumed:  # the last: on the topic none was
                 raise Failed(
                     expected="Your consumer hands on each stop event once.",
@@ -112,10 +112,10 @@ def require_no_repeats(rig: SensorRig, listeners: Sequence[Heard]) -> None:
 
 def require_all_handled(rig: SensorRig) -> None:
     """Fail unless the consumer handles all events of a pause, once and in order, and none later."""
-    found = backlog(rig, STOP)
+    found = check_backlog(rig, STOP)
     count, kept = found.count, found.kept
     # Whether one that comes again is among those of the pause is a matter of the machine's speed.
-    again = len(_repeated(kept)) or found.again or rig.comes_again()
+    again = len(_repeated_numbers(kept)) or found.again or rig.comes_again()
     if again and len(set(kept)) == count:
         raise Failed(
             expected="Each stop event is handled once.",
@@ -125,8 +125,8 @@ def require_all_handled(rig: SensorRig) -> None:
     if kept != list(range(count)):
         raise Failed(
             expected=f"All {count} events of the pause are handled, once and in order.",
-            actual=f"{amiss(kept, count)}: the consumer handled "
-            f"{around(kept, count)}{rig.raised()}.",
+            actual=f"{describe_fault(kept, count)}: the consumer handled "
+            f"{faulty_numbers(kept, count)}{rig.error_note()}.",
         )
 
 
@@ -140,16 +140,16 @@ def require_only_events(rig: SensorRig, topic: str) -> None:
         )
 
 
-def amiss(got: list[int], count: int) -> str:
+def describe_fault(got: list[int], count: int) -> str:
     """Return what is wrong with ``got``, which is not 0 to ``count - 1`` in order, as a phrase."""
     if missing := count - len(set(got)):
-        return lost(missing, count)
-    if again := _repeated(got):
+        return lost_phrase(missing, count)
+    if again := _repeated_numbers(got):
         return f"{len(again)} of {count} came more than once"
     return "Some came out of order"
 
 
-def around(got: list[int], count: int) -> str:
+def faulty_numbers(got: list[int], count: int) -> str:
     """Return the numbers from one before the first that is out of place on, as a phrase.
 
     Or that those from the first on are there, and then no more up to ``count``.
@@ -157,8 +157,8 @@ def around(got: list[int], count: int) -> str:
     first = next((place for place, number in enumerate(got) if number != place), len(got))
     if got and first == len(got) < count:
         return f"only the first {first} of them" if first > 1 else "only the first of them"
-    return few(got[max(0, first - 1) :])
+    return readings_phrase(got[max(0, first - 1) :])
 
 
-def _repeated(numbers: list[int]) -> set[int]:
+def _repeated_numbers(numbers: list[int]) -> set[int]:
     return {number for number in numbers if numbers.count(number) > 1}

@@ -6,7 +6,7 @@ import re
 
 from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT, ZOOM, ExaminerNode
 from autograder.observe.participants import GUID_PREFIX_BYTES, NAMELESS
-from autograder.observe.phrases import phrase
+from autograder.observe.phrases import as_phrase
 from course.runtime.names import full_name
 
 PUBLISHER = f"a publisher on {IMAGE}"
@@ -24,7 +24,7 @@ TYPES = {
 }
 
 
-def told(name: str) -> str:
+def describe_node(name: str) -> str:
     """Return one of the nodes that a graph gives for a reader.
 
     Of two that have one name, one is forgotten with the other, and its endpoints may stay.
@@ -48,9 +48,9 @@ class CameraGraph:
         self._participants: set[bytes] = set()
         self._marks: set[str] = set()
 
-    def disregard(self) -> None:
+    def ignore_present(self) -> None:
         """Take what is there by now for ghosts."""
-        self._ghosts = {end for _, end in self._endpoints()}
+        self._ghosts = {end for _, end in self._find_endpoints()}
 
     def note_started(self, node: str) -> None:
         """Note that ``node`` is one of the subject's: so is its participant."""
@@ -60,17 +60,19 @@ class CameraGraph:
         """Note that ``node`` was made because the examiner asked for it."""
         self._marks.add(f"/{node}")
 
-    def publishers(self) -> int:
+    def count_publishers(self) -> int:
         """Return how many publishers there are on the image topic."""
-        return sum(what == PUBLISHER and end not in self._ghosts for what, end in self._endpoints())
+        return sum(
+            what == PUBLISHER and end not in self._ghosts for what, end in self._find_endpoints()
+        )
 
-    def endpoints(self, node: str = "") -> list[str]:
+    def list_endpoints(self, node: str = "") -> list[str]:
         """Return the driver's endpoints that are on the graph, and whether ``node`` is."""
         ours = (*TYPES, f"{NODE}{node}")
-        there = {what for what, end in self._endpoints() if end not in self._ghosts}
+        there = {what for what, end in self._find_endpoints() if end not in self._ghosts}
         return [what for what in ours if what in there]
 
-    def nodes(self, *, process: bool = False) -> list[str]:
+    def list_nodes(self, *, process: bool = False) -> list[str]:
         """Return the nodes that were made since this check began, in the driver's participant.
 
         Not those of ours, nor the one hidden node that each session has. With ``process`` also
@@ -81,7 +83,7 @@ class CameraGraph:
         ours = {participant[:size] for participant in self._participants}
         sessions: set[bytes] = set()
         made = []
-        for what, end in self._endpoints():
+        for what, end in self._find_endpoints():
             name = what.removeprefix(NODE)
             if not what.startswith(NODE) or end in self._ghosts or end[:size] not in ours:
                 continue
@@ -92,13 +94,13 @@ class CameraGraph:
                 made.append(name)
         return made
 
-    def left(self, node: str) -> list[str]:
+    def list_leftovers(self, node: str) -> list[str]:
         """Return what is left of the driver on the graph: endpoints, ``node``, helper nodes."""
-        there = self.endpoints(node)
-        helpers = dict.fromkeys(told(name) for name in self.nodes())
+        there = self.list_endpoints(node)
+        helpers = dict.fromkeys(describe_node(name) for name in self.list_nodes())
         return [*there, *(what for what in helpers if what not in there)]
 
-    def missing(self, node: str) -> list[str]:
+    def list_missing(self, node: str) -> list[str]:
         """Return what the driver ``node`` lacks on the graph, or has with another type."""
         services = dict(self._node.get_service_names_and_types())
         types = {
@@ -106,10 +108,10 @@ class CameraGraph:
             SUBSCRIPTION: {e.topic_type for e in self._node.get_subscriptions_info_by_topic(ZOOM)},
             SERVICE: set(services.get(f"/{SNAPSHOT}", [])),
         }
-        there = self.endpoints(node)
+        there = self.list_endpoints(node)
         found = [f"There is no {what[2:]} on the graph." for what in TYPES if what not in there]
         found += [
-            f"There is {what} of the type {phrase(sorted(types[what]))}, not {wanted}."
+            f"There is {what} of the type {as_phrase(sorted(types[what]))}, not {wanted}."
             for what, wanted in TYPES.items()
             if what in there and wanted not in types[what]
         ]
@@ -117,7 +119,7 @@ class CameraGraph:
             found = [f"The node {node} is not on the graph."]
         return found
 
-    def _endpoints(self) -> list[tuple[str, bytes]]:
+    def _find_endpoints(self) -> list[tuple[str, bytes]]:
         found = {
             PUBLISHER: self._node.get_publishers_info_by_topic(IMAGE),
             SUBSCRIPTION: self._node.get_subscriptions_info_by_topic(ZOOM),

@@ -30,7 +30,7 @@ class Program:
             shown = ", ".join(repr(arg) for arg in args)
             raise Failed(
                 expected=f"{name}({shown}) makes a node without an error.",
-                actual=error.told,
+                actual=error.feedback_text,
             ) from None
         self._graph.note_started(node)
         return node
@@ -40,11 +40,11 @@ class Program:
 
         A session tidies up after its ``destroy_node()``; ``bare``: nobody does.
         """
-        self._cleanup(name, lambda: self._subject.stop(name, bare=bare))
+        self._run_cleanup(name, lambda: self._subject.stop(name, bare=bare))
 
     def destroy(self, name: str) -> None:
         """Have ``destroy_node()`` called while the node spins."""
-        self._cleanup(name, lambda: self._subject.call(name, "destroy_node"))
+        self._run_cleanup(name, lambda: self._subject.call(name, "destroy_node"))
 
     def destroy_again(self, name: str) -> None:
         """Have ``destroy_node()`` called a second time, which must return as well."""
@@ -58,16 +58,16 @@ class Program:
                 actual=f"The second call did not return within {REPLY_TIMEOUT:.0f} s.",
             ) from gone
 
-    def drop(self, name: str) -> None:
+    def drop_node(self, name: str) -> None:
         """Have the session let go of a node that is destroyed; it destroys it once more."""
         with suppress(StudentError):
             self._subject.stop(name)
 
-    def _cleanup(self, name: str, act: Callable[[], object]) -> None:
+    def _run_cleanup(self, name: str, act: Callable[[], object]) -> None:
         try:
             act()
         except StudentError as error:
             raise Failed(
                 expected=f"destroy_node() of {name} ends without an error.",
-                actual=error.told,
+                actual=error.feedback_text,
             ) from None

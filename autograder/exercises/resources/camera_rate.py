@@ -34,7 +34,7 @@ class _Count(NamedTuple):
     most: int
 
     @property
-    def right(self) -> bool:
+    def is_right(self) -> bool:
         return abs(self.came - self.wanted) <= self.tolerance and self.most <= AT_ONCE
 
 
@@ -58,8 +58,8 @@ def require_rate(
         if pace < rig.memory.get(_SLOWLY, 0.0):
             continue
         after()
-        count = _count(rig, device, rate, seconds, pace)
-        if count.right:
+        count = _count_pictures(rig, device, rate, seconds, pace)
+        if count.is_right:
             rig.memory[_SLOWLY] = pace
             return
     time = "one second" if seconds == 1 else f"{seconds} seconds"
@@ -67,7 +67,7 @@ def require_rate(
     if abs(count.came - count.wanted) > count.tolerance:
         raise Failed(
             expected=expected,
-            actual=f"In {time} of the robot's time {count.came} came{rig.raised()}.",
+            actual=f"In {time} of the robot's time {count.came} came{rig.error_note()}.",
         )
     raise Failed(
         expected=f"{expected[:-1]}, one after the other.",
@@ -75,7 +75,7 @@ def require_rate(
     )
 
 
-def _count(rig: CameraRig, device: str, rate: float, seconds: int, pace: float) -> _Count:
+def _count_pictures(rig: CameraRig, device: str, rate: float, seconds: int, pace: float) -> _Count:
     """Count pictures of ``device`` while ``seconds`` of simulated time pass.
 
     Time moves on picture by picture: a thread may publish a moment after the timer, and a design
@@ -84,17 +84,17 @@ def _count(rig: CameraRig, device: str, rate: float, seconds: int, pace: float) 
     """
     wanted = rate * seconds
     steps = max(STEPS, round(wanted * math.ceil(1 / rate / LONGEST_STEP)))
-    before, late, most, last = len(rig.pictures(device)), 0, 0, 0
-    patience = rig.patience(LATE_ASLEEP if pace else KEEP_UP)
+    before, late, most, last = len(rig.get_pictures(device)), 0, 0, 0
+    patience = rig.start_patience(LATE_ASLEEP if pace else KEEP_UP)
 
     def came() -> int:
-        return len(rig.pictures(device)) - before
+        return len(rig.get_pictures(device)) - before
 
     for step in range(1, steps + 1):
         _move_on(rig, OVER * seconds / steps, 1 / rate / SLICES, pace / steps)
         due = int(wanted * step / steps)
         # By its phase a design may be one picture behind, and stay so: it is not waited for twice.
-        moment = KEEP_UP if patience.lasts() else 0.0
+        moment = KEEP_UP if patience.has_time_left() else 0.0
         if not rig.wait(lambda least=due - late: came() >= least, moment):  # type: ignore[misc]
             patience.wait(rig.session, lambda least=due - 1: came() >= least)  # type: ignore[misc]
         now = came()
@@ -115,7 +115,7 @@ def _move_on(rig: CameraRig, seconds: float, part: float, pace: float) -> None:
     for _ in range(parts):
         clock = Deadline(pace / parts)
         rig.advance(seconds / parts)
-        rig.wait(lambda clock=clock: not clock.left, clock.left)  # type: ignore[misc]
+        rig.wait(lambda clock=clock: not clock.seconds_left, clock.seconds_left)  # type: ignore[misc]
 
 
 def let_arrive(rig: CameraRig, device: str) -> None:
@@ -125,10 +125,10 @@ def let_arrive(rig: CameraRig, device: str) -> None:
     """
 
     def newest_is_here() -> bool:
-        newest = [picture.number for picture in rig.pictures(device)[-1:]]
-        return newest >= [max(rig.cameras(device), default=0) - 1]
+        newest = [picture.number for picture in rig.get_pictures(device)[-1:]]
+        return newest >= [max(rig.open_cameras(device), default=0) - 1]
 
-    rig.patience(ARRIVES_ASLEEP, ARRIVES).wait(rig.session, newest_is_here)
+    rig.start_patience(ARRIVES_ASLEEP, ARRIVES).wait(rig.session, newest_is_here)
 
 
 def require_own_clock(rig: CameraRig, device: str) -> None:
@@ -151,23 +151,23 @@ def require_own_clock(rig: CameraRig, device: str) -> None:
 
 def _at_once(rig: CameraRig, device: str) -> int:
     """Return how many pictures come in the next step of time in which there are any."""
-    rig.rest()  # one of before may be on its way
-    before = len(rig.pictures(device))
+    rig.wait_for_rest()  # one of before may be on its way
+    before = len(rig.get_pictures(device))
     for _ in range(STEPS):
         rig.advance(STEP)
-        rig.rest()
-        if rig.wait(lambda: len(rig.pictures(device)) > before, KEEP_UP):
+        rig.wait_for_rest()
+        if rig.wait(lambda: len(rig.get_pictures(device)) > before, KEEP_UP):
             break
     _require_standstill(rig, device)
-    return len(rig.pictures(device)) - before
+    return len(rig.get_pictures(device)) - before
 
 
 def _require_standstill(rig: CameraRig, device: str) -> None:
     deadline = Deadline(BACKLOG)
-    while deadline.left:
-        rig.rest()
-        before = len(rig.pictures(device))
-        if not rig.wait(lambda n=before: len(rig.pictures(device)) >= n + 2, STANDSTILL):  # type: ignore[misc]
+    while deadline.seconds_left:
+        rig.wait_for_rest()
+        before = len(rig.get_pictures(device))
+        if not rig.wait(lambda n=before: len(rig.get_pictures(device)) >= n + 2, STANDSTILL):  # type: ignore[misc]
             return
     raise Failed(
         expected="The pictures are timed by a ROS timer, or by the node's clock.",
@@ -177,15 +177,15 @@ def _require_standstill(rig: CameraRig, device: str) -> None:
 
 def require_tick_zoom(rig: CameraRig, device: str, factor: int, when: str) -> None:
     """Fail unless pictures that nobody asks for have the zoom ``factor``, too."""
-    before = len(rig.pictures(device))
+    before = len(rig.get_pictures(device))
     for _ in range(2 * STEPS):
         rig.advance(STEP)
         if rig.wait(
-            lambda: any(p.zoom == factor for p in rig.pictures(device)[before:]),
+            lambda: any(p.zoom == factor for p in rig.get_pictures(device)[before:]),
             PERIOD,
         ):
             return
     raise Failed(
         expected=f"{when} the ten pictures a second have a zoom of {factor} as well.",
-        actual=f"They had a zoom of {rig.pictures(device)[-1].zoom}{rig.raised()}.",
+        actual=f"They had a zoom of {rig.get_pictures(device)[-1].zoom}{rig.error_note()}.",
     )

@@ -27,33 +27,33 @@ def require_snapshot(rig: CameraRig, device: str, when: str, *, slow: bool = Fal
 
     With a ``slow`` camera an answer that does not wait for its picture comes clearly too early.
     """
-    before, asked = len(rig.pictures(device)), sum(rig.cameras(device))
+    before, asked = len(rig.get_pictures(device)), sum(rig.open_cameras(device))
     reply = rig.ask(Trigger, SNAPSHOT, Trigger.Request(), nudging=True)
     answered = time.time_ns()
     if reply is None:
         raise Failed(
             expected=f"{when} the service {SNAPSHOT} answers, without waiting for the next tick.",
-            actual=f"No answer came while the node's clock stood still{rig.raised()}.",
+            actual=f"No answer came while the node's clock stood still{rig.error_note()}.",
         )
     if not reply.success:
         raise Failed(
             expected=f"{when} {SNAPSHOT} succeeds.", actual="It answered with success=False."
         )
     if slow:  # its picture is still being exposed if the answer has not waited for it
-        rig.settle()
-    if not rig.wait(lambda: len(rig.pictures(device)) > before):
+        rig.settle_messages()
+    if not rig.wait(lambda: len(rig.get_pictures(device)) > before):
         raise Failed(
             expected=f"{when} {SNAPSHOT} publishes a picture on {IMAGE} at once.",
             actual="It answered, but no picture came.",
         )
     # By the time that DDS gives it, which is this machine's; what came after a rest, since then.
-    if slow and not any(p.published <= answered for p in rig.pictures(device)[before:]):
+    if slow and not any(p.published <= answered for p in rig.get_pictures(device)[before:]):
         raise Failed(
             expected=f"{when} {SNAPSHOT} answers when its picture has been published.",
             actual="It answered before it had taken one.",
         )
     # A thread may read all the time, and the snapshot publish what it read last.
-    if not rig.wait(lambda: sum(rig.cameras(device)) > asked):
+    if not rig.wait(lambda: sum(rig.open_cameras(device)) > asked):
         raise Failed(
             expected=f"{when} {SNAPSHOT} takes a picture.",
             actual="It published an old one: the camera was not asked.",
@@ -63,11 +63,11 @@ def require_snapshot(rig: CameraRig, device: str, when: str, *, slow: bool = Fal
 def require_one_picture_each(rig: CameraRig, device: str, when: str) -> None:
     """Fail if snapshots publish more pictures than they are asked for, while time stands still."""
     let_arrive(rig, device)
-    before, requests = len(rig.pictures(device)), rig.requests
+    before, requests = len(rig.get_pictures(device)), rig.requests
     for _ in range(FURTHER):
         require_snapshot(rig, device, when)
     let_arrive(rig, device)
-    came, asked = len(rig.pictures(device)) - before, rig.requests - requests
+    came, asked = len(rig.get_pictures(device)) - before, rig.requests - requests
     if came > asked + 1:  # a tick's may have been on its way
         raise Failed(
             expected=f"{when} {SNAPSHOT} takes one picture.",
@@ -89,32 +89,34 @@ def require_snapshots_under_way(
     a robot, at the next tick. Here time stands still, so that ticks ask the camera for no picture;
     a zoom is that something, or a nudge, where zooms are of the callback group that awaits.
     """
-    snapshot = rig.client(Trigger, SNAPSHOT)
-    asked = sum(rig.cameras(device))
+    snapshot = rig.get_client(Trigger, SNAPSHOT)
+    asked = sum(rig.open_cameras(device))
     replies = [snapshot.call_async(Trigger.Request()) for _ in range(BURST)]
 
     def next_one_waits() -> bool:
         """Whether a first answer is here, if it has to be, and a callback waits for a picture."""
-        done, more = [reply.done() for reply in replies], sum(rig.cameras(device)) - asked
+        done, more = [reply.done() for reply in replies], sum(rig.open_cameras(device)) - asked
         return all(done) or (any(done) and more >= 2) or (not answered and more >= 1)
 
-    patience = rig.patience()
-    while not rig.wait(next_one_waits, PERIOD) and patience.lasts():
+    patience = rig.start_patience()
+    while not rig.wait(next_one_waits, PERIOD) and patience.has_time_left():
         rig.node.zoom.publish(Int32(data=1))
         rig.nudge()
     if not any(reply.done() for reply in replies) and (answered or not next_one_waits()):
         raise Failed(
             expected=f"The service {SNAPSHOT} answers when the picture is there.",
-            actual=f"No answer came{rig.raised()}.",
+            actual=f"No answer came{rig.error_note()}.",
         )
     return lambda: sum(not (reply.done() and reply.result().success) for reply in replies)
 
 
 def require_no_queue(rig: CameraRig, device: str, destroy: Callable[[], object]) -> None:
     """Fail if pictures that a slow camera is behind with are all taken before ``destroy`` ends."""
-    before = sum(rig.cameras(device))
+    before = sum(rig.open_cameras(device))
     rig.advance(A_FEW * PERIOD)
-    if sum(rig.cameras(device)) - before < A_FEW - 1:  # it does not take them one by one at once
+    if (
+        sum(rig.open_cameras(device)) - before < A_FEW - 1
+    ):  # it does not take them one by one at once
         rig.advance(MANY * PERIOD)
     if (asked := _asked_during(rig, device, destroy)) > LAST_ONES:
         raise Failed(
@@ -127,13 +129,13 @@ def require_no_queue(rig: CameraRig, device: str, destroy: Callable[[], object])
 
 def _asked_during(rig: CameraRig, device: str, act: Callable[[], object]) -> int:
     """Return for how many pictures the camera of ``device`` was asked while ``act`` ran."""
-    before = highest = sum(rig.cameras(device))
+    before = highest = sum(rig.open_cameras(device))
     over = threading.Event()
 
     def look() -> None:
         nonlocal highest
         while not over.wait(PERIOD):
-            highest = max(highest, sum(rig.cameras(device)))
+            highest = max(highest, sum(rig.open_cameras(device)))
 
     with ThreadPoolExecutor(max_workers=1) as beside:
         looking = beside.submit(look)
@@ -167,18 +169,18 @@ def _require_followed(
     rig: CameraRig, device: str, factor: int, when: str, expected: str, *, again: bool
 ) -> None:
     """Fail unless the zoom ``factor`` is seen soon; send it once, or ``again`` until it is."""
-    patience, sent = rig.patience(), False
-    while patience.lasts():
+    patience, sent = rig.start_patience(), False
+    while patience.has_time_left():
         if again or not sent:
             rig.node.zoom.publish(Int32(data=factor))
             sent = True
         require_snapshot(rig, device, when)
-        if rig.wait(lambda: rig.pictures(device)[-1].zoom == factor, PERIOD):
+        if rig.wait(lambda: rig.get_pictures(device)[-1].zoom == factor, PERIOD):
             return
     raise Failed(
         expected=expected,
-        actual=f"The pictures went on with a zoom of {rig.pictures(device)[-1].zoom}"
-        f"{rig.raised()}.",
+        actual=f"The pictures went on with a zoom of {rig.get_pictures(device)[-1].zoom}"
+        f"{rig.error_note()}.",
     )
 
 
@@ -186,8 +188,8 @@ def require_zoom_kept(rig: CameraRig, device: str, factor: int, when: str) -> No
     """Fail unless further pictures have the zoom ``factor``, without its being sent again."""
     for _ in range(FURTHER):
         require_snapshot(rig, device, when)
-    if not rig.wait(lambda: rig.pictures(device)[-1].zoom == factor):
+    if not rig.wait(lambda: rig.get_pictures(device)[-1].zoom == factor):
         raise Failed(
             expected=f"{when} the next pictures have a zoom of {factor}, until another one is set.",
-            actual=f"They had a zoom of {rig.pictures(device)[-1].zoom}{rig.raised()}.",
+            actual=f"They had a zoom of {rig.get_pictures(device)[-1].zoom}{rig.error_note()}.",
         )

@@ -23,7 +23,7 @@ from autograder.exercises.resources.process_usage import Usage
 from autograder.exercises.resources.program_observer import ProgramObserver
 from autograder.exercises.resources.rig import ENDED, PERIOD, CameraRig
 from autograder.observe.patience import SETTLE_S
-from autograder.observe.phrases import phrase
+from autograder.observe.phrases import as_phrase
 
 LIVES = 4
 TRIED = 3
@@ -66,14 +66,14 @@ class Lives:
         return self.worked and not self.raised
 
     @property
-    def clean(self) -> bool:
+    def is_clean(self) -> bool:
         """Whether nothing was left of any of them."""
         left = self.left_open or self.left_on_graph or self.of_starts
-        return self.went_on and not left and not (self.usages and _leaks(self.kept()))
+        return self.went_on and not left and not (self.usages and _list_leaks(self.kept_per_life()))
 
-    def kept(self) -> Usage:
+    def kept_per_life(self) -> Usage:
         """Return what a life leaves behind: the median, as something else may come or go once."""
-        grown = [after.grown(before) for before, after in pairwise(self.usages)]
+        grown = [after.growth_since(before) for before, after in pairwise(self.usages)]
         return Usage(*map(median_low, zip(*grown, strict=True)))
 
 
@@ -90,13 +90,13 @@ def require_pace(rig: CameraRig) -> None:
 def require_no_harm_at_the_end(rig: CameraRig) -> None:
     """Fail unless a driver may be destroyed twice at Ctrl-C."""
     if (lives := seen_lives(rig)) is not None and lives.harmed:
-        raise _failed("destroy_node() can be called a second time.", lives.harmed)
+        raise _make_failure("destroy_node() can be called a second time.", lives.harmed)
 
 
 def require_off_graph_at_the_end(rig: CameraRig) -> None:
     """Fail unless a driver's endpoints go at Ctrl-C."""
     if (lives := seen_lives(rig)) is not None and lives.left_on_graph:
-        raise _failed("nothing of it is on the graph.", "Its publisher or service still was.")
+        raise _make_failure("nothing of it is on the graph.", "Its publisher or service still was.")
 
 
 def require_closed_at_the_end(rig: CameraRig) -> None:
@@ -104,13 +104,13 @@ def require_closed_at_the_end(rig: CameraRig) -> None:
     if (lives := seen_lives(rig)) is None:
         return
     if not lives.worked:
-        raise _failed("it takes pictures.", "It took none.")
+        raise _make_failure("it takes pictures.", "It took none.")
     if lives.raised:
-        raise _failed(
+        raise _make_failure(
             "its destroy_node() returns.", "The program was gone: an exception left it, or an exit."
         )
     if lives.left_open:
-        raise _failed("its destroy_node() closes the camera.", "It was still open.")
+        raise _make_failure("its destroy_node() closes the camera.", "It was still open.")
 
 
 def require_nothing_kept_at_the_end(rig: CameraRig) -> None:
@@ -118,14 +118,14 @@ def require_nothing_kept_at_the_end(rig: CameraRig) -> None:
     lives = seen_lives(rig)
     if lives is None or len(lives.usages) < LIVES:
         return
-    if left := _leaks(lives.kept()):
-        raise _failed(
+    if left := _list_leaks(lives.kept_per_life()):
+        raise _make_failure(
             "it leaves no thread and no file behind, and less than 1 MiB.",
-            f"Each of its lives left {phrase(left)} behind.{lives.others}",
+            f"Each of its lives left {as_phrase(left)} behind.{lives.others}",
         )
 
 
-def _leaks(kept: Usage) -> list[str]:
+def _list_leaks(kept: Usage) -> list[str]:
     left = ["a thread"] if kept.threads > 0 else []
     left += ["an open file"] if kept.files > 0 else []
     left += [f"{kept.memory // 1024} MiB of memory"] if kept.memory >= MEMORY else []
@@ -148,31 +148,31 @@ def _watch_twice(rig: CameraRig, programs: Programs) -> Lives:
 
     Only then it is known which of the two calls it was.
     """
-    twice = _watch(rig, programs, twice=True)
+    twice = _watch_program(rig, programs, twice=True)
     if twice.went_on:
         return twice
-    once = _watch(rig, programs, twice=False)
+    once = _watch_program(rig, programs, twice=False)
     if not once.went_on:
         return once
     harm = "the program was gone" if twice.raised else "the driver did not start again"
     return replace(once, harmed=f"After the second call {harm}.")
 
 
-def _watch(rig: CameraRig, programs: Programs, *, twice: bool) -> Lives:
-    device, stuck = rig.device(), rig.device("stuck")
+def _watch_program(rig: CameraRig, programs: Programs, *, twice: bool) -> Lives:
+    device, stuck = rig.new_device(), rig.new_device("stuck")
     driver = [(DRIVER, [device])]
     then = [
         *[Life(driver)] * (LIVES - 2),
         Life(driver, tried=[(DRIVER, [stuck])] * TRIED),
         Life([(MANAGED, [])]),
-        Life([(DRIVER, [rig.device("unplugged")])]),
+        Life([(DRIVER, [rig.new_device("unplugged")])]),
     ]
     with programs.program(driver, then=then, twice=twice) as program:
         seen = ProgramObserver(rig, program)
         lives = _watch_lives(seen, device)
         if len(lives.usages) == LIVES - 1:
             lives = _watch_last_life(seen, lives, device, stuck)
-        return _watch_others(seen, lives) if lives.clean else lives
+        return _watch_others(seen, lives) if lives.is_clean else lives
 
 
 def _watch_lives(seen: ProgramObserver, device: str) -> Lives:
@@ -187,26 +187,28 @@ def _watch_lives(seen: ProgramObserver, device: str) -> Lives:
         lives = _end_life(seen, lives, device)
         if not lives.went_on or lives.left_open or lives.left_on_graph:
             return lives
-        usage = _usage(seen, lives.usages)
-        lives = replace(lives, usages=(*lives.usages, usage), others=seen.rig.others())
+        usage = _settled_usage(seen, lives.usages)
+        lives = replace(lives, usages=(*lives.usages, usage), others=seen.rig.process_note())
     return lives
 
 
 def _begin_life(seen: ProgramObserver, lives: Lives, device: str) -> Lives:
     # A picture is asked for by a timer or a thread, once the nodes spin.
-    if not seen.program.up or not (seen.wait(lambda: any(seen.rig.cameras(device))) or seen.gone()):
+    if not seen.program.up or not (
+        seen.wait(lambda: any(seen.rig.open_cameras(device))) or seen.is_gone()
+    ):
         return replace(lives, worked=False)
-    if seen.gone():
+    if seen.is_gone():
         return replace(lives, raised=True)
-    seen.wait(seen.working)
+    seen.wait(seen.is_working)
     return lives
 
 
 def _end_life(seen: ProgramObserver, lives: Lives, device: str) -> Lives:
     seen.program.interrupt()
-    closed = seen.wait(lambda: not seen.rig.cameras(device))
-    off_graph = seen.wait(lambda: not seen.working())
-    if seen.gone():
+    closed = seen.wait(lambda: not seen.rig.open_cameras(device))
+    off_graph = seen.wait(lambda: not seen.is_working())
+    if seen.is_gone():
         return replace(lives, raised=True)
     return replace(lives, left_open=not closed, left_on_graph=not off_graph)
 
@@ -217,82 +219,88 @@ def _watch_last_life(seen: ProgramObserver, lives: Lives, device: str, stuck: st
     What the driver itself leaves is known by then, so what is more is left by them: nothing is said
     of it where each of its own lives leaves something.
     """
-    rig, before, nodes = seen.rig, seen.rig.process.usage(), len(seen.nodes())
+    rig, before, nodes = seen.rig, seen.rig.process.read_usage(), len(seen.find_nodes())
     seen.program.interrupt()
     # Its pictures come when the starts are over, each of which may take its second.
-    if not seen.wait(lambda: seen.node.of(device), SETTLE_S + TRIED * ENDED):
-        return replace(lives, raised=True) if seen.gone() else lives
-    lives = replace(lives, pace=seen.pace(device, 1 / PERIOD))
+    if not seen.wait(lambda: seen.node.pictures_of(device), SETTLE_S + TRIED * ENDED):
+        return replace(lives, raised=True) if seen.is_gone() else lives
+    lives = replace(lives, pace=seen.pace_fault(device, 1 / PERIOD))
     last = _end_life(seen, lives, device)
     if last.raised:
         return last
-    usage = _usage(seen, lives.usages)
-    lives = replace(lives, usages=(*lives.usages, usage), others=rig.others())
-    if _goes(seen, lives):
+    usage = _settled_usage(seen, lives.usages)
+    lives = replace(lives, usages=(*lives.usages, usage), others=rig.process_note())
+    if _is_freed_late(seen, lives):
         lives = replace(lives, usages=())
-    if not lives.clean:
+    if not lives.is_clean:
         return lives
-    open_ = last.left_open or not rig.ends(lambda: not rig.cameras(stuck), seen.session)
+    open_ = last.left_open or not rig.wait_for_end(
+        lambda: not rig.open_cameras(stuck), seen.session
+    )
     left = ["a camera open"] if open_ else []
     left += ["an endpoint on the graph"] if last.left_on_graph else []
-    if not left and not seen.wait(lambda: len(seen.nodes()) <= nodes):
+    if not left and not seen.wait(lambda: len(seen.find_nodes()) <= nodes):
         left = ["a node on the graph"]
 
     def kept() -> list[str]:
-        threads, files, memory = rig.process.usage().grown(before)
+        threads, files, memory = rig.process.read_usage().growth_since(before)
         # Most of them: threads come and go. The life itself may keep as much memory as a start.
         most = TRIED // 2 + 1
-        return _leaks(Usage(threads // most, files // most, memory // (TRIED + 1)))
+        return _list_leaks(Usage(threads // most, files // most, memory // (TRIED + 1)))
 
-    if not left and not rig.ends(lambda: not kept(), seen.session):
+    if not left and not rig.wait_for_end(lambda: not kept(), seen.session):
         left = kept()
-    return replace(lives, of_starts=f"They left {phrase(left)}.{rig.others()}" if left else "")
+    return replace(
+        lives, of_starts=f"They left {as_phrase(left)}.{rig.process_note()}" if left else ""
+    )
 
 
 def _watch_others(seen: ProgramObserver, lives: Lives) -> Lives:
     """Watch a managed camera in the program of drivers that gave everything back."""
-    others = tuple({*seen.nodes().values()})
+    others = tuple({*seen.find_nodes().values()})
     lives = replace(lives, own_nodes=others)
     seen.program.interrupt()
     managed = watch_managed(seen, others=others)
-    if not managed.clean:
+    if not managed.is_clean:
         return replace(lives, managed=managed)
     seen.program.interrupt()
-    return replace(lives, managed=managed, start_raises=seen.wait(seen.gone))
+    return replace(lives, managed=managed, start_raises=seen.wait(seen.is_gone))
 
 
-def _usage(seen: ProgramObserver, before: Sequence[Usage]) -> Usage:
+def _settled_usage(seen: ProgramObserver, before: Sequence[Usage]) -> Usage:
     """Return what the program holds, once no more goes that the task gives a second to go.
 
     Where a life has left something once, each may: that is waited for at the end of them.
     """
     rig = seen.rig
-    rig.rest()  # its node may be off the graph, and its last threads and files go just now
+    rig.wait_for_rest()  # its node may be off the graph, and its last threads and files go just now
 
     def gone() -> bool:
         # Memory alone is not waited for: a thread that ends gives it back, or nobody.
-        return not _leaks(rig.process.usage().grown(before[-1])._replace(memory=0))
+        return not _list_leaks(rig.process.read_usage().growth_since(before[-1])._replace(memory=0))
 
-    if len(before) == 1 or (before and not _leaks(before[-1].grown(before[-2]))):
-        rig.ends(gone, seen.session)
-    return rig.process.usage()
+    if len(before) == 1 or (before and not _list_leaks(before[-1].growth_since(before[-2]))):
+        rig.wait_for_end(gone, seen.session)
+    return rig.process.read_usage()
 
 
-def _goes(seen: ProgramObserver, lives: Lives) -> bool:
+def _is_freed_late(seen: ProgramObserver, lives: Lives) -> bool:
     """Whether what each of these lives has left behind goes by itself, if late.
 
     A thread that looks every few seconds whether it is to end is too slow, and no leak. One that
     does not sleep for a time does not wake up by itself.
     """
     rig, first = seen.rig, lives.usages[0]
-    if not _leaks(lives.kept()) or not (wakes := rig.process.wakes()):
+    if not _list_leaks(lives.kept_per_life()) or not (wakes := rig.process.wake_times()):
         return False
 
     def a_life() -> Usage:
-        return Usage(*(more // (LIVES - 1) for more in rig.process.usage().grown(first)))
+        return Usage(
+            *(more // (LIVES - 1) for more in rig.process.read_usage().growth_since(first))
+        )
 
-    return seen.wait(lambda: not _leaks(a_life()), min(SETTLE_S, max(wakes) + ENDED))
+    return seen.wait(lambda: not _list_leaks(a_life()), min(SETTLE_S, max(wakes) + ENDED))
 
 
-def _failed(expected: str, actual: str) -> Failed:
+def _make_failure(expected: str, actual: str) -> Failed:
     return Failed(expected=f"{WHEN} {expected}", actual=actual)

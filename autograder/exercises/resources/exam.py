@@ -44,9 +44,9 @@ from autograder.exercises.resources.ctrl_c import (
     require_off_graph_at_the_end,
     require_pace,
 )
-from autograder.exercises.resources.leak_test import MEMORY, growth
+from autograder.exercises.resources.leak_test import MEMORY, measure_growth
 from autograder.exercises.resources.leaks import (
-    attempt,
+    attempt_start,
     failing_starts,
     failing_starts_memory,
     refuse_zooms,
@@ -85,7 +85,7 @@ from autograder.exercises.resources.unasked_starts import (
     require_nothing_left_unasked,
     require_start_raises_unasked,
 )
-from autograder.observe.phrases import phrase
+from autograder.observe.phrases import as_phrase
 
 EXAM: Exam[CameraRig] = Exam("resources", camera_rig)
 
@@ -97,7 +97,7 @@ READ_NODES = "Chapter 5, “Nodes: lifecycle management” and “Nodes: resourc
 READ_MANAGED = "ROS 2 design, “Managed nodes”"
 
 
-def needed(check: Callable[[CameraRig], None]) -> Callable[[CameraRig], None]:
+def once_per_notebook(check: Callable[[CameraRig], None]) -> Callable[[CameraRig], None]:
     """Run a check that others need once a notebook, not once a part of the exam."""
 
     @wraps(check)
@@ -118,14 +118,14 @@ def needed(check: Callable[[CameraRig], None]) -> Callable[[CameraRig], None]:
     ),
     read="Chapter 5, “Nodes: the processing units”",
 )
-@needed
+@once_per_notebook
 def driver_runs(rig: CameraRig) -> None:
     """The driver opens its camera, sends ten pictures a second, zooms, and takes snapshots.
 
     Only a node that does its work has something to clean up.
     """
-    device = rig.device()
-    with rig.life(DRIVER, device) as node:
+    device = rig.new_device()
+    with rig.run_life(DRIVER, device) as node:
         require_open(rig, device)
         require_endpoints(rig, node)
         require_picture(rig, device)
@@ -158,15 +158,15 @@ def driver_runs(rig: CameraRig) -> None:
     ),
     read=READ_NODES,
 )
-@needed
+@once_per_notebook
 def endpoints_gone(rig: CameraRig) -> None:
     """After destroy_node() nothing of the driver is on the graph any more.
 
     An endpoint that is left is a ghost: others wait for its answers, or take an old picture for a
     new one.
     """
-    device = rig.device()
-    with rig.life(DRIVER, device) as node:
+    device = rig.new_device()
+    with rig.run_life(DRIVER, device) as node:
         require_endpoints(rig, node)
         rig.program.stop(DRIVER, bare=True)
         require_gone(rig, device, "After destroy_node()", node)
@@ -183,15 +183,15 @@ def endpoints_gone(rig: CameraRig) -> None:
     ),
     read=READ_NODES,
 )
-@needed
+@once_per_notebook
 def camera_given_back(rig: CameraRig) -> None:
     """After destroy_node() the camera is closed, and the driver can be started again.
 
     A device can be open once. If a driver dies with it open, no restart helps: “device is busy”.
     """
-    device = rig.device()
+    device = rig.new_device()
     for _ in range(2):  # it has been started before: for the check that this one needs
-        with rig.life(DRIVER, device):
+        with rig.run_life(DRIVER, device):
             require_picture(rig, device, "When the driver is started again,")
             rig.program.stop(DRIVER)
             require_closed(rig, device, "After destroy_node()")
@@ -215,15 +215,15 @@ def lives_are_flat(rig: CameraRig) -> None:
     A robot is switched on for weeks. What one life leaves behind, however little, adds up until a
     thread or a file cannot be made any more, and it then fails in a node that did nothing wrong.
     """
-    with rig.trying():
-        grown = growth(rig)
-    if leaked := grown.leaks():
+    with rig.clean_session():
+        grown = measure_growth(rig)
+    if leaked := grown.list_leaks():
         raise Failed(
-            expected=f"{grown.made} lives leave no thread and no file behind, and less than "
+            expected=f"{grown.lives_made} lives leave no thread and no file behind, and less than "
             f"{MEMORY} KiB a life.",
-            actual=f"Each life of the driver left {phrase(leaked)} behind.{rig.others()}",
+            actual=f"Each life of the driver left {as_phrase(leaked)} behind.{rig.process_note()}",
         )
-    with rig.trying():
+    with rig.clean_session():
         require_flat_snapshots(rig)
     require_nothing_kept_at_the_end(rig)
 
@@ -243,19 +243,19 @@ def cleanup_twice(rig: CameraRig) -> None:
     Cleanup is called from several places: an error handler, a signal, the end of the program. The
     one that comes second must not turn an orderly end into a crash.
     """
-    with rig.life(DRIVER, device := rig.device()):
+    with rig.run_life(DRIVER, device := rig.new_device()):
         require_picture(rig, device)
     # Sessions and the middleware start threads for a first life, and keep them.
     threads = rig.process.thread_ids()
     # Another camera: nothing says that the first one is closed as soon as destroy_node() is over.
-    with rig.life(DRIVER, device := rig.device()):
+    with rig.run_life(DRIVER, device := rig.new_device()):
         require_picture(rig, device)
         rig.program.destroy(DRIVER)
         rig.program.destroy_again(DRIVER)
         require_closed(rig, device, "After destroy_node()")
         # The program still refers to the node: no thread ends because Python collects it.
         require_threads_ended(rig, threads, "After destroy_node()")
-    with rig.life(DRIVER, device := rig.device()):
+    with rig.run_life(DRIVER, device := rig.new_device()):
         require_picture(rig, device, "When the driver is started again after two cleanups,")
     require_no_harm_at_the_end(rig)
 
@@ -277,19 +277,19 @@ def failed_start(rig: CameraRig) -> None:
     A supervisor tries again every few seconds while the cable is unplugged. If each try leaves a
     half-made node on the graph, the robot is full of ghosts when the camera is back.
     """
-    with rig.trying():
+    with rig.clean_session():
         for kind in ("unplugged", "stuck"):
-            device = rig.device(kind)
-            attempt(rig, device)
+            device = rig.new_device(kind)
+            attempt_start(rig, device)
             require_closed(rig, device, f"After CameraDriver({device!r}) has raised")
             before = failing_starts(rig, kind, FAILING_STARTS)
         # A participant's endpoints are told in order: when those of a driver that works are known,
         # those of the failed starts before it are known, too.
-        device = rig.device()
+        device = rig.new_device()
         node = rig.program.start(DRIVER, device)
         require_picture(rig, device)
         require_endpoints(rig, node)
-        attempt(rig, device)  # it can be open once
+        attempt_start(rig, device)  # it can be open once
         rig.program.stop(DRIVER)
         require_gone(rig, device, "After failed starts, one that worked, and its end,", node)
         failing_starts_memory(rig, kind, FAILING_STARTS, before)
@@ -307,25 +307,25 @@ def failed_start(rig: CameraRig) -> None:
     ),
     read=READ_MANAGED,
 )
-@needed
+@once_per_notebook
 def managed_runs(rig: CameraRig) -> None:
     """The managed camera goes through its states, and sends pictures when it is active.
 
     A supervisor brings a robot up in step: all devices are opened and found in order before the
     first one moves.
     """
-    device = rig.device()
-    with rig.life(MANAGED) as name:
+    device = rig.new_device()
+    with rig.run_life(MANAGED) as name:
         node = Managed(rig, name)
-        node.require(device=device)
-        node.go("configure")
+        node.require_parameters(device=device)
+        node.make_transitions("configure")
         require_open(rig, device)
-        node.go("activate")
+        node.make_transitions("activate")
         require_picture(rig, device)
         require_only_pictures(rig)
         require_own_clock(rig, device)
         require_rate(rig, device, 10)
-        node.go("deactivate", "cleanup")
+        node.make_transitions("deactivate", "cleanup")
 
 
 @EXAM.check(
@@ -345,30 +345,30 @@ def silent_when_inactive(rig: CameraRig) -> None:
     “Inactive” is a promise: the supervisor may now move the camera's arm, or give the bandwidth to
     somebody else.
     """
-    device = rig.device()
-    with rig.life(MANAGED) as name:
+    device = rig.new_device()
+    with rig.run_life(MANAGED) as name:
         node = Managed(rig, name)
-        node.require(device=device)
-        strange = rig.node.strange()
-        node.go("configure")
+        node.require_parameters(device=device)
+        strange = rig.node.count_strange()
+        node.make_transitions("configure")
         require_still(rig, device, "configure")
-        node.go("activate")
+        node.make_transitions("activate")
         require_picture(rig, device)
-        node.go("deactivate")
+        node.make_transitions("deactivate")
         inactive = time.time_ns()
-        rig.settle()
+        rig.settle_messages()
         require_still(rig, device, "deactivate")
         require_still_held(rig, device)
-        asked = max(rig.cameras(device), default=0)
-        node.go("activate")
+        asked = max(rig.open_cameras(device), default=0)
+        node.make_transitions("activate")
         require_fresh(rig, device, inactive, asked, strange)
         require_rate(rig, device, 10, " after a second “activate”")
-        node.go("deactivate")
+        node.make_transitions("deactivate")
         require_stopped(rig, device, "deactivate")
-        node.go("cleanup")
-        slow = rig.device("slow")
-        node.require(device=slow)
-        node.go("configure")
+        node.make_transitions("cleanup")
+        slow = rig.new_device("slow")
+        node.require_parameters(device=slow)
+        node.make_transitions("configure")
         require_silent_at_once(rig, node, slow)
 
 
@@ -382,14 +382,14 @@ def silent_when_inactive(rig: CameraRig) -> None:
     ),
     read=READ_MANAGED,
 )
-@needed
+@once_per_notebook
 def managed_gives_back(rig: CameraRig) -> None:
     """After “cleanup” the managed camera holds nothing, and can be configured anew.
 
     This is how a driver gets new parameters without ending its process: what it still held from
     its first configuration would be in the way of the second.
     """
-    with rig.life(MANAGED) as name:
+    with rig.run_life(MANAGED) as name:
         node = Managed(rig, name)
         require_no_publisher_yet(rig)
         node.require_defaults()
@@ -418,17 +418,17 @@ def configure_refused(rig: CameraRig) -> None:
     A wrong parameter file must be found before the robot drives. A node that takes it as it is, or
     that is stuck half way, is found out when the first picture is missing.
     """
-    with rig.life(MANAGED) as name:
+    with rig.run_life(MANAGED) as name:
         node = Managed(rig, name)
         draw = rig.draws.number
         below = draw("a rate below 0", -5.0, -9.0, -0.5)
         above = draw("a rate that is too high", FASTEST + 0.5, FASTEST + 0.2, FASTEST + 3.0)
         require_refusals(rig, node, (0.0, below, above, 1000.0))
-        node.require(device=rig.device(), rate=0.5)  # slow, and allowed
-        node.go("configure", "cleanup")
-        device = rig.device()
-        node.require(device=device, rate=10.0)
-        node.go("configure", "activate")
+        node.require_parameters(device=rig.new_device(), rate=0.5)  # slow, and allowed
+        node.make_transitions("configure", "cleanup")
+        device = rig.new_device()
+        node.require_parameters(device=device, rate=10.0)
+        node.make_transitions("configure", "activate")
         # A participant's endpoints are told in order: those of the failed attempts are known.
         require_picture(rig, device)
         require_one_publisher(rig)
@@ -450,15 +450,15 @@ def activation_error(rig: CameraRig) -> None:
     The state machine has a place for what goes wrong. A node that pretends to be active sends no
     picture; one that keeps the broken camera open cannot be repaired by a second “configure”.
     """
-    with rig.life(MANAGED) as name:
+    with rig.run_life(MANAGED) as name:
         node = Managed(rig, name)
         for time in ("", " a second time"):
-            device, threads = rig.device("stuck"), rig.process.thread_ids()
-            node.require(device=device)
+            device, threads = rig.new_device("stuck"), rig.process.thread_ids()
+            node.require_parameters(device=device)
             # Whoever tries the stream when the node is configured finds out even earlier.
-            if (state := node.attempt("configure")) == "inactive":
+            if (state := node.attempt_transition("configure")) == "inactive":
                 require_one_publisher(rig)
-                state = node.attempt("activate")
+                state = node.attempt_transition("activate")
             if state not in ("unconfigured", "finalized"):
                 raise Failed(
                     expected=f"If the stream does not start{time}, your node ends unconfigured or "
@@ -470,9 +470,9 @@ def activation_error(rig: CameraRig) -> None:
                 return
         # The middleware may have started a thread the first time.
         require_threads_ended(rig, threads, "After the error")
-        device = rig.device()
-        node.require(device=device)
-        node.go("configure", "activate")
+        device = rig.new_device()
+        node.require_parameters(device=device)
+        node.make_transitions("configure", "activate")
         require_picture(rig, device)
         require_rate(rig, device, 10, " after an error and a restart")
 
@@ -493,20 +493,20 @@ def managed_shutdown(rig: CameraRig) -> None:
     An emergency does not wait for deactivate and cleanup: whoever ends the node in the middle of
     its work must find the camera closed.
     """
-    with rig.life(MANAGED) as name:
+    with rig.run_life(MANAGED) as name:
         require_no_helper_finalized(rig, Managed(rig, name))
     paths = {"unconfigured": (), "inactive": ("configure",), "active": ("configure", "activate")}
     for end in ("shutdown", "destroy_node()"):
         for state, path in paths.items():
-            device = rig.device()
-            with rig.life(MANAGED) as name:
+            device = rig.new_device()
+            with rig.run_life(MANAGED) as name:
                 node, threads = Managed(rig, name), rig.process.thread_ids()
-                node.require(device=device)
-                node.go(*path)
+                node.require_parameters(device=device)
+                node.make_transitions(*path)
                 if path:
                     require_one_publisher(rig)
                 if end == "shutdown":
-                    node.go("shutdown")
+                    node.make_transitions("shutdown")
                 else:
                     rig.program.stop(MANAGED, bare=True)
                 when = f"After {end} in the state {state}"
@@ -535,8 +535,8 @@ def callback_raises(rig: CameraRig) -> None:
     Somebody will send a wrong value. The driver may refuse it, but it must go on working, and it
     must still end cleanly.
     """
-    device = rig.device()
-    with rig.life(DRIVER, device) as node:
+    device = rig.new_device()
+    with rig.run_life(DRIVER, device) as node:
         require_endpoints(rig, node)
         zoom = rig.draws.whole("a zoom before one that is refused", 2, 2, 8)
         require_zoom(rig, device, zoom, "While the driver runs")
@@ -551,7 +551,7 @@ def callback_raises(rig: CameraRig) -> None:
             " after a zoom that was refused",
             after=lambda: rig.refused_zoom(99),
         )
-        before = rig.process.usage()
+        before = rig.process.read_usage()
         refuse_zooms(rig)
         rig.program.stop(DRIVER)
         require_closed(rig, device, "After destroy_node()")
@@ -577,10 +577,10 @@ def cleanup_when_busy(rig: CameraRig) -> None:
     Nobody stops a robot between two callbacks. If cleanup and callback wait for each other, the
     process hangs with the camera open, and only the power switch helps.
     """
-    with rig.life(DRIVER, rig.device()):
+    with rig.run_life(DRIVER, rig.new_device()):
         pass
-    rig.rest()  # a thread may have one step left to its end
-    usual = rig.process.threads()
+    rig.wait_for_rest()  # a thread may have one step left to its end
+    usual = rig.process.count_threads()
     for take in range(TAKES):
         if _destroyed_during_a_snapshot(rig, usual, answered=take == 0):
             break
@@ -590,8 +590,8 @@ def cleanup_when_busy(rig: CameraRig) -> None:
             f"time, of {TAKES}, snapshots succeeded after it had been asked for. After a hand-in a "
             "person looks at it."
         )
-    device = rig.device("slow")
-    with rig.life(DRIVER, device):
+    device = rig.new_device("slow")
+    with rig.run_life(DRIVER, device):
         require_picture(rig, device)
         require_no_queue(rig, device, lambda: rig.program.destroy(DRIVER))
         require_closed(rig, device, "After destroy_node() with a slow camera")
@@ -606,8 +606,8 @@ def _destroyed_during_a_snapshot(rig: CameraRig, usual: int, *, answered: bool) 
     between two of them. So one that succeeded meanwhile leaves it open, and so does a request that
     was made twice, whose picture may have been taken for the next one's.
     """
-    device = rig.device("slow")
-    with rig.life(DRIVER, device) as node:
+    device = rig.new_device("slow")
+    with rig.run_life(DRIVER, device) as node:
         require_endpoints(rig, node)
         requests = rig.requests
         require_snapshot(rig, device, "While the driver runs", slow=True)
@@ -618,9 +618,9 @@ def _destroyed_during_a_snapshot(rig: CameraRig, usual: int, *, answered: bool) 
         rig.program.destroy(DRIVER)
         require_closed(rig, device, when)
         require_gone(rig, device, when, node)
-        rig.program.drop(DRIVER)
+        rig.program.drop_node(DRIVER)
         require_callbacks_ended(rig, threads, usual, when)
-        again = rig.device()
+        again = rig.new_device()
         rig.program.start(DRIVER, again)
         zoom = rig.draws.whole("a zoom after a restart", 4, 2, 8)
         require_zoom(rig, again, zoom, "After a restart")

@@ -28,7 +28,7 @@ class Picture(NamedTuple):
     published: int
 
 
-def _picture(message: Any, published: int) -> Picture | None:
+def _parse_picture(message: Any, published: int) -> Picture | None:
     label = bytes(message.data[:200]).split(b"\n")[0].decode(errors="replace")
     found = re.fullmatch(r"([\w-]{1,100}) (\d{1,9}) (\d{1,3})", label)
     return Picture(found[1], int(found[2]), int(found[3]), published) if found else None
@@ -49,22 +49,22 @@ class ExaminerNode(QuietNode):
         self.settled = 0  # see `published_at`
         for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
             qos = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=reliability)
-            self.create_subscription(Image, IMAGE, self._note, qos)
+            self.create_subscription(Image, IMAGE, self._note_picture, qos)
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.zoom = self.create_publisher(Int32, ZOOM, latched)
 
-    def _note(self, message: Any, info: dict[str, int]) -> None:
+    def _note_picture(self, message: Any, info: dict[str, int]) -> None:
         # By the writer's stamp it is known when the other reader gets it, too.
         stamp = info["source_timestamp"]
-        if (picture := _picture(message, published_at(info, self.settled))) is None:
+        if (picture := _parse_picture(message, published_at(info, self.settled))) is None:
             self._strange.add(stamp)
         else:
             self._pictures.setdefault((stamp, *picture[:3]), picture)
 
-    def of(self, device: str) -> list[Picture]:
+    def pictures_of(self, device: str) -> list[Picture]:
         """Return the pictures of ``device``; later calls return them first, and then newer ones."""
         return [picture for picture in list(self._pictures.values()) if picture.device == device]
 
-    def strange(self) -> int:
+    def count_strange(self) -> int:
         """Return how many images came that are not a camera's."""
         return len(self._strange)

@@ -27,19 +27,19 @@ POOLED = 24
 no more of others that have come and gone: Fast DDS keeps 200 KiB each for the next one, of 15."""
 
 
-def live(rig: CameraRig, lives: int) -> None:
+def run_lives(rig: CameraRig, lives: int) -> None:
     """Start and end the driver ``lives`` times, then collect what is garbage."""
-    device = rig.device()
+    device = rig.new_device()
     for _ in range(lives):
         rig.program.start(DRIVER, device)
-        _film(rig, device)
+        _take_pictures(rig, device)
         rig.program.stop(DRIVER)
         # A thread of the driver may close the camera a moment later.
-        rig.wait(lambda: not rig.cameras(device), idle=ENDED)
+        rig.wait(lambda: not rig.open_cameras(device), idle=ENDED)
     rig.subject.collect()
 
 
-def _film(rig: CameraRig, device: str) -> None:
+def _take_pictures(rig: CameraRig, device: str) -> None:
     """Let the driver take some pictures: who keeps them is known by their number.
 
     A timer takes all of them as time moves on. A thread that keeps one order at a time may take
@@ -47,7 +47,7 @@ def _film(rig: CameraRig, device: str) -> None:
     """
 
     def asked() -> int:
-        return sum(rig.cameras(device))
+        return sum(rig.open_cameras(device))
 
     rig.advance(PICTURES * STEP)
     for _ in range(PICTURES):
@@ -66,7 +66,7 @@ class Growth(NamedTuple):
     times: int = 1
 
     @property
-    def made(self) -> int:
+    def lives_made(self) -> int:
         """How many lives there were, the warm-up aside."""
         return self.times * self.lives
 
@@ -74,48 +74,48 @@ class Growth(NamedTuple):
         """Return the same with what it has grown by in as many lives more."""
         return Growth(Usage(*map(min, self.usage, usage)), self.lives, self.times + 1)
 
-    def leaks(self) -> list[str]:
+    def list_leaks(self) -> list[str]:
         """Return what these lives leaked, a phrase each."""
-        return _leaks(self.usage, self.lives)
+        return _list_leaks(self.usage, self.lives)
 
 
-def growth(rig: CameraRig) -> Growth:
+def measure_growth(rig: CameraRig) -> Growth:
     """Return what the process has grown by in 25 lives, or in as many as there is time for."""
     began = time.monotonic()
-    live(rig, WARM_UP)
+    run_lives(rig, WARM_UP)
     pace = (time.monotonic() - began) / WARM_UP
     lives = max(FEWEST, min(LIVES, int(TIME / pace))) // 2
-    first, late = _grown(rig, lives), Deadline(SETTLE_S)
-    grown = Growth(first, lives).and_in(_grown(rig, lives, late))
-    while grown.made < POOLED and grown.usage.memory >= _most_memory(lives):
-        grown = grown.and_in(_grown(rig, lives))
+    first, late = _measure_lives(rig, lives), Deadline(SETTLE_S)
+    grown = Growth(first, lives).and_in(_measure_lives(rig, lives, late))
+    while grown.lives_made < POOLED and grown.usage.memory >= _most_memory(lives):
+        grown = grown.and_in(_measure_lives(rig, lives))
     return grown
 
 
-def _grown(rig: CameraRig, lives: int, late: Deadline | None = None) -> Usage:
+def _measure_lives(rig: CameraRig, lives: int, late: Deadline | None = None) -> Usage:
     """Return what the process has grown by in so many lives.
 
     A thread that looks every few seconds whether it is to end is too slow, and no leak: those of
     lives before these may wake up until ``late``.
     """
-    before, threads = rig.process.usage(), rig.process.thread_ids()
-    live(rig, lives)
+    before, threads = rig.process.read_usage(), rig.process.thread_ids()
+    run_lives(rig, lives)
 
     def over() -> bool:
-        return not _leaks(rig.process.usage().grown(before), lives)
+        return not _list_leaks(rig.process.read_usage().growth_since(before), lives)
 
-    if not rig.ends(over) and late is not None:
-        wakes = rig.process.wakes(threads)
-        rig.wait(over, min(late.left, max(wakes) + ENDED) if wakes else 0.0)
-    return rig.process.usage().grown(before)
+    if not rig.wait_for_end(over) and late is not None:
+        wakes = rig.process.wake_times(threads)
+        rig.wait(over, min(late.seconds_left, max(wakes) + ENDED) if wakes else 0.0)
+    return rig.process.read_usage().growth_since(before)
 
 
-def _leaks(grown: Usage, lives: int) -> list[str]:
+def _list_leaks(grown: Usage, lives: int) -> list[str]:
     found = []
     if grown.threads >= lives / 2:
-        found.append(f"{_each(grown.threads / lives)} of its threads")
+        found.append(f"{_count_word(grown.threads / lives)} of its threads")
     if grown.files >= lives / 2:
-        found.append(f"{_each(grown.files / lives)} of its open files")
+        found.append(f"{_count_word(grown.files / lives)} of its open files")
     if grown.memory >= _most_memory(lives):
         found.append(f"{grown.memory // lives} KiB of memory")
     return found
@@ -125,5 +125,5 @@ def _most_memory(lives: int) -> int:
     return max(NOISE, lives * MEMORY)
 
 
-def _each(a_life: float) -> str:
+def _count_word(a_life: float) -> str:
     return {1: "one", 2: "two"}.get(round(a_life), "some")

@@ -32,13 +32,13 @@ def require_flat(rig: CameraRig, before: Usage, times: int, expected: str, round
     for what in ("threads", "files"):
 
         def grown(what: str = what) -> int:
-            return int(getattr(rig.process.usage().grown(before), what))
+            return int(getattr(rig.process.read_usage().growth_since(before), what))
 
-        if not rig.ends(lambda grown=grown: grown() < most):  # type: ignore[misc]
+        if not rig.wait_for_end(lambda grown=grown: grown() < most):  # type: ignore[misc]
             raise Failed(
                 expected=f"{expected} no thread and no file.",
                 actual=f"After {times} {rounds} the process had {grown()} more {WORDS[what]} "
-                f"than before.{rig.others()}",
+                f"than before.{rig.process_note()}",
             )
 
 
@@ -56,17 +56,17 @@ def require_flat_memory(
     """
     for last in (False, True):
         rig.subject.collect()
-        memory = rig.process.usage().grown(before).memory
+        memory = rig.process.read_usage().growth_since(before).memory
         if memory < max(FEWEST_FOR_MEMORY, times) * START_MEMORY:
             return
         if not last:
-            before = rig.process.usage()
+            before = rig.process.read_usage()
             again()
     raise Failed(
         expected=f"{expected} and less than 1 MiB of memory each.",
         actual=f"After {times} {rounds} the process had {memory // 1024} MiB more memory than "
         "before. They came after as many others: what a first time costs does not count."
-        f"{rig.others()}",
+        f"{rig.process_note()}",
     )
 
 
@@ -75,13 +75,13 @@ def require_flat_snapshots(rig: CameraRig) -> None:
 
     A life of its own: an answer of a service costs more than all the rest of a short one.
     """
-    device, before = rig.device(), rig.process.usage()
+    device, before = rig.new_device(), rig.process.read_usage()
     rig.program.start(DRIVER, device)
     require_picture(rig, device)
     for _ in range(WORK):
         require_snapshot(rig, device, "While the driver runs")
     rig.program.stop(DRIVER)
-    rig.wait(lambda: not rig.cameras(device), idle=ENDED)
+    rig.wait(lambda: not rig.open_cameras(device), idle=ENDED)
     expected = "What a snapshot takes is given back by the end of a life:"
     require_flat(rig, before, WORK, expected, "snapshots and the end of the driver")
 
@@ -104,24 +104,24 @@ def failing_starts(rig: CameraRig, kind: str, times: int) -> Usage:
 
     Return what the process held before.
     """
-    before = rig.process.usage()
-    _attempts(rig, kind, times)
+    before = rig.process.read_usage()
+    _attempt_starts(rig, kind, times)
     require_flat(rig, before, times, NO_START, STARTS)
     return before
 
 
 def failing_starts_memory(rig: CameraRig, kind: str, times: int, before: Usage) -> None:
     """Fail if since ``before`` the process has kept memory of so many starts that failed."""
-    again = partial(_attempts, rig, kind, times)
+    again = partial(_attempt_starts, rig, kind, times)
     require_flat_memory(rig, before, again, times, NO_START, STARTS)
 
 
-def _attempts(rig: CameraRig, kind: str, times: int) -> None:
+def _attempt_starts(rig: CameraRig, kind: str, times: int) -> None:
     for _ in range(times):
-        attempt(rig, rig.device(kind))
+        attempt_start(rig, rig.new_device(kind))
 
 
-def attempt(rig: CameraRig, device: str) -> None:
+def attempt_start(rig: CameraRig, device: str) -> None:
     """Start the driver on a ``device`` that has something wrong with it."""
     try:
         rig.subject.start(DRIVER, device)

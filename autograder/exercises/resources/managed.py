@@ -14,7 +14,7 @@ from rcl_interfaces.srv import GetParameters, SetParameters
 
 from autograder.examination.exam import Failed
 from autograder.exercises.resources.observer import RESEND, Observer
-from autograder.observe.phrases import phrase
+from autograder.observe.phrases import as_phrase
 
 TRANSITIONS = {
     "configure": (Transition.TRANSITION_CONFIGURE, "inactive"),
@@ -39,16 +39,18 @@ class Managed:
         self._node = node
         self._rate = ""
 
-    def set(self, **values: str | float) -> bool:
+    def set_parameters(self, **values: str | float) -> bool:
         """Set parameters; return whether the node took them all."""
-        return not self._refused(values)
+        return not self._refused_parameters(values)
 
-    def _refused(self, values: dict[str, str | float]) -> list[str]:
+    def _refused_parameters(self, values: dict[str, str | float]) -> list[str]:
         """Set parameters; return what the node refused, and why."""
         self._rate = f" with a rate of {values['rate']:g} Hz" if "rate" in values else ""
-        parameters = [Parameter(name=name, value=_value(value)) for name, value in values.items()]
+        parameters = [
+            Parameter(name=name, value=_parameter_value(value)) for name, value in values.items()
+        ]
         request = SetParameters.Request(parameters=parameters)
-        reply = self._ask(SetParameters, "set_parameters", request)
+        reply = self._ask_service(SetParameters, "set_parameters", request)
         if len(reply.results) != len(parameters):
             raise Failed(
                 expected=f"A request to set {len(parameters)} parameters gets a result for each.",
@@ -60,19 +62,19 @@ class Managed:
             if not result.successful
         ]
 
-    def require(self, **values: str | float) -> None:
+    def require_parameters(self, **values: str | float) -> None:
         """Set parameters that the node must take."""
-        if refused := self._refused(values):
+        if refused := self._refused_parameters(values):
             shown = ", ".join(f"{name}={value!r}" for name, value in values.items())
             raise Failed(
                 expected=f"The parameters {shown} can be set.",
-                actual=f"The node refused {phrase(refused)}.",
+                actual=f"The node refused {as_phrase(refused)}.",
             )
 
     def require_defaults(self) -> None:
         """Fail unless the parameters have their defaults; nobody has set any yet."""
         request = GetParameters.Request(names=["device", "rate"])
-        values = list(self._ask(GetParameters, "get_parameters", request).values)
+        values = list(self._ask_service(GetParameters, "get_parameters", request).values)
         device, rate = (*values, ParameterValue(), ParameterValue())[:2]
         text, double = ParameterType.PARAMETER_STRING, ParameterType.PARAMETER_DOUBLE
         if (device.type, device.string_value, rate.type, rate.double_value) != (
@@ -81,34 +83,36 @@ class Managed:
             raise Failed(
                 expected="Your node has the parameters device (a string, by default 'front') and "
                 "rate (a double, by default 10.0).",
-                actual=f"When it had just been made, device was {_shown(device)} and rate was "
-                f"{_shown(rate)}.",
+                actual=f"When it had just been made, device was {_show_value(device)} and rate was "
+                f"{_show_value(rate)}.",
             )
 
-    def state(self) -> str:
+    def get_state(self) -> str:
         """Return the label of the node's state."""
-        return str(self._ask(GetState, "get_state", GetState.Request()).current_state.label)
+        return str(self._ask_service(GetState, "get_state", GetState.Request()).current_state.label)
 
-    def attempt(self, transition: str) -> str:
+    def attempt_transition(self, transition: str) -> str:
         """Ask for a transition; return the state that came of it."""
-        number = TRANSITIONS[transition][0] if transition in TRANSITIONS else self._shutdown()
-        client = self._rig.client(ChangeState, f"{self._node}/change_state")
+        number = (
+            TRANSITIONS[transition][0] if transition in TRANSITIONS else self._shutdown_number()
+        )
+        client = self._rig.get_client(ChangeState, f"{self._node}/change_state")
         self._rig.wait(client.service_is_ready)
         reply = client.call_async(ChangeState.Request(transition=Transition(id=number)))
         # The state says what came of it, even if the response is lost.
         self._rig.wait(reply.done, RESEND)
         states: list[str] = []
-        if not self._rig.wait(lambda: states.append(self.state()) or states[-1] in STATES):  # type: ignore[func-returns-value]
+        if not self._rig.wait(lambda: states.append(self.get_state()) or states[-1] in STATES):  # type: ignore[func-returns-value]
             raise Failed(
                 expected=f"A “{transition}” comes to its end.",
-                actual=f"Your node is stuck in “{states[-1]}”{self._rig.raised()}. Each on_…() "
+                actual=f"Your node is stuck in “{states[-1]}”{self._rig.error_note()}. Each on_…() "
                 "method must return, and return a TransitionCallbackReturn.",
             )
         return states[-1]
 
-    def _shutdown(self) -> int:
+    def _shutdown_number(self) -> int:
         """Return the number of the shutdown from the state that the node says it is in."""
-        state = self.state()
+        state = self.get_state()
         if state not in SHUTDOWNS:
             raise Failed(
                 expected=f"Before it is shut down your node is {' or '.join(SHUTDOWNS)}.",
@@ -116,19 +120,20 @@ class Managed:
             )
         return int(SHUTDOWNS[state])
 
-    def go(self, *transitions: str) -> None:
+    def make_transitions(self, *transitions: str) -> None:
         """Make transitions that must all succeed."""
         for transition in transitions:
             goal = TRANSITIONS[transition][1] if transition in TRANSITIONS else "finalized"
-            if (state := self.attempt(transition)) != goal:
+            if (state := self.attempt_transition(transition)) != goal:
                 how = self._rate if transition == "configure" else ""
                 raise Failed(
                     expected=f"After “{transition}”{how} your node is {goal}.",
-                    actual=f"It is {state}{self._rig.raised()}. {self._hint(transition)}",
+                    actual=f"It is {state}{self._rig.error_note()}. "
+                    f"{self._transition_hint(transition)}",
                 )
 
     @staticmethod
-    def _hint(transition: str) -> str:
+    def _transition_hint(transition: str) -> str:
         """Return why rclpy says nothing, and how to see it: it catches what on_…() raises."""
         return (
             f"Your on_{transition}() did not return SUCCESS, or it raised. rclpy keeps such an "
@@ -136,23 +141,23 @@ class Managed:
             "your own: `node = course.run(ManagedCamera)`, then `node.on_configure(None)` …"
         )
 
-    def _ask(self, service: Any, name: str, request: Any) -> Any:
+    def _ask_service(self, service: Any, name: str, request: Any) -> Any:
         reply = self._rig.ask(service, f"{self._node}/{name}", request)
         if reply is None:
             raise Failed(
                 expected=f"Your node answers its service {self._node}/{name}.",
-                actual=f"No answer came{self._rig.raised()}.",
+                actual=f"No answer came{self._rig.error_note()}.",
             )
         return reply
 
 
-def _value(value: str | float) -> ParameterValue:
+def _parameter_value(value: str | float) -> ParameterValue:
     if isinstance(value, str):
         return ParameterValue(type=ParameterType.PARAMETER_STRING, string_value=value)
     return ParameterValue(type=ParameterType.PARAMETER_DOUBLE, double_value=value)
 
 
-def _shown(value: ParameterValue) -> str:
+def _show_value(value: ParameterValue) -> str:
     """Return a parameter's value for a reader."""
     kinds = {
         ParameterType.PARAMETER_NOT_SET: "not there",

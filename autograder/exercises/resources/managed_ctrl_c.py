@@ -16,7 +16,7 @@ from autograder.exercises.resources.managed_life import MANAGED, ManagedLife, wa
 from autograder.exercises.resources.process_usage import Usage
 from autograder.exercises.resources.program_observer import ProgramObserver
 from autograder.exercises.resources.rig import CameraRig
-from autograder.observe.phrases import phrase
+from autograder.observe.phrases import as_phrase
 
 LIVES = 3
 ALONE = "When the managed camera runs in a program of its own,"
@@ -26,8 +26,8 @@ ENDED = f"{ALONE} which is ended by Ctrl-C while it is active,"
 def require_managed_pace(rig: CameraRig, node: str) -> None:
     """Fail unless a managed camera, ``node``, keeps its rate by the machine's clock."""
     life = _in_shared_program(rig)
-    if life is None or not life.worked:
-        life = _alone(rig, node)
+    if life is None or not life.has_worked:
+        life = _in_own_program(rig, node)
     if life is None:
         return
     _require_active(life)
@@ -42,8 +42,8 @@ def require_managed_pace(rig: CameraRig, node: str) -> None:
 def require_managed_ended(rig: CameraRig, node: str) -> None:
     """Fail unless an active managed camera, ``node``, gives everything back at Ctrl-C."""
     life = _in_shared_program(rig)
-    if life is None or not life.clean:
-        life = _alone(rig, node)
+    if life is None or not life.is_clean:
+        life = _in_own_program(rig, node)
     if life is None:
         return
     _require_active(life)
@@ -55,7 +55,7 @@ def require_managed_ended(rig: CameraRig, node: str) -> None:
     if life.left:
         raise Failed(
             expected=f"{ENDED} its destroy_node() leaves nothing behind.",
-            actual=f"It left {phrase([*life.left])} behind.{rig.others()}",
+            actual=f"It left {as_phrase([*life.left])} behind.{rig.process_note()}",
         )
 
 
@@ -83,7 +83,7 @@ def _in_shared_program(rig: CameraRig) -> ManagedLife | None:
     return lives.managed if lives is not None else None
 
 
-def _alone(rig: CameraRig, node: str) -> ManagedLife | None:
+def _in_own_program(rig: CameraRig, node: str) -> ManagedLife | None:
     """Return what was seen in a program of its own, once a notebook; None if there is none."""
     if rig.programs is None:
         return None
@@ -107,9 +107,9 @@ def _watch_alone(rig: CameraRig, programs: Programs, node: str) -> ManagedLife:
             life = again
             if not life.went_on or life.left or life.pace:
                 return life
-            usages.append(rig.process.usage())
+            usages.append(rig.process.read_usage())
             program.interrupt()
-    grown = [after.grown(before) for before, after in pairwise(usages)]
+    grown = [after.growth_since(before) for before, after in pairwise(usages)]
     if not grown:
         return life
     threads, files, _ = map(min, zip(*grown, strict=True))

@@ -6,12 +6,12 @@ from collections import Counter
 
 from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_duties import require_closed
-from autograder.exercises.resources.camera_graph import NODE, SERVICE, SUBSCRIPTION, told
+from autograder.exercises.resources.camera_graph import NODE, SERVICE, SUBSCRIPTION, describe_node
 from autograder.exercises.resources.examiner_node import IMAGE
 from autograder.exercises.resources.managed import Managed
 from autograder.exercises.resources.rig import GHOSTS, CameraRig
 from autograder.observe.patience import SETTLE_S
-from autograder.observe.phrases import capitalized, phrase
+from autograder.observe.phrases import as_phrase, capitalize_first
 
 FOUND = 3.0  # s in which a node in another context is found, as a participant of its own
 
@@ -21,17 +21,17 @@ def require_only_pictures(rig: CameraRig) -> None:
 
     Those that it made before that publisher are known by then.
     """
-    if more := [what for what in rig.graph.endpoints() if what in (SUBSCRIPTION, SERVICE)]:
+    if more := [what for what in rig.graph.list_endpoints() if what in (SUBSCRIPTION, SERVICE)]:
         raise Failed(
             expected="The managed node has no zoom and no snapshot.",
-            actual=f"There was {phrase(more)} on the graph.",
+            actual=f"There was {as_phrase(more)} on the graph.",
         )
 
 
 def require_no_publisher_yet(rig: CameraRig) -> None:
     """Fail if a node that has never been configured has a publisher on the image topic."""
     rig.catch_up()
-    if rig.graph.publishers():
+    if rig.graph.count_publishers():
         raise Failed(
             expected=f"Before the first “configure” there is no publisher on {IMAGE}.",
             actual="There was one: your node makes it in its constructor.",
@@ -40,39 +40,39 @@ def require_no_publisher_yet(rig: CameraRig) -> None:
 
 def require_one_publisher(rig: CameraRig) -> None:
     """Fail unless a node that is configured has exactly one publisher on the image topic."""
-    if not rig.wait(lambda: rig.graph.publishers() == 1):
+    if not rig.wait(lambda: rig.graph.count_publishers() == 1):
         raise Failed(
             expected=f"A configured node has one publisher on {IMAGE}.",
-            actual=f"The number of its publishers was {rig.graph.publishers()}.",
+            actual=f"The number of its publishers was {rig.graph.count_publishers()}.",
         )
 
 
 def require_nothing_held(rig: CameraRig, device: str, when: str) -> None:
     """Fail if a managed node holds a camera or a publisher."""
     require_closed(rig, device, when)
-    if not rig.wait(lambda: not rig.graph.publishers()):
+    if not rig.wait(lambda: not rig.graph.count_publishers()):
         raise Failed(
             expected=f"{when} there is no publisher on {IMAGE}.",
-            actual=f"{capitalized(rig.end_of_wait)} the number of publishers was "
-            f"{rig.graph.publishers()}.",
+            actual=f"{capitalize_first(rig.end_of_wait)} the number of publishers was "
+            f"{rig.graph.count_publishers()}.",
         )
 
 
 def require_off_graph(rig: CameraRig, node: str, when: str) -> None:
     """Fail if the ``node`` itself is on the graph, or another one that it made."""
     name = f"{NODE}{node}"
-    if rig.wait(lambda: name not in rig.graph.endpoints(node) and not rig.graph.nodes()):
+    if rig.wait(lambda: name not in rig.graph.list_endpoints(node) and not rig.graph.list_nodes()):
         return
-    if name in rig.graph.endpoints(node):
+    if name in rig.graph.list_endpoints(node):
         raise Failed(
             expected=f"{when} the node is off the graph.",
-            actual=f"{capitalized(rig.end_of_wait)} {name} was still there: only the inherited "
-            "destroy_node() takes it down.",
+            actual=f"{capitalize_first(rig.end_of_wait)} {name} was still there: only the "
+            "inherited destroy_node() takes it down.",
         )
-    made = phrase([told(name) for name in rig.graph.nodes()])
+    made = as_phrase([describe_node(name) for name in rig.graph.list_nodes()])
     raise Failed(
         expected=f"{when} nothing that your node made is on the graph.",
-        actual=f"{capitalized(rig.end_of_wait)} there still was {made}.",
+        actual=f"{capitalize_first(rig.end_of_wait)} there still was {made}.",
     )
 
 
@@ -82,17 +82,17 @@ def require_no_helper_finalized(rig: CameraRig, node: Managed) -> None:
     One that is made once and for all is there in the state unconfigured, too: it may stay until
     destroy_node().
     """
-    device = rig.device()
-    node.require(device=device)
+    device = rig.new_device()
+    node.require_parameters(device=device)
     rig.subject.collect()  # an earlier life may have left a node in a context that goes on
-    at_first = len(_made(rig))
-    node.go("configure", "activate", "deactivate", "cleanup")
+    at_first = len(_made_nodes(rig))
+    node.make_transitions("configure", "activate", "deactivate", "cleanup")
     # Nodes go off the graph in their own time.
-    rig.wait(lambda: len(rig.graph.nodes(process=True)) <= at_first, GHOSTS)
-    idle, threads = _made(rig), rig.process.thread_ids()
-    node.go("configure", "activate")
+    rig.wait(lambda: len(rig.graph.list_nodes(process=True)) <= at_first, GHOSTS)
+    idle, threads = _made_nodes(rig), rig.process.thread_ids()
+    node.make_transitions("configure", "activate")
     started = rig.process.thread_ids() - threads
-    node.go("shutdown")
+    node.make_transitions("shutdown")
 
     def left() -> list[str]:
         """Return the nodes that came since.
@@ -100,28 +100,29 @@ def require_no_helper_finalized(rig: CameraRig, node: Managed) -> None:
         A node alone in another context has threads, and they end with it: it need not be seen off.
         """
         ended = bool(started) and not started & rig.process.thread_ids()
-        now = rig.graph.nodes(process=not ended)
+        now = rig.graph.list_nodes(process=not ended)
         return list((Counter(now) - Counter(idle)).elements()) if len(now) > len(idle) else []
 
-    _made(rig)
+    _made_nodes(rig)
     # One with threads of its own may be found later than a mark.
     rig.wait(lambda: left() or not started & rig.process.thread_ids(), FOUND)
     if not left():
         return
     rig.subject.collect()  # who shuts a helper's context down leaves the rest to Python
-    rig.see(device, lambda: not left())
+    rig.see_picture(device, lambda: not left())
     if still := left():
         raise Failed(
             expected="After shutdown in the state active your node holds nothing, no other node "
             "that it has made for this state either.",
             actual=f"{SETTLE_S:.0f} s later there still was "
-            f"{phrase([told(name) for name in still])}: "
+            f"{as_phrase([describe_node(name) for name in still])}: "
             "on_shutdown() runs then, and neither on_deactivate() nor on_cleanup() before it.",
         )
 
 
-def _made(rig: CameraRig) -> list[str]:
+def _made_nodes(rig: CameraRig) -> list[str]:
     """Return the managed node, and the nodes that it has by now made beside itself."""
     rig.catch_up()
-    rig.rest()  # the mark is in one context; what others have told is here when all is at rest
-    return rig.graph.nodes(process=True)
+    # The mark is in one context; what others have told is here when all is at rest.
+    rig.wait_for_rest()
+    return rig.graph.list_nodes(process=True)

@@ -36,7 +36,7 @@ class ManagedLife:
     new_files: int = 0
 
     @property
-    def worked(self) -> bool:
+    def has_worked(self) -> bool:
         """Whether it was active and sent its pictures."""
         return self.made and self.failed is None and not self.pace
 
@@ -46,7 +46,7 @@ class ManagedLife:
         return self.made and self.failed is None and not self.raised
 
     @property
-    def clean(self) -> bool:
+    def is_clean(self) -> bool:
         """Whether it is certain that nothing of it was left."""
         return self.went_on and not (self.left or self.new_threads > 0 or self.new_files > 0)
 
@@ -63,42 +63,42 @@ def watch_managed(
     seen.wait(lambda: node in seen.lifecycle_nodes() or (not node and seen.lifecycle_nodes()))
     there = seen.lifecycle_nodes()
     if node not in there and len(there) != 1:
-        return ManagedLife(made=False, raised=seen.gone())
-    device = rig.device()
+        return ManagedLife(made=False, raised=seen.is_gone())
+    device = rig.new_device()
     rate = rig.draws.whole("a rate by the machine's clock", RATE, 15, 25)
     managed = Managed(seen, node if node in there else there[0])
-    threads, before = rig.process.thread_ids(), rig.process.usage()
+    threads, before = rig.process.thread_ids(), rig.process.read_usage()
     try:
-        if not managed.set(device=device, rate=float(rate)):  # that is another check's
+        if not managed.set_parameters(device=device, rate=float(rate)):  # that is another check's
             rate = USUAL_RATE
-            managed.require(device=device)
-        managed.go("configure", "activate")
+            managed.require_parameters(device=device)
+        managed.make_transitions("configure", "activate")
     except Failed as failed:
-        return ManagedLife(failed=failed, raised=seen.gone())
-    came = seen.wait(lambda: seen.node.of(device), idle=ENDED)
-    pace = seen.pace(device, rate) if came else "None came."
+        return ManagedLife(failed=failed, raised=seen.is_gone())
+    came = seen.wait(lambda: seen.node.pictures_of(device), idle=ENDED)
+    pace = seen.pace_fault(device, rate) if came else "None came."
     seen.program.interrupt()
     left = []
-    if not seen.ends(lambda: not rig.cameras(device)):
+    if not seen.wait_for_end(lambda: not rig.open_cameras(device)):
         left.append("its open camera")
-    if not seen.ends(lambda: not seen.node.count_publishers(IMAGE)):
+    if not seen.wait_for_end(lambda: not seen.node.count_publishers(IMAGE)):
         left.append(f"its publisher on {IMAGE}")
 
     def nodes_left() -> list[str]:
-        return sorted({*seen.nodes().values()}.difference(others))
+        return sorted({*seen.find_nodes().values()}.difference(others))
 
-    if not seen.ends(lambda: not nodes_left()):
+    if not seen.wait_for_end(lambda: not nodes_left()):
         left += [f"the node {name}" for name in nodes_left()]
-    if seen.gone():
+    if seen.is_gone():
         return ManagedLife(rate=rate, pace=pace, raised=True)
 
     def new_threads() -> int:
         return len(rig.process.thread_ids() - threads)
 
     def new_files() -> int:
-        return rig.process.usage().grown(before).files
+        return rig.process.read_usage().growth_since(before).files
 
-    seen.ends(lambda: new_threads() <= 0 and new_files() <= 0)
+    seen.wait_for_end(lambda: new_threads() <= 0 and new_files() <= 0)
     return ManagedLife(
         rate=rate, pace=pace, left=tuple(left), new_threads=new_threads(), new_files=new_files()
     )

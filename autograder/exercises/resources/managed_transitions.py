@@ -29,42 +29,42 @@ def require_configuration(
 
     ``later`` is a rate that is set once it is configured: good for the next time, or refused.
     """
-    device = rig.device()
-    node.require(device=device, rate=rate)
-    node.go("configure")
+    device = rig.new_device()
+    node.require_parameters(device=device, rate=rate)
+    node.make_transitions("configure")
     require_open(rig, device)
     require_one_publisher(rig)
     when = f" with a rate of {rate:g} Hz"
     if later:
-        node.set(device=rig.device())  # good for the next time as well
-    if later and node.set(rate=later):
+        node.set_parameters(device=rig.new_device())  # good for the next time as well
+    if later and node.set_parameters(rate=later):
         when = f": {rate:g} Hz was set at “configure”, the {later:g} Hz set since are for the next"
-    node.go("activate")
+    node.make_transitions("activate")
     require_picture(rig, device)
     require_rate(rig, device, rate, when, seconds)
-    node.go("deactivate", "cleanup")
+    node.make_transitions("deactivate", "cleanup")
     require_nothing_held(rig, device, "After “cleanup”")
 
 
 def require_flat_rounds(rig: CameraRig, node: Managed) -> None:
     """Fail if rounds through the states leave threads, files, nodes or memory behind."""
-    device = rig.device()
-    node.require(device=device, rate=10.0)
+    device = rig.new_device()
+    node.require_parameters(device=device, rate=10.0)
     rig.subject.collect()
     rig.catch_up()
-    nodes, before = len(rig.graph.nodes()), rig.process.usage()
+    nodes, before = len(rig.graph.list_nodes()), rig.process.read_usage()
 
     def some() -> None:
         for _ in range(ROUNDS):
-            node.go("configure", "activate")
+            node.make_transitions("configure", "activate")
             rig.advance(0.3)
-            node.go("deactivate", "cleanup")
+            node.make_transitions("deactivate", "cleanup")
 
     some()
     expected = f"{ROUNDS} rounds from “configure” to “cleanup” leave nothing behind,"
     require_flat(rig, before, ROUNDS, expected, "rounds")
     rig.catch_up()
-    if (more := len(rig.graph.nodes()) - nodes) >= ROUNDS / 2:
+    if (more := len(rig.graph.list_nodes()) - nodes) >= ROUNDS / 2:
         raise Failed(
             expected=f"{expected} and no node on the graph.",
             actual=f"There were {more} more nodes than before: your node makes helpers, and does "
@@ -75,14 +75,14 @@ def require_flat_rounds(rig: CameraRig, node: Managed) -> None:
 
 def require_no_thread_inactive(rig: CameraRig, node: Managed) -> None:
     """Fail if a thread that was started by “activate” goes on after “deactivate”."""
-    node.go("configure")
+    node.make_transitions("configure")
     threads = rig.process.thread_ids()
-    node.go("activate")
+    node.make_transitions("activate")
     rig.advance(0.3)
-    node.go("deactivate")
+    node.make_transitions("deactivate")
     rig.advance(0.3)  # one that waits for the node's clock gets to see it
     require_threads_ended(rig, threads, "After “deactivate”")
-    node.go("cleanup")
+    node.make_transitions("cleanup")
 
 
 def require_refusals(rig: CameraRig, node: Managed, rates: tuple[float, ...]) -> None:
@@ -92,7 +92,7 @@ def require_refusals(rig: CameraRig, node: Managed, rates: tuple[float, ...]) ->
         "unplugged cameras": [("a camera 'unplugged'", 10.0, "unplugged")],
     }
     for rounds, refused in kinds.items():
-        before = rig.process.usage()
+        before = rig.process.read_usage()
         times = 0
         while times < REFUSALS:
             for what, rate, kind in refused:
@@ -104,10 +104,10 @@ def require_refusals(rig: CameraRig, node: Managed, rates: tuple[float, ...]) ->
 
 def require_refused(rig: CameraRig, node: Managed, what: str, rate: float, kind: str) -> None:
     """Fail unless the node stays unconfigured, and closes the camera of that ``kind``."""
-    device = rig.device(kind)
-    if not node.set(device=device, rate=rate):
+    device = rig.new_device(kind)
+    if not node.set_parameters(device=device, rate=rate):
         return  # refused even earlier: a parameter callback is as good
-    if (state := node.attempt("configure")) != "unconfigured":
+    if (state := node.attempt_transition("configure")) != "unconfigured":
         raise Failed(
             expected=f"Configured with {what}, your node stays unconfigured.",
             actual=f"It is {state}.",

@@ -34,7 +34,7 @@ class Observer:
         self.requests = 0  # that were made of services so far
         self.waited = 0.0  # s of wall time that the last wait took which had no time-out
 
-    def raised(self) -> str:
+    def error_note(self) -> str:
         """Return what the student's callbacks are known to have raised, as the end of a sentence.
 
         From outside it is not.
@@ -44,7 +44,7 @@ class Observer:
     def nudge(self) -> None:
         """Give the executors of who is asked something to do; on a robot the next tick does."""
 
-    def gone(self) -> bool:
+    def is_gone(self) -> bool:
         """Whether who is asked has gone, so that there is nothing to wait for."""
         return False
 
@@ -57,9 +57,9 @@ class Observer:
         `Patience`. `end_of_wait` says afterwards when that was.
         """
         if timeout is None:
-            patience = self.patience(idle)
+            patience = self.start_patience(idle)
             holds = patience.wait(self.session, condition)
-            self.waited = patience.spent
+            self.waited = patience.seconds_spent
             return holds
         with suppress(WaitTimeout):
             self.session.until(condition, timeout=timeout, what="an observation")
@@ -73,7 +73,7 @@ class Observer:
             return "when nothing was at work any more"
         return f"{SETTLE_S:.0f} s later"
 
-    def patience(self, idle: float = IDLE_S, seconds: float = SETTLE_S) -> Patience:
+    def start_patience(self, idle: float = IDLE_S, seconds: float = SETTLE_S) -> Patience:
         """Begin to wait for as long as something may take: see `Patience`."""
         return Patience(self._still, seconds, idle)
 
@@ -83,15 +83,15 @@ class Observer:
         A response that goes out before its way back is known is lost: it is asked for again, so
         this is for requests that may be made twice. ``nudging``: a callback may await something.
         """
-        client = self.client(service, name)
+        client = self.get_client(service, name)
         self.wait(client.service_is_ready)
-        patience = self.patience()
+        patience = self.start_patience()
         replies: list[Any] = []
-        while patience.lasts() and not self.gone():
+        while patience.has_time_left() and not self.is_gone():
             replies.append(client.call_async(request))
             self.requests += 1
             again = Deadline(RESEND)
-            while again.left and patience.lasts() and not self.gone():
+            while again.seconds_left and patience.has_time_left() and not self.is_gone():
                 self.wait(lambda: any(reply.done() for reply in replies), NUDGE)
                 for reply in replies:
                     if reply.done():
@@ -100,7 +100,7 @@ class Observer:
                     self.nudge()
         return None
 
-    def client(self, service: Any, name: str) -> Any:
+    def get_client(self, service: Any, name: str) -> Any:
         """Return the client of a service, one for all lives of its server."""
         if name not in self._clients:
             self._clients[name] = self.node.create_client(service, name)

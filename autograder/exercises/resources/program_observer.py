@@ -12,7 +12,7 @@ from autograder.exercises.resources.observer import Observer
 from autograder.exercises.resources.rig import CameraRig
 from autograder.observe.participants import node_of, of_others
 from autograder.observe.patience import IDLE_S
-from autograder.observe.phrases import capitalized, pictures
+from autograder.observe.phrases import capitalize_first, pictures_phrase
 from autograder.processes.fair_deadline import FairDeadline
 
 COUNTED = 6
@@ -34,27 +34,27 @@ class ProgramObserver(Observer):
         self.rig = rig
         self.program = program
 
-    def gone(self) -> bool:
+    def is_gone(self) -> bool:
         """Whether the program has ended."""
-        return self.program.ended()
+        return self.program.has_ended()
 
     def wait(
         self, condition: Callable[[], Any], timeout: float | None = None, idle: float = IDLE_S
     ) -> bool:
         """Wait as `Observer.wait` does, as long as the program is there."""
-        super().wait(lambda: condition() or self.gone(), timeout, idle)
+        super().wait(lambda: condition() or self.is_gone(), timeout, idle)
         return bool(condition())
 
-    def ends(self, over: Callable[[], Any]) -> bool:
-        """Wait as `CameraRig.ends` does, as long as the program is there."""
-        self.rig.ends(lambda: over() or self.gone(), self.session)
+    def wait_for_end(self, over: Callable[[], Any]) -> bool:
+        """Wait as `CameraRig.wait_for_end` does, as long as the program is there."""
+        self.rig.wait_for_end(lambda: over() or self.is_gone(), self.session)
         return bool(over())
 
-    def working(self) -> bool:
+    def is_working(self) -> bool:
         """Whether a publisher of pictures or a service for them is on the graph."""
         return bool(self.node.count_publishers(IMAGE) or self.node.count_services(SNAPSHOT))
 
-    def nodes(self) -> dict[bytes, str]:
+    def find_nodes(self) -> dict[bytes, str]:
         """Return the program's nodes on the graph, by what each of them publishes on."""
         ends = of_others(self.node.get_publishers_info_by_topic("/parameter_events"))
         return {bytes(end.endpoint_gid): node_of(end) for end in ends}
@@ -65,21 +65,23 @@ class ProgramObserver(Observer):
         Of one that was destroyed rclpy 7.1 leaves the services there until Python collects it.
         """
         services = {name for name, _ in self.node.get_service_names_and_types()}
-        nodes = sorted({*self.nodes().values()})
+        nodes = sorted({*self.find_nodes().values()})
         return [name for name in nodes if f"{name}{CHANGE_STATE}" in services]
 
-    def pace(self, device: str, rate: float) -> str:
+    def pace_fault(self, device: str, rate: float) -> str:
         """Return how many pictures of ``device`` come in what time, unless at about this rate."""
 
         def came() -> int:
-            return len(self.node.of(device))
+            return len(self.node.pictures_of(device))
 
         for _ in range(TAKES):
             begun, before = time.monotonic(), came()
             deadline = FairDeadline(COUNTED / (SLOWEST * rate), self.rig.outside.delay)
-            while (left := deadline.left) and came() < before + COUNTED and not self.gone():
+            while (
+                (left := deadline.seconds_left) and came() < before + COUNTED and not self.is_gone()
+            ):
                 self.wait(lambda most=before + COUNTED: came() >= most, left)  # type: ignore[misc]
             number, seconds = came() - before, time.monotonic() - begun
             if number >= COUNTED and number <= seconds * FASTEST * rate:
                 return ""
-        return f"{capitalized(pictures(number))} came in {seconds:.1f} s."
+        return f"{capitalize_first(pictures_phrase(number))} came in {seconds:.1f} s."

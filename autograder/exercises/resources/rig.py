@@ -25,7 +25,7 @@ from autograder.exercises.resources.examiner_node import Picture
 from autograder.exercises.resources.observer import Observer
 from autograder.exercises.resources.process_usage import Process
 from autograder.observe.patience import SETTLE_S, Waits
-from autograder.observe.phrases import phrase
+from autograder.observe.phrases import as_phrase
 
 GHOSTS = 1.0
 """Seconds that endpoints of an earlier life are given to go off the graph."""
@@ -61,28 +61,28 @@ class CameraRig(Observer):
 
     # The subject.
 
-    def fresh(self) -> None:
+    def begin_session(self) -> None:
         """Begin a new session on simulated time; nothing of an earlier one goes on."""
         self.subject.open(sim_time=True)
         self._clean, self._provoked = True, False
 
     @contextmanager
-    def life(self, name: str, *args: Any) -> Iterator[str]:
+    def run_life(self, name: str, *args: Any) -> Iterator[str]:
         """Give the full name of a node of the class ``name`` for one life.
 
         It is stopped at the end, unless it is destroyed by then. What its cleanup raises then is
         for another check to find.
         """
-        with self.trying():
+        with self.clean_session():
             node = self.program.start(name, *args)
             yield node
         try:
             self.subject.stop(name)
-            self._clean = self._vanishes(node)
+            self._clean = self._has_vanished(node)
         except StudentError:
             self._clean = False
 
-    def _vanishes(self, node: str) -> bool:
+    def _has_vanished(self, node: str) -> bool:
         """Whether a node that was stopped goes off the graph.
 
         rclpy 7.1 leaves the services of a destroyed lifecycle node there until it is collected; the
@@ -94,18 +94,18 @@ class CameraRig(Observer):
         return self.wait(lambda: not self.node.count_services(service))
 
     @contextmanager
-    def trying(self) -> Iterator[None]:
+    def clean_session(self) -> Iterator[None]:
         """Begin with a clean session, and leave none to the next check if this one fails.
 
         What a wrong design has left on the graph by now is not held against it again, and what the
         examiner made a callback raise in an earlier check explains nothing in this one.
         """
         if not self._clean or self._provoked:
-            self.fresh()
+            self.begin_session()
         # A design that has left some once leaves them each time, and they are told from new ones.
         if not self._leaves_ghosts:
-            self._leaves_ghosts = not self.wait(lambda: not self.graph.endpoints(), GHOSTS)
-        self.graph.disregard()
+            self._leaves_ghosts = not self.wait(lambda: not self.graph.list_endpoints(), GHOSTS)
+        self.graph.ignore_present()
         self._clean = False
         yield
         self._clean = True
@@ -117,7 +117,7 @@ class CameraRig(Observer):
         except StudentError as error:
             raise Failed(
                 expected="Your callbacks return, and the driver follows the robot's time.",
-                actual=f"{_held_up(str(error))}{self.raised()}.",
+                actual=f"{_held_up(str(error))}{self.error_note()}.",
             ) from None
 
     def nudge(self) -> None:
@@ -128,12 +128,12 @@ class CameraRig(Observer):
         """
         self.subject.nudge()
 
-    def raised(self) -> str:
+    def error_note(self) -> str:
         """Return what the student's callbacks raised, as the end of a sentence."""
         raised, ended = self.subject.errors(), self.subject.thread_errors()
         told = [f"a callback raised: {raised[-1].rstrip('.')}"] if raised else []
         told += [f"a thread of yours ended with {ended[-1].rstrip('.')}"] if ended else []
-        return f" ({phrase(told)})" if told else ""
+        return f" ({as_phrase(told)})" if told else ""
 
     def refused_zoom(self, factor: int) -> None:
         """Send a zoom that the camera does not have; it is with the driver when this returns."""
@@ -143,7 +143,7 @@ class CameraRig(Observer):
 
     # What is seen.
 
-    def ends(
+    def wait_for_end(
         self,
         over: Callable[[], Any],
         session: Waits | None = None,
@@ -160,54 +160,57 @@ class CameraRig(Observer):
             among: the threads that may have a part in it; None for all.
         """
         session = session or self.session
-        if self.patience(SOON).wait(session, over):
+        if self.start_patience(SOON).wait(session, over):
             return True
-        if min(self.process.wakes(among), default=ENDED) >= ENDED and not self.process.others():
+        if (
+            min(self.process.wake_times(among), default=ENDED) >= ENDED
+            and not self.process.other_processes()
+        ):
             return False
-        return self.patience(ENDED).wait(session, over)
+        return self.start_patience(ENDED).wait(session, over)
 
-    def rest(self) -> bool:
+    def wait_for_rest(self) -> bool:
         """Return True when all that was sent has been dealt with, False if a thread never rests."""
-        return self._still.reached()
+        return self._still.wait_for_rest()
 
-    def settle(self) -> None:
+    def settle_messages(self) -> None:
         """Wait until all that was sent has been dealt with: what comes then was sent after that."""
-        if self.rest():
+        if self.wait_for_rest():
             self.node.settled = time.time_ns()
 
-    def others(self) -> str:
+    def process_note(self) -> str:
         """Return a sentence on the processes that the notebook has started, if there are any."""
-        if not (names := self.process.others()):
+        if not (names := self.process.other_processes()):
             return ""
         were = "A process that it had started was" if len(names) == 1 else "Processes were"
-        return f" {were} left: {phrase(names)}."
+        return f" {were} left: {as_phrase(names)}."
 
-    def device(self, kind: str = "front") -> str:
+    def new_device(self, kind: str = "front") -> str:
         """Return a device that nobody else uses; ``kind`` is its name's beginning."""
         return f"{kind}-{secrets.token_hex(4)}"
 
-    def cameras(self, device: str) -> list[int]:
+    def open_cameras(self, device: str) -> list[int]:
         """Return how often each open camera of ``device`` was asked for a picture."""
-        return self.process.positions(f"camera:{device}")
+        return self.process.file_positions(f"camera:{device}")
 
-    def streams(self, device: str) -> bool:
+    def is_streaming(self, device: str) -> bool:
         """Whether the stream of ``device`` runs."""
-        return bool(self.process.positions(f"camera-stream:{device}"))
+        return bool(self.process.file_positions(f"camera-stream:{device}"))
 
-    def pictures(self, device: str) -> list[Picture]:
+    def get_pictures(self, device: str) -> list[Picture]:
         """Return the pictures of ``device`` that went over the topic, in order of arrival."""
-        return self.node.of(device)
+        return self.node.pictures_of(device)
 
-    def see(self, device: str, condition: Callable[[], Any] | None = None) -> bool:
+    def see_picture(self, device: str, condition: Callable[[], Any] | None = None) -> bool:
         """Let time pass until ``condition`` (by default: that there is a picture) holds.
 
         Endpoints find each other in their own time, and what is sent before is lost.
         """
-        condition = condition or (lambda: self.pictures(device))
-        patience = self.patience()
+        condition = condition or (lambda: self.get_pictures(device))
+        patience = self.start_patience()
         for _ in range(int(SETTLE_S / PERIOD)):
             self.advance(STEP)
-            if self.wait(condition, PERIOD if patience.lasts() else 0.0):
+            if self.wait(condition, PERIOD if patience.has_time_left() else 0.0):
                 return True
         return False
 

@@ -30,9 +30,9 @@ def require_start_raises_unasked(rig: CameraRig) -> None:
     lives = seen_lives(rig)
     raises = lives.start_raises if lives is not None else None
     if raises is None:
-        device = rig.device("unplugged")
+        device = rig.new_device("unplugged")
         with rig.programs.program([(DRIVER, [device])]) as program:
-            raises = rig.patience().wait(program.session, program.ended)
+            raises = rig.start_patience().wait(program.session, program.has_ended)
     if not raises:
         raise Failed(
             expected=f"{DRIVER}('unplugged') raises in a program of its own as well, which so "

@@ -9,7 +9,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
 from autograder.exercises.safety.deferred_replies import Held
-from autograder.observe.qos_refusal import refusal
+from autograder.observe.qos_refusal import find_refusal
 from autograder.observe.quiet_node import QuietNode
 
 # Which QoS a student's subscription has is free: what is offered meets every demand but a deadline.
@@ -51,33 +51,33 @@ class Player(QuietNode):
         """Let all go on that wait in `pause`; return whether there were any."""
         return self._paused.release()
 
-    def hear(self, msg_type: Any, topic: str, note: Callable[[Any], None]) -> None:
+    def add_listener(self, msg_type: Any, topic: str, note: Callable[[Any], None]) -> None:
         """Listen to a topic that the student's node publishes on, once it does."""
         self._ears[topic] = (msg_type, note)
 
     @property
-    def heard(self) -> list[str]:
+    def heard_topics(self) -> list[str]:
         """The topics that the student's node publishes on."""
         return list(self._ears)
 
-    def attend(self) -> None:
+    def subscribe_all(self) -> None:
         """Subscribe, with what is offered: lossless wherever that is possible."""
         for topic, (msg_type, note) in self._ears.items():
             offers = [end.qos_profile for end in self.get_publishers_info_by_topic(topic)]
             reliable = all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offers)
             self.create_subscription(msg_type, topic, note, LOSSLESS if reliable else UNDEMANDING)
 
-    def speak(self, msg_type: Any, topic: str) -> Any:
+    def add_publisher(self, msg_type: Any, topic: str) -> Any:
         """Return a publisher on a topic that the student's node listens to."""
         self.spoken.append(topic)
         return self.create_publisher(msg_type, topic, LATCHED)
 
-    def unheard(self) -> str:
+    def describe_unheard(self) -> str:
         """Return which of the node's subscriptions cannot be served, and why; empty if none."""
         for topic in self.spoken:
             offers = [end.qos_profile for end in self.get_publishers_info_by_topic(topic)]
             demands = [end.qos_profile for end in self.get_subscriptions_info_by_topic(topic)]
-            why = [refusal(offer, demand) for offer in offers for demand in demands]
+            why = [find_refusal(offer, demand) for offer in offers for demand in demands]
             if why and (first := why[0]) is not None and all(why):
                 return (
                     f"Its subscription to {topic} demands more than any publisher offers: "
@@ -85,13 +85,15 @@ class Player(QuietNode):
                 )
         return ""
 
-    def uses(self, service: str) -> None:
+    def add_used_service(self, service: str) -> None:
         """Say that the examiner is a client of a service that the student's node serves."""
         self.used.append(service)
 
-    def missing(self) -> str:
+    def describe_missing(self) -> str:
         """Return what the student's node lacks, a sentence each; empty if all is connected."""
-        lacking = [f"no publisher on {t}" for t in self.heard if not self.count_publishers(t)]
+        lacking = [
+            f"no publisher on {t}" for t in self.heard_topics if not self.count_publishers(t)
+        ]
         lacking += [f"no subscription to {t}" for t in self.spoken if not self.count_subscribers(t)]
         lacking += self.missing_servers()
         return "There is " + ", ".join(lacking) + "." if lacking else ""
@@ -101,6 +103,6 @@ class Player(QuietNode):
         return []
 
 
-def following(before: list[str]) -> str:
+def following_phrase(before: list[str]) -> str:
     """Return which request a request follows, to put behind it; empty if it is the first one."""
     return f", the next one after “{before[0]}”" if before else ""

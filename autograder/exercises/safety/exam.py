@@ -42,7 +42,7 @@ def gripper_answers(rig: RobotRig) -> None:
 
     The rest of the robot waits for this word: the arm lifts only what is held.
     """
-    rig.once(gripper_client.carried_out)
+    rig.run_once(gripper_client.carried_out)
 
 
 @EXAM.check(
@@ -59,7 +59,7 @@ def gripper_refuses(rig: RobotRig) -> None:
 
     The gripper has its reason, such as fingers in between: asking again is no way to overrule it.
     """
-    gripper_client.refused(rig)
+    gripper_client.examine_refusals(rig)
 
 
 @EXAM.check(
@@ -77,7 +77,7 @@ def gripper_retries(rig: RobotRig) -> None:
     A hiccup is worth a second try. A client that tries for ever never tells anybody that the
     gripper is dead, and one that tries without pauses keeps it from recovering.
     """
-    gripper_client.unanswered(rig)
+    gripper_client.examine_silence(rig)
 
 
 @EXAM.check(
@@ -93,7 +93,7 @@ def speed_serves(rig: RobotRig) -> None:
 
     In a crowded ward operators slow the robot down, and have to know that it listened.
     """
-    rig.once(speed_service.good)
+    rig.run_once(speed_service.examine_good_requests)
 
 
 @EXAM.check(
@@ -111,7 +111,7 @@ def speed_refuses(rig: RobotRig) -> None:
     NaN compares false with every limit: a check that forgets it lets the robot drive at any speed.
     And an exception in the callback answers nobody.
     """
-    speed_service.bad(rig)
+    speed_service.examine_bad_requests(rig)
 
 
 @EXAM.check(
@@ -128,7 +128,7 @@ def goals_end(rig: RobotRig) -> None:
     A result arrives for an aborted goal too. Whoever takes every result for success unloads the
     parcel in the corridor.
     """
-    rig.once(navigator_client.ended)
+    rig.run_once(navigator_client.examine_ends)
 
 
 @EXAM.check(
@@ -145,7 +145,7 @@ def goals_stall(rig: RobotRig) -> None:
 
     A limit on the whole drive is too short for a long corridor and too long for a hung navigator.
     """
-    navigator_client.stalled(rig)
+    navigator_client.examine_stalls(rig)
 
 
 @EXAM.check(
@@ -162,7 +162,7 @@ def drive_arrives(rig: RobotRig) -> None:
 
     The wheels keep doing what they were told last: a drive that ends without a stop does not end.
     """
-    rig.once(drive_server.arrives)
+    rig.run_once(drive_server.examine_arrival)
 
 
 @EXAM.check(
@@ -179,7 +179,7 @@ def drive_cancels(rig: RobotRig) -> None:
 
     Somebody steps in front of the robot: whoever cancels means now.
     """
-    drive_server.canceled(rig)
+    drive_server.examine_cancels(rig)
 
 
 @EXAM.check(
@@ -196,7 +196,7 @@ def drive_aborts(rig: RobotRig) -> None:
 
     When the jam comes loose, wheels that were not stopped start to turn again.
     """
-    drive_server.aborted(rig)
+    drive_server.examine_jams(rig)
 
 
 @EXAM.check(
@@ -214,7 +214,7 @@ def gripper_stale(rig: RobotRig) -> None:
     The late answer is about the past. Taken for the present one, it says `done` while the gripper
     is still moving, or reports one grip twice.
     """
-    late_answers.stale(rig)
+    late_answers.examine_late_answers(rig)
 
 
 @EXAM.check(
@@ -231,7 +231,7 @@ def gripper_absent(rig: RobotRig) -> None:
 
     A node that blocks looks dead to the safety monitor, which then stops the whole robot.
     """
-    gripper_client.absent(rig)
+    gripper_client.examine_absence(rig)
 
 
 @EXAM.check(
@@ -248,7 +248,7 @@ def speed_atomic(rig: RobotRig) -> None:
 
     Half of a request is a state that nobody asked for, and that the next good request makes real.
     """
-    speed_service.atomic(rig)
+    speed_service.examine_atomicity(rig)
 
 
 @EXAM.check(
@@ -265,7 +265,7 @@ def goals_lost(rig: RobotRig) -> None:
 
     Just when the navigator does not obey or does not answer, nobody else stops the robot.
     """
-    navigator_client.lost(rig)
+    navigator_client.examine_losses(rig)
 
 
 @EXAM.check(
@@ -283,4 +283,4 @@ def drive_shutdown(rig: RobotRig) -> None:
     An update, Ctrl-C, a launch file that ends: nodes go down while the robot drives, and nobody
     is left to tell the wheels.
     """
-    shutdowns.shutdown(rig)
+    shutdowns.examine_shutdown(rig)

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from autograder.examination.exam import Failed
-from autograder.exercises.safety.counterpart import following
+from autograder.exercises.safety.counterpart import following_phrase
 from autograder.exercises.safety.gripper import GripUser
 from autograder.exercises.safety.node_under_test import COARSE, STRIDE, Robot
-from autograder.exercises.safety.rig import RobotRig, serving
+from autograder.exercises.safety.rig import RobotRig, run_server
 
 GRIPPER = {"services": ["gripper/set"]}
 
@@ -22,27 +22,27 @@ AFTER = 1.5  # s in which a second outcome would show
 
 
 @contextmanager
-def client(rig: RobotRig, gripper: bool = True) -> Iterator[tuple[Robot, GripUser]]:
+def run_client(rig: RobotRig, gripper: bool = True) -> Iterator[tuple[Robot, GripUser]]:
     """Give the client and its user, with a ``gripper`` or without, for the length of the block."""
-    with rig.robot(GripUser.CLIENT, GripUser) as (robot, user):
+    with rig.run_robot(GripUser.CLIENT, GripUser) as (robot, user):
         if gripper:
-            with serving(rig, robot, user.gripper, GRIPPER):
+            with run_server(rig, robot, user.make_gripper, GRIPPER):
                 yield robot, user
         else:
-            robot.sees(GRIPPER, there=False)
-            with robot.unserved():
+            robot.wait_for_discovery(GRIPPER, there=False)
+            with robot.watch_wall_waits():
                 yield robot, user
 
 
-def tried(robot: Robot, user: GripUser, close: bool) -> None:
+def request_grip(robot: Robot, user: GripUser, close: bool) -> None:
     """Ask for a grip, and wait until the gripper is asked for it."""
     user.request(close)
     if not robot.run(lambda: user.tries, PROMPT):
         raise Failed(
-            expected=f"After grip/request {str(close).lower()}{following(user.before)}, "
+            expected=f"After grip/request {str(close).lower()}{following_phrase(user.before)}, "
             "gripper/set is called.",
-            actual=f"Within {PROMPT:g} s the gripper was not called. {said(user)}"
-            f"{robot.complaint()}",
+            actual=f"Within {PROMPT:g} s the gripper was not called. {describe_outcomes(user)}"
+            f"{robot.error_note()}",
         )
     require_data(user, close)
 
@@ -58,13 +58,15 @@ def require_data(user: GripUser, close: bool) -> None:
             )
 
 
-def outcome(robot: Robot, user: GripUser, when: str, word: str, limit: float = PROMPT) -> None:
+def require_outcome(
+    robot: Robot, user: GripUser, when: str, word: str, limit: float = PROMPT
+) -> None:
     """Require one outcome, and a held arm unless it is good."""
     robot.run(lambda: user.outcomes, limit)
     if user.outcomes != [word]:
         raise Failed(
             expected=f"{when}, grip/outcome says “{word}”, once.",
-            actual=said(user, f"Within {limit:.3g} s it") + robot.complaint(),
+            actual=describe_outcomes(user, f"Within {limit:.3g} s it") + robot.error_note(),
         )
     if word != "done" and not robot.run(lambda: user.holds, PROMPT):
         raise Failed(
@@ -73,14 +75,16 @@ def outcome(robot: Robot, user: GripUser, when: str, word: str, limit: float = P
         )
 
 
-def once(robot: Robot, user: GripUser, when: str) -> None:
+def require_once(robot: Robot, user: GripUser, when: str) -> None:
     """Require that the outcome stays the only one."""
-    robot.spend(AFTER, COARSE)
+    robot.spend_time(AFTER, COARSE)
     if len(user.outcomes) != 1:
-        raise Failed(expected=f"{when}, there is exactly one outcome.", actual=said(user))
+        raise Failed(
+            expected=f"{when}, there is exactly one outcome.", actual=describe_outcomes(user)
+        )
 
 
-def said(user: GripUser, who: str = "It") -> str:
+def describe_outcomes(user: GripUser, who: str = "It") -> str:
     """Return which outcomes there were, as a sentence; ``who`` begins one that says: none."""
     words = ", then ".join(f"“{word}”" for word in user.outcomes)
     return f"It said {words}." if words else f"{who} said nothing."

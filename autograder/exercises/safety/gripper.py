@@ -40,9 +40,9 @@ class Gripper(QuietNode):
         super().__init__("gripper")
         self._arrived = arrived
         group = ReentrantCallbackGroup()
-        self.create_service(SetBool, "gripper/set", self._serve, callback_group=group)
+        self.create_service(SetBool, "gripper/set", self._serve_request, callback_group=group)
 
-    async def _serve(
+    async def _serve_request(
         self, request: SetBool.Request, response: SetBool.Response
     ) -> SetBool.Response:
         executor = self.executor
@@ -75,15 +75,17 @@ class GripUser(Player):
         self.before: list[str] = []  # the outcome of the request before this one, if there was any
         self.beats: list[float] = []
         self.holds = 0
-        self._request = self.speak(Bool, "grip/request")
-        self.hear(String, "grip/outcome", lambda message: self.outcomes.append(message.data))
-        self.hear(Empty, "arm/hold", self._held)
-        self.hear(Empty, "grip/heartbeat", lambda _: self.beats.append(self.now))
+        self._request = self.add_publisher(Bool, "grip/request")
+        self.add_listener(
+            String, "grip/outcome", lambda message: self.outcomes.append(message.data)
+        )
+        self.add_listener(Empty, "arm/hold", self._note_hold)
+        self.add_listener(Empty, "grip/heartbeat", lambda _: self.beats.append(self.now))
 
-    def _held(self, _message: Empty) -> None:
+    def _note_hold(self, _message: Empty) -> None:
         self.holds += 1
 
-    def gripper(self) -> Gripper:
+    def make_gripper(self) -> Gripper:
         """Return a gripper whose requests are noted here; it is for the session to run."""
         return Gripper(lambda *arrived: self.tries.append(Try(self.now, *arrived)))
 
@@ -108,20 +110,20 @@ class Operator(Player):
         super().__init__("operator")
         self.limits: list[tuple[float, float]] = []
         self.commands: list[Twist] = []
-        self._jam = self.speak(Bool, "hardware/jammed")
-        self.hear(Twist, "wheels/limits", self._note)
-        self.hear(Twist, "cmd_vel", lambda message: self.commands.append(message))
+        self._jam = self.add_publisher(Bool, "hardware/jammed")
+        self.add_listener(Twist, "wheels/limits", self._note_limits)
+        self.add_listener(Twist, "cmd_vel", lambda message: self.commands.append(message))
         self._client = self.create_client(SetParametersAtomically, "speed/set")
-        self.uses("speed/set")
+        self.add_used_service("speed/set")
 
-    def _note(self, message: Twist) -> None:
+    def _note_limits(self, message: Twist) -> None:
         self.limits.append((message.linear.x, message.angular.z))
 
-    def jam(self, jammed: bool) -> None:
+    def jam_wheels(self, jammed: bool) -> None:
         """Jam the wheels, or free them."""
         self._jam.publish(Bool(data=jammed))
 
-    def ask(self, parameters: list[Parameter]) -> Future:
+    def request_limits(self, parameters: list[Parameter]) -> Future:
         """Send a request; return the future of its answer. Forgets what was before."""
         self.limits, self.commands = [], []
         request = SetParametersAtomically.Request(parameters=parameters)
@@ -132,41 +134,41 @@ class Operator(Player):
         return [] if self._client.service_is_ready() else ["no server of speed/set"]
 
 
-def double(name: str, value: float) -> Parameter:
+def double_parameter(name: str, value: float) -> Parameter:
     """Return a parameter that is a double."""
     kind = ParameterType.PARAMETER_DOUBLE
     return Parameter(name=name, value=ParameterValue(type=kind, double_value=value))
 
 
-def whole(name: str, value: int) -> Parameter:
+def integer_parameter(name: str, value: int) -> Parameter:
     """Return a parameter that is an integer."""
     kind = ParameterType.PARAMETER_INTEGER
     return Parameter(name=name, value=ParameterValue(type=kind, integer_value=value))
 
 
-def flag(name: str, value: bool) -> Parameter:
+def bool_parameter(name: str, value: bool) -> Parameter:
     """Return a parameter that is a bool."""
     kind = ParameterType.PARAMETER_BOOL
     return Parameter(name=name, value=ParameterValue(type=kind, bool_value=value))
 
 
-def text(name: str, value: str) -> Parameter:
+def string_parameter(name: str, value: str) -> Parameter:
     """Return a parameter that is a string."""
     kind = ParameterType.PARAMETER_STRING
     return Parameter(name=name, value=ParameterValue(type=kind, string_value=value))
 
 
-def unset(name: str) -> Parameter:
+def untyped_parameter(name: str) -> Parameter:
     """Return a parameter that has no type, and no value."""
     return Parameter(name=name)
 
 
-def doubles(name: str, *values: float) -> Parameter:
+def array_parameter(name: str, *values: float) -> Parameter:
     """Return a parameter that is an array of doubles."""
     kind = ParameterType.PARAMETER_DOUBLE_ARRAY
     return Parameter(name=name, value=ParameterValue(type=kind, double_array_value=list(values)))
 
 
-def ready(future: Any) -> Callable[[], bool]:
+def done_condition(future: Any) -> Callable[[], bool]:
     """Return a condition: the future is done."""
     return lambda: bool(future.done())

@@ -13,12 +13,12 @@ from autograder.exercises.safety.grip_request import (
     LONGEST,
     PROMPT,
     TOLERANCE,
-    client,
-    once,
-    outcome,
+    describe_outcomes,
+    request_grip,
     require_data,
-    said,
-    tried,
+    require_once,
+    require_outcome,
+    run_client,
 )
 from autograder.exercises.safety.gripper import GripUser
 from autograder.exercises.safety.node_under_test import COARSE, STRIDE, Robot, WallWait
@@ -43,10 +43,10 @@ SHORTEST = 4.5 - 5 * ALLOWED - STRIDE  # s: three tries and two pauses, each as 
 
 def carried_out(rig: RobotRig) -> None:
     """The gripper answers, at once and within the time of a try."""
-    with client(rig) as (robot, user):
+    with run_client(rig) as (robot, user):
         close = robot.draws.flag("the grip that is carried out")
         _carries_out(robot, user, close, 0.0)
-        once(robot, user, _carries_out(robot, user, not close, SLOW))
+        require_once(robot, user, _carries_out(robot, user, not close, SLOW))
     rig.require_times_unasked(GripUser.CLIENT, plain_program_times.SLOW)
 
 
@@ -56,8 +56,8 @@ def _carries_out(robot: Robot, user: GripUser, close: bool, delay: float, aside:
     ``aside`` is a sentence to add if the gripper was called again. Returns what happened in words,
     as the beginning of a sentence.
     """
-    tried(robot, user, close)
-    robot.spend(delay)
+    request_grip(robot, user, close)
+    robot.spend_time(delay)
     if not user.outcomes:
         user.tries[0].reply(True)
     robot.run(lambda: user.outcomes or len(user.tries) > 1, PROMPT)
@@ -67,39 +67,39 @@ def _carries_out(robot: Robot, user: GripUser, close: bool, delay: float, aside:
             actual=f"The gripper was called {len(user.tries)} times.{aside}",
         )
     when = f"When the gripper answered success=True after {delay:g} s"
-    outcome(robot, user, when, "done")
+    require_outcome(robot, user, when, "done")
     return when
 
 
-def refused(rig: RobotRig) -> None:
+def examine_refusals(rig: RobotRig) -> None:
     """The gripper answers that it will not: to the first try, and to the second."""
-    with client(rig) as (robot, user):
+    with run_client(rig) as (robot, user):
         for grip in range(robot.draws.whole("grips before a refusal", 0, 0, 2)):
             _carries_out(robot, user, robot.draws.flag(f"grip {grip} before a refusal"), 0.0)
         close = robot.draws.flag("the grip that is refused")
-        tried(robot, user, close)
-        _refuses(robot, user, "When the gripper answered success=False")
-        tried(robot, user, not close)
+        request_grip(robot, user, close)
+        _require_refusal(robot, user, "When the gripper answered success=False")
+        request_grip(robot, user, not close)
         with suppress(WallWait):
             robot.run(lambda: len(user.tries) > 1 or user.outcomes, LONGEST, COARSE)
         tries_again = len(user.tries) > 1
         if tries_again:
             when = "When the gripper answered not the first try, but the second with success=False"
-            _refuses(robot, user, when)
+            _require_refusal(robot, user, when)
         robot.require_no_errors("refused")
     if not tries_again:  # that is another check's, and what is still under way must not be
         rig.begin_anew()
 
 
-def _refuses(robot: Robot, user: GripUser, when: str) -> None:
+def _require_refusal(robot: Robot, user: GripUser, when: str) -> None:
     """Refuse the try that is under way, and require that it is the last."""
     user.holds = 0  # one that came with the request says nothing about the outcome
     tries = len(user.tries)
     user.tries[-1].reply(False)
     robot.run(lambda: user.outcomes or len(user.tries) > tries, PROMPT)
     _require_no_more(user, tries, when)
-    outcome(robot, user, when, "refused")
-    once(robot, user, when)
+    require_outcome(robot, user, when, "refused")
+    require_once(robot, user, when)
     _require_no_more(user, tries, when)
 
 
@@ -112,16 +112,16 @@ def _require_no_more(user: GripUser, tries: int, when: str) -> None:
         )
 
 
-def unanswered(rig: RobotRig) -> None:
+def examine_silence(rig: RobotRig) -> None:
     """The gripper takes every request and answers none: its callback hangs, and once it raises.
 
     So it does with the next request, too: the tries and pauses of that one begin anew.
     """
-    with client(rig) as (robot, user):
+    with run_client(rig) as (robot, user):
         close = robot.draws.flag("the grip without an answer")
         _given_up(robot, user, close, held=True)
         user.tries[2].reply(True)
-        once(robot, user, f"{GIVEN_UP}, and a late answer to the third")
+        require_once(robot, user, f"{GIVEN_UP}, and a late answer to the third")
         try:
             _given_up(robot, user, not close)
         except Failed as failed:
@@ -134,7 +134,7 @@ def unanswered(rig: RobotRig) -> None:
 def _soon_after(robot: Robot, user: GripUser) -> None:
     """Have a try answered late, but in time, when the time of one that was answered runs out."""
     _carries_out(robot, user, True, 0.0)
-    robot.spend(APART)
+    robot.spend_time(APART)
     _carries_out(robot, user, False, SLOW, LEFT)
 
 
@@ -143,7 +143,7 @@ def _given_up(robot: Robot, user: GripUser, close: bool, *, held: bool = False) 
 
     ``held``: time stands still for a while when the first try has had its own.
     """
-    tried(robot, user, close)
+    request_grip(robot, user, close)
     began = user.now
 
     def goes_on() -> bool:
@@ -164,18 +164,18 @@ def _given_up(robot: Robot, user: GripUser, close: bool, *, held: bool = False) 
     if not robot.run(lambda: user.outcomes, DEADLINE + began - user.now):
         raise Failed(
             expected=f"A gripper that never answers is given up within {LONGEST:g} s.",
-            actual=f"After {DEADLINE:.1f} s of simulated time there {_tries(len(user.tries))} "
-            f"and no outcome.{_hint_of_clock(user)}{robot.complaint()}",
+            actual=f"After {DEADLINE:.1f} s of simulated time there {_say_tries(len(user.tries))} "
+            f"and no outcome.{_hint_of_clock(user)}{robot.error_note()}",
         )
     said_at = user.now
     times = [attempt.at for attempt in user.tries]
     if len(times) != 3:
         raise Failed(
             expected="A gripper that never answers is tried three times.",
-            actual=f"There {_tries(len(times))} before the outcome “{user.outcomes[0]}”.",
+            actual=f"There {_say_tries(len(times))} before the outcome “{user.outcomes[0]}”.",
         )
     require_data(user, close)
-    outcome(robot, user, GIVEN_UP, "failed")
+    require_outcome(robot, user, GIVEN_UP, "failed")
     _require_pauses(times[1] - times[0], times[2] - times[1])
     _require_clear(said_at - times[2])
 
@@ -186,7 +186,7 @@ def _hint_of_clock(user: GripUser) -> str:
     return " A time-out on the wall clock does not run in simulated time."
 
 
-def _tries(count: int) -> str:
+def _say_tries(count: int) -> str:
     return "was 1 try" if count == 1 else f"were {count} tries"
 
 
@@ -216,28 +216,30 @@ def _require_clear(waited: float) -> None:
         )
 
 
-def absent(rig: RobotRig) -> None:
+def examine_absence(rig: RobotRig) -> None:
     """The gripper dies with a request in its hands, stays away, and comes back during another."""
     rig.begin_anew()
-    with client(rig) as (robot, user):
+    with run_client(rig) as (robot, user):
         began = user.now
         began_on_the_wall = time.monotonic()
-        robot.spend(IDLE)
+        robot.spend_time(IDLE)
         watched = time.monotonic() - began_on_the_wall
-        heartbeat.beats(user.beats, began, user.now, "Before the first request", watched)
-        tried(robot, user, True)
-    with client(rig, gripper=False) as (robot, user):
+        heartbeat.require_beats(user.beats, began, user.now, "Before the first request", watched)
+        request_grip(robot, user, True)
+    with run_client(rig, gripper=False) as (robot, user):
         began = user.now
-        _gone(robot, user, "When the gripper died in the middle of a call", began)
+        _require_failure(robot, user, "When the gripper died in the middle of a call", began)
         user.request(True)
-        _gone(robot, user, "When there was no gripper at all", user.now)
+        _require_failure(robot, user, "When there was no gripper at all", user.now)
         user.request(False)
-        robot.spend(BACK)
-    with client(rig) as (robot, user):
+        robot.spend_time(BACK)
+    with run_client(rig) as (robot, user):
         _come_back(robot, user)
-        tried(robot, user, True)
+        request_grip(robot, user, True)
         user.tries[0].reply(True)
-        outcome(robot, user, "When the gripper had come back and answered success=True", "done")
+        require_outcome(
+            robot, user, "When the gripper had come back and answered success=True", "done"
+        )
         _refused_alive(robot, user)
         robot.require_no_errors("absent")
     rig.require_times_unasked(GripUser.CLIENT, plain_program_times.BEAT)
@@ -249,28 +251,28 @@ def _come_back(robot: Robot, user: GripUser) -> None:
     if not robot.run(lambda: user.tries, DEADLINE - BACK):
         raise Failed(
             expected=f"{when}, it is called: the third try comes 3.5 s after the request or later.",
-            actual=f"It was never called. {said(user)}{robot.complaint()}",
+            actual=f"It was never called. {describe_outcomes(user)}{robot.error_note()}",
         )
     require_data(user, False)
     user.tries[-1].reply(True)
-    outcome(robot, user, f"{when} and answered success=True", "done")
+    require_outcome(robot, user, f"{when} and answered success=True", "done")
 
 
 def _refused_alive(robot: Robot, user: GripUser) -> None:
     """Have a grip refused, and let the heart beat on; what is said is another check's."""
-    tried(robot, user, True)
+    request_grip(robot, user, True)
     user.tries[0].reply(False)
     began = user.now
-    robot.spend(2 * heartbeat.BEAT)
-    heartbeat.beats(user.beats, began, user.now, "After a refusal")
+    robot.spend_time(2 * heartbeat.BEAT)
+    heartbeat.require_beats(user.beats, began, user.now, "After a refusal")
 
 
-def _gone(robot: Robot, user: GripUser, when: str, began: float) -> None:
-    outcome(robot, user, when, "failed", DEADLINE)
+def _require_failure(robot: Robot, user: GripUser, when: str, began: float) -> None:
+    require_outcome(robot, user, when, "failed", DEADLINE)
     lasted = user.now - began
     if lasted < SHORTEST:
         raise Failed(
             expected=f"{when}, three tries take 3 s, and the pauses 1.5 s: it may come back.",
             actual=f"“failed” came after {lasted:.1f} s.",
         )
-    heartbeat.beats(user.beats, began, user.now, when)
+    heartbeat.require_beats(user.beats, began, user.now, when)

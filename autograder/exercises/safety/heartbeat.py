@@ -19,7 +19,7 @@ HELD_UP = (
 )
 
 
-def beats(
+def require_beats(
     seen: Sequence[float], since: float, until: float, when: str, watched: float | None = None
 ) -> None:
     """Require a heartbeat every 0.5 s from ``since`` to ``until``, by the times of those seen.
@@ -39,11 +39,11 @@ def beats(
     lasted = until - since
     silence = max(after - before for before, after in pairwise([since, *there, until]))
     if silence > BEAT + ALLOWED + BLUR:
-        hint = _guess(len(there), watched) if len(there) <= lasted / BEAT / 2 else ""
+        hint = _guess_cause(len(there), watched) if len(there) <= lasted / BEAT / 2 else ""
         raise Failed(
             expected=f"{when}, the heartbeat goes on at one every {BEAT:g} s: no silence is longer "
             f"than {BEAT + ALLOWED:g} s.",
-            actual=f"In {lasted:.1f} s there {_heartbeats(len(there))}; the longest silence lasted "
+            actual=f"In {lasted:.1f} s there {_say_beats(len(there))}; the longest silence lasted "
             f"{silence:.1f} s.{hint}",
         )
     most = int((lasted + BLUR) / (BEAT - ALLOWED)) + 1
@@ -51,11 +51,11 @@ def beats(
         raise Failed(
             expected=f"{when}, the heartbeat goes on at one every {BEAT:g} s: at most {most} in "
             f"{lasted:.1f} s.",
-            actual=f"In {lasted:.1f} s there {_heartbeats(len(there))}.",
+            actual=f"In {lasted:.1f} s there {_say_beats(len(there))}.",
         )
 
 
-def _guess(count: int, watched: float | None) -> str:
+def _guess_cause(count: int, watched: float | None) -> str:
     """Return what a student is asked for whom there were hardly any, to add; empty if nothing."""
     if watched is None:
         return f" {HELD_UP}"
@@ -63,5 +63,5 @@ def _guess(count: int, watched: float | None) -> str:
     return f" {BY_THE_WALL}" if count <= watched / BEAT + 1 else ""
 
 
-def _heartbeats(count: int) -> str:
+def _say_beats(count: int) -> str:
     return "was 1 heartbeat" if count == 1 else f"were {count or 'no'} heartbeats"

@@ -64,23 +64,23 @@ class Navigator(QuietNode):
         super().__init__("navigator")
         self._user = user
         self._server = _PlainServer(
-            self, self._refuses, lambda: user.pause(self),
+            self, self._refuses_cancel, lambda: user.pause(self),
             execute_callback=lambda _: Drive.Result(),
-            goal_callback=self._goal, handle_accepted_callback=user.goals.append,
+            goal_callback=self._answer_goal, handle_accepted_callback=user.goals.append,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
             callback_group=ReentrantCallbackGroup(),
         )  # fmt: skip
 
-    async def _goal(self, goal: Drive.Goal) -> GoalResponse:
+    async def _answer_goal(self, goal: Drive.Goal) -> GoalResponse:
         self._user.orders.append(goal.order)
         await self._user.pause(self)
-        await self._user.hesitate(self)
+        await self._user.delay_goal(self)
         return GoalResponse.ACCEPT if self._user.accepts else GoalResponse.REJECT
 
-    async def _refuses(self) -> bool:
+    async def _refuses_cancel(self) -> bool:
         self._user.cancels.append(self._user.now)
         await self._user.pause(self)
-        await self._user.ponder(self)
+        await self._user.delay_cancel(self)
         return not self._user.obeys
 
     def destroy_node(self) -> None:
@@ -107,11 +107,13 @@ class NavigatorUser(Player):
         self.outcomes: list[str] = []
         self.before: list[str] = []  # the outcome of the request before this one, if there was any
         self.speeds: list[bool] = []
-        self._request = self.speak(Int32, "navigate/request")
-        self.hear(String, "navigate/outcome", lambda message: self.outcomes.append(message.data))
-        self.hear(Twist, "cmd_vel", lambda message: self.speeds.append(moves(message)))
+        self._request = self.add_publisher(Int32, "navigate/request")
+        self.add_listener(
+            String, "navigate/outcome", lambda message: self.outcomes.append(message.data)
+        )
+        self.add_listener(Twist, "cmd_vel", lambda message: self.speeds.append(is_motion(message)))
 
-    def navigator(self) -> Navigator:
+    def make_navigator(self) -> Navigator:
         """Return a navigator; it is for the session to run."""
         return Navigator(self)
 
@@ -136,12 +138,12 @@ class NavigatorUser(Player):
             noted.clear()
         self._request.publish(Int32(data=metres))
 
-    async def hesitate(self, server: Node) -> None:
+    async def delay_goal(self, server: Node) -> None:
         """Let the navigator wait until it is to decide, if this goal is one of that kind."""
         if self.hesitates:
             await self._undecided.wait(server)
 
-    async def ponder(self, server: Node) -> None:
+    async def delay_cancel(self, server: Node) -> None:
         """Do the same with a request to cancel."""
         if self.ponders:
             await self._undecided.wait(server)
@@ -150,12 +152,12 @@ class NavigatorUser(Player):
         """Have the navigator answer the goal, or the request to cancel, that it has."""
         self._undecided.release()
 
-    def feedback(self, metres: int) -> None:
+    def send_feedback(self, metres: int) -> None:
         """Tell how far the drive has come."""
         marks = list(range(1, metres + 1))
         self.goals[0].publish_feedback(Drive.Feedback(sequence=marks))
 
-    def end(self, how: Callable[[ServerGoalHandle], None]) -> None:
+    def end_goal(self, how: Callable[[ServerGoalHandle], None]) -> None:
         """End the goal with a method of its handle: succeed, abort or canceled."""
 
         def ending(goal: ServerGoalHandle) -> Drive.Result:
@@ -191,19 +193,19 @@ class Dispatcher(Player):
         self.commands: list[Twist] = []
         self.told: list[float] = []  # when each came, in simulated s
         self.faults: list[str] = []
-        self._jam = self.speak(Bool, "hardware/jammed")
-        self.hear(Twist, "cmd_vel", self._command)
-        self.hear(String, "drive/fault", lambda message: self.faults.append(message.data))
+        self._jam = self.add_publisher(Bool, "hardware/jammed")
+        self.add_listener(Twist, "cmd_vel", self._note_command)
+        self.add_listener(String, "drive/fault", lambda message: self.faults.append(message.data))
         self._client = ActionClient(self, Drive, "drive")
         for service in services_of("drive"):
-            self.uses(service)
+            self.add_used_service(service)
 
-    def _command(self, message: Twist) -> None:
+    def _note_command(self, message: Twist) -> None:
         self.commands.append(message)
         self.told.append(self.now)
-        self.speeds.append(moves(message))
+        self.speeds.append(is_motion(message))
 
-    def jam(self, jammed: bool) -> None:
+    def jam_wheels(self, jammed: bool) -> None:
         """Jam the wheels, or free them."""
         self._jam.publish(Bool(data=jammed))
 
@@ -228,7 +230,7 @@ class Dispatcher(Player):
             drive.feedback.append(list(message.feedback.sequence))
             drive.fed.append(self.now)
 
-        with self._held():
+        with self._hold_answers():
             goal = self._client.send_goal_async(Drive.Goal(order=metres), fed)
         goal.add_done_callback(answered)
         return drive
@@ -239,14 +241,14 @@ class Dispatcher(Player):
         def answered(future: Future) -> None:
             drive.canceling = bool(future.result().goals_canceling)
 
-        with self._held():
+        with self._hold_answers():
             canceling = drive.handle.cancel_goal_async()
         canceling.add_done_callback(answered)
 
-    def _held(self) -> AbstractContextManager[None]:
+    def _hold_answers(self) -> AbstractContextManager[None]:
         """Keep answers from being taken: rclpy registers a request after it has sent it."""
         assert isinstance(self.executor, BackgroundExecutor)
-        return self.executor.held()
+        return self.executor.hold_still()
 
     def missing_servers(self) -> list[str]:
         """Return whether the server is missing."""
@@ -263,7 +265,7 @@ def services_of(action: str) -> list[str]:
     return [f"{action}/_action/{part}" for part in ("send_goal", "cancel_goal", "get_result")]
 
 
-def moves(speed: Twist) -> bool:
+def is_motion(speed: Twist) -> bool:
     """Whether a Twist is anything but a stop; NaN is no stop."""
     parts = (speed.linear, speed.angular)
     return any(value != 0.0 for part in parts for value in (part.x, part.y, part.z))

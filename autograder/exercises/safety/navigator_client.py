@@ -10,10 +10,10 @@ from rclpy.action.server import ServerGoalHandle
 
 from autograder.examination.exam import Failed
 from autograder.exercises.safety import plain_program_times
-from autograder.exercises.safety.counterpart import following
+from autograder.exercises.safety.counterpart import following_phrase
 from autograder.exercises.safety.navigation import NavigatorUser, services_of
 from autograder.exercises.safety.node_under_test import COARSE, STRIDE, Robot
-from autograder.exercises.safety.rig import RobotRig, serving
+from autograder.exercises.safety.rig import RobotRig, run_server
 
 NAVIGATOR = {"services": services_of("navigate")}
 
@@ -34,47 +34,50 @@ APART = 0.5  # s from one goal to another, whose answer takes so long that the f
 
 
 @contextmanager
-def _user(rig: RobotRig, navigator: bool = True) -> Iterator[tuple[Robot, NavigatorUser]]:
-    with rig.robot(NavigatorUser.CLIENT, NavigatorUser) as (robot, user):
+def _run_client(rig: RobotRig, navigator: bool = True) -> Iterator[tuple[Robot, NavigatorUser]]:
+    with rig.run_robot(NavigatorUser.CLIENT, NavigatorUser) as (robot, user):
         if navigator:
-            with serving(rig, robot, user.navigator, NAVIGATOR):
+            with run_server(rig, robot, user.make_navigator, NAVIGATOR):
                 yield robot, user
         else:
-            robot.sees(NAVIGATOR, there=False)
-            with robot.unserved():
+            robot.wait_for_discovery(NAVIGATOR, there=False)
+            with robot.watch_wall_waits():
                 yield robot, user
 
 
-def _metres(robot: Robot, more: int = 0) -> int:
+def _draw_metres(robot: Robot, more: int = 0) -> int:
     """Return the length of a drive in m; ones with ``more`` differ, lest one be remembered."""
     return robot.draws.whole("metres of a drive", *METRES) + more
 
 
-def _far(robot: Robot) -> int:
+def _draw_far_metres(robot: Robot) -> int:
     return robot.draws.whole("metres of a long drive", *FAR)
 
 
-def _accepted(robot: Robot, user: NavigatorUser, metres: int = 0, *, ponders: bool = False) -> None:
+def _require_accepted(
+    robot: Robot, user: NavigatorUser, metres: int = 0, *, ponders: bool = False
+) -> None:
     """Ask for a drive, and wait until its goal has been accepted; see `NavigatorUser.request`."""
-    user.request(metres or _metres(robot), ponders=ponders)
-    _sent(robot, user)
+    user.request(metres or _draw_metres(robot), ponders=ponders)
+    _require_goal(robot, user)
     if not robot.run(lambda: user.goals, PROMPT):
         raise RuntimeError("the examiner's navigator did not accept a goal")
 
 
-def _sent(robot: Robot, user: NavigatorUser) -> None:
+def _require_goal(robot: Robot, user: NavigatorUser) -> None:
     robot.run(lambda: user.orders, PROMPT)
     metres = user.metres
     if user.orders[:1] != [metres]:
         order = f"a goal with order={user.orders[0]}" if user.orders else "no goal"
         raise Failed(
-            expected=f"After navigate/request {metres}{following(user.before)}, a goal with "
+            expected=f"After navigate/request {metres}{following_phrase(user.before)}, a goal with "
             f"order={metres} is sent.",
-            actual=f"The request was published, and the navigator got {order}." + robot.complaint(),
+            actual=f"The request was published, and the navigator got {order}."
+            + robot.error_note(),
         )
 
 
-def _outcome(
+def _require_outcome(
     robot: Robot, user: NavigatorUser, when: str, word: str, limit: float = PROMPT
 ) -> None:
     """Require one outcome, and a stop unless it is good."""
@@ -84,7 +87,7 @@ def _outcome(
         raise Failed(
             expected=f"{when}, navigate/outcome says “{word}”, once.",
             actual=(f"It said {words}." if words else f"Within {limit:.3g} s it said nothing.")
-            + robot.complaint(),
+            + robot.error_note(),
         )
     if word == "arrived":
         return
@@ -99,76 +102,78 @@ def _outcome(
         )
 
 
-def _once(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
+def _require_once(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
     """Require that the outcome stays the only one, past any timer of the goal's."""
-    robot.spend(AFTER, COARSE)
-    _outcome(robot, user, when, word)
+    robot.spend_time(AFTER, COARSE)
+    _require_outcome(robot, user, when, word)
 
 
-def ended(rig: RobotRig) -> None:
+def examine_ends(rig: RobotRig) -> None:
     """Goals that succeed, are rejected, are aborted; nothing of them is left behind."""
-    with _user(rig) as (robot, user):
-        for ends in robot.draws.shuffled("ends of goals", (_succeeds, _is_rejected, _is_aborted)):
+    with _run_client(rig) as (robot, user):
+        for ends in robot.draws.shuffled(
+            "ends of goals", (_goal_succeeds, _is_rejected, _is_aborted)
+        ):
             ends(robot, user)
         robot.require_no_errors("ended")
 
 
-def _succeeds(robot: Robot, user: NavigatorUser) -> None:
-    _accepted(robot, user)
-    user.feedback(1)
-    user.end(ServerGoalHandle.succeed)
-    _ends(robot, user, "When the goal succeeded", "arrived")
+def _goal_succeeds(robot: Robot, user: NavigatorUser) -> None:
+    _require_accepted(robot, user)
+    user.send_feedback(1)
+    user.end_goal(ServerGoalHandle.succeed)
+    _require_end(robot, user, "When the goal succeeded", "arrived")
 
 
 def _is_rejected(robot: Robot, user: NavigatorUser) -> None:
-    user.request(_far(robot), accepts=False, hesitates=True)
-    _sent(robot, user)
+    user.request(_draw_far_metres(robot), accepts=False, hesitates=True)
+    _require_goal(robot, user)
     user.speeds.clear()  # what came with the request is no answer to the rejection
     user.decide()
-    _ends(robot, user, "When the navigator rejected the goal", "rejected")
+    _require_end(robot, user, "When the navigator rejected the goal", "rejected")
 
 
 def _is_aborted(robot: Robot, user: NavigatorUser) -> None:
-    _accepted(robot, user, _metres(robot, -1))
-    user.feedback(1)
-    robot.rest()
+    _require_accepted(robot, user, _draw_metres(robot, -1))
+    user.send_feedback(1)
+    robot.wait_for_rest()
     user.speeds.clear()  # what came with the acceptance is no answer to the abort
-    user.end(ServerGoalHandle.abort)
-    _ends(robot, user, "When the navigator aborted the goal", "aborted")
+    user.end_goal(ServerGoalHandle.abort)
+    _require_end(robot, user, "When the navigator aborted the goal", "aborted")
 
 
-def _ends(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
+def _require_end(robot: Robot, user: NavigatorUser, when: str, word: str) -> None:
     """Require an outcome at once, and none after it: a timer of the goal's may still run."""
-    _outcome(robot, user, when, word)
-    _once(robot, user, f"{when}, and for {AFTER:g} s after that", word)
+    _require_outcome(robot, user, when, word)
+    _require_once(robot, user, f"{when}, and for {AFTER:g} s after that", word)
 
 
-def stalled(rig: RobotRig) -> None:
+def examine_stalls(rig: RobotRig) -> None:
     """A slow drive that goes on, then one whose feedback ceases."""
-    with _user(rig) as (robot, user):
+    with _run_client(rig) as (robot, user):
         _slowly_drives(robot, user)
-        user.end(ServerGoalHandle.succeed)
-        _outcome(robot, user, "When a slow drive succeeded", "arrived")
+        user.end_goal(ServerGoalHandle.succeed)
+        _require_outcome(robot, user, "When a slow drive succeeded", "arrived")
 
-        _accepted(robot, user)
-        robot.spend(1.0)
-        user.feedback(1)
-        _canceled(robot, user, "the last feedback")
+        _require_accepted(robot, user)
+        robot.spend_time(1.0)
+        user.send_feedback(1)
+        _require_cancel(robot, user, "the last feedback")
         when = f"When feedback ceased for {SILENCE:g} s, and the cancel was accepted"
-        _outcome(robot, user, when, "stalled")
-        user.end(ServerGoalHandle.canceled)
-        _once(robot, user, when, "stalled")
+        _require_outcome(robot, user, when, "stalled")
+        user.end_goal(ServerGoalHandle.canceled)
+        _require_once(robot, user, when, "stalled")
         robot.require_no_errors("stalled")
     rig.require_times_unasked(NavigatorUser.CLIENT, plain_program_times.STALL)
 
 
 def _slowly_drives(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive, and give it feedback so often that it must be left alone."""
-    _accepted(robot, user, BREATHS[-1] + 1)
+    _require_accepted(robot, user, BREATHS[-1] + 1)
     for before, passed in pairwise((-1, 0, *BREATHS)):
         if passed:
-            user.feedback(passed)
-        robot.spend(BREATH, COARSE)
+            user.send_feedback(passed)
+        robot.spend_time(BREATH, COARSE)
         if user.cancels or user.outcomes:
             did = "It was canceled" if user.cancels else f"It said “{user.outcomes[0]}”"
             same = " The last feedback had the same marks as the one before: it counts, too."
@@ -178,12 +183,12 @@ def _slowly_drives(robot: Robot, user: NavigatorUser) -> None:
             )
 
 
-def _canceled(robot: Robot, user: NavigatorUser, event: str = "its acceptance") -> None:
+def _require_cancel(robot: Robot, user: NavigatorUser, event: str = "its acceptance") -> None:
     """Wait in silence until the goal is canceled, neither too early nor too late.
 
     ``event`` is what has just happened, and begins the silence.
     """
-    robot.rest()
+    robot.wait_for_rest()
     user.speeds.clear()  # what came before the silence does not answer it
     since = user.now
     robot.run(lambda: user.cancels, SILENCE + TOLERANCE)
@@ -207,17 +212,17 @@ def _canceled(robot: Robot, user: NavigatorUser, event: str = "its acceptance") 
 
 def _slowly_refused(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive that is accepted late, but in time, and its cancel refused the same way."""
-    user.request(_far(robot), obeys=False, hesitates=True, ponders=True)
-    _sent(robot, user)
+    user.request(_draw_far_metres(robot), obeys=False, hesitates=True, ponders=True)
+    _require_goal(robot, user)
     _answers_slowly(robot, user, "the goal")
     robot.run(lambda: user.goals, PROMPT)
-    _canceled(robot, user)
+    _require_cancel(robot, user)
     _answers_slowly(robot, user, "the request to cancel")
 
 
 def _answers_slowly(robot: Robot, user: NavigatorUser, what: str, aside: str = "") -> None:
     """Let an answer come late, but in time; ``aside`` is a sentence to add if it was given up."""
-    robot.spend(HESITATION)
+    robot.spend_time(HESITATION)
     if user.outcomes:
         raise Failed(
             expected=f"An answer to {what} after {HESITATION:g} s is in time.",
@@ -228,54 +233,56 @@ def _answers_slowly(robot: Robot, user: NavigatorUser, what: str, aside: str = "
 
 def _too_late(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive whose goal is accepted, and reached, when it has been given up."""
-    user.request(_metres(robot), hesitates=True)
-    _sent(robot, user)
+    user.request(_draw_metres(robot), hesitates=True)
+    _require_goal(robot, user)
     user.speeds.clear()  # what came with the request does not answer the silence
     when = f"When the navigator did not answer the goal for {ANSWER:g} s"
-    _outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
+    _require_outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
     user.decide()
     if robot.run(lambda: user.goals, PROMPT):
-        user.feedback(1)
-        user.end(ServerGoalHandle.succeed)
-    _once(robot, user, f"{when}, then accepted it and arrived", "lost")
+        user.send_feedback(1)
+        user.end_goal(ServerGoalHandle.succeed)
+    _require_once(robot, user, f"{when}, then accepted it and arrived", "lost")
 
 
 def _cancel_too_late(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive whose cancel is accepted when it has been given up."""
-    _accepted(robot, user, _metres(robot, 1), ponders=True)
-    _canceled(robot, user)
+    _require_accepted(robot, user, _draw_metres(robot, 1), ponders=True)
+    _require_cancel(robot, user)
     when = f"When the navigator did not answer the request to cancel for {ANSWER:g} s"
-    _outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
+    _require_outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
     user.decide()
-    robot.rest()
-    user.end(ServerGoalHandle.canceled)
-    _once(robot, user, f"{when}, then accepted it", "lost")
+    robot.wait_for_rest()
+    user.end_goal(ServerGoalHandle.canceled)
+    _require_once(robot, user, f"{when}, then accepted it", "lost")
 
 
-def lost(rig: RobotRig) -> None:
+def examine_losses(rig: RobotRig) -> None:
     """A navigator that refuses to cancel, one that is slow or dies on the way, and none at all."""
-    with _user(rig) as (robot, user):
+    with _run_client(rig) as (robot, user):
         _slowly_refused(robot, user)
         when = "When the navigator refused to cancel"
-        _outcome(robot, user, when, "runaway")
-        user.feedback(2)
-        user.end(ServerGoalHandle.succeed)
-        _once(robot, user, f"{when}, and reported success later", "runaway")
+        _require_outcome(robot, user, when, "runaway")
+        user.send_feedback(2)
+        user.end_goal(ServerGoalHandle.succeed)
+        _require_once(robot, user, f"{when}, and reported success later", "runaway")
         _too_late(robot, user)
         _cancel_too_late(robot, user)
-        _accepted(robot, user)
-    with _user(rig, navigator=False) as (robot, user):
+        _require_accepted(robot, user)
+    with _run_client(rig, navigator=False) as (robot, user):
         when = "When the navigator died on the way"
         limit = SILENCE + ANSWER + 2 * ALLOWED + STRIDE
-        _outcome(robot, user, when, "lost", limit)
-        _once(robot, user, when, "lost")
-        user.request(_metres(robot))
+        _require_outcome(robot, user, when, "lost", limit)
+        _require_once(robot, user, when, "lost")
+        user.request(_draw_metres(robot))
         when = "When there was no navigator"
-        _outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
-    with _user(rig) as (robot, user):
-        _accepted(robot, user)
-        user.end(ServerGoalHandle.succeed)
-        _outcome(robot, user, "When the navigator had come back, and the goal succeeded", "arrived")
+        _require_outcome(robot, user, when, "lost", ANSWER + TOLERANCE + STRIDE)
+    with _run_client(rig) as (robot, user):
+        _require_accepted(robot, user)
+        user.end_goal(ServerGoalHandle.succeed)
+        _require_outcome(
+            robot, user, "When the navigator had come back, and the goal succeeded", "arrived"
+        )
         _soon_after(robot, user)
         robot.require_no_errors("lost")
     rig.require_times_unasked(
@@ -285,14 +292,16 @@ def lost(rig: RobotRig) -> None:
 
 def _soon_after(robot: Robot, user: NavigatorUser) -> None:
     """Ask for a drive that is accepted late, but in time, while a time-out of the last may run."""
-    robot.spend(APART)
-    user.request(_metres(robot, -1), hesitates=True)
-    _sent(robot, user)
+    robot.spend_time(APART)
+    user.request(_draw_metres(robot, -1), hesitates=True)
+    _require_goal(robot, user)
     aside = (
         f" The goal before was sent {APART:g} s before this one, and answered at once: is its "
         "time-out called off?"
     )
     _answers_slowly(robot, user, "the goal", aside)
     robot.run(lambda: user.goals, PROMPT)
-    user.end(ServerGoalHandle.succeed)
-    _outcome(robot, user, "When the goal was accepted late, but in time, and succeeded", "arrived")
+    user.end_goal(ServerGoalHandle.succeed)
+    _require_outcome(
+        robot, user, "When the goal was accepted late, but in time, and succeeded", "arrived"
+    )

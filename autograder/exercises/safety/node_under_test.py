@@ -71,21 +71,25 @@ class Robot:
         except StudentError as error:
             raise Failed(
                 expected=f"{name}() makes a node without an error.",
-                actual=error.told,
+                actual=error.feedback_text,
             ) from None
-        self.wait(lambda: not player.missing())
-        if lacking := player.missing():
+        self.wait(lambda: not player.describe_missing())
+        if lacking := player.describe_missing():
             raise Failed(
                 expected=f"{name} has every endpoint of the task right after it was made.",
                 actual=lacking,
             )
-        if unheard := player.unheard():
+        if unheard := player.describe_unheard():
             raise Failed(expected=f"{name} can hear what it is told.", actual=unheard)
-        player.attend()
-        self.sees(
-            {"publishers": player.spoken, "subscribers": player.heard, "clients": player.used}
+        player.subscribe_all()
+        self.wait_for_discovery(
+            {
+                "publishers": player.spoken,
+                "subscribers": player.heard_topics,
+                "clients": player.used,
+            }
         )
-        self.rest()
+        self.wait_for_rest()
 
     def wait(self, condition: Callable[[], Any], timeout: float | None = None) -> bool:
         """Wait for something of DDS's own, for ``timeout`` s or with `Patience`: time stands still.
@@ -99,7 +103,7 @@ class Robot:
             return True
         return False
 
-    def sees(self, endpoints: Endpoints, there: bool = True) -> bool:
+    def wait_for_discovery(self, endpoints: Endpoints, there: bool = True) -> bool:
         """Wait until the node has discovered each endpoint, or the loss of each; return if so."""
 
         def all_seen() -> bool:
@@ -108,33 +112,33 @@ class Robot:
 
         return self.wait(all_seen)
 
-    def rest(self) -> None:
+    def wait_for_rest(self) -> None:
         """Return when all that was sent has been dealt with, on both sides.
 
         A node that meets each answer with another request never comes to rest: time goes on.
         """
-        self._still.reached()
+        self._still.wait_for_rest()
         for _ in range(ROUNDS):
             if not self._player.resume():
                 return
-            self._still.reached()
+            self._still.wait_for_rest()
 
     def run(self, until: Callable[[], Any], limit: float, stride: float = STRIDE) -> bool:
         """Let time pass until ``until`` holds, ``limit`` s at most; return whether it does."""
         end = self._player.now + limit
-        self.rest()
+        self.wait_for_rest()
         while not until():
             if self._player.now >= end - STRIDE / 2:
                 return False
             self._go_on(min(stride, end - self._player.now))
         return True
 
-    def spend(self, seconds: float, stride: float = STRIDE) -> None:
+    def spend_time(self, seconds: float, stride: float = STRIDE) -> None:
         """Let so much time pass."""
         self.run(lambda: False, seconds, stride)
 
     @contextmanager
-    def unserved(self) -> Iterator[None]:
+    def watch_wall_waits(self) -> Iterator[None]:
         """Look before each stride whether a callback waits by the wall clock: nobody serves it.
 
         Outside such a block that is looked for only while some callback goes on. How much simulated
@@ -162,9 +166,9 @@ class Robot:
                 expected=f"No callback of {self.name} blocks while something is slow or broken.",
                 actual="A callback held up the node so that even its clock stood still."
                 + _of_waits(self._bench.subject.wall_waits())
-                + self.complaint(),
+                + self.error_note(),
             ) from None
-        self.rest()
+        self.wait_for_rest()
 
     def _require_no_wall_wait(self) -> None:
         """Fail if a thread waits by the wall clock for longer than a nap.
@@ -174,13 +178,13 @@ class Robot:
         """
         waits: list[str] = []
         if self._bench.outside.own_network:
-            sleeps = [s for s in self._sleeps() if s.until > time.monotonic() + NAP_S]
+            sleeps = [s for s in self._find_sleeps() if s.until > time.monotonic() + NAP_S]
             if not sleeps:
                 return
             waits = self._bench.subject.wall_waits()  # now: it may be over when it is certain
             if not any(sleep.to_the_end for sleep in sleeps):
                 self.wait(lambda: False, NAP_S)
-                later = {sleep.thread: sleep.until for sleep in self._sleeps()}
+                later = {sleep.thread: sleep.until for sleep in self._find_sleeps()}
                 if not any(abs(later.get(s.thread, 0.0) - s.until) < SAME_S for s in sleeps):
                     return  # what wakes up at once has not waited
         waits = waits or self._bench.subject.wall_waits()
@@ -196,7 +200,7 @@ class Robot:
         sleeping = self._bench.outside.ask("sleepers", threads=threads)
         return frozenset(threads) - {int(thread) for thread, _, _ in sleeping}
 
-    def _sleeps(self) -> list[Sleep]:
+    def _find_sleeps(self) -> list[Sleep]:
         """Return which threads of the session sleep by the wall clock."""
         now = time.monotonic()
         found = self._bench.outside.ask("sleepers", threads=[*self._threads])
@@ -212,7 +216,7 @@ class Robot:
         A thread or a timer on the wall clock would go on. ``what`` it would be, as a clause.
         """
         self._require_no_wall_wait()
-        if happened() or not self._still.reached() or self.wait(happened, NAP_S):
+        if happened() or not self._still.wait_for_rest() or self.wait(happened, NAP_S):
             return  # it came by then, or somebody is at work all the time: that proves nothing
         if self.wait(happened, seconds):
             raise WallWait(
@@ -220,7 +224,7 @@ class Robot:
                 actual=f"{what}, within {seconds:g} s of wall time, while that stood still.",
             )
 
-    def complaint(self) -> str:
+    def error_note(self) -> str:
         """Return what a callback and a thread raised last, a sentence each; empty if none did.
 
         What was raised before this node was made is another one's.

@@ -48,21 +48,21 @@ class Shutdowns:
 
     def watch_idle(self, program: Program, stage: Stage) -> None:
         """Have it called with nothing to do, in a program whose nodes have done what they had."""
-        stage.play_more(Dispatcher.SERVER, partial(self._idle, program))
+        stage.play_more(Dispatcher.SERVER, partial(self._while_idle, program))
         self._note_end(program)
 
     def watch_all(self, program: Program) -> None:
         """Have it called in a drive, and then with nothing to do, unless that has been seen."""
         acts = {
             ON_THE_WAY: partial(self._on_the_way, program),
-            IDLE: partial(self._idle, program),
+            IDLE: partial(self._while_idle, program),
         }
         Stage(program, self._still, [Part(Dispatcher.SERVER, Dispatcher, acts)]).play()
         self._note_end(program)
 
     def _note_end(self, program: Program) -> None:
-        if self._when and program.ended():
-            self._note(
+        if self._when and program.has_ended():
+            self._note_fault(
                 "it raises nothing.",
                 "The program was gone: an exception left shutdown() or a callback.",
             )
@@ -101,19 +101,19 @@ class Shutdowns:
             return
         self._when = ""
         program.interrupt()  # it is ended, and then made anew
-        self._comes(program, dispatcher.missing)
+        self._wait_until(program, dispatcher.describe_missing)
         program.interrupt()
-        self._comes(program, lambda: not dispatcher.missing())
+        self._wait_until(program, lambda: not dispatcher.describe_missing())
         # It may be known here before it knows of anybody, see `Stage`.
         Patience(self._still, idle=MEET_IDLE_S).wait(program.session, lambda: False)
 
-    def _idle(self, program: Program, dispatcher: Dispatcher, run: Run) -> Act:
-        if IDLE in self._seen or dispatcher.missing():
+    def _while_idle(self, program: Program, dispatcher: Dispatcher, run: Run) -> Act:
+        if IDLE in self._seen or dispatcher.describe_missing():
             return
         dispatcher.speeds.clear()
         self._shut_down(program, IDLE, lambda: dispatcher.speeds)
         if dispatcher.speeds[-1:] != [False]:
-            self._note(
+            self._note_fault(
                 "it stops the wheels: a zero Twist on cmd_vel.",
                 "The last Twist on cmd_vel told the robot to drive."
                 if dispatcher.speeds
@@ -122,41 +122,43 @@ class Shutdowns:
         yield from self._goal_afterwards(dispatcher)
         self._seen.add(IDLE)
 
-    def _comes(
+    def _wait_until(
         self, program: Program, condition: Callable[[], object], idle: float | None = None
     ) -> bool:
         patience = Patience(self._still) if idle is None else Patience(self._still, idle=idle)
-        return patience.wait(program.session, lambda: condition() or program.ended())
+        return patience.wait(program.session, lambda: condition() or program.has_ended())
 
     def _shut_down(self, program: Program, when: str, stopped: Callable[[], object]) -> None:
         """Have it called, and wait until the wheels are told to stop."""
         self._when = when
         program.interrupt()
-        if not self._comes(program, stopped, AT_ONCE_S) and self._comes(program, stopped):
+        if not self._wait_until(program, stopped, AT_ONCE_S) and self._wait_until(program, stopped):
             self._late.append(when)  # or a message was lost, and sent again
 
     def _require_aborted(self, dispatcher: Dispatcher, drive: Drives, stopped: int) -> None:
         if dispatcher.speeds[-1]:
-            self._note("it stops the robot.", "The last Twist on cmd_vel told the robot to drive.")
+            self._note_fault(
+                "it stops the robot.", "The last Twist on cmd_vel told the robot to drive."
+            )
         if any(dispatcher.speeds[stopped:]):
-            self._note(
+            self._note_fault(
                 "the wheels are told nothing any more but to stop.",
                 "Before the goal was aborted they were told to drive again.",
             )
         if (how := drive_goal.WORDS.get(drive.status or 0, "not over")) != "aborted":
-            self._note("the drive is aborted.", f"{SETTLES:g} s later it was {how}.")
+            self._note_fault("the drive is aborted.", f"{SETTLES:g} s later it was {how}.")
 
     def _goal_afterwards(self, dispatcher: Dispatcher) -> Act:
         """Send a goal: whatever is answered, nothing moves."""
         dispatcher.send(AFTERWARDS)
         yield from wait_until(lambda: any(dispatcher.speeds), AFTERWARDS)
         if any(dispatcher.speeds):
-            self._note(
+            self._note_fault(
                 "the wheels are told nothing any more but to stop.",
                 f"A goal of {AFTERWARDS} m that came afterwards drove the robot.",
             )
 
-    def _note(self, expected: str, actual: str) -> None:
+    def _note_fault(self, expected: str, actual: str) -> None:
         wrong = Failed(expected=f"{WHEN} {self._when}, {expected}", actual=actual)
         self._wrong.setdefault(self._when, wrong)
 

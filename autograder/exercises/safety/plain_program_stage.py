@@ -87,50 +87,50 @@ class Stage:
         self.under_way = {part.name: next(iter(part.acts)) for part in parts}
         self.ended = dict[str, str]()
         self._due: dict[str, tuple[float, Act]] = {
-            part.name: (0.0, self._acts(part)) for part in parts
+            part.name: (0.0, self._run_acts(part)) for part in parts
         }
 
-    def _acts(self, part: Part) -> Act:
+    def _run_acts(self, part: Part) -> Act:
         for name, act in part.acts.items():
             self.under_way[part.name] = name
             # A wrong node may leave its counterpart where that cannot go on.
             with suppress(Exception):
-                yield from act(self.players[part.name], self._run)
+                yield from act(self.players[part.name], self._run_node)
             if name == TIMED and part.name in self._servers:
                 self._program.session.stop(self._servers.pop(part.name))
             # What a callback raised ends rclpy's executor when it has the next one to run.
             for _ in range(2):
                 yield 0.0 if name == TIMED else STRIDE_S
 
-    def _run(self, make: Callable[[], Node]) -> None:
+    def _run_node(self, make: Callable[[], Node]) -> None:
         if make.__name__ not in self._made:
             self._made.add(make.__name__)
             self._program.session.run(make)
-            self._rest()
+            self._wait_for_rest()
 
     def play(self) -> None:
         """Move time on until every act is over, or nothing is left to act on."""
-        self._play()
+        self._play_on()
         # On a busy machine it takes a while until something ends.
         Patience(self._still, idle=END_S).wait(self._program.session, self._all_ended)
         self._note_ended()
 
     def _all_ended(self) -> bool:
-        return self._program.ended() or self.there <= {*self.ended}
+        return self._program.has_ended() or self.there <= {*self.ended}
 
     def play_more(self, name: str, act: Callable[[Any, Run], Act]) -> None:
         """Do one thing more to a class when all else is over."""
 
         def acts() -> Act:
-            with suppress(Exception):  # as in `_acts`
-                yield from act(self.players[name], self._run)
+            with suppress(Exception):  # as in `_run_acts`
+                yield from act(self.players[name], self._run_node)
 
         self._due[name] = (self._clock.now, acts())
-        self._play()
+        self._play_on()
 
-    def _play(self) -> None:
-        self._rest()
-        while self._due and not self._program.ended():
+    def _play_on(self) -> None:
+        self._wait_for_rest()
+        while self._due and not self._program.has_ended():
             now = self._clock.now
             for name, (due, acts) in [*self._due.items()]:
                 if due <= now:
@@ -138,9 +138,9 @@ class Stage:
                         del self._due[name]
                     else:
                         self._due[name] = (now + seconds, acts)
-            self._rest()
+            self._wait_for_rest()
             self._note_ended()
-            self._move()
+            self._move_clock()
 
     def _note_ended(self) -> None:
         for name in self.there - {*self.ended}:
@@ -151,23 +151,23 @@ class Stage:
                     next(acts, None)  # it may note what came before the end
 
     @property
-    def _times(self) -> bool:
+    def _is_timing(self) -> bool:
         """Whether something is being timed."""
         return any(self.under_way[name] == TIMED for name in self._due)
 
-    def _rest(self) -> None:
-        rested = self._still.reached()
+    def _wait_for_rest(self) -> None:
+        rested = self._still.wait_for_rest()
         for player in self.players.values():
             if player.resume():
-                rested = self._still.reached() and rested
-        self.rested = self.rested and (rested or not self._times)
+                rested = self._still.wait_for_rest() and rested
+        self.rested = self.rested and (rested or not self._is_timing)
 
-    def _move(self) -> None:
-        seconds = self._fine if self._times else STRIDE_S
+    def _move_clock(self) -> None:
+        seconds = self._fine if self._is_timing else STRIDE_S
         for player in self.players.values():  # before: what comes in on the way bears its end
             player.now = self._clock.now + seconds
         self._clock.move(seconds)
-        self._rest()
+        self._wait_for_rest()
 
 
 def wait_until(happened: Callable[[], Any], most: float) -> Act:

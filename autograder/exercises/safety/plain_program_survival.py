@@ -17,7 +17,12 @@ from autograder.examination.check_context import Bench
 from autograder.examination.exam import NotExaminable
 from autograder.examination.plain_programs import Programs
 from autograder.exercises.safety import plain_program_times
-from autograder.exercises.safety.gripper import GripUser, Operator, double, text
+from autograder.exercises.safety.gripper import (
+    GripUser,
+    Operator,
+    double_parameter,
+    string_parameter,
+)
 from autograder.exercises.safety.navigation import Dispatcher, NavigatorUser
 from autograder.exercises.safety.plain_program_shutdown import Shutdowns
 from autograder.exercises.safety.plain_program_stage import (
@@ -72,7 +77,7 @@ def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
     """
     if bench.programs is None:
         return False
-    ends = _found(bench, bench.programs, still).ends
+    ends = _get_findings(bench, bench.programs, still).ends
     if trial and (name, trial) not in ends:
         raise NotExaminable(NOT_FOUND_OUT)
     return bool(trial) and ends[name, trial]
@@ -85,10 +90,10 @@ def require_time(name: str, what: str, bench: Bench, still: Stillness) -> None:
     """
     if bench.programs is None:
         return
-    timings = _found(bench, bench.programs, still).timings
+    timings = _get_findings(bench, bench.programs, still).timings
     if name not in timings:
         raise NotExaminable(NOT_FOUND_OUT)
-    plain_program_times.require(name, what, bench, still, timings[name])
+    plain_program_times.require_timing(name, what, bench, still, timings[name])
 
 
 def shutdowns_seen(bench: Bench) -> Shutdowns | None:
@@ -97,7 +102,7 @@ def shutdowns_seen(bench: Bench) -> Shutdowns | None:
     return known.shutdowns if known is not None else None
 
 
-def _found(bench: Bench, programs: Programs, still: Stillness) -> Found:
+def _get_findings(bench: Bench, programs: Programs, still: Stillness) -> Found:
     key = f"{__name__}.found"
     if key not in bench.memory:
         found = Found({}, {}, Shutdowns(still))
@@ -109,15 +114,15 @@ def _found(bench: Bench, programs: Programs, still: Stillness) -> Found:
 def _ending_acts(programs: Programs, still: Stillness, found: Found) -> dict[tuple[str, str], bool]:
     """Return of each act whether it ends a program; note what else is seen in what is ``found``."""
     ends = {(part.name, act): False for part in PARTS for act in part.acts}
-    first = _play(programs, still, PARTS, shutdowns=found.shutdowns)
+    first = _play_program(programs, still, PARTS, shutdowns=found.shutdowns)
     found.timings.update(first.timings if first else {})
     if first is not None and not first.ended:
         return ends
     once = {*first.ended.items()} if first else set[tuple[str, str]]()
     there = {part.name for part in PARTS} if first else set[str]()
     left, raising, deadline = [*PARTS], set[str](), Deadline(MOST_S)
-    while left and deadline.left:
-        played = _play(programs, still, left, apart=True)
+    while left and deadline.seconds_left:
+        played = _play_program(programs, still, left, apart=True)
         found.timings.update(played.timings if played else {})
         ended = played.ended if played else {}
         there |= played.there if played else set()
@@ -127,10 +132,12 @@ def _ending_acts(programs: Programs, still: Stillness, found: Found) -> dict[tup
                 raising.add(name)
                 ends[name, act] = True
             once.add((name, act))
-        left = [_from(part, ended[part.name], ends) for part in left if part.name in ended]
+        left = [
+            _remaining_part(part, ended[part.name], ends) for part in left if part.name in ended
+        ]
         left = [part for part in left if part.acts]
     if first and not raising and not left:
-        again = _play(programs, still, PARTS)
+        again = _play_program(programs, still, PARTS)
         left = [*PARTS] if again and again.ended else []
     # Of a class whose node was made when the harness asked, and in no program, nothing is known.
     for part in (*left, *(part for part in PARTS if part.name not in there)):
@@ -139,7 +146,7 @@ def _ending_acts(programs: Programs, still: Stillness, found: Found) -> dict[tup
     return ends
 
 
-def _from(part: Part, act: str, ends: Mapping[tuple[str, str], bool]) -> Part:
+def _remaining_part(part: Part, act: str, ends: Mapping[tuple[str, str], bool]) -> Part:
     """Return what is left to do to a class: an act, unless that is settled, and those after it."""
     names = [*part.acts]
     first = names.index(act) + (1 if ends[part.name, act] else 0)
@@ -159,7 +166,7 @@ class Played(NamedTuple):
     timings: Mapping[str, Timing]
 
 
-def _play(
+def _play_program(
     programs: Programs,
     still: Stillness,
     parts: Sequence[Part],
@@ -180,7 +187,7 @@ def _play(
             return None
         stage = Stage(program, still, parts)
         stage.play()
-        ended = stage.ended if apart else stage.under_way if program.ended() else {}
+        ended = stage.ended if apart else stage.under_way if program.has_ended() else {}
         if shutdowns is not None and not ended:
             shutdowns.watch_idle(program, stage)
         timings = {
@@ -197,7 +204,7 @@ def _grip_without_gripper(user: GripUser, run: Run) -> Act:
 
 
 def _grips_refused(user: GripUser, run: Run) -> Act:
-    run(user.gripper)
+    run(user.make_gripper)
     for success in (True, False):
         user.request(success)
         yield from wait_until(lambda: user.tries, 1.0)
@@ -206,7 +213,7 @@ def _grips_refused(user: GripUser, run: Run) -> Act:
 
 
 def _grip_unanswered(user: GripUser, run: Run) -> Act:
-    run(user.gripper)
+    run(user.make_gripper)
     user.request(True)
     yield from wait_until(lambda: len(user.tries) > 1, 3.0)
     user.tries[1].crash()
@@ -216,7 +223,7 @@ def _grip_unanswered(user: GripUser, run: Run) -> Act:
 
 
 def _grip_answered_late(user: GripUser, run: Run) -> Act:
-    run(user.gripper)
+    run(user.make_gripper)
     user.request(True)
     yield from wait_until(lambda: len(user.tries) > 1, 3.0)
     user.tries[0].reply(True)
@@ -226,29 +233,30 @@ def _grip_answered_late(user: GripUser, run: Run) -> Act:
 
 
 def _limits_that_are_bad(operator: Operator, run: Run) -> Act:
-    good = [double("linear", 0.3), double("angular", 0.6)]
+    good = [double_parameter("linear", 0.3), double_parameter("angular", 0.6)]
     for parameters in (
-        good, [double("linear", math.nan)], [double("angular", math.inf)], [double("linear", -0.5)],
-        [double("angular", 7.0)], [text("linear", "fast")], [double("warp", 0.5)], [], good,
+        good, [double_parameter("linear", math.nan)], [double_parameter("angular", math.inf)],
+        [double_parameter("linear", -0.5)], [double_parameter("angular", 7.0)],
+        [string_parameter("linear", "fast")], [double_parameter("warp", 0.5)], [], good,
     ):  # fmt: skip
-        yield from wait_until(operator.ask(parameters).done, 0.5)
+        yield from wait_until(operator.request_limits(parameters).done, 0.5)
 
 
 def _limits_for_jammed_wheels(operator: Operator, run: Run) -> Act:
-    half = [double("linear", 0.3), double("angular", math.nan)]
-    yield from wait_until(operator.ask(half).done, 0.5)
-    operator.jam(True)
+    half = [double_parameter("linear", 0.3), double_parameter("angular", math.nan)]
+    yield from wait_until(operator.request_limits(half).done, 0.5)
+    operator.jam_wheels(True)
     yield STRIDE_S
-    yield from wait_until(operator.ask([double("linear", 0.9)]).done, 0.5)
-    operator.jam(False)
+    yield from wait_until(operator.request_limits([double_parameter("linear", 0.9)]).done, 0.5)
+    operator.jam_wheels(False)
     yield STRIDE_S
-    yield from wait_until(operator.ask([double("linear", 0.4)]).done, 0.5)
+    yield from wait_until(operator.request_limits([double_parameter("linear", 0.4)]).done, 0.5)
 
 
 def _goals_that_are_lost(user: NavigatorUser, run: Run) -> Act:
     user.request(3)
     yield from wait_until(lambda: user.outcomes, 3.0)  # there may be no navigator yet
-    run(user.navigator)
+    run(user.make_navigator)
     user.request(3, obeys=False)
     yield from wait_until(lambda: user.outcomes, 5.0)
     user.request(3, hesitates=True)
@@ -258,23 +266,23 @@ def _goals_that_are_lost(user: NavigatorUser, run: Run) -> Act:
 
 
 def _goals_that_end(user: NavigatorUser, run: Run) -> Act:
-    run(user.navigator)
+    run(user.make_navigator)
     for how in (ServerGoalHandle.succeed, ServerGoalHandle.abort):
         user.request(3)
         yield from wait_until(lambda: user.goals, 1.0)
-        user.feedback(1)
+        user.send_feedback(1)
         yield STRIDE_S
-        user.end(how)
+        user.end_goal(how)
         yield from wait_until(lambda: user.outcomes, 1.0)
     user.request(3, accepts=False)
     yield from wait_until(lambda: user.outcomes, 1.0)
 
 
 def _goal_that_stalls(user: NavigatorUser, run: Run) -> Act:
-    run(user.navigator)
+    run(user.make_navigator)
     user.request(3)
     yield from wait_until(lambda: user.cancels, 4.0)
-    user.end(ServerGoalHandle.canceled)
+    user.end_goal(ServerGoalHandle.canceled)
     yield from wait_until(lambda: user.outcomes, 1.0)
 
 
@@ -290,32 +298,32 @@ def _drives_that_are_canceled(dispatcher: Dispatcher, run: Run) -> Act:
 def _drives_with_jammed_wheels(dispatcher: Dispatcher, run: Run) -> Act:
     drive = dispatcher.send(3)
     yield from wait_until(lambda: any(dispatcher.speeds), 1.0)
-    dispatcher.jam(True)
+    dispatcher.jam_wheels(True)
     yield from wait_until(lambda: drive.status, 2.0)
-    dispatcher.jam(False)
+    dispatcher.jam_wheels(False)
     yield STRIDE_S
     again = dispatcher.send(1)
     yield from wait_until(lambda: again.status, 3.0)
 
 
-def _timed(name: str, acts: Mapping[str, Callable[[Any, Run], Act]]) -> Part:
+def _timed_part(name: str, acts: Mapping[str, Callable[[Any, Run], Act]]) -> Part:
     """Return the part of a class that is timed before these acts."""
     part = next(part for part in plain_program_times.PARTS if part.name == name)
     return part._replace(acts={**part.acts, **acts})
 
 
 PARTS = (
-    _timed(GripUser.CLIENT, {
+    _timed_part(GripUser.CLIENT, {
         "absent": _grip_without_gripper, "refused": _grips_refused,
         "unanswered": _grip_unanswered, "stale": _grip_answered_late,
     }),
     Part(Operator.SERVER, Operator, {
         "bad": _limits_that_are_bad, "atomic": _limits_for_jammed_wheels,
     }),
-    _timed(NavigatorUser.CLIENT, {
+    _timed_part(NavigatorUser.CLIENT, {
         "lost": _goals_that_are_lost, "ended": _goals_that_end, "stalled": _goal_that_stalls,
     }),
-    _timed(Dispatcher.SERVER, {
+    _timed_part(Dispatcher.SERVER, {
         "canceled": _drives_that_are_canceled, "aborted": _drives_with_jammed_wheels,
     }),
 )  # fmt: skip

@@ -116,7 +116,7 @@ class Timing(NamedTuple):
         return not TIMES[what].least <= took <= TIMES[what].most
 
 
-def require(name: str, what: str, bench: Bench, still: Stillness, timing: Timing) -> None:
+def require_timing(name: str, what: str, bench: Bench, still: Stillness, timing: Timing) -> None:
     """Fail if something takes a node of a class far too long or far too short.
 
     Args:
@@ -162,7 +162,8 @@ def _once_more(name: str, bench: Bench, still: Stillness, stride: float) -> Timi
         return Timing(stage.players[name].took, stage.rested)
 
 
-def within(player: GripUser | NavigatorUser | Dispatcher, most: float, what: Callable[[], object],
+def wait_within(
+    player: GripUser | NavigatorUser | Dispatcher, most: float, what: Callable[[], object],
 ) -> Act:  # fmt: skip
     """Wait until something happened, stride by stride, for so many s at most."""
     end = player.now + most - 1e-3  # else sums of floats decide
@@ -170,51 +171,51 @@ def within(player: GripUser | NavigatorUser | Dispatcher, most: float, what: Cal
         yield 0.0
 
 
-def _never() -> bool:
+def _never_happens() -> bool:
     return False
 
 
 def _times_of_a_grip(user: GripUser, run: Run) -> Act:
-    yield from within(user, 1.5 * BEATS, lambda: len(user.beats) > BEATS)
+    yield from wait_within(user, 1.5 * BEATS, lambda: len(user.beats) > BEATS)
     if len(user.beats) > 1:
         user.took[BEAT] = (user.beats[-1] - user.beats[0]) / (len(user.beats) - 1)
     user.request(True)
-    yield from within(user, 1.0, lambda: user.tries)
-    yield from within(user, SLOW_S, _never)
+    yield from wait_within(user, 1.0, lambda: user.tries)
+    yield from wait_within(user, SLOW_S, _never_happens)
     user.tries[0].reply(True)
-    yield from within(user, 2.0, lambda: user.outcomes or len(user.tries) > 1)
+    yield from wait_within(user, 2.0, lambda: user.outcomes or len(user.tries) > 1)
     user.took[SLOW] = len(user.tries)
     if len(user.tries) > 1:
         user.tries[1].reply(True)
-        yield from within(user, 2.0, lambda: user.outcomes)
+        yield from wait_within(user, 2.0, lambda: user.outcomes)
 
     user.request(False)
-    yield from within(user, 1.0, lambda: user.tries)
-    yield from within(user, LATE_S, _never)
+    yield from wait_within(user, 1.0, lambda: user.tries)
+    yield from wait_within(user, LATE_S, _never_happens)
     user.tries[0].reply(True)
-    yield from within(user, 6.0, lambda: user.outcomes or len(user.tries) > 1)
+    yield from wait_within(user, 6.0, lambda: user.outcomes or len(user.tries) > 1)
     user.took[LATE] = len(user.tries)
     tried = [attempt.at for attempt in user.tries]
     user.took[PAUSE] = tried[1] - tried[0] if len(tried) > 1 else math.inf
     if len(tried) > 1:
         user.tries[1].reply(True)
-        yield from within(user, 1.0, lambda: user.outcomes)
+        yield from wait_within(user, 1.0, lambda: user.outcomes)
 
 
 def _times_of_a_navigator(user: NavigatorUser, run: Run) -> Act:
     asked = user.now
     user.request(3, ponders=True)
-    yield from within(user, 5.0, lambda: user.cancels)
+    yield from wait_within(user, 5.0, lambda: user.cancels)
     user.took[STALL] = user.cancels[0] - asked
-    yield from within(user, 3.0, lambda: user.outcomes)
+    yield from wait_within(user, 3.0, lambda: user.outcomes)
     user.took[CANCEL] = user.now - user.cancels[0]
     user.decide()
     yield 0.0
-    user.end(ServerGoalHandle.canceled)
+    user.end_goal(ServerGoalHandle.canceled)
     yield 0.0
     asked = user.now
     user.request(3, hesitates=True)
-    yield from within(user, 3.0, lambda: user.outcomes)
+    yield from wait_within(user, 3.0, lambda: user.outcomes)
     user.took[GOAL] = user.now - asked
     user.decide()
     yield 0.0
@@ -223,32 +224,35 @@ def _times_of_a_navigator(user: NavigatorUser, run: Run) -> Act:
 def _times_of_a_drive(dispatcher: Dispatcher, run: Run) -> Act:
     began = dispatcher.now
     drive = dispatcher.send(METRES)
-    yield from within(dispatcher, 3.0 * METRES, lambda: drive.status)
+    yield from wait_within(dispatcher, 3.0 * METRES, lambda: drive.status)
     dispatcher.took[DRIVE] = dispatcher.now - began
     told = [*dispatcher.told, dispatcher.now]
     dispatcher.took[COMMANDS] = max(after - before for before, after in pairwise(told))
 
     drive = dispatcher.send(2 * METRES)
-    yield from within(dispatcher, 1.0, lambda: any(dispatcher.speeds))
+    yield from wait_within(dispatcher, 1.0, lambda: any(dispatcher.speeds))
     dispatcher.cancel(drive)
     began = dispatcher.now
-    yield from within(dispatcher, 2.0, lambda: drive.status)
+    yield from wait_within(dispatcher, 2.0, lambda: drive.status)
     dispatcher.took[CANCELED] = dispatcher.now - began
 
     drive = dispatcher.send(2 * METRES)
-    yield from within(dispatcher, 1.0, lambda: any(dispatcher.speeds))
-    dispatcher.jam(True)
+    yield from wait_within(dispatcher, 1.0, lambda: any(dispatcher.speeds))
+    dispatcher.jam_wheels(True)
     began = dispatcher.now
-    yield from within(dispatcher, 4.0, lambda: drive.status)
+    yield from wait_within(dispatcher, 4.0, lambda: drive.status)
     dispatcher.took[ABORTED] = dispatcher.now - began
-    dispatcher.jam(False)
+    dispatcher.jam_wheels(False)
     yield 0.0
 
 
 PARTS = (
-    Part(GripUser.CLIENT, GripUser, {TIMED: _times_of_a_grip}, GripUser.gripper),
+    Part(GripUser.CLIENT, GripUser, {TIMED: _times_of_a_grip}, GripUser.make_gripper),
     Part(
-        NavigatorUser.CLIENT, NavigatorUser, {TIMED: _times_of_a_navigator}, NavigatorUser.navigator
+        NavigatorUser.CLIENT,
+        NavigatorUser,
+        {TIMED: _times_of_a_navigator},
+        NavigatorUser.make_navigator,
     ),
     Part(Dispatcher.SERVER, Dispatcher, {TIMED: _times_of_a_drive}),
 )

@@ -36,7 +36,7 @@ class RobotRig:
         self._still = Stillness(bench.outside)
 
     @contextmanager
-    def robot(self, name: str, player: type[PlayerT]) -> Iterator[tuple[Robot, PlayerT]]:
+    def run_robot(self, name: str, player: type[PlayerT]) -> Iterator[tuple[Robot, PlayerT]]:
         """Give the node of a class and its counterpart; after a failed check, fresh ones.
 
         A check that passed leaves a subject that can go on: another session would have to be
@@ -53,7 +53,7 @@ class RobotRig:
             raise
 
     def _change_to(self, name: str, player: type[Player]) -> None:
-        self.renew()
+        self.renew_node()
         if not self._fresh:
             self.bench.subject.open(threads=THREADS, sim_time=True)
             self.bench.subject.mark("beside")  # the executor starts its threads with the first node
@@ -79,11 +79,11 @@ class RobotRig:
         seen = plain_program_survival.shutdowns_seen(self.bench)
         plain_program_shutdown.require_shutdown(self.bench, self._still, seen)
 
-    def renew(self) -> None:
+    def renew_node(self) -> None:
         """Have the next check begin with a fresh node, in the same session."""
         if self._robot is not None:
             self.bench.subject.stop(self._robot.name)
-        self.clear()
+        self.take_down()
 
     def begin_anew(self) -> None:
         """Have the next check begin with a fresh node in a fresh session, whose time begins at 0.
@@ -91,16 +91,16 @@ class RobotRig:
         A constructor always finds the clock at 0. In a session where time has gone on, a thread
         that it starts has to catch up with it first.
         """
-        self.clear()
+        self.take_down()
         self._fresh = False
 
-    def once(self, trial: Callable[[RobotRig], None]) -> None:
+    def run_once(self, trial: Callable[[RobotRig], None]) -> None:
         """Run a trial that others build on, unless an earlier part of the exam has passed it."""
         if trial.__name__ not in self.bench.memory:
             trial(self)
             self.bench.memory[trial.__name__] = True
 
-    def clear(self) -> None:
+    def take_down(self) -> None:
         """Take the examiner's end down."""
         self._robot = None
         if self._player is not None:
@@ -109,14 +109,14 @@ class RobotRig:
 
 
 @contextmanager
-def serving(
+def run_server(
     rig: RobotRig, robot: Robot, make: Callable[[], Node], services: Endpoints
 ) -> Iterator[None]:
     """Run a server of the examiner's for the length of the block; the robot knows both ends."""
     server = rig.bench.session.run(make)
     try:
-        robot.sees(services)
-        robot.rest()
+        robot.wait_for_discovery(services)
+        robot.wait_for_rest()
         yield
     finally:
         rig.bench.session.stop(server)
@@ -129,4 +129,4 @@ def robot_rig(bench: Bench) -> Iterator[RobotRig]:
     try:
         yield rig
     finally:
-        rig.clear()
+        rig.take_down()

@@ -18,11 +18,11 @@ AFTERWARDS = 2  # m of a goal that comes after shutdown(), and s in which it wou
 LOOKS = 3  # calls of it, if need be, of which the fastest counts: any may be held up by the machine
 
 
-def shutdown(rig: RobotRig) -> None:
+def examine_shutdown(rig: RobotRig) -> None:
     """The node is about to be taken down, on the way, and then while nothing is under way."""
     took = [_shutdown_on_the_way(rig)]
     while took[-1] > AT_ONCE and len(took) < LOOKS:
-        rig.renew()
+        rig.renew_node()
         took.append(_shutdown_on_the_way(rig))
     if min(took) > AT_ONCE:
         raise Failed(
@@ -30,8 +30,8 @@ def shutdown(rig: RobotRig) -> None:
             actual=f"Called {len(took)} times, it took {min(took):.1f} s or more each time, by the "
             "wall clock.",
         )
-    rig.renew()
-    with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
+    rig.renew_node()
+    with rig.run_robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
         _shut_down(rig, "while no goal is under way")
         robot.run(lambda: dispatcher.speeds, drive_goal.STOP)
         if dispatcher.speeds[-1:] != [False]:
@@ -67,19 +67,21 @@ def _goal_afterwards(robot: Robot, dispatcher: Dispatcher, last: str) -> None:
 
 def _shutdown_on_the_way(rig: RobotRig) -> float:
     """Shut the node down in the middle of a drive; return how long the call took, in s."""
-    with rig.robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
-        drive = drive_goal.driving(robot, dispatcher, drive_goal.LONG)
-        robot.spend(0.5)
+    with rig.run_robot(Dispatcher.SERVER, Dispatcher) as (robot, dispatcher):
+        drive = drive_goal.start_drive(robot, dispatcher, drive_goal.LONG)
+        robot.spend_time(0.5)
         took = _shut_down(rig, "in the middle of a drive")
-        robot.rest()
+        robot.wait_for_rest()
         if dispatcher.speeds[-1]:
             raise Failed(
                 expected="shutdown() stops the robot at once.",
                 actual="After the call the last Twist on cmd_vel told the robot to drive.",
             )
         before = len(dispatcher.speeds)
-        drive_goal.ends(robot, drive, "A goal under way at shutdown()", "aborted", drive_goal.ABORT)
-        drive_goal.stands(robot, dispatcher, "been aborted")
+        drive_goal.require_end(
+            robot, drive, "A goal under way at shutdown()", "aborted", drive_goal.ABORT
+        )
+        drive_goal.require_stop(robot, dispatcher, "been aborted")
         if any(dispatcher.speeds[before:]):
             raise Failed(
                 expected="After shutdown() the wheels are told nothing any more but to stop.",
@@ -97,7 +99,7 @@ def _shut_down(rig: RobotRig, when: str) -> float:
     except StudentError as error:
         raise Failed(
             expected=f"{Dispatcher.SERVER} has a method shutdown() that does not raise {when}.",
-            actual=error.told,
+            actual=error.feedback_text,
         ) from None
     except SubjectGone as gone:
         if not rig.bench.subject.hangs:

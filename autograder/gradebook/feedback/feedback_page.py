@@ -38,13 +38,13 @@ class Feedback:
 
     def of_cell(self, cell: NotebookNode) -> Line | None:
         """Return what a cell earned, if it is graded."""
-        if not submission.metadata(cell).get("grade"):
+        if not submission.nbgrader_metadata(cell).get("grade"):
             return None
         name = submission.grade_id(cell)
         return next((line for line in self.lines if line.grade_id == name), None)
 
 
-def describe(notebook: NotebookNode, resources: Any, converter: Any) -> Feedback:
+def describe_feedback(notebook: NotebookNode, resources: Any, converter: Any) -> Feedback:
     """Return what the page of a notebook says, from the gradebook.
 
     Args:
@@ -57,15 +57,17 @@ def describe(notebook: NotebookNode, resources: Any, converter: Any) -> Feedback
     if "student" not in names or converter is None:
         return Feedback("Feedback", "", ())
     with Gradebook(names["db_url"]) as gradebook:
-        sheet = sheets.read(gradebook, converter.coursedir, names["assignment"], names["student"])
+        sheet = sheets.read_sheet(
+            gradebook, converter.coursedir, names["assignment"], names["student"]
+        )
     exercise = next(
         (found for found in sheet.exercises if found.notebook == names["notebook"]),
         Exercise(names["notebook"], names["notebook"], ()),
     )
-    late = sheets.late(sheet.seconds_late, exercise.penalty)
+    late = sheets.describe_lateness(sheet.seconds_late, exercise.penalty)
     has_index = names["notebook"] != Path(INDEX).stem and not _goes_alone(converter, names)
     return Feedback(
-        exercise.title, exercise.total, exercise.lines, late, INDEX if has_index else "",
+        exercise.title, exercise.score_sentence, exercise.lines, late, INDEX if has_index else "",
         any("$" in cell.source for cell in notebook.cells if cell.cell_type == "markdown"),
     )  # fmt: skip
 
@@ -75,6 +77,6 @@ def _goes_alone(converter: Any, names: Any) -> bool:
 
     A link to the page about all exercises would lead nowhere there.
     """
-    folder = roster.folder(Path(converter.coursedir.root), names["student"])
+    folder = roster.student_folder(Path(converter.coursedir.root), names["student"])
     secret = folder / str(names["assignment"]) / SECRET
     return secret.exists()

@@ -54,10 +54,10 @@ class IndexPages:
         assignment, student = graded.name, graded.parent.name
         coursedir = CourseDirectory(config=self._config)
         place = coursedir.format_path(coursedir.feedback_directory, student, assignment)
-        write(coursedir, assignment, student, Path(place))
+        write_page(coursedir, assignment, student, Path(place))
 
 
-def write(coursedir: CourseDirectory, assignment: str, student: str, folder: Path) -> None:
+def write_page(coursedir: CourseDirectory, assignment: str, student: str, folder: Path) -> None:
     """Write the index page into a ``folder`` of feedback pages.
 
     A notebook that is called "index" has this name for its own page: then nothing is written.
@@ -67,16 +67,16 @@ def write(coursedir: CourseDirectory, assignment: str, student: str, folder: Pat
         OSError: it cannot be written.
     """
     with Gradebook(coursedir.db_url, coursedir.course_id) as gradebook:
-        sheet = sheets.read(gradebook, coursedir, assignment, student)
+        sheet = sheets.read_sheet(gradebook, coursedir, assignment, student)
     if Path(INDEX).stem not in {exercise.notebook for exercise in sheet.exercises}:
-        write_whole(folder / INDEX, page(sheet))
+        write_whole(folder / INDEX, render_page(sheet))
 
 
-def page(sheet: Sheet) -> str:
+def render_page(sheet: Sheet) -> str:
     """Return a sheet as one HTML page."""
     title = f"{sheet.assignment}: feedback for {sheet.name}"
-    body = "".join(_exercise(exercise) for exercise in sheet.exercises)
-    late = f'<p class="late">{escape(sheet.late)}</p>' if sheet.late else ""
+    body = "".join(_exercise_rows(exercise) for exercise in sheet.exercises)
+    late = f'<p class="late">{escape(sheet.late_sentence)}</p>' if sheet.late_sentence else ""
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta http-equiv="Content-Security-Policy" '
@@ -84,24 +84,24 @@ def page(sheet: Sheet) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n"
         f"<body><main><h1>{escape(title)}</h1>"
-        f"<p><strong>{escape(sheet.total)}</strong></p>{late}{_handed_in(sheet)}"
+        f"<p><strong>{escape(sheet.score_sentence)}</strong></p>{late}{_handed_in(sheet)}"
         '<table><thead><tr><th scope="col">Exercise</th><th scope="col">Points</th></tr></thead>'
         f"<tbody>{body}</tbody></table></main></body></html>\n"
     )
 
 
-def _exercise(exercise: Exercise) -> str:
+def _exercise_rows(exercise: Exercise) -> str:
     link = quote(f"{exercise.notebook}.html")
     penalty = f"<tr><th>Late</th><td>-{exercise.penalty:g}</td></tr>" if exercise.penalty else ""
     return (
         f'<tr class="exercise"><th scope="row"><a href="{link}">{escape(exercise.title)}</a></th>'
         f"<td>{exercise.score:g} of {exercise.max_score:g}</td></tr>"
-        + "".join(_line(line, link) for line in exercise.lines)
+        + "".join(_line_row(line, link) for line in exercise.lines)
         + penalty
     )
 
 
-def _line(line: Line, link: str) -> str:
+def _line_row(line: Line, link: str) -> str:
     kind = ' class="waits"' if line.waits else ""
     comment = ", with a comment" if line.comment else ""
     return (
@@ -116,7 +116,7 @@ def _handed_in(sheet: Sheet) -> str:
     return f"<p>Handed in on {sheet.handed_in:%Y-%m-%d at %H:%M} UTC.</p>"
 
 
-def configure(config: Config) -> None:
+def configure_feedback(config: Config) -> None:
     """Have feedback be written with its index page, unless a ``config`` says otherwise."""
     chosen: Any = config.GenerateFeedback
     if "post_convert_hook" not in chosen:

@@ -22,7 +22,7 @@ from nbgrader.coursedir import CourseDirectory
 from autograder.assignments import questions
 from autograder.assignments.questions import Question
 from autograder.gradebook.database import of_cells
-from course.messages.yaml_text import counted
+from course.messages.yaml_text import format_count
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,15 @@ class Line:
     @property
     def said(self) -> str:
         """What is to be said of it, in a few words."""
-        said = f"{self.points:g} of {_points(self.max_points)}"
+        said = f"{self.points:g} of {_points_text(self.max_points)}"
         if not self.waits:
             return said
         if self.marked:
             return f"{said}, to be looked at again"
         what = "waits for its mark" if self.written else "waits for a person"
-        return f"{said} so far, {what}" if self.points else f"{what} ({_points(self.max_points)})"
+        return (
+            f"{said} so far, {what}" if self.points else f"{what} ({_points_text(self.max_points)})"
+        )
 
 
 @dataclass(frozen=True)
@@ -80,9 +82,9 @@ class Exercise:
         return sum(line.max_points for line in self.lines)
 
     @property
-    def total(self) -> str:
+    def score_sentence(self) -> str:
         """The score as a sentence that says what is still to come."""
-        return total(self.lines, self.score)
+        return describe_score(self.lines, self.score)
 
 
 @dataclass(frozen=True)
@@ -120,35 +122,39 @@ class Sheet:
         return sum(exercise.penalty for exercise in self.exercises)
 
     @property
-    def total(self) -> str:
+    def score_sentence(self) -> str:
         """The score as a sentence that says what is still to come."""
-        return total(self.lines, self.score)
+        return describe_score(self.lines, self.score)
 
     @property
-    def late(self) -> str:
+    def late_sentence(self) -> str:
         """What is to be said of lateness: a sentence, or nothing."""
-        return late(self.seconds_late, self.penalty)
+        return describe_lateness(self.seconds_late, self.penalty)
 
 
-def read(gradebook: Gradebook, coursedir: CourseDirectory, assignment: str, student: str) -> Sheet:
+def read_sheet(
+    gradebook: Gradebook, coursedir: CourseDirectory, assignment: str, student: str
+) -> Sheet:
     """Return the sheet of a student, as the gradebook has it now.
 
     Raises:
         MissingEntry: there is no such submission.
     """
     submission = gradebook.find_submission(assignment, student)
-    asked = questions.known(coursedir, assignment)
+    asked = questions.known_questions(coursedir, assignment)
     worth = gradebook.db.query(Notebook.name, SubmittedNotebook.late_submission_penalty)
     worth = worth.join(SubmittedNotebook, SubmittedNotebook.notebook_id == Notebook.id)
     worth = worth.filter(SubmittedNotebook.assignment_id == submission.id)
     penalties = {notebook: float(penalty or 0.0) for notebook, penalty in worth}
     comments = {
         (notebook, cell): said or ""
-        for notebook, cell, said in _rows(gradebook, Comment, (Comment.comment,), submission)
+        for notebook, cell, said in _query_rows(gradebook, Comment, (Comment.comment,), submission)
     }
     lines: dict[str, dict[str, Line]] = {notebook: {} for notebook in sorted(penalties)}
     columns = (Grade.score, Grade.manual_score, Grade.max_score, Grade.needs_manual_grade)
-    for notebook, cell, score, by_hand, most, waits in _rows(gradebook, Grade, columns, submission):
+    for notebook, cell, score, by_hand, most, waits in _query_rows(
+        gradebook, Grade, columns, submission
+    ):
         question = asked.get(notebook, {}).get(cell)
         lines[notebook][cell] = Line(
             cell,
@@ -164,7 +170,7 @@ def read(gradebook: Gradebook, coursedir: CourseDirectory, assignment: str, stud
         Exercise(
             notebook,
             questions.title_of_notebook(notebook),
-            tuple(_ordered(found, asked.get(notebook, {}))),
+            tuple(_sort_lines(found, asked.get(notebook, {}))),
             penalties[notebook],
         )
         for notebook, found in lines.items()
@@ -179,10 +185,10 @@ def read(gradebook: Gradebook, coursedir: CourseDirectory, assignment: str, stud
     )  # fmt: skip
 
 
-def total(lines: Iterable[Line], score: float) -> str:
+def describe_score(lines: Iterable[Line], score: float) -> str:
     """Return a sum as a sentence that says what is still to come."""
     every = list(lines)
-    said = f"{score:g} of {_points(sum(line.max_points for line in every))}"
+    said = f"{score:g} of {_points_text(sum(line.max_points for line in every))}"
     waiting = [line for line in every if line.waits]
     if not waiting:
         return f"{said}."
@@ -191,20 +197,20 @@ def total(lines: Iterable[Line], score: float) -> str:
     what, whom = ("answer", "a mark") if written else ("part", "a person")
     verb = "waits" if len(waiting) == 1 else "wait"
     return (
-        f"{said} so far; {counted(len(waiting), what)} {verb} for {whom} and can add up to "
+        f"{said} so far; {format_count(len(waiting), what)} {verb} for {whom} and can add up to "
         f"{open_points:g}."
     )
 
 
-def late(seconds: float, penalty: float) -> str:
+def describe_lateness(seconds: float, penalty: float) -> str:
     """Return what is to be said of lateness: a sentence, or nothing."""
     if seconds <= 0:
         return ""
-    off = f"{_points(penalty)} off" if penalty else "nothing is taken off"
-    return f"Handed in {_time(seconds)} late: {off}."
+    off = f"{_points_text(penalty)} off" if penalty else "nothing is taken off"
+    return f"Handed in {_time_text(seconds)} late: {off}."
 
 
-def _rows(
+def _query_rows(
     gradebook: Gradebook, kind: type, columns: tuple[object, ...], submission: SubmittedAssignment
 ) -> list[tuple]:  # type: ignore[type-arg]
     query = of_cells(gradebook.db, kind, *columns)
@@ -212,17 +218,17 @@ def _rows(
     return [tuple(row)[1:] for row in query]
 
 
-def _ordered(found: dict[str, Line], asked: dict[str, Question]) -> list[Line]:
+def _sort_lines(found: dict[str, Line], asked: dict[str, Question]) -> list[Line]:
     order = {cell: number for number, cell in enumerate(asked)}
     return sorted(found.values(), key=lambda line: (order.get(line.grade_id, 999), line.grade_id))
 
 
-def _points(value: float) -> str:
+def _points_text(value: float) -> str:
     return "1 point" if value == 1 else f"{value:g} points"
 
 
-def _time(seconds: float) -> str:
+def _time_text(seconds: float) -> str:
     minutes = max(1, round(seconds / 60))
     days, hours, minutes = minutes // 1440, minutes // 60 % 24, minutes % 60
     parts = [(days, "day"), (hours, "hour"), (minutes, "minute")]
-    return " ".join([counted(number, unit) for number, unit in parts if number][:2])
+    return " ".join([format_count(number, unit) for number, unit in parts if number][:2])

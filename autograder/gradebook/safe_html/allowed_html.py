@@ -32,16 +32,16 @@ if TYPE_CHECKING:
     from autograder.gradebook.safe_html.page_texts import Page
 
 
-def _names(text: str) -> frozenset[str]:
+def _split_names(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-_MATH_TAGS = _names(
+_MATH_TAGS = _split_names(
     "math mi mn mo mrow ms mspace mtext msup msub msubsup mfrac msqrt mroot mover munder "
     "munderover mtable mtr mtd mstyle mpadded mphantom mmultiscripts mprescripts none semantics "
     "annotation"
 )
-_PLAIN_TAGS = _names(
+_PLAIN_TAGS = _split_names(
     "p br hr b i u s em strong small mark del ins sub sup kbd samp var code pre q blockquote cite "
     "abbr dfn h1 h2 h3 h4 h5 h6 ul ol li dl dt dd div span table caption thead tbody tfoot tr th "
     "td colgroup col details summary figure figcaption section article"
@@ -133,14 +133,15 @@ def cleaned_html(text: str, *, coloured: bool = False) -> str:
     """
     pictures = _DRAWING.sub(lambda found: _as_picture(found[0]), text)
     return nh3.clean(
-        pictures, tags=set(TAGS), attributes={**TAGS, "*": EVERYWHERE}, attribute_filter=_kept,
+        pictures, tags=set(TAGS), attributes={**TAGS, "*": EVERYWHERE},
+        attribute_filter=_filter_attribute,
         url_schemes={"http", "https", "mailto", "data", "attachment"},
         filter_style_properties=STYLES, allowed_classes=_CLASSES if coloured else {},
         clean_content_tags={"script", "style", "template", "iframe", "object", "svg", "title"},
     )  # fmt: skip
 
 
-def _kept(_tag: str, name: str, value: str) -> str | None:
+def _filter_attribute(_tag: str, name: str, value: str) -> str | None:
     if name in _TARGETS:
         return value if _TARGETS[name](value.strip()) else None
     return None if name == "style" and "(" in value else value
@@ -157,18 +158,18 @@ def _as_picture(svg: str) -> str:
     return f'<img alt="" src="data:image/svg+xml;base64,{data}">'
 
 
-def disarmed(text: str, *, tags: bool = True) -> str:
+def disarm_markdown(text: str, *, tags: bool = True) -> str:
     """Return Markdown in which no link or picture is left that is not on the list, and no such tag.
 
     It reads as before: see the module's own words. No tag at all is left unless ``tags`` says so.
     A picture that a browser may not load is a link to it instead.
     """
-    text = _PICTURE_BEGINS.sub(lambda found: _pictured(text, found.start()), text)
-    text = _TAG_BEGINS.sub(lambda found: _opened(text, found.start(), tags), text)
-    return _LINK_BEGINS.sub(lambda found: _linked(text, found.end()), text)
+    text = _PICTURE_BEGINS.sub(lambda found: _screen_picture(text, found.start()), text)
+    text = _TAG_BEGINS.sub(lambda found: _screen_tag(text, found.start(), tags), text)
+    return _LINK_BEGINS.sub(lambda found: _screen_link(text, found.end()), text)
 
 
-def _pictured(text: str, place: int) -> str:
+def _screen_picture(text: str, place: int) -> str:
     """Return the beginning of a picture, apart from its bracket if it may not be loaded.
 
     It stays only where all readers of Markdown see the same picture: its words hold nothing that
@@ -178,7 +179,7 @@ def _pictured(text: str, place: int) -> str:
     return "![" if found and is_source(found[1]) else f"!{_JOINER}["
 
 
-def _opened(text: str, place: int, tags: bool) -> str:
+def _screen_tag(text: str, place: int, tags: bool) -> str:
     found = _TAG.match(text, place) if tags else None
     if _AUTOLINK.match(text, place) or (found and _is_listed(found[2].lower(), found[3])):
         return "<"
@@ -207,7 +208,7 @@ def _is_quiet(style: str) -> bool:
     )
 
 
-def _linked(text: str, place: int) -> str:
+def _screen_link(text: str, place: int) -> str:
     """Return a bracket, apart from a link's target at ``place`` if that is not on the list."""
     target = text[place + 1 : place + 1 + LONGEST_LINK].lstrip(" \t\r\n")
     if target.startswith("<"):
@@ -226,17 +227,17 @@ MAX_PLAIN = 100_000
 _LINE = re.compile(r"[^\n]{200}(?=[^\n])")
 
 
-def shortened(text: str) -> str:
+def shorten_text(text: str) -> str:
     """Return what is shown of a text that is not formatted."""
     return outputs.shortened_text(text[:MAX_PLAIN], max(len(text) - MAX_PLAIN, 0))
 
 
-def fenced(text: str) -> str:
+def fence_text(text: str) -> str:
     """Return a text as one block of code: what takes too long to format reads the same in it.
 
     Its lines are short, because nbconvert looks for links in code, too, and slowly in long lines.
     """
-    text = _LINE.sub(r"\g<0>\n", shortened(text))
+    text = _LINE.sub(r"\g<0>\n", shorten_text(text))
     longest = max(map(len, re.findall(r"`{3,}", text)), default=2)
     fence = "`" * (longest + 1)
     return f"{fence}\n{_TAG_BEGINS.sub(f'<{_JOINER}', text)}\n{fence}"
@@ -253,25 +254,25 @@ def screen_texts(notebook: NotebookNode, released: NotebookNode, page: Page) -> 
     taken = [part for cell in notebook.cells if (part := submission.grade_id(cell))]
     for cell in notebook.cells:
         if "attachments" in cell:
-            cell.attachments = _attached(cell.attachments)
+            cell.attachments = _screen_attachments(cell.attachments)
         if submission.is_locked(cell) or cell.source in given:
             continue
         if cell.cell_type == "raw":
             cell.source = _TAG_BEGINS.sub(f"<{_JOINER}", cell.source)
         elif cell.cell_type == "markdown":
-            cell.source = _fit(cell.source, taken, page, cell.get("attachments", {}))
-        elif cell.cell_type == "code" and page.code(cell.source) is None:
+            cell.source = _fit_markdown(cell.source, taken, page, cell.get("attachments", {}))
+        elif cell.cell_type == "code" and page.highlight_code(cell.source) is None:
             cell.metadata["magics_language"] = "text"  # what nbconvert has for "not coloured"
 
 
-def _fit(
+def _fit_markdown(
     text: str, taken: Collection[str], page: Page, attachments: Mapping[str, Any] | None = None
 ) -> str:
-    shown = page.answer(text, taken, attachments or {})
-    return fenced(text) if shown is None else shown
+    shown = page.format_answer(text, taken, attachments or {})
+    return fence_text(text) if shown is None else shown
 
 
-def answer(
+def screen_answer(
     text: str, taken: Collection[str], looks: Callable[[str], tuple[bool, Collection[str]]]
 ) -> str:
     """Return Markdown that a page can show in place of an answer.
@@ -282,21 +283,21 @@ def answer(
         looks: returns whether all elements of a Markdown text pair up, and their ids.
     """
     for tags in (True, False):
-        shown = disarmed(text, tags=tags)
+        shown = disarm_markdown(text, tags=tags)
         pairs_up, ids = looks(shown)
-        if pairs_up and not any(_clashes(name, taken) for name in ids):
+        if pairs_up and not any(_is_reserved(name, taken) for name in ids):
             return shown
-    return fenced(text)
+    return fence_text(text)
 
 
-def _clashes(name: str, taken: Collection[str]) -> bool:
+def _is_reserved(name: str, taken: Collection[str]) -> bool:
     """Whether the formgrader's page, or its script, looks for one of its own parts by a name."""
     return name in ("notebook", "notebook-container", "statusmessage", "site") or any(
         name in (part, f"{part}_extra_credit", f"{part}-comment") for part in taken
     )
 
 
-def _attached(attachments: Any) -> dict[str, dict[str, str]]:
+def _screen_attachments(attachments: Any) -> dict[str, dict[str, str]]:
     return {
         str(name): {
             kind: data for kind, data in found.items()
@@ -310,22 +311,22 @@ def _is_base64(data: Any) -> bool:
     return isinstance(data, str) and _BASE64.fullmatch(data) is not None
 
 
-def quiet(text: str) -> str:
+def limit_escapes(text: str) -> str:
     """Return a text of an output whose escape sequences are few enough to be shown in colour."""
     return (
         text if text.count("\x1b") <= MAX_ESCAPES else text.replace("\x1b", "\N{SYMBOL FOR ESCAPE}")
     )
 
 
-def screened(output: Mapping[str, Any], page: Page) -> dict[str, Any]:
+def screen_output(output: Mapping[str, Any], page: Page) -> dict[str, Any]:
     """Return an output of a cell with what of it may be shown; ``page`` is that it stands on."""
     kept = dict(output)
     if "text" in kept:
-        kept["text"] = quiet(str(kept["text"]))
+        kept["text"] = limit_escapes(str(kept["text"]))
     if "traceback" in kept:
-        kept["traceback"] = [quiet(str(line)) for line in kept["traceback"]]
+        kept["traceback"] = [limit_escapes(str(line)) for line in kept["traceback"]]
     if "data" in kept:
-        kept["data"] = _shown(kept["data"], page)
+        kept["data"] = _screen_data(kept["data"], page)
         about = kept.get("metadata") or {}
         sizes = {
             kind: {name: value for name, value in said.items() if name in ("width", "height")}
@@ -335,7 +336,7 @@ def screened(output: Mapping[str, Any], page: Page) -> dict[str, Any]:
     return kept
 
 
-def _shown(data: Mapping[str, Any], page: Page) -> dict[str, Any]:
+def _screen_data(data: Mapping[str, Any], page: Page) -> dict[str, Any]:
     kept: dict[str, Any] = {}
     for kind, value in data.items():
         if not isinstance(value, str):
@@ -343,15 +344,15 @@ def _shown(data: Mapping[str, Any], page: Page) -> dict[str, Any]:
         if kind in PICTURES and _is_base64(value):
             kept[kind] = value
         elif kind == "text/plain":
-            kept[kind] = quiet(value)
-        elif kind == "text/html" and (cleaned := page.html(value)) is not None:
+            kept[kind] = limit_escapes(value)
+        elif kind == "text/html" and (cleaned := page.clean_html(value)) is not None:
             kept[kind] = cleaned
         elif kind == "text/markdown":
-            kept[kind] = _fit(value, (), page)
+            kept[kind] = _fit_markdown(value, (), page)
         elif kind == "text/latex":
             kept[kind] = _TAG_BEGINS.sub("< ", value)  # which says the same in a formula
         elif kind == "text/vnd.mermaid" and len(value) <= MAX_DIAGRAM:
-            kept[kind] = disarmed(_MERMAID_ACTION.sub("", value))
+            kept[kind] = disarm_markdown(_MERMAID_ACTION.sub("", value))
     drawing = data.get("image/svg+xml")
     if isinstance(drawing, str) and "text/html" not in kept:
         kept["text/html"] = _as_picture(drawing)
@@ -363,7 +364,7 @@ def _shown(data: Mapping[str, Any], page: Page) -> dict[str, Any]:
 _ACTIVE = re.compile(r"html|[/+]xml$|/xsl$|rfc822")
 _SVG_SPACE = "http://www.w3.org/2000/svg"
 _PAGE_SPACE = "http://www.w3.org/1999/xhtml"
-_SVG_TAGS = _names(
+_SVG_TAGS = _split_names(
     "svg g path rect circle ellipse line polyline polygon text tspan textPath defs clipPath mask "
     "pattern linearGradient radialGradient stop marker symbol use image title desc metadata style "
     "filter feGaussianBlur feOffset feBlend feFlood feComposite feMerge feMergeNode"
@@ -400,10 +401,10 @@ class _Drawing:
 
     def __init__(self) -> None:
         self._parser = xml.parsers.expat.ParserCreate(namespace_separator=" ")
-        self._parser.StartElementHandler = self._begin
-        self._parser.EndElementHandler = self._end
-        self._parser.CharacterDataHandler = self._text
-        self._parser.StartDoctypeDeclHandler = self._doctype
+        self._parser.StartElementHandler = self._begin_element
+        self._parser.EndElementHandler = self._end_element
+        self._parser.CharacterDataHandler = self._add_text
+        self._parser.StartDoctypeDeclHandler = self._check_doctype
         self._parser.ProcessingInstructionHandler = self._refuse
         self._in_style = False
         self._style = ""
@@ -412,7 +413,7 @@ class _Drawing:
         self._parser.Parse(svg, True)
         self._require_quiet(self._style)
 
-    def _begin(self, tag: str, attributes: dict[str, str]) -> None:
+    def _begin_element(self, tag: str, attributes: dict[str, str]) -> None:
         space, _, name = tag.rpartition(" ")
         if space == _PAGE_SPACE or (space == _SVG_SPACE and name not in _SVG_TAGS):
             self._refuse()
@@ -427,17 +428,17 @@ class _Drawing:
             if not its_space and not is_target:
                 self._require_quiet(value)
 
-    def _end(self, tag: str) -> None:
+    def _end_element(self, tag: str) -> None:
         self._in_style = self._in_style and tag.rpartition(" ")[2] != "style"
 
-    def _text(self, text: str) -> None:
+    def _add_text(self, text: str) -> None:
         self._style += text if self._in_style else ""
 
     def _require_quiet(self, style: str) -> None:
         if _STYLE_LOADS.search(_STYLE_HOLDS.sub("", style)):
             self._refuse()
 
-    def _doctype(self, _name: str, _system: Any, _public: Any, has_subset: bool) -> None:
+    def _check_doctype(self, _name: str, _system: Any, _public: Any, has_subset: bool) -> None:
         if has_subset:
             self._refuse()
 

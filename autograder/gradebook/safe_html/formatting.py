@@ -29,9 +29,9 @@ _NO_ALT = re.compile(r"<img(?![^<>]*\salt=)", re.IGNORECASE)
 _ALT = '<img alt="No description has been provided for this image"'
 
 
-def serve() -> None:
+def serve_requests() -> None:
     """Format what comes on standard input, until it ends."""
-    while (request := _read()) is not None:
+    while (request := _read_request()) is not None:
         begun = time.process_time()
         # The signal that comes then ends this process: no parser can put it off.
         signal.setitimer(signal.ITIMER_PROF, request["seconds"])
@@ -42,40 +42,41 @@ def serve() -> None:
         except Exception as error:  # noqa: BLE001 - a stranger's text: parsers fail in many ways
             reply = {"over": True, "why": type(error).__name__}
         signal.setitimer(signal.ITIMER_PROF, 0)
-        _write({**reply, "spent": time.process_time() - begun})
+        _write_reply({**reply, "spent": time.process_time() - begun})
 
 
-def _markdown(request: dict[str, Any]) -> dict[str, Any]:
-    made = strip_files_prefix(_made(request["text"], request["attachments"]))  # type: ignore[no-untyped-call]
+def _format_markdown(request: dict[str, Any]) -> dict[str, Any]:
+    made = strip_files_prefix(_render_markdown(request["text"], request["attachments"]))  # type: ignore[no-untyped-call]
     return {"made": _NO_ALT.sub(_ALT, allowed_html.cleaned_html(made, coloured=True))}
 
 
-def _answer(request: dict[str, Any]) -> dict[str, Any]:
+def _format_answer(request: dict[str, Any]) -> dict[str, Any]:
     def elements(text: str) -> tuple[bool, list[str]]:
-        made = _made(text, request["attachments"])
+        made = _render_markdown(text, request["attachments"])
         strip_files_prefix(made)  # type: ignore[no-untyped-call]  # the formgrader does, for long
         found = _Elements()
         found.feed(made)
         found.close()
         return found.pair_up and not found.open, found.ids
 
-    return {"made": allowed_html.answer(request["text"], request["taken"], elements)}
+    return {"made": allowed_html.screen_answer(request["text"], request["taken"], elements)}
 
 
-def _made(text: str, attachments: dict[str, Any]) -> str:
+def _render_markdown(text: str, attachments: dict[str, Any]) -> str:
     return MarkdownWithMath(IPythonRenderer(escape=False, attachments=attachments)).render(text)
 
 
-def _code(request: dict[str, Any]) -> dict[str, Any]:
+def _highlight_code(request: dict[str, Any]) -> dict[str, Any]:
     return {"made": Highlight2HTML(pygments_lexer=request["language"])(request["text"])}  # type: ignore[no-untyped-call]
 
 
-def _html(request: dict[str, Any]) -> dict[str, Any]:
+def _clean_html(request: dict[str, Any]) -> dict[str, Any]:
     return {"made": _NO_ALT.sub(_ALT, allowed_html.cleaned_html(request["text"]))}
 
 
 _WAYS: dict[str, Callable[[dict[str, Any]], dict[str, Any]]] = {
-    "markdown": _markdown, "answer": _answer, "code": _code, "html": _html,
+    "markdown": _format_markdown, "answer": _format_answer,
+    "code": _highlight_code, "html": _clean_html,
 }  # fmt: skip
 
 
@@ -103,15 +104,15 @@ class _Elements(HTMLParser):
             self.pair_up = False
 
 
-def _read() -> dict[str, Any] | None:
-    length = _bytes(LENGTH.size)
+def _read_request() -> dict[str, Any] | None:
+    length = _read_bytes(LENGTH.size)
     if len(length) < LENGTH.size:
         return None
-    request: dict[str, Any] = json.loads(_bytes(LENGTH.unpack(length)[0]))
+    request: dict[str, Any] = json.loads(_read_bytes(LENGTH.unpack(length)[0]))
     return request
 
 
-def _bytes(count: int) -> bytes:
+def _read_bytes(count: int) -> bytes:
     parts = []
     while count and (part := os.read(0, min(count, 1 << 20))):
         parts.append(part)
@@ -119,7 +120,7 @@ def _bytes(count: int) -> bytes:
     return b"".join(parts)
 
 
-def _write(reply: dict[str, Any]) -> None:
+def _write_reply(reply: dict[str, Any]) -> None:
     data = json.dumps(reply).encode()
     if len(data) > MAX_REPLY:
         data = b'{"over": true}'
@@ -137,13 +138,13 @@ def main() -> None:
         child = os.fork()
         if not child:
             try:
-                serve()
+                serve_requests()
             finally:
                 os._exit(0)
         _, status = os.waitpid(child, 0)
         if os.WIFEXITED(status):
             sys.exit()
-        _write({"over": True})
+        _write_reply({"over": True})
 
 
 if __name__ == "__main__":

@@ -42,25 +42,25 @@ class Page:
         """Begin with all of the time."""
         self._left = PAGE_S
 
-    def markdown(self, text: str, attachments: Mapping[str, Any]) -> str | None:
+    def format_markdown(self, text: str, attachments: Mapping[str, Any]) -> str | None:
         """Return Markdown as HTML, with the pictures of its ``attachments``; None if over time."""
-        return self._ask("markdown", text, attachments=attachments)
+        return self._ask_formatter("markdown", text, attachments=attachments)
 
-    def answer(
+    def format_answer(
         self, text: str, taken: Collection[str], attachments: Mapping[str, Any]
     ) -> str | None:
         """Return Markdown that may stand for an answer (`screen.answer`); None if over time."""
-        return self._ask("answer", text, taken=list(taken), attachments=attachments)
+        return self._ask_formatter("answer", text, taken=list(taken), attachments=attachments)
 
-    def code(self, text: str, language: str = "ipython3") -> str | None:
+    def highlight_code(self, text: str, language: str = "ipython3") -> str | None:
         """Return code as coloured HTML; None if over time."""
-        return self._ask("code", text, language=language)
+        return self._ask_formatter("code", text, language=language)
 
-    def html(self, text: str) -> str | None:
+    def clean_html(self, text: str) -> str | None:
         """Return HTML of which nothing runs (`screen.cleaned_html`); None if over time."""
-        return self._ask("html", text)
+        return self._ask_formatter("html", text)
 
-    def _ask(self, what: str, text: str, **more: Any) -> str | None:
+    def _ask_formatter(self, what: str, text: str, **more: Any) -> str | None:
         seconds = min(TEXT_S, self._left)
         if len(text) > MAX_TEXTS[what] or seconds <= 0:
             return None
@@ -98,20 +98,22 @@ class _Formatter:
         with self._lock:
             process = self.start()
             try:
-                return self._reply(process, data)
+                return self._send_request(process, data)
             except (OSError, ValueError, KeyError):
                 self.end()
                 return None, TEXT_S
 
-    def _reply(self, process: subprocess.Popen[bytes], data: bytes) -> tuple[str | None, float]:
+    def _send_request(
+        self, process: subprocess.Popen[bytes], data: bytes
+    ) -> tuple[str | None, float]:
         assert process.stdin is not None
         process.stdin.write(LENGTH.pack(len(data)) + data)
         process.stdin.flush()
         deadline = time.monotonic() + PATIENCE_S
-        (length,) = LENGTH.unpack(_read(process, LENGTH.size, deadline))
+        (length,) = LENGTH.unpack(_read_bytes(process, LENGTH.size, deadline))
         if length > MAX_REPLY:
             raise ValueError("too long")
-        reply = json.loads(_read(process, length, deadline))
+        reply = json.loads(_read_bytes(process, length, deadline))
         return reply.get("made"), float(reply.get("spent", TEXT_S))
 
     def end(self) -> None:
@@ -128,7 +130,7 @@ class _Formatter:
         process.wait()
 
 
-def _read(process: subprocess.Popen[bytes], count: int, deadline: float) -> bytes:
+def _read_bytes(process: subprocess.Popen[bytes], count: int, deadline: float) -> bytes:
     """Return so many bytes of what a process writes.
 
     Raises:

@@ -42,10 +42,10 @@ def with_pictures(page: str, folder: Path) -> str:
         nonlocal room
         written = html.unescape(match[2] if match[2] is not None else match[3])
         if written not in known:
-            content = _picture(written, folder, room)
+            content = _read_picture(written, folder, room)
             if content is None:
                 return match[0]
-            kind = TYPES[Path(_path(written)).suffix.lower()]
+            kind = TYPES[Path(_linked_path(written)).suffix.lower()]
             known[written] = f"data:{kind};base64,{base64.b64encode(content).decode()}"
             room -= len(content)
         return f'{match[1]}"{known[written]}"'
@@ -53,7 +53,7 @@ def with_pictures(page: str, folder: Path) -> str:
     return _IMAGE.sub(source, page)
 
 
-def _path(written: str) -> str:
+def _linked_path(written: str) -> str:
     """Return the path in a link to a file beside the page; empty if it leads elsewhere."""
     try:
         link = urlsplit(written)
@@ -62,8 +62,8 @@ def _path(written: str) -> str:
     return "" if link.scheme or link.netloc else unquote(link.path)
 
 
-def _picture(written: str, folder: Path, room: int) -> bytes | None:
-    name = _path(written)
+def _read_picture(written: str, folder: Path, room: int) -> bytes | None:
+    name = _linked_path(written)
     if Path(name).suffix.lower() not in TYPES:
         return None
     try:

@@ -51,7 +51,7 @@ class Here:
         """Return the answer to a request."""
         if what in ("lose", "deliver"):
             raise CannotLoseError("others use the network, too")
-        return requests.answer(self._scene, what, given)
+        return requests.answer_request(self._scene, what, given)
 
 
 class Afar:
@@ -90,6 +90,6 @@ class AskedDelay:
         """Return what stands for this moment."""
         return time.monotonic()
 
-    def since(self, mark: float) -> float:
+    def delay_since(self, mark: float) -> float:
         """Return for how many s it was kept since then."""
         return float(self._outside.ask("kept", since=mark))

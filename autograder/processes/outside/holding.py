@@ -69,17 +69,18 @@ class Held:
     threads: int
     of_dds: frozenset[int]
 
-    def jams(self) -> bool:
+    def is_jammed(self) -> bool:
         """Return whether DDS cannot receive just now, as one of its threads waits for a lock.
 
         Who has the lock is held, so that it waits until the end: what the queues keep then tells
-        nothing of them. `held` looks for a moment when that is not so, and may not find one.
+        nothing of them. `hold_threads` looks for a moment when that is not so, and may not find
+        one.
         """
         return any(map(_waits_for_a_lock, self.of_dds))
 
 
 @contextmanager
-def held(processes: Processes) -> Iterator[Held]:
+def hold_threads(processes: Processes) -> Iterator[Held]:
     """Hold all threads but those of DDS for the length of the block.
 
     Args:
@@ -129,14 +130,14 @@ class _Hold:
             return
         self._outcome.put(Held(len(self._stopped), frozenset(self._of_dds)))
         while not self.over.wait(REAP_S):
-            self._reap()
+            self._note_stops()
         self._let_go()
 
     def _hold_in_a_calm_moment(self) -> None:
         calm = Deadline(CALM_S)
         while True:
             self._hold_all()
-            if not calm.left or not any(map(_is_at_work, self._stopped)):
+            if not calm.seconds_left or not any(map(_is_at_work, self._stopped)):
                 return
             self._let_go()
             self.over.wait(LOOK_S)
@@ -147,12 +148,12 @@ class _Hold:
         code = cache(partial(code_of, libraries=DDS_LIBRARIES))
         while new := self._new_threads():
             for tid in new:
-                self._seize(tid)
+                self._seize_thread(tid)
             self._await_stops(deadline)
             for tid in new.keys() & self._stopped.keys():
                 if _is_of_dds(tid, partial(code, f"/proc/{new[tid]}")):
                     self._of_dds.add(tid)
-                    self._detach(tid)
+                    self._detach_thread(tid)
 
     def _new_threads(self) -> dict[int, int]:
         """Return {thread: process} of the threads that are not held or known yet, and not ended."""
@@ -165,7 +166,7 @@ class _Hold:
                         found[tid] = pid
         return found
 
-    def _seize(self, tid: int) -> None:
+    def _seize_thread(self, tid: int) -> None:
         try:
             _ptrace(_SEIZE, tid)
             _ptrace(_INTERRUPT, tid)
@@ -174,24 +175,24 @@ class _Hold:
         except PermissionError:
             if _has_ended(tid):
                 return
-            raise HoldError(_refusal()) from None
+            raise HoldError(_explain_refusal()) from None
         self._seized.add(tid)
 
     def _await_stops(self, deadline: Deadline) -> None:
         """Wait until each seized thread stands still, or for what the kernel does not interrupt."""
         while True:
-            self._reap()
+            self._note_stops()
             moving = self._seized - self._stopped.keys()
-            if all(_state(tid) == _BLOCKED for tid in moving):
+            if all(_thread_state(tid) == _BLOCKED for tid in moving):
                 return
-            if not deadline.left:
+            if not deadline.seconds_left:
                 raise HoldError(
                     f"The threads of the submission could not be held: {len(moving)} of them did "
                     f"not stop within {HOLD_TIMEOUT_S:.0f} s."
                 )
             self.over.wait(LOOK_S)
 
-    def _reap(self) -> None:
+    def _note_stops(self) -> None:
         """Note which have stopped or ended; who was killed goes only when that has been noted."""
         while True:
             try:
@@ -213,14 +214,14 @@ class _Hold:
     def _let_go(self) -> None:
         """Let all threads go on; one that has not stopped yet is let go as soon as it stops."""
         deadline = Deadline(HOLD_TIMEOUT_S)
-        while self._seized and deadline.left:
+        while self._seized and deadline.seconds_left:
             for tid in list(self._stopped):
-                self._detach(tid)
-            self._reap()
+                self._detach_thread(tid)
+            self._note_stops()
             if self._seized - self._stopped.keys():
                 threading.Event().wait(LOOK_S)
 
-    def _detach(self, tid: int) -> None:
+    def _detach_thread(self, tid: int) -> None:
         owed = self._stopped.pop(tid)
         with suppress(ProcessLookupError):  # it was killed
             _ptrace(_DETACH, tid, owed)
@@ -234,7 +235,7 @@ def _is_of_dds(tid: int, code: Callable[[], Sequence[range]]) -> bool:
     """
     with suppress(OSError, ValueError):
         if Path(f"/proc/{tid}/comm").read_bytes().startswith(DDS_THREADS):
-            registers = _registers(tid)
+            registers = _read_registers(tid)
             with Path(f"/proc/{tid}/mem").open("rb", buffering=0) as memory:
                 found = os.pread(memory.fileno(), _DESCRIPTOR_BYTES, registers[_DESCRIPTOR])
             return points_into(found, code())
@@ -254,7 +255,7 @@ def code_of(process: str, libraries: tuple[str, ...]) -> list[range]:
         OSError: it has ended.
     """
     names = "|".join(map(re.escape, libraries))
-    path = rf"{re.escape(str(_installed()))}/(?:[^\n]*/)?(?:{names})[^/\n]*"
+    path = rf"{re.escape(str(_ros_prefix()))}/(?:[^\n]*/)?(?:{names})[^/\n]*"
     executable = rf"^([0-9a-f]+)-([0-9a-f]+) ..x\S+ \S+ \S+ \S+ +{path}$"
     mappings = Path(process, "maps").read_bytes()  # as text, other line ends would count as well
     found = re.findall(os.fsencode(executable), mappings, re.MULTILINE)
@@ -262,7 +263,7 @@ def code_of(process: str, libraries: tuple[str, ...]) -> list[range]:
 
 
 @cache
-def _installed() -> Path:
+def _ros_prefix() -> Path:
     """Return where ROS 2 is installed: rclpy is in ``lib/python3.x/site-packages`` there."""
     rclpy = find_spec("rclpy")
     assert rclpy is not None
@@ -276,7 +277,7 @@ def points_into(words: bytes, code: Sequence[range]) -> bool:
     return any(place in part for part in code for place in places)
 
 
-def _state(tid: int) -> bytes:
+def _thread_state(tid: int) -> bytes:
     with suppress(OSError):
         # The name of a thread may hold anything.
         return Path(f"/proc/{tid}/stat").read_bytes().rpartition(b") ")[2][:1]
@@ -284,7 +285,7 @@ def _state(tid: int) -> bytes:
 
 
 def _has_ended(tid: int) -> bool:
-    return _state(tid) in _ENDED
+    return _thread_state(tid) in _ENDED
 
 
 def _is_at_work(tid: int) -> bool:
@@ -294,13 +295,13 @@ def _is_at_work(tid: int) -> bool:
     for a lock may have another, and stands where the owner of it may let go at any moment.
     """
     with suppress(ProcessLookupError):
-        registers = _registers(tid)
+        registers = _read_registers(tid)
         waited = registers[_RESULT] in _TAKEN_OUT and registers[_CALL] < 2**63
         return not waited or _waits_for_a_lock(tid)
     return False
 
 
-def _registers(tid: int) -> Sequence[int]:
+def _read_registers(tid: int) -> Sequence[int]:
     registers = (ctypes.c_ulonglong * _REGISTERS)()
     _ptrace(_GET_REGISTERS, tid, ctypes.addressof(registers))
     return list(registers)
@@ -329,7 +330,7 @@ def _ptrace(request: int, tid: int, data: int = 0) -> None:
         raise OSError(number, f"ptrace: {os.strerror(number)}")
 
 
-def _refusal() -> str:
+def _explain_refusal() -> str:
     """Return one sentence about why threads cannot be held."""
     yama = Path("/proc/sys/kernel/yama/ptrace_scope")
     scope = ""

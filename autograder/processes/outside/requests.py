@@ -15,8 +15,8 @@ from typing import Any
 
 from autograder.processes.fair_deadline import SeenDelay
 from autograder.processes.outside import usage
-from autograder.processes.outside.holding import Held, held
-from autograder.processes.outside.sleeping import Code, Sleeper, sleepers
+from autograder.processes.outside.holding import Held, hold_threads
+from autograder.processes.outside.sleeping import Code, Sleeper, find_sleepers
 from autograder.processes.outside.stillness import HANGS, Stillness
 from autograder.processes.process_folders import Processes, Sandboxed
 from course.util import executables
@@ -52,7 +52,7 @@ class Scene:
         self._delay = SeenDelay(subject, pid)
         self._moments, self._marks = [time.monotonic()], [self._delay.mark()]
 
-    def note(self) -> None:
+    def note_delay(self) -> None:
         """Note now and then for how long the subject was kept waiting by now."""
         if time.monotonic() >= self._moments[-1] + SAMPLE_S:
             if len(self._moments) >= MOST_SAMPLES:
@@ -63,10 +63,10 @@ class Scene:
     def kept_since(self, moment: float) -> float:
         """Return for how many s it was kept since a moment, or since the last note before it."""
         place = max(0, bisect_right(self._moments, moment) - 1)
-        return self._delay.since(self._marks[place])
+        return self._delay.delay_since(self._marks[place])
 
 
-def answer(scene: Scene, what: str, given: Given) -> Any:
+def answer_request(scene: Scene, what: str, given: Given) -> Any:
     """Return the answer to a request, as JSON knows it.
 
     Raises:
@@ -77,7 +77,7 @@ def answer(scene: Scene, what: str, given: Given) -> Any:
     known = REQUESTS.get(what) if isinstance(what, str) else None
     if known is None:
         raise RequestError("there is no such request")
-    scene.note()
+    scene.note_delay()
     return known(scene, given)
 
 
@@ -86,8 +86,8 @@ def _watch(scene: Scene, given: Given) -> None:
 
 
 def _rest(scene: Scene, given: Given) -> bool:
-    restless, timeout = (_seconds(given, name) for name in ("restless", "timeout"))
-    return scene.still.reached(restless, timeout)
+    restless, timeout = (_require_seconds(given, name) for name in ("restless", "timeout"))
+    return scene.still.wait_for_rest(restless, timeout)
 
 
 def _asleep(scene: Scene, given: Given) -> bool:
@@ -96,35 +96,37 @@ def _asleep(scene: Scene, given: Given) -> bool:
 
 def _threads(scene: Scene, given: Given) -> list[int]:
     # Its own alone: which of them a session has given up, say, has nothing to do with children.
-    return usage.thread_ids(scene.subject.of(scene.pid))
+    return usage.thread_ids(scene.subject.folder_of(scene.pid))
 
 
 def _naps(scene: Scene, given: Given) -> list[tuple[int, int]]:
-    return [*usage.naps(scene.subject, _numbers(given, "threads", MOST_NUMBERS)).items()]
+    return [
+        *usage.count_naps(scene.subject, _require_numbers(given, "threads", MOST_NUMBERS)).items()
+    ]
 
 
 def _sleepers(scene: Scene, given: Given) -> list[Sleeper]:
-    threads = _numbers(given, "threads", MOST_NUMBERS)
-    return sleepers(scene.subject.of(scene.pid), threads, scene.code)
+    threads = _require_numbers(given, "threads", MOST_NUMBERS)
+    return find_sleepers(scene.subject.folder_of(scene.pid), threads, scene.code)
 
 
 def _usage(scene: Scene, given: Given) -> usage.Usage:
-    return usage.usage(scene.subject)
+    return usage.measure_usage(scene.subject)
 
 
 def _positions(scene: Scene, given: Given) -> list[int]:
     name = given.get("file")
     if not isinstance(name, str) or len(name) > LONGEST_NAME or "/" in name:
         raise RequestError("a file needs a name")
-    return usage.positions(scene.subject, name)
+    return usage.file_positions(scene.subject, name)
 
 
 def _others(scene: Scene, given: Given) -> list[str]:
-    return usage.names(scene.subject, scene.pid)
+    return usage.process_names(scene.subject, scene.pid)
 
 
 def _kept(scene: Scene, given: Given) -> float:
-    return scene.kept_since(_number(given, "since"))
+    return scene.kept_since(_require_number(given, "since"))
 
 
 def _hold(scene: Scene, given: Given) -> int:
@@ -132,13 +134,13 @@ def _hold(scene: Scene, given: Given) -> int:
     if not isinstance(scene.subject, Sandboxed):
         raise RequestError("who is not in a sandbox cannot be held")
     scene.hold.close()
-    scene.held = scene.hold.enter_context(held(scene.subject.outside))
+    scene.held = scene.hold.enter_context(hold_threads(scene.subject.outer_pids))
     return scene.held.threads
 
 
 def _release(scene: Scene, given: Given) -> bool:
-    """Let them go on; return whether DDS could not receive meanwhile (`Held.jams`)."""
-    jams = scene.held is not None and scene.held.jams()
+    """Let them go on; return whether DDS could not receive meanwhile (`Held.is_jammed`)."""
+    jams = scene.held is not None and scene.held.is_jammed()
     scene.held = None
     scene.hold.close()
     return jams
@@ -146,10 +148,10 @@ def _release(scene: Scene, given: Given) -> bool:
 
 def _lose(scene: Scene, given: Given) -> None:
     """Drop all that is sent to some UDP ports of the submission's network."""
-    ports = _numbers(given, "ports", MOST_PORTS)
+    ports = _require_numbers(given, "ports", MOST_PORTS)
     if not ports or not all(0 < port < 2**16 for port in ports):
         raise RequestError("these are no ports")
-    _nft(
+    _run_nft(
         f"add table {TABLE}",
         f"add chain {TABLE} air {{ type filter hook input priority 0; policy accept; }}",
         f"add rule {TABLE} air udp dport {{ {', '.join(map(str, ports))} }} drop",
@@ -157,7 +159,7 @@ def _lose(scene: Scene, given: Given) -> None:
 
 
 def _deliver(scene: Scene, given: Given) -> None:
-    _nft(f"delete table {TABLE}")
+    _run_nft(f"delete table {TABLE}")
 
 
 REQUESTS: Mapping[str, Callable[[Scene, Given], Any]] = {
@@ -179,8 +181,8 @@ REQUESTS: Mapping[str, Callable[[Scene, Given], Any]] = {
 """What can be asked for."""
 
 
-def _nft(*commands: str) -> None:
-    tool = executables.find("nft")
+def _run_nft(*commands: str) -> None:
+    tool = executables.find_tool("nft")
     if tool is None:
         raise CannotLoseError("nftables is not installed")
     rules = "\n".join(commands).encode()
@@ -190,7 +192,7 @@ def _nft(*commands: str) -> None:
         raise CannotLoseError(f"nft: {said[0]}" if said else "")
 
 
-def _number(given: Given, name: str) -> float:
+def _require_number(given: Given, name: str) -> float:
     found = given.get(name)
     if isinstance(found, bool) or not isinstance(found, int | float):
         raise RequestError(f"{name} is no number")
@@ -200,14 +202,14 @@ def _number(given: Given, name: str) -> float:
         raise RequestError(f"{name} is too large") from None
 
 
-def _seconds(given: Given, name: str) -> float:
-    seconds = _number(given, name)
+def _require_seconds(given: Given, name: str) -> float:
+    seconds = _require_number(given, name)
     if not 0 <= seconds <= 10 * HANGS:
         raise RequestError(f"{name} is too long or too short")
     return seconds
 
 
-def _numbers(given: Given, name: str, most: int) -> list[int]:
+def _require_numbers(given: Given, name: str, most: int) -> list[int]:
     found = given.get(name)
     if not isinstance(found, list) or len(found) > most:
         raise RequestError(f"{name} is no list, or a long one")

@@ -46,7 +46,7 @@ class Sleeper(NamedTuple):
     """Nothing wakes it before, as what it waits for might: it does nothing but sleep."""
 
 
-def sleepers(process: str, threads: Iterable[int], code: Code) -> list[Sleeper]:
+def find_sleepers(process: str, threads: Iterable[int], code: Code) -> list[Sleeper]:
     """Return which of a process's ``threads`` sleep for a time.
 
     None are told if the kernel does not let us look (ptrace(2)).
@@ -62,10 +62,10 @@ def sleepers(process: str, threads: Iterable[int], code: Code) -> list[Sleeper]:
         try:
             for thread in threads:
                 with suppress(OSError, ValueError, IndexError, OverflowError, struct.error):
-                    call = _read(f"{process}/task/{thread}/syscall").split()
+                    call = _read_file(f"{process}/task/{thread}/syscall").split()
                     # "running" is no number
                     number, *given = int(call[0]), *(int(word, 16) for word in call[1:])
-                    if (left := _left(number, given, memory)) is not None:
+                    if (left := _sleep_left(number, given, memory)) is not None:
                         stack = os.pread(memory, _STACK, given[-2])
                         if not _waits_in_ros(process, stack, code):
                             to_the_end = number in (_NANOSLEEP, _CLOCK_NANOSLEEP)
@@ -75,7 +75,7 @@ def sleepers(process: str, threads: Iterable[int], code: Code) -> list[Sleeper]:
     return found
 
 
-def _read(path: str) -> bytes:
+def _read_file(path: str) -> bytes:
     file = os.open(path, os.O_RDONLY)
     try:
         return os.read(file, 4096)
@@ -83,7 +83,7 @@ def _read(path: str) -> bytes:
         os.close(file)
 
 
-def _left(number: int, given: Sequence[int], memory: int) -> float | None:
+def _sleep_left(number: int, given: Sequence[int], memory: int) -> float | None:
     """Return for how many s a system call will sleep; None if it does not do so for a time."""
     if number in _MILLISECONDS:
         milliseconds = given[_MILLISECONDS[number]] & 0xFFFFFFFF
@@ -92,10 +92,10 @@ def _left(number: int, given: Sequence[int], memory: int) -> float | None:
         seconds, rest = _time_at(memory, pointer)
         return seconds + rest / (1e6 if number == _SELECT else 1e9)
     if number == _CLOCK_NANOSLEEP:
-        return _until(memory, given[2], given[0], absolute=bool(given[1] & _ABSOLUTE))
+        return _seconds_until(memory, given[2], given[0], absolute=bool(given[1] & _ABSOLUTE))
     if number == _FUTEX and given[3] and given[1] & _COMMAND in (_WAIT, _WAIT_UNTIL):
         clock = time.CLOCK_REALTIME if given[1] & _OF_THE_DAY else time.CLOCK_MONOTONIC
-        return _until(memory, given[3], clock, absolute=given[1] & _COMMAND == _WAIT_UNTIL)
+        return _seconds_until(memory, given[3], clock, absolute=given[1] & _COMMAND == _WAIT_UNTIL)
     return None
 
 
@@ -106,7 +106,7 @@ def _waits_in_ros(process: str, stack: bytes, code: Code) -> bool:
     return points_into(stack, code[process])
 
 
-def _until(memory: int, pointer: int, clock: int, *, absolute: bool) -> float:
+def _seconds_until(memory: int, pointer: int, clock: int, *, absolute: bool) -> float:
     seconds, nanoseconds = _time_at(memory, pointer)
     now = time.clock_gettime(clock) if absolute else 0.0
     return seconds + nanoseconds / 1e9 - now

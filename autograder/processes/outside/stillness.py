@@ -56,12 +56,12 @@ class Stillness:
         self._watched = watched
         self._nap = threading.Event()  # never set
         self._open: dict[Task, _Thread] = {}
-        self._listed: dict[str, frozenset[Task]] = {}  # by process; see `_tasks`
+        self._listed: dict[str, frozenset[Task]] = {}  # by process; see `_list_tasks`
         self._suspect: Task | None = None  # who was awake last, and so may well be again
         self._restless: dict[Task, float] = {}  # s of computing in the last rests, none reached
         self._endless: set[Task] = set()  # who has done so for ENDLESS s
 
-    def reached(self, restless: float = RESTLESS, timeout: float = HANGS) -> bool:
+    def wait_for_rest(self, restless: float = RESTLESS, timeout: float = HANGS) -> bool:
         """Return once both processes are at rest, or prove to be restless; say which it was.
 
         Restless is who has computed, or slept and woken again, for ``restless`` s. A thread that
@@ -71,19 +71,19 @@ class Stillness:
         """
         deadline = time.monotonic() + timeout
         unrest = _Unrest()
-        asleep = {task: self._runs(task) for task in self._endless}
-        before, looked = self._look(), time.monotonic()
+        asleep = {task: self._runs_of(task) for task in self._endless}
+        before, looked = self._look_once(), time.monotonic()
         since = looked  # when a thread was last seen to have run
         while True:
-            now, moment = self._look(), time.monotonic()
+            now, moment = self._look_once(), time.monotonic()
             if now.awake is not None or now != before:
                 since = moment
-                unrest.add(now.awake, moment - looked)
+                unrest.add_look(now.awake, moment - looked)
             elif not self._endless or moment - since >= QUIET:
-                self._recall(asleep)
+                self._reset_restless(asleep)
                 return True
             if unrest.spent >= restless or moment >= deadline:
-                self._blame(unrest.worked, restless / 2)
+                self._note_restless(unrest.worked, restless / 2)
                 return False
             if now.awake is not None or self._endless:
                 self._nap.wait(_NAP)
@@ -94,55 +94,55 @@ class Stillness:
 
         An examiner that asks for this has yet to fall asleep over it: so a second look decides.
         """
-        if self._look().awake is None:
+        if self._look_once().awake is None:
             return True
         self._nap.wait(_NAP)
-        return self._look().awake is None
+        return self._look_once().awake is None
 
-    def _blame(self, worked: Mapping[Task, float], most: float) -> None:
+    def _note_restless(self, worked: Mapping[Task, float], most: float) -> None:
         """Note who has computed for the larger part of a rest that was not reached."""
         row = {t: s + self._restless.get(t, 0.0) for t, s in worked.items() if s >= most}
         self._endless |= {task for task, seconds in row.items() if seconds >= ENDLESS}
         self._restless, self._suspect = row, None
 
-    def _recall(self, asleep: Mapping[Task, bytes | None]) -> None:
+    def _reset_restless(self, asleep: Mapping[Task, bytes | None]) -> None:
         """Begin a new row of rests; let those count again that slept through this one."""
         self._restless = {}
-        self._endless -= {t for t, runs in asleep.items() if runs and runs == self._runs(t)}
+        self._endless -= {t for t, runs in asleep.items() if runs and runs == self._runs_of(t)}
 
-    def _look(self) -> Look:
-        if self._suspect in self._open and self._runs(self._suspect) is None:
+    def _look_once(self) -> Look:
+        if self._suspect in self._open and self._runs_of(self._suspect) is None:
             return Look({}, self._suspect)
         self._suspect = None
         mine = f"/proc/{os.getpid()}", threading.get_native_id()
-        folders = {folder for watched in self._watched for folder in watched.folders()}
+        folders = {folder for watched in self._watched for folder in watched.list_folders()}
         for gone in self._listed.keys() - folders:
             del self._listed[gone]
-        tasks = frozenset().union(*map(self._tasks, folders)) - {mine}
+        tasks = frozenset().union(*map(self._list_tasks, folders)) - {mine}
         for ended in self._open.keys() - tasks:
             del self._open[ended]
         self._endless &= tasks
         found: dict[Task, bytes] = {}
         for task in tasks - self._endless:
-            runs = self._runs(task)
+            runs = self._runs_of(task)
             if runs is None:
                 self._suspect = task
                 return Look({}, task)
             found[task] = runs
         return Look(found)
 
-    def _runs(self, task: Task) -> bytes | None:
+    def _runs_of(self, task: Task) -> bytes | None:
         """Return what a thread's runs change, or None if it is not asleep."""
         try:
             if task not in self._open:
                 self._open[task] = _Thread(task)
-            return self._open[task].runs()
+            return self._open[task].read_runs()
         except OSError:  # it has just ended; another may get its number
             self._open.pop(task, None)
             self._listed.pop(task[0], None)
             return None
 
-    def _tasks(self, process: str) -> frozenset[Task]:
+    def _list_tasks(self, process: str) -> frozenset[Task]:
         """Return a process's threads, which are listed anew only if there must be others.
 
         If as many as were listed are there, and each of these is then found to be there, they are
@@ -169,11 +169,11 @@ class _Unrest:
         self.worked: dict[Task, float] = {}
         self._totals: dict[Task, float] = {}
 
-    def add(self, awake: Task | None, elapsed: float) -> None:
+    def add_look(self, awake: Task | None, elapsed: float) -> None:
         """Count what a thread has computed, or ``elapsed`` s if all slept, but one had run."""
         if awake is None:
             self.spent += min(elapsed, _CLIP)
-        elif (total := _worked(awake)) is None:
+        elif (total := _computed_seconds(awake)) is None:
             self._totals.pop(awake, None)
         else:
             more = max(0.0, total - self._totals.get(awake, total))
@@ -194,7 +194,7 @@ class _Thread:
         for file in getattr(self, "_files", ()):
             os.close(file)
 
-    def runs(self) -> bytes | None:
+    def read_runs(self) -> bytes | None:
         """Return what changes whenever it stops running, or None if it is not asleep."""
         stat, counts = self._files
         state = os.pread(stat, 1024, 0).rpartition(b") ")[2][:1]  # its name may hold anything
@@ -204,7 +204,7 @@ class _Thread:
         return found if _COUNTS == "schedstat" else found[found.index(b"voluntary_ctxt") :]
 
 
-def _counts() -> str:
+def _counting_file() -> str:
     """Return the file of proc(5) that counts a thread's runs.
 
     A tenth of the text of ``status``, schedstat tells to the nanosecond for how long it has run,
@@ -216,10 +216,10 @@ def _counts() -> str:
     return "status"
 
 
-_COUNTS = _counts()
+_COUNTS = _counting_file()
 
 
-def _worked(task: Task) -> float | None:
+def _computed_seconds(task: Task) -> float | None:
     """Return for how many s a thread has computed, by the wall's clock if the kernel keeps none.
 
     None: it has ended since it was looked at.

@@ -27,15 +27,15 @@ class Usage(NamedTuple):
     files: int
     memory: int
 
-    def grown(self, since: Usage) -> Usage:
+    def growth_since(self, since: Usage) -> Usage:
         """Return by how much it has grown since an earlier look."""
         return Usage(*(now - before for now, before in zip(self, since, strict=True)))
 
 
-def usage(processes: Processes) -> Usage:
+def measure_usage(processes: Processes) -> Usage:
     """Return what they hold now."""
     threads = files = pages = 0
-    for folder in processes.folders():
+    for folder in processes.list_folders():
         with suppress(OSError):
             threads += len(os.listdir(f"{folder}/task"))  # noqa: PTH208 - the names alone, of many
             files += len(os.listdir(f"{folder}/fd"))  # noqa: PTH208
@@ -55,12 +55,12 @@ def thread_ids(process: str) -> list[int]:
     return []
 
 
-def naps(processes: Processes, threads: Iterable[int]) -> dict[int, int]:
+def count_naps(processes: Processes, threads: Iterable[int]) -> dict[int, int]:
     """Return how often each of these threads, if it is there, has gone to sleep of itself.
 
     So which of them works: one that waits for ever goes to sleep just once.
     """
-    found, folders = {}, processes.folders()
+    found, folders = {}, processes.list_folders()
     for thread in threads:
         for folder in folders:
             with suppress(OSError, IndexError):
@@ -69,13 +69,13 @@ def naps(processes: Processes, threads: Iterable[int]) -> dict[int, int]:
     return found
 
 
-def positions(processes: Processes, name: str) -> list[int]:
+def file_positions(processes: Processes, name: str) -> list[int]:
     """Return the file positions of their descriptors of a file that has been unlinked.
 
     Only the last part of the path is compared: the rest depends on the mount namespace.
     """
     found = []
-    for folder in processes.folders():
+    for folder in processes.list_folders():
         descriptors: list[Path] = []
         with suppress(OSError):
             descriptors = list(Path(folder, "fd").iterdir())
@@ -87,12 +87,12 @@ def positions(processes: Processes, name: str) -> list[int]:
     return found
 
 
-def names(processes: Processes, but: int) -> list[str]:
+def process_names(processes: Processes, but: int) -> list[str]:
     """Return what they are called, all but one: a process gives itself whatever name it likes."""
     found = []
-    for folder in processes.folders():
+    for folder in processes.list_folders():
         with suppress(OSError):
-            if folder != processes.of(but):
+            if folder != processes.folder_of(but):
                 name = Path(folder, "comm").read_bytes().decode(errors="replace").rstrip("\n")
                 found.append(name if name.isprintable() else repr(name))
     return found[:MOST_NAMES]

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from autograder.processes.channel import Channel, ChannelClosed
-from autograder.processes.descriptors import readable
+from autograder.processes.descriptors import readable_descriptors
 from autograder.processes.outside import requests
 from autograder.processes.outside.holding import HoldError
 from autograder.processes.outside.requests import CannotLoseError, RequestError, Scene
@@ -27,23 +27,23 @@ MAX_REQUEST = 64 * 1024
 """Bytes of the longest request."""
 
 
-def serve(engine: int, examiner: Channel) -> None:
+def serve_requests(engine: int, examiner: Channel) -> None:
     """Answer requests until engine or examiner has gone."""
     scene: Scene | None = None
     while True:
-        ready = readable([engine, examiner], None)
+        ready = readable_descriptors([engine, examiner], None)
         if engine in ready:
             with open(engine, encoding="utf-8", closefd=False) as lines:
                 line = lines.readline()
             if not line:
                 return
-            scene = _scene(json.loads(line))
+            scene = _make_scene(json.loads(line))
         elif examiner.fileno() in ready:
             request = examiner.receive()
-            examiner.send(_reply(scene, request))
+            examiner.send(_answer_request(scene, request))
 
 
-def _scene(told: dict[str, Any]) -> Scene | None:
+def _make_scene(told: dict[str, Any]) -> Scene | None:
     try:
         subject, examiner = Sandboxed(told["subject"], told["ours"]), Sandboxed(told["examiner"])
         return Scene(subject, told["pid"], examiner)
@@ -51,12 +51,12 @@ def _scene(told: dict[str, Any]) -> Scene | None:
         return None  # one of them has ended
 
 
-def _reply(scene: Scene | None, request: dict[str, Any]) -> dict[str, Any]:
+def _answer_request(scene: Scene | None, request: dict[str, Any]) -> dict[str, Any]:
     what = request.pop("what", "")
     if scene is None:
         return {"error": "there is nobody to look at"}
     try:
-        return {"answer": requests.answer(scene, what, request)}
+        return {"answer": requests.answer_request(scene, what, request)}
     except RequestError as error:
         return {"error": str(error)}
     except CannotLoseError as error:
@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     options = parser.parse_args(arguments)
     try:
-        serve(0, Channel(socket.socket(fileno=options.examiner), MAX_REQUEST))
+        serve_requests(0, Channel(socket.socket(fileno=options.examiner), MAX_REQUEST))
     except ChannelClosed:
         return 0
     return 0

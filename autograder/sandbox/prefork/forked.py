@@ -11,7 +11,7 @@ import threading
 from contextlib import suppress
 from typing import IO, Any
 
-from autograder.processes.descriptors import readable
+from autograder.processes.descriptors import readable_descriptors
 from course.errors import CourseError
 
 FORK_TIMEOUT = 60.0
@@ -64,11 +64,11 @@ class ForkedProcess:
             subprocess.TimeoutExpired: it has not ended within ``timeout`` seconds.
         """
         if self.returncode is None:
-            if not readable([self._report], timeout):
+            if not readable_descriptors([self._report], timeout):
                 raise subprocess.TimeoutExpired(self._what, timeout or 0.0)
             text = self._report.recv(4096)
             # Without its keeper, which only the machine itself can have ended, nobody knows.
-            self._release(int(json.loads(text)["code"]) if text else -signal.SIGKILL)
+            self._release_handle(int(json.loads(text)["code"]) if text else -signal.SIGKILL)
         assert self.returncode is not None
         return self.returncode
 
@@ -79,7 +79,7 @@ class ForkedProcess:
                 with suppress(ProcessLookupError):
                     signal.pidfd_send_signal(self._handle, signal.SIGKILL)
 
-    def _release(self, code: int) -> None:
+    def _release_handle(self, code: int) -> None:
         with self._ending:
             self.returncode = code
             os.close(self._handle)

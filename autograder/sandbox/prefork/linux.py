@@ -36,19 +36,19 @@ class _CapabilityHeader(ctypes.Structure):
     _fields_ = (("version", ctypes.c_uint32), ("pid", ctypes.c_int))
 
 
-def join(descriptor: int, flags: int) -> None:
+def join_namespace(descriptor: int, flags: int) -> None:
     """Join the namespace, or those ``flags`` of a process (given by a pidfd), of ``descriptor``.
 
     A process namespace is joined by the children of this process, not by itself.
     """
-    _checked(_libc.setns(descriptor, flags), "setns")
+    _check_result(_libc.setns(descriptor, flags), "setns")
 
 
 def bound_capabilities() -> None:
     """Empty the bounding set: no program that is executed later brings a capability back."""
     for capability in range(64):
         try:
-            _prctl(_DROP_FROM_BOUNDING_SET, capability)
+            _call_prctl(_DROP_FROM_BOUNDING_SET, capability)
         except OSError as error:
             if error.errno != errno.EINVAL:
                 raise
@@ -57,28 +57,28 @@ def bound_capabilities() -> None:
 
 def drop_capabilities() -> None:
     """Give up every capability, for good."""
-    _prctl(_AMBIENT, _CLEAR_ALL_AMBIENT)
+    _call_prctl(_AMBIENT, _CLEAR_ALL_AMBIENT)
     header = _CapabilityHeader(_CAPABILITY_VERSION_3, 0)
-    _checked(_libc.capset(ctypes.byref(header), (ctypes.c_uint32 * 6)()), "capset")
-    _prctl(_NO_NEW_PRIVILEGES, 1)
+    _check_result(_libc.capset(ctypes.byref(header), (ctypes.c_uint32 * 6)()), "capset")
+    _call_prctl(_NO_NEW_PRIVILEGES, 1)
 
 
 def filter_calls(program: bytes) -> None:
     """Let a filter, an array of ``struct sock_filter``, decide about all further system calls."""
     given = _Program(len(program) // 8, program)
-    _checked(_libc.prctl(_SET_SECCOMP, _FILTER, ctypes.byref(given), 0, 0), "seccomp")
+    _check_result(_libc.prctl(_SET_SECCOMP, _FILTER, ctypes.byref(given), 0, 0), "seccomp")
 
 
 def allow_looking() -> None:
     """Let this process see its own /proc entries again: the kernel hides them from a new user."""
-    _prctl(_SET_DUMPABLE, 1)
+    _call_prctl(_SET_DUMPABLE, 1)
 
 
-def _prctl(option: int, value: int) -> None:
-    _checked(_libc.prctl(option, value, 0, 0, 0), "prctl")
+def _call_prctl(option: int, value: int) -> None:
+    _check_result(_libc.prctl(option, value, 0, 0, 0), "prctl")
 
 
-def _checked(result: int, call: str) -> None:
+def _check_result(result: int, call: str) -> None:
     if result == -1:
         number = ctypes.get_errno()
         raise OSError(number, f"{call}: {os.strerror(number)}")

@@ -46,7 +46,7 @@ def import_all(more: Iterable[str] = ()) -> None:
         import_module(name)
     for package, modules in INTERFACES.items():
         for module in modules:
-            _load(import_module(f"{package}.{module}"))
+            _load_type_support(import_module(f"{package}.{module}"))
 
 
 def note_files() -> None:
@@ -79,7 +79,7 @@ def scratch_folder(*variables: str) -> Iterator[None]:
             os.environ.update(before)
 
 
-def _load(interfaces: object) -> None:
+def _load_type_support(interfaces: object) -> None:
     """Load the type support of interfaces, which rclpy else does when one is first used."""
     for interface in vars(interfaces).values():
         if isinstance(interface, type):

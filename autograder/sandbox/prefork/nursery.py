@@ -56,9 +56,9 @@ class Zygote:
                 self._tasks.close()
                 raise ZygoteError(f"there is no {error.filename}") from error
             theirs.close()
-            self.pid = self._ready(said)
+            self.pid = self._wait_until_ready(said)
 
-    def _ready(self, said: IO[bytes]) -> int:
+    def _wait_until_ready(self, said: IO[bytes]) -> int:
         self._tasks.settimeout(START_TIMEOUT)
         try:
             text = self._tasks.recv(4096)
@@ -77,7 +77,7 @@ class Zygote:
         )
 
     @property
-    def alive(self) -> bool:
+    def is_alive(self) -> bool:
         """Whether it still runs."""
         return self._process.poll() is None
 
@@ -102,7 +102,7 @@ class Zygote:
         return forked
 
     @property
-    def started(self) -> int:
+    def started_pid(self) -> int:
         """The process that was started for it: what goes before it, if anything does."""
         return self._process.pid
 
@@ -129,7 +129,7 @@ class Nursery:
         self._starting: dict[str, threading.Lock] = {}  # one a module: they start side by side
         self._owner = os.getpid()
 
-    def zygote(
+    def get_zygote(
         self, module: str, environment: Mapping[str, str], before: Sequence[str] = ()
     ) -> Zygote:
         """Return the zygote of a module; another one if it has ended, or was started otherwise.
@@ -144,16 +144,16 @@ class Nursery:
         with starting:
             known = self._zygotes.get(module)
             wanted = (dict(environment), list(before))
-            if known is None or not known.alive or (known.environment, known.before) != wanted:
+            if known is None or not known.is_alive or (known.environment, known.before) != wanted:
                 if known is not None:
                     self._zygotes.pop(module).close()
                 known = self._zygotes[module] = Zygote(module, environment, before)
             return known
 
     @property
-    def started(self) -> set[int]:
+    def started_pids(self) -> set[int]:
         """The processes that were started for the zygotes."""
-        return {zygote.started for zygote in self._of_this_process()}
+        return {zygote.started_pid for zygote in self._of_this_process()}
 
     def kill_forked(self) -> None:
         """Kill all that was forked; the zygotes go on."""

@@ -54,7 +54,7 @@ class Task:
         """Read what `to_json` wrote."""
         return cls(**json.loads(text))
 
-    def join(self, handed: list[int]) -> tuple[list[int], int | None]:
+    def join_namespaces(self, handed: list[int]) -> tuple[list[int], int | None]:
         """Join the namespaces, by the first of the descriptors.
 
         Returns:
@@ -63,15 +63,15 @@ class Task:
         pidfd = None
         if self.process:
             pidfd, *handed = handed
-            linux.join(pidfd, _differing(pidfd))
+            linux.join_namespace(pidfd, _differing_namespaces(pidfd))
         for kind in self.namespaces:
             namespace, *handed = handed
             # The kernel lets nobody join the user namespace that it is in.
             if os.fstat(namespace).st_ino != Path(f"/proc/self/ns/{kind}").stat().st_ino:
-                linux.join(namespace, linux.NAMESPACES[kind])
+                linux.join_namespace(namespace, linux.NAMESPACES[kind])
         return handed, pidfd
 
-    def become(self, handed: list[int]) -> None:
+    def become_process(self, handed: list[int]) -> None:
         """Turn this process, a fork of a fork that has joined, into the one that is wanted.
 
         Nothing of the zygote's is left within its reach but the modules in its memory.
@@ -107,7 +107,7 @@ class Task:
         return int(import_module(self.module).main(self.arguments) or 0)
 
 
-def _differing(pidfd: int) -> int:
+def _differing_namespaces(pidfd: int) -> int:
     """Return the flags of those namespaces in which a process is not already where this one is."""
     info = Path(f"/proc/self/fdinfo/{pidfd}").read_text().splitlines()
     pid = next(int(line.split()[1]) for line in info if line.startswith("Pid:"))

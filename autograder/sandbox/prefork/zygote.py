@@ -30,7 +30,7 @@ LARGEST_TASK = 128 * 1024
 """Bytes of a task's JSON; an environment is the largest part of it."""
 
 
-def serve(tasks: socket.socket) -> Task | None:
+def serve_tasks(tasks: socket.socket) -> Task | None:
     """Fork what is asked for until nobody asks any more.
 
     Returns:
@@ -41,42 +41,42 @@ def serve(tasks: socket.socket) -> Task | None:
         if not text:
             return None
         report = socket.socket(fileno=handed.pop(0))
-        if _fork(report) == 0:
+        if _fork_or_report(report) == 0:
             tasks.close()
-            return _keep(Task.from_json(text), report, handed)
+            return _run_keeper(Task.from_json(text), report, handed)
         report.close()
         for descriptor in handed:
             os.close(descriptor)
 
 
-def _fork(report: socket.socket) -> int | None:
+def _fork_or_report(report: socket.socket) -> int | None:
     """Fork; if the machine refuses, report that and return None."""
     try:
         return os.fork()
     except OSError as error:
-        _say(report, {"error": f"fork: {error.strerror}"})
+        _send_report(report, {"error": f"fork: {error.strerror}"})
         return None
 
 
-def _keep(task: Task, report: socket.socket, handed: list[int]) -> Task:
+def _run_keeper(task: Task, report: socket.socket, handed: list[int]) -> Task:
     """Join, and fork the task's process; return in that process only."""
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     try:
-        handed, holder = task.join(handed)
+        handed, holder = task.join_namespaces(handed)
     except OSError as error:
-        _say(report, {"error": str(error)})
+        _send_report(report, {"error": str(error)})
         os._exit(1)
-    pid = _fork(report)
+    pid = _fork_or_report(report)
     if pid == 0:
         report.detach()  # closed with everything else that is not the task's
-        task.become(handed)
+        task.become_process(handed)
         return task
     if pid is not None:
-        _stay(report, pid, holder)
+        _wait_as_keeper(report, pid, holder)
     os._exit(1)
 
 
-def _stay(report: socket.socket, pid: int, holder: int | None) -> NoReturn:
+def _wait_as_keeper(report: socket.socket, pid: int, holder: int | None) -> NoReturn:
     """Report a process and how it ended; its number is its own until whoever asked is done.
 
     When whoever asked is gone, by ``kill -9`` too, nobody wants the process any more: it is killed.
@@ -97,19 +97,19 @@ def _stay(report: socket.socket, pid: int, holder: int | None) -> NoReturn:
     if holder is not None:
         with suppress(ProcessLookupError):
             signal.pidfd_send_signal(holder, signal.SIGKILL)
-    _say(report, {"code": code})
+    _send_report(report, {"code": code})
     with suppress(OSError):
         report.recv(1)
     os.waitpid(pid, 0)
     os._exit(0)
 
 
-def _say(report: socket.socket, message: dict[str, Any]) -> None:
+def _send_report(report: socket.socket, message: dict[str, Any]) -> None:
     with suppress(OSError):
         report.send(json.dumps(message).encode())
 
 
-def _reap(*_: object) -> None:
+def _reap_children(*_: object) -> None:
     with suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass
@@ -164,9 +164,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     gc.collect()
     gc.freeze()
     gc.enable()
-    signal.signal(signal.SIGCHLD, _reap)
+    signal.signal(signal.SIGCHLD, _reap_children)
     tasks.send(json.dumps({"ready": os.getpid()}).encode())
-    task = serve(tasks)
+    task = serve_tasks(tasks)
     return 0 if task is None else leaving.run(task)
 
 

@@ -66,7 +66,7 @@ class ErrorLog:
             traceback="".join(
                 traceback.format_exception(type(exception), exception, frames)
             ).rstrip(),
-            problem=_problem(job, exception),
+            problem=_describe_problem(job, exception),
         )
         last = traceback.extract_tb(frames)[-1:] if frames else []
         place = [(frame.filename, frame.lineno) for frame in last]
@@ -92,7 +92,7 @@ def callback_name(job: Job, frames: TracebackType | None = None) -> str:
     return str(name or "a callback").replace("<locals>.", "")
 
 
-def _problem(job: Job, exception: BaseException) -> str:
+def _describe_problem(job: Job, exception: BaseException) -> str:
     thrown_by_rclpy = _first_learner_frame(exception.__traceback__) is None
     if thrown_by_rclpy and isinstance(exception, TypeError) and isinstance(job.entity, Service):
         return "did not return its response, so the client gets no answer"

@@ -34,19 +34,19 @@ def look_at(native_id: int, before: Look | None = None) -> Look:
     """Look at a thread of this process, last seen as `before`; one that ended is not asleep."""
     task = f"/proc/self/task/{native_id}"
     try:
-        status = _read(f"{task}/status")
+        status = _read_file(f"{task}/status")
     except OSError:
         return Look(False, "", 0.0)
     asleep = status.partition("\nState:\t")[2][:1] == "S"
     switches = status[status.index("voluntary_ctxt") :]
     if before is not None and asleep and switches == before.switches:
         return Look(True, switches, before.worked)  # it has not run since
-    return Look(asleep, switches, _worked(task))
+    return Look(asleep, switches, _processor_seconds(task))
 
 
-def _worked(task: str) -> float:
+def _processor_seconds(task: str) -> float:
     try:
-        return int(_read(f"{task}/schedstat").split()[0]) / 1e9
+        return int(_read_file(f"{task}/schedstat").split()[0]) / 1e9
     except (
         OSError,
         ValueError,
@@ -58,13 +58,13 @@ def _worked(task: str) -> float:
 def _waits_without_end(native_id: int) -> bool:
     """Return whether a thread waits for a lock, and with no time-out (futex(2))."""
     try:
-        call = _read(f"/proc/self/task/{native_id}/syscall").split()
+        call = _read_file(f"/proc/self/task/{native_id}/syscall").split()
         return int(call[0]) == _FUTEX and int(call[4], 16) == 0
     except (OSError, ValueError, IndexError):  # it runs, or the kernel does not say
         return False
 
 
-def _read(path: str) -> str:
+def _read_file(path: str) -> str:
     """Return what a small file of the kernel's holds; looks are many, and `open` is slower."""
     file = os.open(path, os.O_RDONLY)
     try:
@@ -81,14 +81,14 @@ class Idleness:
         threads = (t for t in threading.enumerate() if t.ident == thread_id)
         self._native_id = next((t.native_id or 0 for t in threads), 0)
         self._first = self._last = look_at(self._native_id)
-        self._begin(self._first)
+        self._start_over(self._first)
 
-    def _begin(self, look: Look) -> None:
+    def _start_over(self, look: Look) -> None:
         self._found = False
         self._first, self._since = look, time.monotonic()
         self._asleep = self._awake = self._stirs = 0
 
-    def blocked(self) -> bool:
+    def is_blocked(self) -> bool:
         """Look once more, and return whether the thread is blocked.
 
         Between two calls the caller lets go of the interpreter's lock for a moment.
@@ -109,7 +109,7 @@ class Idleness:
         looks = self._asleep + self._awake
         works = look.worked - self._first.worked > WORK * max(looks, LOOKS)
         if works or self._awake > LOOKS + looks / 4:
-            self._begin(look)
+            self._start_over(look)
         elif self._asleep >= LOOKS and time.monotonic() - self._since >= PATIENCE:
             self._found = look.asleep
         return self._found
@@ -123,6 +123,6 @@ class Idleness:
             self._first = before
         self._stirs += 1
         if look.worked - self._first.worked > WORK * RESTLESS:
-            self._begin(look)  # it has gone on
+            self._start_over(look)  # it has gone on
             return False
         return look.asleep and self._stirs > RESTLESS

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.task import Task
 
 from course.runtime.callbacks.idleness import Idleness
-from course.runtime.logs.store import note
+from course.runtime.logs.store import add_line
 from course.runtime.names import node_name
 
 Report = Callable[["Job", BaseException], None]
@@ -91,12 +91,12 @@ class Job:
         finally:
             _current.job = outer
 
-    def say(self, level: str, text: str) -> None:
+    def log_line(self, level: str, text: str) -> None:
         """Log a line that the callback printed."""
-        note(level, node_name(self.node), text, self.home.session_key)
+        add_line(level, node_name(self.node), text, self.home.session_key)
 
 
-def watched(callback: Callable[..., Any]) -> Callable[..., Any]:
+def wrap_callback(callback: Callable[..., Any]) -> Callable[..., Any]:
     """Return `callback`, made to report what it raises before its caller can swallow it."""
 
     def failed(error: BaseException) -> None:

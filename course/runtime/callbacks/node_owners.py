@@ -29,7 +29,7 @@ class Families:
         )
 
     @contextlib.contextmanager
-    def arrival(self, node: Node) -> Iterator[None]:
+    def note_arrival(self, node: Node) -> Iterator[None]:
         """Note who brings `node`, and that it brings whatever is added within the block."""
         job = current_job()
         parent = _arriving.get() or (job.node if job is not None else None)
@@ -43,9 +43,11 @@ class Families:
 
     def brought_by(self, parent: Node, among: Iterable[Node]) -> list[Node]:
         """Return those of some nodes that `parent` brought, or one that it brought, and so on."""
-        return [node for node in among if node is not parent and parent in self._line(node)]
+        return [
+            node for node in among if node is not parent and parent in self._walk_ancestors(node)
+        ]
 
-    def _line(self, node: Node) -> Iterator[Node]:
+    def _walk_ancestors(self, node: Node) -> Iterator[Node]:
         """Go through who brought `node`, who brought that one, and so on."""
         seen = {node}
         while (found := self._parents.get(node)) is not None:

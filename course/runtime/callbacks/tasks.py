@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.task import Task
 from rclpy.waitable import Waitable
 
-from course.runtime.callbacks.jobs import current_job, watched
+from course.runtime.callbacks.jobs import current_job, wrap_callback
 
 Owner = tuple[Node | None, Any]
 """The node that a task is put to, and the callable to name when it fails."""
@@ -36,7 +36,7 @@ class CreatedTasks:
             self._owners[task] = owner
             return task
 
-    def owner(self, task: Task) -> Owner:
+    def owner_of(self, task: Task) -> Owner:
         """Return whose `task` is."""
         with self._lock:
             return self._owners.get(task, (None, None))
@@ -46,7 +46,7 @@ class CreatedTasks:
         with self._lock:
             self._owners.pop(task, None)
 
-    def all(self) -> list[Task]:
+    def unfinished_tasks(self) -> list[Task]:
         """Return the tasks that are not done."""
         with self._lock:
             return list(self._owners)
@@ -61,7 +61,7 @@ def find_owner(
         node = next((node for node in nodes if bound_to in node.waitables), None)
         shown = next((arg for arg in args if callable(arg)), callback)
         # rclpy swallows what an execute callback raises: hear of it before rclpy does.
-        return (node, shown), tuple(watched(arg) if arg is shown else arg for arg in args)
+        return (node, shown), tuple(wrap_callback(arg) if arg is shown else arg for arg in args)
     if isinstance(bound_to, Node):
         return (bound_to, callback), args
     job = current_job()

@@ -64,14 +64,14 @@ def state_of(node: LifecycleNodeMixin) -> str:
     return str(node._state_machine.current_state[1])
 
 
-def failed(node: Node) -> list[FailedTransition]:
+def failed_transitions(node: Node) -> list[FailedTransition]:
     """Return what went wrong since the last transition of `node` that succeeded."""
     return list(_failed.get(node, ()))
 
 
-def watch() -> None:
+def watch_transitions() -> None:
     """Note from now on what goes wrong in the transitions of all nodes. Idempotent."""
-    for name, made in ((_EXECUTE, _execute), (_CHANGE, _change)):
+    for name, made in ((_EXECUTE, _execute_callback), (_CHANGE, _change_state)):
         if getattr(LifecycleNodeMixin, name) is not made:
             setattr(LifecycleNodeMixin, name, made)
 
@@ -82,7 +82,7 @@ _CHANGE = "_LifecycleNodeMixin__change_state"
 _rclpys_change: Any = getattr(LifecycleNodeMixin, _CHANGE)
 
 
-def _execute(self: Any, current_state_id: int, previous_state: LifecycleState) -> Any:
+def _execute_callback(self: Any, current_state_id: int, previous_state: LifecycleState) -> Any:
     """Do what rclpy's own method does, and note what comes out."""
     callback = self._callbacks.get(current_state_id)
     if callback is None:
@@ -92,7 +92,7 @@ def _execute(self: Any, current_state_id: int, previous_state: LifecycleState) -
     try:
         returned = callback(previous_state)
     except Exception as error:  # noqa: BLE001 - as rclpy does
-        what = f"{where} raised {_raised(error)}. rclpy hides it and "
+        what = f"{where} raised {_describe_error(error)}. rclpy hides it and "
         what += (
             "finalizes the node."
             if current_state_id == State.TRANSITION_STATE_ERRORPROCESSING
@@ -100,23 +100,23 @@ def _execute(self: Any, current_state_id: int, previous_state: LifecycleState) -
         )
         frames = learner_frames(error.__traceback__)
         text = "".join(traceback.format_exception(type(error), error, frames)).rstrip()
-        _note(self, "raised", what, text)
+        _note_failure(self, "raised", what, text)
         return TransitionCallbackReturn.ERROR
     if returned == TransitionCallbackReturn.SUCCESS:
         if current_state_id != State.TRANSITION_STATE_ERRORPROCESSING:
             _failed.pop(self, None)
     elif isinstance(returned, TransitionCallbackReturn):
-        _note(self, "returned", f"{where} returned {returned.name}.")
+        _note_failure(self, "returned", f"{where} returned {returned.name}.")
     else:
         state = state_of(self)
-        _note(
+        _note_failure(
             self, "stuck", f"{where} returned {type(returned).__name__}, which is no "
             f"TransitionCallbackReturn: rclpy stops half-way, and the node stays {state}.",
         )  # fmt: skip
     return returned
 
 
-def _change(self: Any, transition_id: int) -> Any:
+def _change_state(self: Any, transition_id: int) -> Any:
     before = state_of(self)
     try:
         return _rclpys_change(self, transition_id)
@@ -124,7 +124,7 @@ def _change(self: Any, transition_id: int) -> Any:
         if state_of(self) == before:
             known = {item[0]: item[1] for item in self._state_machine.transition_graph}
             leads = sorted({item[1] for item in self._state_machine.available_transitions})
-            _note(
+            _note_failure(
                 self, "refused", f"{node_name(self)} was asked to "
                 f"{known.get(transition_id, f'make transition {transition_id}')} and cannot: it is "
                 f"{before}, from where it can {' or '.join(leads) or 'do nothing more'}.",
@@ -132,12 +132,12 @@ def _change(self: Any, transition_id: int) -> Any:
         raise
 
 
-def _note(node: Any, kind: Kind, what: str, text: str = "") -> None:
+def _note_failure(node: Any, kind: Kind, what: str, text: str = "") -> None:
     found = FailedTransition(node_name(node), kind, what, text, next(_numbers))
     _failed.setdefault(node, deque(maxlen=_KEPT)).append(found)
 
 
-def _raised(error: Exception) -> str:
+def _describe_error(error: Exception) -> str:
     """Return type, message and the learner's own line of an exception."""
     try:
         message = " ".join(str(error).split())[:_LONGEST]

@@ -53,19 +53,19 @@ _known: weakref.WeakSet[Closable] = weakref.WeakSet()
 _lock = threading.Lock()
 
 
-def register(session: Closable) -> None:
+def register_session(session: Closable) -> None:
     """Remember `session`, to close it at interpreter exit at the latest."""
     with _lock:
         _open[id(session)] = session
         _known.add(session)
 
 
-def known() -> list[Closable]:
+def known_sessions() -> list[Closable]:
     """Return the sessions of this process that are open, or closed and still referred to."""
     return list(_known)
 
 
-def close(session: Closable, report: CloseReport, timeout: float) -> CloseReport:
+def close_session(session: Closable, report: CloseReport, timeout: float) -> CloseReport:
     """Dismantle `session` within `timeout` seconds and fill in `report`."""
     start = time.monotonic()
     leaked = session.dismantle(start + timeout)
@@ -73,7 +73,7 @@ def close(session: Closable, report: CloseReport, timeout: float) -> CloseReport
         _open.pop(id(session), None)
     report.leaked[:] = leaked
     if not _open and not leaked:
-        streams.uninstall()
+        streams.uninstall_streams()
     report.duration = time.monotonic() - start
     return report
 
@@ -82,7 +82,7 @@ def _close_all() -> None:
     deadline = time.monotonic() + _EXIT_TIMEOUT
     for session in list(_open.values()):
         session.close(max(0.1, deadline - time.monotonic()))
-    rcutils_tap.uninstall()
+    rcutils_tap.uninstall_handler()
 
 
 def _forget_in_child() -> None:

@@ -47,7 +47,7 @@ def open_context(
     if isinstance(peers, str) or not all(isinstance(peer, str) for peer in peers):
         raise SessionError(f'peers is a list of addresses, such as ["192.168.1.7"], not {peers!r}.')
     ensure_log_dir()
-    port_files.clear()
+    port_files.remove_abandoned()
     arguments = ["--ros-args", "--disable-stdout-logs", "--disable-external-lib-logs"]
     # rclpy 7.1 leaves this service of a destroyed node on the graph, until the context ends.
     arguments += ["-p", "start_type_description_service:=false"]
@@ -55,7 +55,7 @@ def open_context(
         # The one way to reach a class that calls super().__init__("name") and nothing else.
         arguments += ["-p", "use_sim_time:=true"]
     context = SessionContext()
-    with _environment(_discovery_variables(discovery, peers)):
+    with _set_environment(_discovery_variables(discovery, peers)):
         ours = rclpy.context.g_logging_ref_count == 0  # then our arguments configure logging
         try:
             context.init(arguments, domain_id=domain_id)
@@ -64,7 +64,7 @@ def open_context(
             raise SessionError(
                 f"ROS 2 did not start ({reason}): run `course doctor` to see why."
             ) from error
-        rcutils_tap.install(hand_on=ours)
+        rcutils_tap.install_handler(hand_on=ours)
     return context
 
 
@@ -78,7 +78,7 @@ def _discovery_variables(discovery: Discovery, peers: Sequence[str]) -> dict[str
 
 
 @contextlib.contextmanager
-def _environment(variables: Mapping[str, str]) -> Iterator[None]:
+def _set_environment(variables: Mapping[str, str]) -> Iterator[None]:
     with _environment_lock:
         before = {name: os.environ.get(name) for name in variables}
         os.environ.update(variables)

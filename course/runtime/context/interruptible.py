@@ -64,13 +64,13 @@ class SessionContext(Context):
     def shutdown(self) -> None:
         """Shut the context down."""
         self._end_waking()
-        with self._at_rest(), rcutils_tap.staying():
+        with self._at_rest(), rcutils_tap.stay_installed():
             super().shutdown()
 
     def try_shutdown(self) -> None:
         """Shut the context down, if that has not been done."""
         self._end_waking()
-        with self._at_rest(), rcutils_tap.staying():
+        with self._at_rest(), rcutils_tap.stay_installed():
             super().try_shutdown()
 
     def join(self, timeout: float) -> None:
@@ -86,9 +86,9 @@ class SessionContext(Context):
         its context has ended under it.
         """
         with contextlib.ExitStack() as stack:
-            ours = [executor for executor in self._ours if not executor.ended]
+            ours = [executor for executor in self._ours if not executor.has_ended]
             for executor in ours:
-                stack.enter_context(executor.held())
+                stack.enter_context(executor.hold_still())
             deadline = time.monotonic() + _PATIENCE
             for executor in ours:
                 while executor.runs_elsewhere() and time.monotonic() < deadline:

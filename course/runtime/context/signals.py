@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 
 
 @contextlib.contextmanager
-def ending(wake: Callable[[], None]) -> Iterator[None]:
+def wake_on_signals(wake: Callable[[], None]) -> Iterator[None]:
     """Call `wake` on SIGINT and SIGTERM inside the block; the handlers before are put back.
 
     The main thread calls it between two steps of whatever it does: it must take no lock that this

@@ -35,14 +35,14 @@ from course.runtime.output import streams
 from course.runtime.rclpy_fixes import incompatible_qos_events
 from course.runtime.rclpy_fixes.clock_sleep import sleeps_by_clock
 from course.runtime.teardown import is_alive
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 
 
-def _never() -> bool:
+def _never_true() -> bool:
     return False
 
 
-def _nothing() -> None:
+def _do_nothing() -> None:
     """Wake nobody: the one thread has run the callback itself."""
 
 
@@ -83,7 +83,7 @@ class BackgroundExecutor(Executor):
         `report` hears of each callback that raised, `pulse` of each that ended.
         """
         super().__init__(context=context)
-        self._wait_list = WaitList(self, super().wake if threads > 1 else _nothing)
+        self._wait_list = WaitList(self, super().wake if threads > 1 else _do_nothing)
         self.threads = threads
         self.session_key = session_key
         self.report = report
@@ -101,8 +101,8 @@ class BackgroundExecutor(Executor):
         self._newest_end = object()  # another one each time that a callback is done
         self._interrupted = self.gate.new_interrupt()
         self._round = _fresh_false()
-        self._workers = Workers(threads, self._run, name) if threads > 1 else None
-        self._threads = Threads(self._loop, self._workers, name)
+        self._workers = Workers(threads, self._run_job, name) if threads > 1 else None
+        self._threads = Threads(self._spin_loop, self._workers, name)
 
     def start(self) -> None:
         """Start spinning in the background."""
@@ -124,29 +124,29 @@ class BackgroundExecutor(Executor):
         self._drop_what_never_began()
         return left
 
-    def owns(self, thread: threading.Thread) -> bool:
+    def has_thread(self, thread: threading.Thread) -> bool:
         """Return whether `thread` is one of this executor's own."""
-        return self._threads.own(thread)
+        return self._threads.has_thread(thread)
 
     @property
-    def ended(self) -> bool:
+    def has_ended(self) -> bool:
         """Whether it has stopped for good."""
         return self.gate.stopping
 
     @contextlib.contextmanager
-    def held(self) -> Iterator[None]:
+    def hold_still(self) -> Iterator[None]:
         """Keep the executor from waiting on its nodes: they can be removed or destroyed safely.
 
         Callbacks that already run are not waited for. May be called from a callback.
         """
-        with self.gate.held():
+        with self.gate.hold_closed():
             yield
 
     def run_ready(self) -> bool:
         """Run one round of what is ready, and return whether there was anything.
 
-        To be called while `held`. Without workers the callbacks run in the calling thread. rclpy
-        resumes a coroutine in every round, whatever it awaits: that alone is not anything.
+        To be called while `hold_still`. Without workers the callbacks run in the calling thread.
+        rclpy resumes a coroutine in every round, whatever it awaits: that alone is not anything.
         """
         if self._workers is None and self.running:
             return False  # the one thread has a callback to run, and the others wait for it
@@ -163,14 +163,14 @@ class BackgroundExecutor(Executor):
             if self._workers is not None and self._workers.job_of(ready[0]) is not None:
                 return busy  # no worker is free: nothing else can begin either
             busy = busy or ready[0] not in self._awaiting
-            self._execute(self._job(*ready))
+            self._execute_job(self._make_job(*ready))
 
     @property
-    def awaiting(self) -> int:
+    def awaiting_count(self) -> int:
         """How many callbacks have begun, and await something."""
         return len(self._awaiting)
 
-    def working(self) -> set[Job]:
+    def working_jobs(self) -> set[Job]:
         """Return the callbacks that run and are neither done nor blocked; look once at each.
 
         With one thread there is nobody to go on without a blocked callback, so there it counts,
@@ -182,22 +182,22 @@ class BackgroundExecutor(Executor):
         begun = {job for job in running if job.thread_id}
         if len(begun) < len(running) and len({job.thread_id for job in begun}) < self.threads:
             return running - begun  # a worker is free, and has not come to it yet
-        return {job for job in begun if not self._blocked(job)}  # each is looked at
+        return {job for job in begun if not self._is_blocked(job)}  # each is looked at
 
-    def resumes(self, job: Job) -> bool:
+    def is_resuming(self, job: Job) -> bool:
         """Return whether a callback that runs has begun before, and awaited something."""
         return job.task in self._awaiting
 
     @staticmethod
-    def _blocked(job: Job) -> bool:
+    def _is_blocked(job: Job) -> bool:
         if sleeps_by_clock(job):
             return True
         if job.idleness is None:
             job.idleness = Idleness(job.thread_id)
-        return job.idleness.blocked()
+        return job.idleness.is_blocked()
 
     def wait_for_a_job(self, timeout: float) -> None:
-        """Return when a running callback has ended, or after `timeout` s; while `held`."""
+        """Return when a running callback has ended, or after `timeout` s; while `hold_still`."""
         self.gate.wait(timeout)
 
     def runs_elsewhere(self) -> bool:
@@ -216,9 +216,9 @@ class BackgroundExecutor(Executor):
         A new thread takes its place; the old one ends when its callback does. Return whether that
         was needed: the job may have ended just now.
         """
-        with self.held():
+        with self.hold_still():
             try:
-                # Whoever removes a job decides what its thread does next: `_run` or we.
+                # Whoever removes a job decides what its thread does next: `_run_job` or we.
                 self.running.remove(job)
             except KeyError:
                 return False
@@ -243,7 +243,7 @@ class BackgroundExecutor(Executor):
 
     def add_node(self, node: Node) -> bool:
         """Add a node; one that a callback of another node adds belongs to that node."""
-        with self._families.arrival(node):
+        with self._families.note_arrival(node):
             return bool(super().add_node(node))
 
     def wait_for_ready_callbacks(self, *args: Any, **kwargs: Any) -> tuple[Any, Any, Any]:
@@ -255,10 +255,10 @@ class BackgroundExecutor(Executor):
         self,
         timeout_sec: Any = None,
         nodes: list[Node] | None = None,
-        condition: Callable[[], bool] = _never,
+        condition: Callable[[], bool] = _never_true,
     ) -> Generator[Ready, None, None]:
         timeout = getattr(timeout_sec, "timeout", timeout_sec)
-        return self._wait_list.ready(timeout, nodes, condition)
+        return self._wait_list.ready_tasks(timeout, nodes, condition)
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Task:
         """Schedule a function, a coroutine function or a coroutine, as every executor does."""
@@ -272,7 +272,7 @@ class BackgroundExecutor(Executor):
         The executor spins by itself, so this only waits; except in a callback on the one thread
         that there is, which runs the next callback itself.
         """
-        self._spin_once(timeout_sec, _never)
+        self._spin_once(timeout_sec, _never_true)
 
     def spin_once_until_future_complete(self, future: Future, timeout_sec: Any = None) -> None:
         """Do `spin_once`, or return when `future` is done."""
@@ -284,7 +284,9 @@ class BackgroundExecutor(Executor):
         self.request_stop()
         forever = timeout_sec is None or timeout_sec < 0
         patience = threading.TIMEOUT_MAX if forever else timeout_sec
-        inside = self.owns(threading.current_thread())  # a callback cannot wait for its own end
+        inside = self.has_thread(
+            threading.current_thread()
+        )  # a callback cannot wait for its own end
         left = [] if inside else self.join(time.monotonic() + (patience or 0.0))
         return super().shutdown(timeout_sec=0.0) and not left
 
@@ -293,25 +295,25 @@ class BackgroundExecutor(Executor):
     def _spin_once(self, timeout: float | None, done: Callable[[], bool]) -> None:
         if threading.current_thread() is self._threads.spinner and self._workers is None:
             with contextlib.suppress(ShutdownException, TimeoutException):
-                self._run(self._next_job(timeout, done))
+                self._run_job(self._next_job(timeout, done))
             return
         seen = self.finished
         limit = float("inf") if timeout is None or timeout < 0 else timeout
-        poll(lambda: done() or self.ended or self.finished != seen, limit, self.pulse)
+        poll_condition(lambda: done() or self.has_ended or self.finished != seen, limit, self.pulse)
 
-    def _next_job(self, timeout: Any, done: Callable[[], bool] = _never) -> Job:
+    def _next_job(self, timeout: Any, done: Callable[[], bool] = _never_true) -> Job:
         try:
             if self.gate.enter():
                 # Equal arguments resume rclpy's suspended wait; a new condition starts afresh.
                 self._interrupted = self.gate.new_interrupt()
             interrupted = self._interrupted
-            condition = interrupted if done is _never else lambda: interrupted() or done()
+            condition = interrupted if done is _never_true else lambda: interrupted() or done()
             while True:
                 ready: Any = super().wait_for_ready_callbacks(timeout, None, condition)
                 if self._workers is None or (job := self._workers.job_of(ready[0])) is None:
-                    return self._job(*ready)
+                    return self._make_job(*ready)
                 # rclpy offers a task again and again until a worker has begun it.
-                self.gate.watch(lambda begun=job: begun.thread_id)  # type: ignore[misc]
+                self.gate.wait_until(lambda begun=job: begun.thread_id)  # type: ignore[misc]
         except ConditionReachedException:
             raise ShutdownException from None  # nothing to run for now
         finally:
@@ -321,25 +323,25 @@ class BackgroundExecutor(Executor):
         """Return whether there is anything to wait on: to wait in order to see takes far longer."""
         return bool(self._tasks) or any(map(_has_entities, self.get_nodes()))
 
-    def _job(self, task: Any, entity: Any, node: Any) -> Job:
+    def _make_job(self, task: Any, entity: Any, node: Any) -> Job:
         shown = None
         if entity is None:
-            node, shown = self._created.owner(task)
+            node, shown = self._created.owner_of(task)
         elif isinstance(entity, EventHandler):
-            incompatible_qos_events.listen(entity)
+            incompatible_qos_events.listen_to(entity)
         job = Job(task, entity, node, self, shown)
         self.running.add(job)
         return job
 
-    def _execute(self, job: Job) -> None:
+    def _execute_job(self, job: Job) -> None:
         if self._workers is None:
-            self._run(job)
+            self._run_job(job)
         else:
             self._workers.put(job)
 
-    def _loop(self) -> None:
+    def _spin_loop(self) -> None:
         me, threads, gate = threading.current_thread(), self._threads, self.gate
-        execute = self._run if self._workers is None else self._workers.put
+        execute = self._run_job if self._workers is None else self._workers.put
         while threads.spinner is me and not gate.stopping:
             try:
                 execute(self._next_job(None))
@@ -353,15 +355,15 @@ class BackgroundExecutor(Executor):
                         self.remove_node(node)
             except Exception as error:  # noqa: BLE001 - a waitable of the learner's, for instance
                 if self.context.ok():  # else rclpy.shutdown() came in between
-                    self.report(Job(Task(_never), None, None, self), error)
+                    self.report(Job(Task(_never_true), None, None, self), error)
                 self.request_stop()
 
-    def _run(self, job: Job) -> bool:
+    def _run_job(self, job: Job) -> bool:
         """Run a callback; return whether this thread is to go on with others."""
         job.thread_id = threading.get_ident()
         newest_end = self._newest_end
         self.gate.notify()
-        streams.install()
+        streams.install_streams()
         failure = job()
         # rclpy resumes each coroutine once before it waits, and leaves out those that run at that
         # moment. What one awaits may be done just after that, and nothing else might ever wake it.
@@ -387,7 +389,7 @@ class BackgroundExecutor(Executor):
             self.given_up.discard(job)
             goes_on = False
         if self._workers is not None:
-            self._workers.end(job)
+            self._workers.end_job(job)
         if look_again if done else self._newest_end is not newest_end:
             self.wake()
         self.pulse.beat()
@@ -396,7 +398,7 @@ class BackgroundExecutor(Executor):
 
     def _drop_what_never_began(self) -> None:
         # A coroutine that never began would complain on stderr.
-        tasks = self._created.all()
+        tasks = self._created.unfinished_tasks()
         if self._workers is not None:
             never_begun = self._workers.never_begun()
             self.running.difference_update(never_begun)

@@ -86,12 +86,12 @@ def blocked_callbacks(
         for job in executor.running.copy()
         if job.thread_id and time.monotonic() - job.since > longer_than
     ]
-    return [describe(job) for job in sorted(jobs, key=lambda job: job.since)]
+    return [describe_job(job) for job in sorted(jobs, key=lambda job: job.since)]
 
 
-def describe(job: Job) -> BlockedCallback:
+def describe_job(job: Job) -> BlockedCallback:
     """Return what can be seen of `job` from outside."""
-    frames = list(_frames(job))
+    frames = list(_walk_frames(job))
     home: Any = job.home
     client, method = next(
         ((client, frame.f_code.co_name) for frame in frames if (client := _client_of(frame))),
@@ -99,7 +99,7 @@ def describe(job: Job) -> BlockedCallback:
     )
     reason, advice = "", _ADVICE_SLOW
     if client is not None and method in _WAITS_FOR_SERVER:
-        reason, advice = f"It waits for {_name(client)}, which nobody offers.", _ADVICE_LATER
+        reason, advice = f"It waits for {_target_name(client)}, which nobody offers.", _ADVICE_LATER
     elif client is not None:
         reason, advice = _why_no_answer(client, job)
     name = node_name(job.node)
@@ -135,7 +135,7 @@ _ADVICE_GROUP = (
 )
 
 
-def _frames(job: Job) -> Iterator[FrameType]:
+def _walk_frames(job: Job) -> Iterator[FrameType]:
     """Go through the frames of the thread that runs `job`, the innermost first."""
     frame = sys._current_frames().get(job.thread_id)
     while frame is not None:
@@ -163,7 +163,7 @@ def _wall_wait(frame: FrameType) -> str:
     return name if timed or name in _WAITS_FOR_SERVER else ""
 
 
-def _name(client: Client | ActionClient) -> str:
+def _target_name(client: Client | ActionClient) -> str:
     """Return the name of what `client` asks; rclpy has no public name for an action."""
     found = client.srv_name if isinstance(client, Client) else client.__dict__.get("_action_name")
     return str(found or "an action")
@@ -172,11 +172,11 @@ def _name(client: Client | ActionClient) -> str:
 def _why_no_answer(client: Client | ActionClient, job: Job) -> tuple[str, str]:
     """Return why the answer that `job` waits for does not come, and what to do about it."""
     home: Any = job.home
-    name = _name(client)
+    name = _target_name(client)
     # Its own node may have been taken out of the executor just now, to be stopped.
     nodes = [*home.get_nodes(), *([job.node] if job.node is not None else [])]
-    asker = next((node for node in nodes if _has(node, client)), None)
-    servers = list(_servers(nodes, client)) if isinstance(client, Client) else []
+    asker = next((node for node in nodes if _has_client(node, client)), None)
+    servers = list(_find_servers(nodes, client)) if isinstance(client, Client) else []
     if home.threads == 1 and (asker is not None or servers):
         whose = "the answer" if asker is not None else "the request"
         return (
@@ -198,11 +198,11 @@ def _why_no_answer(client: Client | ActionClient, job: Job) -> tuple[str, str]:
     return "", f"It waits for the answer of {name}."
 
 
-def _has(node: Node, client: Client | ActionClient) -> bool:
+def _has_client(node: Node, client: Client | ActionClient) -> bool:
     return client in (node.clients if isinstance(client, Client) else node.waitables)
 
 
-def _servers(nodes: list[Node], client: Client) -> Iterator[Any]:
+def _find_servers(nodes: list[Node], client: Client) -> Iterator[Any]:
     with contextlib.suppress(InvalidHandle):  # destroyed meanwhile
         for node in nodes:
             yield from (one for one in node.services if one.service_name == client.service_name)

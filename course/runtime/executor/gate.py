@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 from rclpy.executors import ShutdownException
 
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 
 _TIMEOUT = 5.0  # s; waking an executor takes microseconds, so this bounds what cannot happen
 
@@ -34,14 +34,14 @@ class Gate:
         self._changes = Pulse()
 
     @contextlib.contextmanager
-    def held(self) -> Iterator[None]:
+    def hold_closed(self) -> Iterator[None]:
         """Keep the spinning thread out for the length of the block."""
         holder = object()
         try:
             self._holders.append(holder)
             self.stale = True
             self._wake()
-            poll(lambda: not self._waiting, _TIMEOUT, self._changes)
+            poll_condition(lambda: not self._waiting, _TIMEOUT, self._changes)
             yield
         finally:
             if holder in self._holders:  # else an interrupt came before that
@@ -66,7 +66,7 @@ class Gate:
         while self._holders or self.stale or self.stopping:
             self._waiting = False
             self.notify()
-            poll(lambda: not self._holders or self.stopping, float("inf"), self._changes)
+            poll_condition(lambda: not self._holders or self.stopping, float("inf"), self._changes)
             if self.stopping:
                 raise ShutdownException
             self.stale = False
@@ -93,6 +93,8 @@ class Gate:
         """Return after the next `notify`, or after `timeout` s."""
         self._changes.wait(self._changes.count, timeout)
 
-    def watch(self, condition: Callable[[], object]) -> None:
+    def wait_until(self, condition: Callable[[], object]) -> None:
         """Return when `condition` holds, somebody holds the gate, or the executor is to end."""
-        poll(lambda: condition() or self._holders or self.stopping, _TIMEOUT, self._changes)
+        poll_condition(
+            lambda: condition() or self._holders or self.stopping, _TIMEOUT, self._changes
+        )

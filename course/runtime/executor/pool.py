@@ -27,11 +27,11 @@ class Crew:
         self._ended: list[BackgroundExecutor] = []
         self._lock = threading.Lock()
 
-    def executor(self, threads: int, purpose: str = "") -> BackgroundExecutor:
+    def get_executor(self, threads: int, purpose: str = "") -> BackgroundExecutor:
         """Return the spinning executor of `threads` threads for `purpose`; make it at first use."""
         with self._lock:
             executor = self._executors.get((threads, purpose))
-            if executor is None or executor.ended:  # a callback may shut its executor down
+            if executor is None or executor.has_ended:  # a callback may shut its executor down
                 if executor is not None:
                     self._ended.append(executor)
                 name = f"{self._label} {purpose}".rstrip()
@@ -47,32 +47,32 @@ class Crew:
                 executor.start()
             return executor
 
-    def all(self) -> list[BackgroundExecutor]:
+    def all_executors(self) -> list[BackgroundExecutor]:
         """Return the executors made so far."""
         with self._lock:
             return [*self._ended, *self._executors.values()]
 
-    def nodes(self) -> list[Node]:
+    def all_nodes(self) -> list[Node]:
         """Return the nodes of all executors."""
-        return [node for executor in self.all() for node in executor.get_nodes()]
+        return [node for executor in self.all_executors() for node in executor.get_nodes()]
 
-    def owns(self, thread: threading.Thread) -> bool:
+    def has_thread(self, thread: threading.Thread) -> bool:
         """Return whether `thread` belongs to one of the executors."""
-        return any(executor.owns(thread) for executor in self.all())
+        return any(executor.has_thread(thread) for executor in self.all_executors())
 
     def stop(self, deadline: float) -> list[str]:
         """Stop them all; return what still runs at `deadline`: the thread, and whose callback."""
-        for executor in self.all():
+        for executor in self.all_executors():
             executor.request_stop()
         return [
             f"{thread.name}{_busy_with(executor, thread)}"
-            for executor in self.all()
+            for executor in self.all_executors()
             for thread in executor.join(deadline)
         ]
 
     def shutdown(self, deadline: float) -> None:
         """Free what the stopped executors hold of rclpy."""
-        for executor in self.all():
+        for executor in self.all_executors():
             executor.shutdown(timeout_sec=max(0.0, deadline - time.monotonic()))
 
 

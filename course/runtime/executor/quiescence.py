@@ -25,26 +25,26 @@ _AGE = 1.0  # s that a callback may run, and be one of many
 
 @contextlib.contextmanager
 def all_held(executors: Sequence[BackgroundExecutor]) -> Iterator[None]:
-    """Hold every executor; see `BackgroundExecutor.held`."""
+    """Hold every executor; see `BackgroundExecutor.hold_still`."""
     with contextlib.ExitStack() as stack:
         for executor in executors:
-            stack.enter_context(executor.held())
+            stack.enter_context(executor.hold_still())
         yield
 
 
-def settle(executors: Sequence[BackgroundExecutor], timeout: float = 5.0) -> bool:
+def settle_executors(executors: Sequence[BackgroundExecutor], timeout: float = 5.0) -> bool:
     """Return True once nothing is ready anywhere and no callback runs, False after `timeout` s.
 
     Called from a callback of one of the executors it cannot work, and returns False.
     """
-    if any(executor.owns(threading.current_thread()) for executor in executors):
+    if any(executor.has_thread(threading.current_thread()) for executor in executors):
         return False
     with all_held(executors):
         return come_to_rest(executors, timeout)
 
 
 def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> bool:
-    """Do the work of `settle` on executors that are held already.
+    """Do the work of `settle_executors` on executors that are held already.
 
     Callbacks that go on setting each other off, as a coroutine that polls does, are left behind
     once each has had its turn.
@@ -53,16 +53,18 @@ def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> boo
     chain = _Chain(executors)
     idle = 0
     while True:
-        working = [(executor, job) for executor in executors for job in executor.working()]
+        working = [(executor, job) for executor in executors for job in executor.working_jobs()]
         if working:
             # One that only looks again whether what it awaits has come is no sign of life.
-            idle = idle if all(executor.resumes(job) for executor, job in working) else 0
+            idle = idle if all(executor.is_resuming(job) for executor, job in working) else 0
             working[0][0].wait_for_a_job(_NAP)
         else:
             progress = [executor.run_ready() for executor in executors]
             idle = 0 if any(progress) else idle + 1
             # A coroutine that goes on may let another one go on, which only a further round shows.
-            if idle > sum(executor.awaiting for executor in executors) and _nothing_runs(executors):
+            if idle > sum(executor.awaiting_count for executor in executors) and _nothing_runs(
+                executors
+            ):
                 return True
         if chain.is_endless():
             return True
@@ -81,20 +83,20 @@ class _Chain:
     def __init__(self, executors: Sequence[BackgroundExecutor]) -> None:
         self._executors = executors
         self._began = time.monotonic()
-        self._ended_before = self._ended()
+        self._ended_before = self._count_ended()
         self._signs = _TURN if follow_each_other(executors) else self._first_signs()
 
     def _first_signs(self) -> tuple[tuple[float, int], ...]:
         before = any(executor.endless > -math.inf for executor in self._executors)
         return _AGAIN if before else _ENDLESS
 
-    def _ended(self) -> int:
+    def _count_ended(self) -> int:
         return sum(executor.finished for executor in self._executors)
 
     def is_endless(self) -> bool:
         """Return whether they go on and on, and none of them does so alone."""
         now = time.monotonic()
-        ended = self._ended() - self._ended_before
+        ended = self._count_ended() - self._ended_before
         if not any(now - self._began >= s and ended >= number for s, number in self._signs):
             return False
         running = [job for executor in self._executors for job in executor.running.copy()]
@@ -111,4 +113,4 @@ def _nothing_runs(executors: Sequence[BackgroundExecutor]) -> bool:
         return True
     # What this round has set off may have woken it: let it show.
     executors[0].wait_for_a_job(_NAP)
-    return not any(executor.working() for executor in executors)
+    return not any(executor.working_jobs() for executor in executors)

@@ -34,7 +34,7 @@ class Threads:
         for thread in self._all:
             thread.start()
 
-    def own(self, thread: threading.Thread) -> bool:
+    def has_thread(self, thread: threading.Thread) -> bool:
         """Return whether `thread` is or was one of these."""
         return thread in self._all
 

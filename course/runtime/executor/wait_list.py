@@ -73,7 +73,7 @@ class Owned(NamedTuple):
 
     def may_begin(self) -> bool:
         """Return whether its callback may still begin, after those that came before it."""
-        if not any(self.entity is other for other in _entities(self.node, self.kind)):
+        if not any(self.entity is other for other in _entities_of(self.node, self.kind)):
             return False  # destroyed since
         if self.kind == "timer" and not self.entity.handle.is_timer_ready():
             return False  # cancelled since
@@ -107,7 +107,7 @@ class WaitList:
         self._all = self._often = _Wait((), ())
         self._seldom_due = 0.0
 
-    def ready(
+    def ready_tasks(
         self, timeout: float | None, nodes: Sequence[Node] | None, condition: Callable[[], bool]
     ) -> Generator[Ready, None, None]:
         """Yield what is ready to run, as rclpy's own wait does: at least one, and then no more.
@@ -134,7 +134,7 @@ class WaitList:
         found = False
         while not found and not executor._is_shutdown and not condition():
             looked_at = executor.get_nodes() if nodes is None else nodes
-            for begun in self._begun(looked_at):
+            for begun in self._begun_tasks(looked_at):
                 found = True
                 yield begun
             ready = self.wait(looked_at, limit)
@@ -145,7 +145,7 @@ class WaitList:
                 if owned.may_begin():
                     found = True
                     entity, node, kind = owned
-                    yield self._task(entity, node, take[kind]), entity, node
+                    yield self._make_task(entity, node, take[kind]), entity, node
             if over:
                 raise TimeoutException
         if executor._is_shutdown:
@@ -159,7 +159,7 @@ class WaitList:
         self._kept.close()
         self._all = self._often = _Wait((), ())
 
-    def _begun(self, nodes: Sequence[Node]) -> Iterator[Ready]:
+    def _begun_tasks(self, nodes: Sequence[Node]) -> Iterator[Ready]:
         """Yield the tasks that go on: coroutines, and those that no worker has come to."""
         executor = self._executor
         if not executor._tasks:
@@ -184,9 +184,9 @@ class WaitList:
         if self.changed or nodes != self._nodes:
             self.changed = False  # first: what is created from now on changes it again
             self._kept.close()
-            self._gather(nodes)
+            self._gather_entities(nodes)
             if self._keeps:
-                self._kept.enter_context(self._all.used())
+                self._kept.enter_context(self._all.keep_entities())
         left = self._seldom_due - time.monotonic()
         if not self._may_begin_all():
             said: dict[CallbackGroup, bool] = {}
@@ -198,23 +198,23 @@ class WaitList:
             timeout = left if timeout < 0 else min(left, timeout)
         else:
             wait = self._all
-        with nullcontext() if self._keeps else wait.used():
+        with nullcontext() if self._keeps else wait.keep_entities():
             wait.misses = wait.misses or self._all.misses
-            ready = [] if wait.misses else wait.ready(self._executor, timeout)
+            ready = [] if wait.misses else wait.wait_for_ready(self._executor, timeout)
         if wait is not self._often:
             self._seldom_due = time.monotonic() + SELDOM_S
         if wait.misses:  # something was destroyed just now
             self.changed = True
         return ready
 
-    def _gather(self, nodes: Sequence[Node]) -> None:
+    def _gather_entities(self, nodes: Sequence[Node]) -> None:
         self._nodes = list(nodes)
         owned = [
             Owned(entity, node, kind)
             for kinds in (("waitable",), _KINDS)
             for node in nodes
             for kind in kinds
-            for entity in _entities(node, kind)
+            for entity in _entities_of(node, kind)
         ]
         executor = self._executor
         own = executor._guard.handle, executor._sigint_gc.handle
@@ -231,16 +231,16 @@ class WaitList:
             for group, entity in self._groups.items()
         )
 
-    def _task(self, entity: Any, node: Node, take: Callable[[Any], Any]) -> Task:
+    def _make_task(self, entity: Any, node: Node, take: Callable[[Any], Any]) -> Task:
         entity._executor_event = True  # not to be waited on until it is taken
         arguments = (entity, take, self._executor, self._wake)
-        task = Task(_run, arguments, executor=self._executor)
+        task = Task(_run_callback, arguments, executor=self._executor)
         with self._executor._tasks_lock:
             self._executor._tasks.append((task, entity, node))
         return task
 
 
-async def _run(
+async def _run_callback(
     entity: Any, take: Callable[[Any], Any], executor: Executor, wake: Callable[[], None]
 ) -> None:
     """Run a callback as rclpy does; but if there is nothing to take, its group is free again.
@@ -287,7 +287,7 @@ def _is_seldom(owned: Owned) -> bool:
     return isinstance(entity, EventHandler) and any(entity.event_type is kind for kind in _NEWS)
 
 
-def _entities(node: Node, kind: str) -> Iterable[Any]:
+def _entities_of(node: Node, kind: str) -> Iterable[Any]:
     entities: Iterable[Any] = getattr(node, "guards" if kind == "guard_condition" else f"{kind}s")
     return entities
 
@@ -321,7 +321,7 @@ class _Wait:
         self._wait_set: Any = None
 
     @contextmanager
-    def used(self) -> Iterator[None]:
+    def keep_entities(self) -> Iterator[None]:
         """Let nobody destroy the entities for the length of the block."""
         used = []
         try:
@@ -336,12 +336,12 @@ class _Wait:
             for end in used:
                 end(None, None, None)
 
-    def ready(self, executor: Executor, timeout: float) -> list[Owned]:
+    def wait_for_ready(self, executor: Executor, timeout: float) -> list[Owned]:
         """Return what is ready, after ``timeout`` s at most (for ever if it is negative)."""
         for guard in self._guards:
             if guard._executor_triggered:
                 guard.trigger()  # its callback has not begun since
-        wait_set = self._wait_set or self._make(executor)
+        wait_set = self._wait_set or self._make_wait_set(executor)
         if self._is_of_one_size:
             self._wait_set = wait_set
         wait_set.clear_entities()
@@ -368,7 +368,7 @@ class _Wait:
                             self.owned[place].entity._executor_triggered = True
         return ready + [self.owned[place] for place in sorted(places)]
 
-    def _make(self, executor: Executor) -> Any:
+    def _make_wait_set(self, executor: Executor) -> Any:
         count = {kind: len(found) for kind, found in self._handles.items()}
         number = NumberOfEntities(
             count["subscription"], count["guard_condition"], count["timer"], count["client"],

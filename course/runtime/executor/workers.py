@@ -22,7 +22,7 @@ class Workers:
     def __init__(self, count: int, run: Callable[[Job], bool], name: str) -> None:
         """Make the pool; its threads, `threads`, are for the caller to start and to join.
 
-        `run` runs a job, `end`s it, and returns whether its thread is to go on with the next one.
+        `run` runs a job, `end_job`s it, and returns whether its thread is to go on with the next.
         """
         self._run = run
         self._name = name
@@ -36,7 +36,7 @@ class Workers:
     def new_thread(self) -> threading.Thread:
         """Add a thread, in the place of one that is to end; the caller starts it."""
         name = f"{self._name} worker {len(self.threads) + 1}"
-        self.threads.append(threading.Thread(target=self._work, name=name, daemon=True))
+        self.threads.append(threading.Thread(target=self._run_jobs, name=name, daemon=True))
         return self.threads[-1]
 
     def put(self, job: Job) -> None:
@@ -48,7 +48,7 @@ class Workers:
         """Return the job that was put for `task` and has not ended, if there is one."""
         return self._in_hand.get(task)
 
-    def end(self, job: Job) -> None:
+    def end_job(self, job: Job) -> None:
         """Forget `job`: its task may be put again, if it is a coroutine that is not done."""
         self._in_hand.pop(job.task, None)
 
@@ -67,7 +67,7 @@ class Workers:
                     jobs.append(job)
         return jobs
 
-    def _work(self) -> None:
+    def _run_jobs(self) -> None:
         while (job := self._queue.get()) is not None:
             if self._stopping:
                 self._queue.put(job)  # for `never_begun`

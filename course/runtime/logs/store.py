@@ -87,18 +87,18 @@ class LogStore:
                 if not self._make_room(key):
                     break
 
-    def claim(self, node: str, home: object) -> None:
+    def claim_node(self, node: str, home: object) -> None:
         """Note that `home` runs the node of this fully qualified name."""
         with self._lock:
             self._owners.setdefault(logger_of(node), set()).add(id(home))
 
-    def disclaim(self, home: object) -> None:
+    def disclaim_nodes(self, home: object) -> None:
         """Forget whatever `home` claimed."""
         with self._lock:
             for owners in self._owners.values():
                 owners.discard(id(home))
 
-    def knows(self, logger: str) -> bool:
+    def has_logger(self, logger: str) -> bool:
         """Whether a logger of this name has said something in this process, or is a node's here."""
         with self._lock:
             return (
@@ -107,7 +107,7 @@ class LogStore:
                 or (logger, True) in self._rings
             )
 
-    def rows(self, home: object, since: float) -> list[tuple[int, LogRow]]:
+    def rows_of(self, home: object, since: float) -> list[tuple[int, LogRow]]:
         """Return severity and row of what `home`'s nodes and threads said, oldest first.
 
         What nobody's node said (rcl itself, for instance) is everybody's.
@@ -117,7 +117,7 @@ class LogStore:
             owners = {logger: ids for logger, ids in self._owners.items() if ids}
         rows = []
         for entry in sorted(entries, key=lambda entry: entry.stamp):
-            owner = _owner(entry.logger, owners)
+            owner = _find_owner(entry.logger, owners)
             mine = entry.home is home or (
                 entry.home is None and (owner is None or id(home) in owners[owner])
             )
@@ -150,7 +150,7 @@ store = LogStore()
 """The one store of this process: rcutils has one output handler for all of it."""
 
 
-def note(level: str, node: str, message: str, home: object) -> None:
+def add_line(level: str, node: str, message: str, home: object) -> None:
     """Add a line said just now by a callback of `node`."""
     store.add(time.time(), level, logger_of(node), message, home)
 
@@ -170,7 +170,7 @@ def node_of(logger: str) -> str:
     return "/" + logger.replace(".", "/")
 
 
-def _owner(logger: str, owners: dict[str, set[int]]) -> str | None:
+def _find_owner(logger: str, owners: dict[str, set[int]]) -> str | None:
     """Return the node's logger that `logger` is, or is a child of."""
     while logger:
         if logger in owners:

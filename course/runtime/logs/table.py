@@ -44,32 +44,32 @@ class LogTable(Sequence[LogRow]):
         """Return the table as text."""
         if not self.rows:
             return "(nothing logged)"
-        cells = [_cells(row) for row in self.rows]
+        cells = [_row_cells(row) for row in self.rows]
         width = [max(len(row[column]) for row in cells) for column in range(3)]
         lines = []
         for stamp, level, node, message in cells:
             start = f"{stamp:{width[0]}}  {level:{width[1]}}  {node:{width[2]}}  "
             lines.append(start + message.replace("\n", "\n" + " " * len(start)))
-        return "\n".join([*self._older(), *lines])
+        return "\n".join([*self._left_out_lines(), *lines])
 
     def _repr_html_(self) -> str:
         if not self.rows:
             return "<i>nothing logged</i>"
         head = "".join(f"<th>{title}</th>" for title in ("time", "level", "node", "message"))
         body = "".join(
-            "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in _cells(row)[:3])
+            "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in _row_cells(row)[:3])
             + f'<td style="text-align:left;white-space:pre-wrap">{html.escape(row.message)}</td>'
             "</tr>"
             for row in self.rows
         )  # fmt: skip
-        older = "".join(f"<p><i>{html.escape(line)}</i></p>" for line in self._older())
+        older = "".join(f"<p><i>{html.escape(line)}</i></p>" for line in self._left_out_lines())
         return f"{older}<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
-    def _older(self) -> list[str]:
+    def _left_out_lines(self) -> list[str]:
         return [f"({self.left_out} earlier rows: ask for more with last=...)"] * bool(self.left_out)
 
 
-def table(
+def make_table(
     home: object, since: float, names: Sequence[str] | None, level: str, last: int | None
 ) -> LogTable:
     """Return the rows of `home` since `since` (s): of these nodes, of at least this level.
@@ -85,13 +85,13 @@ def table(
         )
     rows = [
         row
-        for severity, row in store.rows(home, since)
+        for severity, row in store.rows_of(home, since)
         if severity >= lowest and (names is None or row.node in names)
     ]
     kept = rows if last is None else rows[max(0, len(rows) - last) :]
     return LogTable(kept, left_out=len(rows) - len(kept))
 
 
-def _cells(row: LogRow) -> tuple[str, str, str, str]:
+def _row_cells(row: LogRow) -> tuple[str, str, str, str]:
     moment = time.strftime("%H:%M:%S", time.localtime(row.stamp))
     return f"{moment}.{int(row.stamp % 1 * 1000):03d}", row.level, row.node, row.message

@@ -17,7 +17,7 @@ from types import FrameType, TracebackType
 from rclpy.node import Node
 
 from course.runtime.names import node_name
-from course.runtime.teardown import is_alive, sweep
+from course.runtime.teardown import destroy_leftovers, is_alive
 
 _LONGEST = 200  # characters of what a constructor raised
 
@@ -53,7 +53,7 @@ class Remains:
         return sorted(thread.name for thread in begun if thread is not None and thread.is_alive())
 
     @property
-    def places(self) -> str:
+    def what_is_left(self) -> str:
         """What is still there, in words; empty if nothing is."""
         words = ["the node on the graph"] if self.node is not None else []
         if names := self.threads:
@@ -62,7 +62,10 @@ class Remains:
 
     def __str__(self) -> str:
         """Return one sentence: which constructor raised what, and what of it is still there."""
-        return f"The constructor of {self.name} raised {self.problem} It left {self.places} behind."
+        return (
+            f"The constructor of {self.name} raised {self.problem} "
+            f"It left {self.what_is_left} behind."
+        )
 
 
 class HalfMade:
@@ -74,13 +77,13 @@ class HalfMade:
         self._known: list[Remains] = []
         self._lock = threading.Lock()
 
-    def all(self) -> list[Remains]:
+    def all_remains(self) -> list[Remains]:
         """Return those of which something is still there."""
         with self._lock:
-            self._known = [remains for remains in self._known if remains.places]
+            self._known = [remains for remains in self._known if remains.what_is_left]
             return list(self._known)
 
-    def note(
+    def note_failure(
         self,
         error: BaseException,
         factory: object,
@@ -102,7 +105,7 @@ class HalfMade:
             for node in _half_made(error.__traceback__)
         ]
         with self._lock:
-            self._known += [remains for remains in found if remains.places]
+            self._known += [remains for remains in found if remains.what_is_left]
         return [remains.name for remains in found]
 
     def clear(self, matches: Callable[[Remains], bool], *, replaced: bool = True) -> None:
@@ -112,20 +115,20 @@ class HalfMade:
             matches: which of them.
             replaced: the learner is told of them, as they have come to run the next one.
         """
-        for remains in filter(matches, self.all()):
+        for remains in filter(matches, self.all_remains()):
             if replaced:
-                self._tell(_hint(remains))
+                self._tell(_make_hint(remains))
             node = remains.node
             if node is not None:
                 if node.executor is not None:
                     node.executor.remove_node(node)
                 with suppress(Exception):  # half of a node: rclpy has no one error for it
-                    sweep(node)
+                    destroy_leftovers(node)
             with self._lock:
                 self._known = [other for other in self._known if other is not remains]
 
 
-def _hint(remains: Remains) -> str:
+def _make_hint(remains: Remains) -> str:
     words = [
         str(remains), "Nobody calls destroy_node() of a node that was never made, so a constructor "
         "gives back what it has made before it raises.",

@@ -51,11 +51,11 @@ class NodeHost:
         self.pulse = Pulse()
         self._errors = ErrorLog()
         label = f"ROS domain {context.get_domain_id()}"
-        self.crew = Crew(context, label, self._record, self.pulse)
+        self.crew = Crew(context, label, self._record_error, self.pulse)
         self.residents = Residents(context, self.crew, self.pulse, self.notices.append)
         self.residents.on_made += [keep_every_level, sleeps_in_own_context, self._claim_log]
         self._opened = time.time()
-        transitions.watch()
+        transitions.watch_transitions()
 
     @property
     def closed(self) -> bool:
@@ -68,7 +68,7 @@ class NodeHost:
         """Make a node and spin it in the background; return it."""
         self.require_open()
         if threads is not None:
-            arguments.whole(threads, "threads", least=1, example=4)
+            arguments.check_whole_number(threads, "threads", least=1, example=4)
         return self.residents.run(factory, args, kwargs, threads or self.threads)
 
     def run_beside(self, factory: Factory) -> Node:
@@ -83,7 +83,7 @@ class NodeHost:
         self.residents.stop_half_made(what)
 
     def let_go(self, node: Node) -> None:
-        """Stop spinning a node and forget it, without destroying it: that is now up to the caller."""
+        """Stop spinning a node and forget it, without destroying it: that is up to the caller."""
         self.residents.let_go(node)
 
     def pause(self, *what: Any) -> None:
@@ -99,7 +99,7 @@ class NodeHost:
     @property
     def nodes(self) -> dict[str, Node]:
         """The nodes that run, by fully qualified name (a snapshot)."""
-        return {resident.name: resident.node for resident in self.residents.all()}
+        return {resident.name: resident.node for resident in self.residents.list_residents()}
 
     @property
     def errors(self) -> list[CallbackError]:
@@ -109,19 +109,23 @@ class NodeHost:
     @property
     def failed_transitions(self) -> list[FailedTransition]:
         """What went wrong in transitions of managed nodes, since the last one that succeeded."""
-        found = [failure for node in self.nodes.values() for failure in transitions.failed(node)]
+        found = [
+            failure
+            for node in self.nodes.values()
+            for failure in transitions.failed_transitions(node)
+        ]
         return sorted(found, key=lambda failure: failure.number)
 
     def logs(self, node: Any = None, *, level: str = "INFO", last: int | None = 50) -> LogTable:
         """Return what nodes logged and callbacks printed, as a table."""
         if last is not None:
-            arguments.whole(last, "last", least=0, example=50)
-        names = None if node is None else self.residents.names(node)
-        return table.table(self.crew, self._opened, names, level, last)
+            arguments.check_whole_number(last, "last", least=0, example=50)
+        names = None if node is None else self.residents.names_of(node)
+        return table.make_table(self.crew, self._opened, names, level, last)
 
     def blocked_callbacks(self, longer_than: float = 1.0) -> list[BlockedCallback]:
         """Return the callbacks that have been running for over `longer_than` seconds."""
-        return blocked_callbacks(self.crew.all(), longer_than)
+        return blocked_callbacks(self.crew.all_executors(), longer_than)
 
     def take_back_stolen_nodes(self) -> None:
         """Spin nodes again that `rclpy.spin_once(node)` and its like took away; leave a notice."""
@@ -143,9 +147,9 @@ class NodeHost:
     # Inside.
 
     def _claim_log(self, node: Node) -> None:
-        store.claim(node_name(node), self.crew)
+        store.claim_node(node_name(node), self.crew)
 
-    def _record(self, job: Job, failure: BaseException) -> None:
+    def _record_error(self, job: Job, failure: BaseException) -> None:
         # A callback that outlives its node finds everything destroyed, and a timer may be cancelled
         # while rclpy calls it: neither is news.
         outlived = isinstance(failure, InvalidHandle) and self.residents.is_leaving(job.node)

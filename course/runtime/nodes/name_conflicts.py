@@ -28,7 +28,7 @@ _OF_NODES = {
 """What rclpy keeps in a node, such as its ``handle``: a class that calls a method so breaks it."""
 
 
-def explain(error: BaseException) -> None:
+def explain_conflict(error: BaseException) -> None:
     """Say in ``error`` that a name is something else already, if that may be why rclpy raised it.
 
     Between two processes endpoints of two types are made, and DDS does not connect them: then a
@@ -40,16 +40,16 @@ def explain(error: BaseException) -> None:
         if frame.f_globals.get("__name__") != "rclpy.node" or not isinstance(node, Node):
             continue
         if isinstance(error, (AttributeError, TypeError)):
-            found = _taken(type(node))
+            found = _describe_taken(type(node))
         if not found and (kind := _KINDS.get(frame.f_code.co_name)) is not None:
             what, type_of, name_of = kind
-            found = _clash(node, what, given[type_of], given[name_of])
+            found = _describe_clash(node, what, given[type_of], given[name_of])
         if found:
             error.args = (f"{found} ({error})",)
             return
 
 
-def _taken(kind: type[Node]) -> str:
+def _describe_taken(kind: type[Node]) -> str:
     """Return a sentence about names of rclpy's that a class of nodes uses; empty without any."""
     own = [name for name in sorted(_OF_NODES) if not _is_property(kind, name)]
     if not own:
@@ -65,7 +65,7 @@ def _is_property(kind: type[Node], name: str) -> bool:
     return isinstance(inspect.getattr_static(kind, name), property)
 
 
-def _clash(node: Node, what: str, ros_type: Any, name: str) -> str:
+def _describe_clash(node: Node, what: str, ros_type: Any, name: str) -> str:
     """Return a sentence about the types of a name; empty if they are the same."""
     if what == "topic":
         full, known = node.resolve_topic_name(name), node.get_topic_names_and_types()

@@ -18,14 +18,14 @@ from course.errors import SessionError
 from course.runtime.callbacks.jobs import Job, current_job
 from course.runtime.context.context import as_default_context
 from course.runtime.executor.background import BackgroundExecutor
-from course.runtime.executor.blocked import describe
+from course.runtime.executor.blocked import describe_job
 from course.runtime.executor.pool import Crew
 from course.runtime.names import is_name, node_name
 from course.runtime.nodes import name_conflicts
 from course.runtime.nodes.half_made import HalfMade, Remains
 from course.runtime.output.rcutils_tap import hearing_constructors
 from course.runtime.teardown import destroy_node, is_alive, is_being_destroyed
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 from course.util import arguments
 
 _CALLBACK_GRACE = 2.0  # s that stop() and pause() give a callback that is running
@@ -64,7 +64,7 @@ class Residents:
         self._made_by: dict[str, object] = {}  # every name that ever ran
         self._lock = threading.RLock()
 
-    def all(self) -> list[Resident]:
+    def list_residents(self) -> list[Resident]:
         """Return the nodes that are kept now; those that somebody destroyed are let go of."""
         with self._lock:
             residents = list(self._residents.values())
@@ -89,14 +89,14 @@ class Residents:
         replace: bool = True,
     ) -> Node:
         """Make a node and spin it; see `Session.run` and, for ``replace=False``, `run_beside`."""
-        arguments.factory(factory, args, kwargs)
-        key = _key(factory, args, kwargs) if replace else None
-        for resident in self.all():
+        arguments.check_factory(factory, args, kwargs)
+        key = _make_key(factory, args, kwargs) if replace else None
+        for resident in self.list_residents():
             if key is not None and resident.key == key:
                 self.stop(resident.node)
         if key is not None:
             self.half_made.clear(lambda remains: remains.key == key)
-        node = factory if isinstance(factory, Node) else self._make(factory, args, kwargs, key)
+        node = factory if isinstance(factory, Node) else self._make_node(factory, args, kwargs, key)
         if node.context is not self._context:
             instead = "pass its class to run()"
             if node is not factory:
@@ -106,14 +106,14 @@ class Residents:
                 "session make the node."
             )
         name = node_name(node)
-        for resident in self.all():
+        for resident in self.list_residents():
             if replace and resident.name == name and resident.node is not node:
                 self.stop(resident.node)
         if replace:
             self.half_made.clear(lambda remains: remains.name == name)
         for callback in self.on_made:
             callback(node)
-        executor = self._crew.executor(threads)
+        executor = self._crew.get_executor(threads)
         with self._lock:
             self._residents[node] = Resident(node, name, key, factory, executor)
             self._made_by[name] = factory
@@ -141,7 +141,7 @@ class Residents:
             return False
         self.stopped.add(node)
         for job in self._take_out(resident.executor, resident.node):
-            blocked = describe(job)  # before its thread is another's business
+            blocked = describe_job(job)  # before its thread is another's business
             if resident.executor.give_up(job):
                 self._tell(
                     f"{resident.name} was stopped, but its callback {blocked.what} goes on: it has "
@@ -164,7 +164,7 @@ class Residents:
         for job in jobs:
             self._tell(
                 f"{resident.name} is paused, but a callback that had begun has not ended: "
-                f"{describe(job)}"
+                f"{describe_job(job)}"
             )
 
     def resume(self, resident: Resident) -> None:
@@ -178,7 +178,7 @@ class Residents:
     def stop_half_made(self, what: tuple[Any, ...]) -> None:
         """Take half-made nodes off the graph that `what` stands for; without any, all."""
         self.half_made.clear(
-            lambda remains: not what or any(_matches(remains, item) for item in what),
+            lambda remains: not what or any(_is_match(remains, item) for item in what),
             replaced=False,
         )
 
@@ -186,8 +186,8 @@ class Residents:
         """Destroy every node; no executor may be spinning. Return which cleanups raised what."""
         problems = []
         self.stop_half_made(())
-        residents = self.all()
-        nodes = {*(resident.node for resident in residents), *self._crew.nodes()}
+        residents = self.list_residents()
+        nodes = {*(resident.node for resident in residents), *self._crew.all_nodes()}
         nodes.update(node for resident in residents for node in resident.held)
         with self._lock:
             self._residents.clear()
@@ -206,19 +206,19 @@ class Residents:
         Raises:
             SessionError: a name that was never run.
         """
-        residents = self.all()
+        residents = self.list_residents()
         if not what:
             return residents
         found = []
         for item in what:
             arguments.node_or_name(item)
-            matches = [resident for resident in residents if _matches(resident, item)]
+            matches = [resident for resident in residents if _is_match(resident, item)]
             if not matches and isinstance(item, str):
                 self._require_seen(item, residents)
             found += matches
         return found
 
-    def names(self, what: Any) -> list[str]:
+    def names_of(self, what: Any) -> list[str]:
         """Return the names of nodes that run or ran and that `what` stands for.
 
         Raises:
@@ -231,31 +231,35 @@ class Residents:
             with self._lock:
                 names = [known for known in self._made_by if is_name(known, what)]
             return names or [resident.name for resident in self.find((what,))]
-        return [name for name, factory in self._made_by.items() if _same(factory, what)]
+        return [name for name, factory in self._made_by.items() if _is_same_factory(factory, what)]
 
-    def stolen(self) -> list[Resident]:
+    def find_stolen(self) -> list[Resident]:
         """Return nodes that some other executor took over and then let go of.
 
         `rclpy.spin_once(node)` does that: the node leaves its executor and does not come back. A
         node that another executor still holds was moved there on purpose; so was one whose own
         executor has been shut down.
         """
-        return [resident for resident in self._elsewhere() if not _holder(resident)]
+        return [
+            resident for resident in self._residents_elsewhere() if not _holding_executor(resident)
+        ]
 
-    def moved(self) -> list[str]:
+    def moved_nodes(self) -> list[str]:
         """Return the names of nodes that an executor holds which is not the session's."""
-        return [resident.name for resident in self._elsewhere() if _holder(resident)]
+        return [
+            resident.name for resident in self._residents_elsewhere() if _holding_executor(resident)
+        ]
 
     def take_back_stolen(self) -> list[str]:
-        """Spin nodes again that were `stolen`; return their names."""
-        stolen = self.stolen()
+        """Spin nodes again that were `find_stolen`; return their names."""
+        stolen = self.find_stolen()
         for resident in stolen:
             resident.executor.add_node(resident.node)
         return [resident.name for resident in stolen]
 
     # Inside.
 
-    def _make(
+    def _make_node(
         self, factory: Factory, args: tuple[Any, ...], kwargs: dict[str, Any], key: Hashable
     ) -> Node:
         # Weakly: what the constructor raises is kept, and with it what this frame refers to.
@@ -265,9 +269,9 @@ class Residents:
                 node = factory(*args, **kwargs)
         except BaseException as error:
             with suppress(Exception):  # rclpy's own error, of a name that cannot be, say, is enough
-                name_conflicts.explain(error)
+                name_conflicts.explain_conflict(error)
             with suppress(Exception):
-                for name in self.half_made.note(error, factory, key, self._is_news(before)):
+                for name in self.half_made.note_failure(error, factory, key, self._is_news(before)):
                     self._made_by[name] = factory
             raise
         if not isinstance(node, Node):
@@ -280,15 +284,15 @@ class Residents:
 
     def _is_news(self, before: Container[threading.Thread]) -> Callable[[threading.Thread], bool]:
         """Return what tells a learner's thread that was not there before."""
-        return lambda thread: thread not in before and not self._crew.owns(thread)
+        return lambda thread: thread not in before and not self._crew.has_thread(thread)
 
-    def _elsewhere(self) -> list[Resident]:
+    def _residents_elsewhere(self) -> list[Resident]:
         """Return the nodes that should be spinning and are not in the executor they belong to."""
         return [
             resident
-            for resident in self.all()
-            if not (resident.paused or resident.executor.ended)
-            and _holder(resident) is not resident.executor
+            for resident in self.list_residents()
+            if not (resident.paused or resident.executor.has_ended)
+            and _holding_executor(resident) is not resident.executor
         ]
 
     def _brought_along(self, resident: Resident) -> list[Node]:
@@ -302,10 +306,10 @@ class Residents:
 
     def _take_out(self, executor: BackgroundExecutor, node: Node) -> list[Job]:
         """Stop spinning a node; return its callbacks that have not ended after some time."""
-        with executor.held():
+        with executor.hold_still():
             executor.remove_node(node)
         if (job := current_job()) is None or job.node is not node:
-            poll(lambda: not executor.running_of(node), _CALLBACK_GRACE, self._pulse)
+            poll_condition(lambda: not executor.running_of(node), _CALLBACK_GRACE, self._pulse)
         return [job for job in executor.running_of(node) if job.thread_id]
 
     def _require_seen(self, name: str, residents: list[Resident]) -> None:
@@ -316,36 +320,36 @@ class Residents:
             raise SessionError(f"No node {name!r} ran in this session; running now: {running}.")
 
 
-def _holder(resident: Resident) -> Executor | None:
+def _holding_executor(resident: Resident) -> Executor | None:
     """Return the executor that has the node, whose wish it is or not."""
     executor = resident.node.executor
     return executor if executor is not None and resident.node in executor.get_nodes() else None
 
 
-def _matches(resident: Resident | Remains, what: Any) -> bool:
+def _is_match(resident: Resident | Remains, what: Any) -> bool:
     if isinstance(what, str):
         return is_name(resident.name, what)
     if isinstance(what, Node):
         return resident.node is what
-    return _same(resident.factory, what)
+    return _is_same_factory(resident.factory, what)
 
 
-def _same(factory: object, other: object) -> bool:
+def _is_same_factory(factory: object, other: object) -> bool:
     # A class defined again in a cell is another object of the same name.
-    path = _path(other)
-    return factory is other or (path is not None and path == _path(factory))
+    path = _factory_path(other)
+    return factory is other or (path is not None and path == _factory_path(factory))
 
 
-def _path(factory: object) -> tuple[str, str] | None:
+def _factory_path(factory: object) -> tuple[str, str] | None:
     factory = getattr(factory, "func", factory)
     module, name = getattr(factory, "__module__", None), getattr(factory, "__qualname__", None)
     # Every lambda has the same name: it says nothing about the node that it makes.
     return (module, name) if module and name and "<lambda>" not in name else None
 
 
-def _key(factory: object, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Hashable:
+def _make_key(factory: object, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Hashable:
     if isinstance(factory, functools.partial):
         args, kwargs = (*factory.args, *args), {**factory.keywords, **kwargs}
-    if isinstance(factory, Node) or (path := _path(factory)) is None:
+    if isinstance(factory, Node) or (path := _factory_path(factory)) is None:
         return None
     return (path, repr(args), repr(sorted(kwargs.items())))

@@ -66,7 +66,7 @@ _being_made = 0  # nodes
 _level_before = LoggingSeverity.UNSET
 
 
-def install(*, hand_on: bool) -> None:
+def install_handler(*, hand_on: bool) -> None:
     """Hear what is logged from now on. Idempotent, and to be repeated after each Context.init().
 
     Args:
@@ -83,7 +83,7 @@ def install(*, hand_on: bool) -> None:
 
 
 @contextlib.contextmanager
-def staying() -> Iterator[None]:
+def stay_installed() -> Iterator[None]:
     """Go on hearing while a context is shut down in the block, and afterwards.
 
     With the last context rclpy takes logging down, which turns the console on. But a callback may
@@ -113,7 +113,7 @@ def staying() -> Iterator[None]:
                 collections.deque(map(operator.call, steps), maxlen=0)
 
 
-def uninstall() -> None:
+def uninstall_handler() -> None:
     """Let nobody hear what is logged from now on, if ours is still in place. Idempotent.
 
     Needed before the interpreter ends: threads of DDS may log later than that, and so may what
@@ -161,7 +161,7 @@ def keep_every_level(node: Node) -> None:
         _lowered.add(logger.name)
 
 
-def _text(text_format: bytes, arguments: int) -> str:
+def _format_text(text_format: bytes, arguments: int) -> str:
     # The next handler needs the arguments too, and reading them uses them up: read a copy.
     copy = ctypes.create_string_buffer(ctypes.string_at(arguments, _VA_LIST_BYTES))
     buffer = ctypes.create_string_buffer(_TEXT_BYTES)
@@ -173,14 +173,14 @@ def _text(text_format: bytes, arguments: int) -> str:
     return buffer.value.decode("utf-8", "replace")
 
 
-def _hear(
+def _hear_line(
     location: int, severity: int, name: bytes, stamp: int, text_format: bytes, arguments: int
 ) -> None:
     spare_the_next_search()
     logger = (name or b"").decode("utf-8", "replace")
     job = current_job()
     home = None if job is None else job.home.session_key
-    store.add(stamp / 1e9, severity, logger, _text(text_format, arguments), home)
+    store.add(stamp / 1e9, severity, logger, _format_text(text_format, arguments), home)
     if _next is None or (severity < LoggingSeverity.INFO and _is_ours_to_lower(logger)):
         return
     with _handing_on() as handler:
@@ -221,7 +221,7 @@ def _is_ours_to_lower(logger: str) -> bool:
     return False
 
 
-_hear_in_c = _Handler(_hear)  # kept here: C only has its address
+_hear_in_c = _Handler(_hear_line)  # kept here: C only has its address
 _ours = ctypes.cast(_hear_in_c, ctypes.c_void_p).value
 _hear_again = functools.partial(
     ctypes.PyDLL("librcutils.so").rcutils_logging_set_output_handler, ctypes.c_void_p(_ours)

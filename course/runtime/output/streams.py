@@ -27,7 +27,7 @@ class JobAwareStream:
         unfinished = job.unfinished = job.unfinished or {}
         *lines, unfinished[self._level] = (unfinished.get(self._level, "") + text).split("\n")
         for line in lines:
-            job.say(self._level, line)
+            job.log_line(self._level, line)
         return len(text)
 
     def writelines(self, lines: Any) -> None:
@@ -49,7 +49,7 @@ class JobAwareStream:
         return iter(self._stream)
 
 
-def install() -> None:
+def install_streams() -> None:
     """Stand in for the present sys.stdout and sys.stderr. Cheap if that is so already."""
     if type(sys.stdout) is JobAwareStream and type(sys.stderr) is JobAwareStream:
         return
@@ -60,7 +60,7 @@ def install() -> None:
                 setattr(sys, name, JobAwareStream(stream, level))
 
 
-def uninstall() -> None:
+def uninstall_streams() -> None:
     """Put the streams back that were there, unless somebody has replaced ours. Idempotent."""
     with _lock:
         for name in ("stdout", "stderr"):
@@ -73,4 +73,4 @@ def finish_lines(job: Job) -> None:
     """Log what a callback printed without a line end."""
     for level, rest in (job.unfinished or {}).items():
         if rest:
-            job.say(level, rest)
+            job.log_line(level, rest)

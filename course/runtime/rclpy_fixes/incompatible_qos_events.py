@@ -23,7 +23,7 @@ _INCOMPATIBLE: tuple[Any, ...] = (
 _named: weakref.WeakKeyDictionary[EventHandler, set[str]] = weakref.WeakKeyDictionary()
 
 
-def listen(handler: EventHandler) -> None:
+def listen_to(handler: EventHandler) -> None:
     """Remember what ``handler`` hears, if it is told of incompatible QoS. Idempotent.
 
     An executor calls this before it runs a handler for the first time, so that no event is missed,
@@ -42,11 +42,11 @@ def listen(handler: EventHandler) -> None:
     handler.callback = heard
 
 
-def policies(endpoint: Publisher | Subscription) -> set[str]:
+def incompatible_policies(endpoint: Publisher | Subscription) -> set[str]:
     """Return the policies (RELIABILITY, say) that DDS has named as incompatible for an endpoint."""
-    return set().union(*(_named.get(handler, ()) for handler in _handlers(endpoint)))
+    return set().union(*(_named.get(handler, ()) for handler in _event_handlers(endpoint)))
 
 
-def _handlers(endpoint: Publisher | Subscription) -> Iterable[EventHandler]:
+def _event_handlers(endpoint: Publisher | Subscription) -> Iterable[EventHandler]:
     handlers: Any = endpoint.event_handlers  # rclpy's annotation is wrong
     return list(handlers)

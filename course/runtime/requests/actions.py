@@ -13,10 +13,10 @@ from rclpy.qos import QoSProfile
 from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
 from course.errors import WaitTimeout
-from course.runtime.executor.quiescence import settle
+from course.runtime.executor.quiescence import settle_executors
 from course.runtime.requests.graph_queries import full_action, full_topic, why_no_service
 from course.runtime.requests.hidden_node import Probe
-from course.runtime.waiting import Deadline, poll
+from course.runtime.waiting import Deadline, poll_condition
 from course.util import arguments
 
 _FEEDBACK_DEPTH = 1000
@@ -89,7 +89,7 @@ class GoalRun:
         Raises:
             WaitTimeout: no result within `timeout` seconds.
         """
-        timeout = arguments.seconds(timeout)
+        timeout = arguments.check_seconds(timeout)
         with self._probe.explaining():
             if not self.done_within(timeout):
                 raise WaitTimeout(
@@ -97,12 +97,12 @@ class GoalRun:
                     f"its state is {self.status.name}, with {len(self.feedback)} feedback messages."
                 )
         # Feedback and result come on separate topics: take what arrived before the result.
-        settle([self._probe.executor])
+        settle_executors([self._probe.executor])
         return self.result
 
     def done_within(self, timeout: float) -> bool:
         """Return whether the goal is `done`, as soon as it is, or after `timeout` seconds."""
-        return bool(poll(lambda: self.done, timeout, self._probe.pulse))
+        return bool(poll_condition(lambda: self.done, timeout, self._probe.pulse))
 
     def cancel(self, timeout: float = 5.0) -> bool:
         """Ask the server to cancel the goal; return whether it agreed.
@@ -112,13 +112,13 @@ class GoalRun:
         Raises:
             WaitTimeout: the server did not answer within `timeout` seconds.
         """
-        timeout = arguments.seconds(timeout)
+        timeout = arguments.check_seconds(timeout)
         if self._handle is None or not self.accepted:
             return False
-        with self._probe.executor.held():  # as in Goals.send
+        with self._probe.executor.hold_still():  # as in Goals.send
             future = self._handle.cancel_goal_async()
         with self._probe.explaining():
-            response = self._probe.outcome(
+            response = self._probe.wait_for_result(
                 future, Deadline(timeout), f"{self.name} did not answer the request to cancel"
             )
         mine = bytes(self._handle.goal_id.uuid)
@@ -139,7 +139,7 @@ class GoalRun:
         """Take the server's answer, and ask for the result of an accepted goal."""
         self.accepted, self._handle = bool(handle.accepted), handle
         if self.accepted:
-            with self._probe.executor.held():
+            with self._probe.executor.hold_still():
                 self._future = handle.get_result_async()
 
 
@@ -198,7 +198,7 @@ class Goals:
         action = self._actions.get((action_type, name))
         if action is None:
             action = self._actions[action_type, name] = _Action(probe, action_type, name)
-        if not poll(action.is_ready, deadline.left, probe.pulse):
+        if not poll_condition(action.is_ready, deadline.seconds_left, probe.pulse):
             reason = why_no_service(probe.node, service, action_type.Impl.SendGoalService)
             reason = reason.replace(SEND_GOAL, "")
             raise WaitTimeout(
@@ -206,7 +206,7 @@ class Goals:
             )
         run = GoalRun(probe, name, on_feedback)
         # rclpy registers the request after it has sent it: no answer may come in between.
-        with probe.executor.held():
+        with probe.executor.hold_still():
             future = action.send(goal, run)
-        run.follow(probe.outcome(future, deadline, f"{name} did not answer to the goal"))
+        run.follow(probe.wait_for_result(future, deadline, f"{name} did not answer to the goal"))
         return run

@@ -32,7 +32,9 @@ def full_topic(node: Node, topic: str) -> str:
     Raises:
         SessionError: it is not a topic name.
     """
-    return _resolved(node.resolve_topic_name, arguments.text(topic, "The topic", "/scan"), "topic")
+    return _resolve_name(
+        node.resolve_topic_name, arguments.check_text(topic, "The topic", "/scan"), "topic"
+    )
 
 
 def full_service(node: Node, name: str) -> str:
@@ -41,8 +43,8 @@ def full_service(node: Node, name: str) -> str:
     Raises:
         SessionError: it is not a service name.
     """
-    name = arguments.text(name, "The service", "/reset")
-    return _resolved(node.resolve_service_name, name, "service")
+    name = arguments.check_text(name, "The service", "/reset")
+    return _resolve_name(node.resolve_service_name, name, "service")
 
 
 def full_action(node: Node, name: str) -> str:
@@ -51,8 +53,8 @@ def full_action(node: Node, name: str) -> str:
     Raises:
         SessionError: it is not a name of an action.
     """
-    name = arguments.text(name, "The action", "/dock")
-    return _resolved(node.resolve_service_name, name, "action")
+    name = arguments.check_text(name, "The action", "/dock")
+    return _resolve_name(node.resolve_service_name, name, "action")
 
 
 def full_node(node: Node | str) -> str:
@@ -63,7 +65,7 @@ def full_node(node: Node | str) -> str:
     """
     if isinstance(node, Node):
         return node_name(node)
-    name = arguments.text(node, "The name of a node", "/camera")
+    name = arguments.check_text(node, "The name of a node", "/camera")
     name = name if name.startswith("/") else f"/{name}"
     space, _, last = name.rpartition("/")
     try:
@@ -71,11 +73,11 @@ def full_node(node: Node | str) -> str:
         validate_node_name(last)
     except NameValidationException as error:  # the rule, and then a drawing of where
         reason = str(error).splitlines()[0].partition(": ")[2].rstrip(":")
-        raise SessionError(f"{yaml_text.shown(node)} is not a node name: {reason}.") from None
+        raise SessionError(f"{yaml_text.short_repr(node)} is not a node name: {reason}.") from None
     return name
 
 
-def _resolved(resolve: Callable[[str], str], name: str, kind: str) -> str:
+def _resolve_name(resolve: Callable[[str], str], name: str, kind: str) -> str:
     try:
         return str(resolve(name))
     except RuntimeError as error:  # rclpy's RCLError: the reason, and a place in its C source
@@ -137,18 +139,18 @@ def why_no_message(node: Node, topic: str, msg_type: Any, qos: QoSProfile) -> st
         verdict, reason = qos_check_compatible(info.qos_profile, qos)
         # Two default profiles give WARNING: what is left unsaid may or may not fit.
         if verdict == QoSCompatibility.ERROR:
-            reasons = ", ".join(part.strip() for part in _reasons(reason))
+            reasons = ", ".join(part.strip() for part in _split_reasons(reason))
             return f"The QoS that {info.node_name} offers on {topic} does not fit: {reasons}."
     count = len(publishers)
     return (
-        f"{yaml_text.counted(count, 'publisher')} on {topic} with a QoS that fits, "
+        f"{yaml_text.format_count(count, 'publisher')} on {topic} with a QoS that fits, "
         "but nothing was published while we listened."
     )
 
 
 def nobody_publishes(node: Node, topic: str) -> str:
     """Return that nobody does, and the topic that may have been meant, as part of a sentence."""
-    return f"Nobody publishes on {topic}{_alike(topic, _published(node))}"
+    return f"Nobody publishes on {topic}{_suggest_name(topic, _published_topics(node))}"
 
 
 def why_no_service(node: Node, name: str, srv_type: Any) -> str:
@@ -156,7 +158,7 @@ def why_no_service(node: Node, name: str, srv_type: Any) -> str:
     services = dict(node.get_service_names_and_types())
     require_type(name, srv_type, list(services.items()))
     others = [service for service in services if node.count_services(service)]
-    return f"Nobody offers {name}{_alike(name, others)}."
+    return f"Nobody offers {name}{_suggest_name(name, others)}."
 
 
 def who_offers(node: Node, names: Sequence[str]) -> dict[str, list[str]]:
@@ -175,16 +177,16 @@ def who_offers(node: Node, names: Sequence[str]) -> dict[str, list[str]]:
     return {name: sorted(nodes) for name, nodes in found.items()}
 
 
-def _published(node: Node) -> list[str]:
+def _published_topics(node: Node) -> list[str]:
     topics = [name for name, _ in node.get_topic_names_and_types()]
     return [name for name in topics if node.count_publishers(name)]
 
 
-def _alike(name: str, names: list[str]) -> str:
+def _suggest_name(name: str, names: list[str]) -> str:
     close = close_match(name, names)
     return f" (is it {close}?)" if close else ""
 
 
-def _reasons(reason: str) -> list[str]:
+def _split_reasons(reason: str) -> list[str]:
     parts = (part.strip() for part in reason.split(";"))
     return [p.removeprefix("ERROR:") for p in parts if p.startswith("ERROR:")] or [reason]

@@ -30,7 +30,7 @@ from course.runtime.requests.graph_queries import (
     why_no_message,
     why_no_service,
 )
-from course.runtime.waiting import Deadline, Pulse, poll
+from course.runtime.waiting import Deadline, Pulse, poll_condition
 
 _LISTEN_DEPTH = 1000
 _LONGEST = 1e9  # s: a Duration counts nanoseconds in 64 bits
@@ -69,7 +69,7 @@ class Probe:
             start_parameter_services=False,
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
-        self.executor = crew.executor(1, "probe")
+        self.executor = crew.get_executor(1, "probe")
         self.executor.add_node(self.node)
 
     def subscribe(
@@ -91,7 +91,7 @@ class Probe:
 
     def drop(self, entity: Subscription | Client) -> None:
         """Destroy a subscription or client of the hidden node. Idempotent."""
-        with self.executor.held():
+        with self.executor.hold_still():
             if isinstance(entity, Subscription):
                 self.node.destroy_subscription(entity)
             else:
@@ -105,22 +105,26 @@ class Probe:
         inbox: list[Any] = []
         deadline = Deadline(timeout)
         profile = qos or fitting_qos(self.node, topic, _LISTEN_DEPTH)
-        with self._listening(msg_type, topic, inbox, profile):
+        with self._listen_to(msg_type, topic, inbox, profile):
             # Listen at once, whatever is offered: the publisher may appear and publish meanwhile.
-            poll(lambda: inbox or self.node.count_publishers(topic), deadline.left, self.pulse)
+            poll_condition(
+                lambda: inbox or self.node.count_publishers(topic),
+                deadline.seconds_left,
+                self.pulse,
+            )
             better = profile if qos is not None else fitting_qos(self.node, topic, _LISTEN_DEPTH)
             with contextlib.ExitStack() as stack:
                 if not inbox and better != profile:
-                    stack.enter_context(self._listening(msg_type, topic, inbox, better))
-                if poll(lambda: inbox, deadline.left, self.pulse):
+                    stack.enter_context(self._listen_to(msg_type, topic, inbox, better))
+                if poll_condition(lambda: inbox, deadline.seconds_left, self.pulse):
                     return inbox[0]
         reason = why_no_message(self.node, topic, msg_type, better)
         raise WaitTimeout(f"No message on {topic} in {timeout:g} s. {reason}", topic)
 
     def publish(self, topic: str, message: Any, qos: QoSProfile, timeout: float) -> None:
         """Publish one message as soon as a subscription matches; see `Session.publish`."""
-        with self.publisher(type(message), topic, qos, timeout) as publisher:
-            if not poll(publisher.get_subscription_count, timeout, self.pulse):
+        with self.open_publisher(type(message), topic, qos, timeout) as publisher:
+            if not poll_condition(publisher.get_subscription_count, timeout, self.pulse):
                 raise WaitTimeout(
                     f"Nobody with a QoS that fits subscribes to {publisher.topic_name}, so nothing "
                     f"was published in {timeout:g} s."
@@ -128,7 +132,7 @@ class Probe:
             publisher.publish(message)
 
     @contextlib.contextmanager
-    def publisher(
+    def open_publisher(
         self, msg_type: Any, topic: str, qos: QoSProfile, timeout: float
     ) -> Iterator[Publisher]:
         """Give a publisher for a block; see `Session.publisher`."""
@@ -139,11 +143,11 @@ class Probe:
             yield publisher
             publisher.wait_for_all_acked(Duration(seconds=min(timeout, _LONGEST)))
         finally:
-            with self.executor.held():
+            with self.executor.hold_still():
                 self.node.destroy_publisher(publisher)
 
     @contextlib.contextmanager
-    def client(self, srv_type: Any, name: str, deadline: Deadline) -> Iterator[Client]:
+    def open_client(self, srv_type: Any, name: str, deadline: Deadline) -> Iterator[Client]:
         """Give a client whose server is there.
 
         Raises:
@@ -153,7 +157,7 @@ class Probe:
         require_type(name, srv_type, self.node.get_service_names_and_types())
         client = self.node.create_client(srv_type, name)
         try:
-            if not poll(client.service_is_ready, deadline.left, self.pulse):
+            if not poll_condition(client.service_is_ready, deadline.seconds_left, self.pulse):
                 reason = why_no_service(self.node, name, srv_type)
                 raise WaitTimeout(
                     f"The service {name} was not ready in {deadline.total:g} s. {reason}", name
@@ -165,13 +169,15 @@ class Probe:
     def call(self, srv_type: Any, name: str, request: Any, timeout: float) -> Any:
         """Return a service's response; see `Session.call`."""
         deadline = Deadline(timeout)
-        with self.client(srv_type, name, deadline) as client:
+        with self.open_client(srv_type, name, deadline) as client:
             future = client.call_async(request)
-            return self.outcome(
+            return self.wait_for_result(
                 future, deadline, f"The service {client.service_name} did not answer"
             )
 
-    def answers(self, srv_type: Any, names: Sequence[str], timeout: float) -> dict[str, Any]:
+    def collect_answers(
+        self, srv_type: Any, names: Sequence[str], timeout: float
+    ) -> dict[str, Any]:
         """Return the responses that come in time; see `Session.answers`."""
         clients = {name: self.node.create_client(srv_type, name) for name in names}
         futures: dict[str, Future] = {}
@@ -184,26 +190,26 @@ class Probe:
             return len(done) == len(clients)
 
         try:
-            poll(all_answered, timeout, self.pulse)
+            poll_condition(all_answered, timeout, self.pulse)
             return {name: future.result() for name, future in futures.items() if future.done()}
         finally:
             for client in clients.values():
                 self.drop(client)
 
-    def outcome(self, future: Future, deadline: Deadline, complaint: str) -> Any:
+    def wait_for_result(self, future: Future, deadline: Deadline, complaint: str) -> Any:
         """Return the result of `future`.
 
         Raises:
             WaitTimeout: none by the deadline; its message begins with `complaint`.
         """
-        if not poll(future.done, deadline.left, self.pulse):
+        if not poll_condition(future.done, deadline.seconds_left, self.pulse):
             if not self.node.context.ok():
                 raise ExternalShutdownException
             raise WaitTimeout(f"{complaint} in {deadline.total:g} s.")
         return future.result()
 
     @contextlib.contextmanager
-    def _listening(
+    def _listen_to(
         self, msg_type: Any, topic: str, inbox: list[Any], qos: QoSProfile
     ) -> Iterator[None]:
         subscription = self.subscribe(msg_type, topic, inbox.append, qos)

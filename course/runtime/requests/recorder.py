@@ -20,7 +20,7 @@ from course.runtime.requests.graph_queries import (
     why_no_message,
 )
 from course.runtime.requests.hidden_node import Probe
-from course.runtime.waiting import poll
+from course.runtime.waiting import poll_condition
 from course.util import arguments
 
 
@@ -62,7 +62,9 @@ class Recorder:
         self._kept: deque[Stamped] = deque(maxlen=limit)
         self._count = 0
         self._lock = threading.Lock()
-        self._subscription = probe.subscribe(self.msg_type, self.topic, self._keep, self.qos)
+        self._subscription = probe.subscribe(
+            self.msg_type, self.topic, self._keep_message, self.qos
+        )
 
     @property
     def messages(self) -> list[Stamped]:
@@ -85,9 +87,12 @@ class Recorder:
         Raises:
             WaitTimeout: fewer arrived within `timeout` seconds; it says why if none did.
         """
-        n, timeout = arguments.whole(n, "n", least=0, example=1), arguments.seconds(timeout)
+        n, timeout = (
+            arguments.check_whole_number(n, "n", least=0, example=1),
+            arguments.check_seconds(timeout),
+        )
         with self._probe.explaining():
-            if poll(lambda: self._count >= n, timeout, self._probe.pulse):
+            if poll_condition(lambda: self._count >= n, timeout, self._probe.pulse):
                 return self.messages
             message = f"{self._count} of {n} messages arrived on {self.topic} in {timeout:g} s."
             if not self._count:
@@ -115,7 +120,7 @@ class Recorder:
         """
         from course.messages import mcap_file
 
-        return mcap_file.write(path, {self.topic: (self.msg_type, self.messages)})
+        return mcap_file.write_recordings(path, {self.topic: (self.msg_type, self.messages)})
 
     def stop(self) -> None:
         """Stop recording; what was recorded stays. Idempotent."""
@@ -133,7 +138,7 @@ class Recorder:
         """Return a summary for a notebook."""
         return f"<Recorder of {self.topic} ({type_name(self.msg_type)}): {self._count} messages>"
 
-    def _keep(self, message: Any, info: dict[str, int]) -> None:
+    def _keep_message(self, message: Any, info: dict[str, int]) -> None:
         # The publisher's stamp, not ours: a busy machine delays callbacks, not the clock.
         simulated = self._now_ns()
         stamp = info["source_timestamp"] if simulated is None else simulated
@@ -142,7 +147,9 @@ class Recorder:
             self._count += 1
 
     def _wait_for_type(self, timeout: float) -> Any:
-        found = poll(lambda: type_on(self._probe.node, self.topic), timeout, self._probe.pulse)
+        found = poll_condition(
+            lambda: type_on(self._probe.node, self.topic), timeout, self._probe.pulse
+        )
         if found is None:
             nobody = nobody_publishes(self._probe.node, self.topic)
             raise WaitTimeout(

@@ -19,7 +19,7 @@ from course.runtime.requests.actions import GoalRun, Goals
 from course.runtime.requests.graph_queries import who_offers
 from course.runtime.requests.hidden_node import Probe
 from course.runtime.requests.recorder import Recorder
-from course.runtime.waiting import Deadline, poll
+from course.runtime.waiting import Deadline, poll_condition
 from course.util import arguments
 
 T = TypeVar("T")
@@ -58,10 +58,10 @@ class Requests:
         self, condition: Callable[[], T], timeout: float = 5.0, what: str = "the condition"
     ) -> T:
         """Return the first true value of `condition`."""
-        arguments.function(condition, "The condition", "lambda: len(heard) > 3")
-        timeout = arguments.seconds(timeout)
-        with self._explaining(vague=True):
-            value = poll(condition, timeout, self._host.pulse)
+        arguments.check_function(condition, "The condition", "lambda: len(heard) > 3")
+        timeout = arguments.check_seconds(timeout)
+        with self._explain_timeouts(vague=True):
+            value = poll_condition(condition, timeout, self._host.pulse)
             if value is None:
                 raise WaitTimeout(f"Waited {timeout:g} s in vain for {what}.")
             return value
@@ -76,19 +76,19 @@ class Requests:
     ) -> Any:
         """Return the next message on `topic`, or the one that a late joiner is given."""
         arguments.ros_type(msg_type, "message")
-        timeout = arguments.seconds(timeout)
-        with self._explaining():
-            profile = arguments.qos(qos)
+        timeout = arguments.check_seconds(timeout)
+        with self._explain_timeouts():
+            profile = arguments.check_qos(qos)
             return self.probe.next_message(msg_type, topic, profile, timeout)
 
     def publish(
         self, topic: str, message: Any, *, qos: QoSProfile | int = 10, timeout: float = 5.0
     ) -> None:
         """Publish one message, once somebody is there to get it."""
-        arguments.message(message)
-        timeout = arguments.seconds(timeout)
-        with self._explaining():
-            profile = arguments.qos(qos)
+        arguments.check_message(message)
+        timeout = arguments.check_seconds(timeout)
+        with self._explain_timeouts():
+            profile = arguments.check_qos(qos)
             if profile is None:
                 profile = QoSProfile(depth=10)
             self.probe.publish(topic, message, profile, timeout)
@@ -99,8 +99,10 @@ class Requests:
     ) -> Iterator[Publisher]:
         """Give a publisher of the session's own for the time of a `with` block."""
         arguments.ros_type(msg_type, "message")
-        profile = arguments.qos(qos) or QoSProfile(depth=10)
-        with self.probe.publisher(msg_type, topic, profile, arguments.seconds(timeout)) as made:
+        profile = arguments.check_qos(qos) or QoSProfile(depth=10)
+        with self.probe.open_publisher(
+            msg_type, topic, profile, arguments.check_seconds(timeout)
+        ) as made:
             yield made
 
     def paced(self, times: int, rate: float) -> Iterator[int]:
@@ -108,28 +110,28 @@ class Requests:
         begun = time.monotonic()
         for number in range(times):
             gap = begun + number / rate - time.monotonic()
-            if poll(lambda: self._host.closed, max(0.0, gap), self._host.pulse):
+            if poll_condition(lambda: self._host.closed, max(0.0, gap), self._host.pulse):
                 return
             yield number + 1
 
     def wait_for_service(self, srv_type: Any, name: str, timeout: float = 5.0) -> None:
         """Return when a server of `name` is ready."""
         arguments.ros_type(srv_type, "service")
-        timeout = arguments.seconds(timeout)
-        with self._explaining(), self.probe.client(srv_type, name, Deadline(timeout)):
+        timeout = arguments.check_seconds(timeout)
+        with self._explain_timeouts(), self.probe.open_client(srv_type, name, Deadline(timeout)):
             pass
 
     def call(self, srv_type: Any, name: str, request: Any, timeout: float = 5.0) -> Any:
         """Call a service and return its response."""
         arguments.ros_type(srv_type, "service")
-        arguments.instance(request, srv_type.Request, "request")
-        timeout = arguments.seconds(timeout)
-        with self._explaining():
+        arguments.check_instance(request, srv_type.Request, "request")
+        timeout = arguments.check_seconds(timeout)
+        with self._explain_timeouts():
             return self.probe.call(srv_type, name, request, timeout)
 
     def answers(self, srv_type: Any, names: Sequence[str], timeout: float = 1.0) -> dict[str, Any]:
         """Return what these services respond to an empty request, by name."""
-        return self.probe.answers(srv_type, names, timeout) if names else {}
+        return self.probe.collect_answers(srv_type, names, timeout) if names else {}
 
     def send_goal(
         self,
@@ -142,11 +144,11 @@ class Requests:
     ) -> GoalRun:
         """Send a goal; return when the server has accepted or rejected it."""
         arguments.ros_type(action_type, "action")
-        arguments.instance(goal, action_type.Goal, "goal")
+        arguments.check_instance(goal, action_type.Goal, "goal")
         if on_feedback is not None:
-            arguments.function(on_feedback, "on_feedback", "print")
-        timeout = arguments.seconds(timeout)
-        with self._explaining():
+            arguments.check_function(on_feedback, "on_feedback", "print")
+        timeout = arguments.check_seconds(timeout)
+        with self._explain_timeouts():
             probe = self.probe
             self._goals_made = self._goals_made or Goals(probe)
             return self._goals_made.send(action_type, name, goal, timeout, on_feedback)
@@ -163,10 +165,10 @@ class Requests:
         """Record a topic from now on."""
         if msg_type is not None:
             arguments.ros_type(msg_type, "message")
-        arguments.whole(limit, "limit", least=1, example=1000)
-        timeout = arguments.seconds(timeout)
-        with self._explaining():
-            profile = arguments.qos(qos)
+        arguments.check_whole_number(limit, "limit", least=1, example=1000)
+        timeout = arguments.check_seconds(timeout)
+        with self._explain_timeouts():
+            profile = arguments.check_qos(qos)
             return Recorder(self.probe, topic, msg_type, profile, limit, self._now_ns, timeout)
 
     def offered(self, names: Sequence[str]) -> dict[str, list[str]]:
@@ -186,13 +188,13 @@ class Requests:
         with self._lock:
             if self._probe is None:
                 self._probe = Probe(self._host.context, self._host.crew, self._host.pulse)
-                self._probe.explaining = self._explaining
+                self._probe.explaining = self._explain_timeouts
             return self._probe
 
     # Inside.
 
     @contextlib.contextmanager
-    def _explaining(self, *, vague: bool = False) -> Iterator[None]:
+    def _explain_timeouts(self, *, vague: bool = False) -> Iterator[None]:
         """Add to a WaitTimeout what this session knows about its reasons.
 
         Args:
@@ -213,7 +215,7 @@ class Requests:
                 hints.append(f"Meanwhile {latest}.")
             if (job := current_job()) is not None and job.home.threads == 1:
                 hints.append("A wait inside a callback holds up all others: run with threads=2.")
-            if moved := self._host.residents.moved():
+            if moved := self._host.residents.moved_nodes():
                 hints.append(
                     f"{', '.join(moved)}: in an executor of your own, where callbacks run only "
                     "while it spins; executor.remove_node(node) gives a node back."

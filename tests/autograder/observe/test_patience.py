@@ -71,4 +71,4 @@ def left(sensor: Sensor = LIDAR, count: int = 15, **seen: object) -> Backlog:
 def test_what_a_pause_has_decided_is_told_from_what_comes_after_it(
     found: Backlog, decided: bool
 ) -> None:
-    assert found.decided is decided
+    assert found.is_decided is decided

@@ -43,7 +43,7 @@ def test_a_message_of_two_subscriptions_counts_once_whatever_its_stamp_says() ->
     forged = RECEIVED * 100
     for received in (RECEIVED, RECEIVED + 7):  # by the one and by the other
         info = {"source_timestamp": forged, "received_timestamp": received}
-        ears.hear(published_at(info), "forged", forged)
-    ears.hear(RECEIVED + 5, "later", RECEIVED + 5)
+        ears.add_message(published_at(info), "forged", forged)
+    ears.add_message(RECEIVED + 5, "later", RECEIVED + 5)
     assert list(ears) == ["forged", "later"]
-    assert ears.newest == RECEIVED + 5
+    assert ears.newest_time == RECEIVED + 5

@@ -11,7 +11,7 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
-from autograder.exercises.qos.examiner_node import ExaminerNode, lossless
+from autograder.exercises.qos.examiner_node import ExaminerNode, lossless_profile
 from autograder.exercises.qos.readings import STOP, Heard, Tag
 from autograder.observe.quiet_node import QuietNode
 from course import Session
@@ -42,14 +42,16 @@ def test_a_guest_hears_in_its_block_only() -> None:
     with Session() as session:
         node = session.run(ExaminerNode)
         before = set(node.subscriptions)
-        stops = session.run(QuietNode, "driver").create_publisher(STOP.type, STOP.topic, lossless())
+        stops = session.run(QuietNode, "driver").create_publisher(
+            STOP.type, STOP.topic, lossless_profile()
+        )
 
         def stop(number: int) -> None:
             tag = Tag(node.nonce, node.phase("event"), number)
-            stops.publish(STOP.message(node.words(STOP, tag)))
+            stops.publish(STOP.make_message(node.words(STOP, tag)))
 
         with suppress(ZeroDivisionError), node.guests():
-            node.listen(STOP, STOP.topic, lossless(), guest)
+            node.listen(STOP, STOP.topic, lossless_profile(), guest)
             session.until(lambda: stops.get_subscription_count() == 2)
             stop(0)
             session.until(lambda: guest[STOP.name] and node.witnessed[STOP.name])

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import pytest
 from std_msgs.msg import String
 
-from autograder.exercises.qos.examiner_node import ExaminerNode, lossless
+from autograder.exercises.qos.examiner_node import ExaminerNode, lossless_profile
 from autograder.exercises.qos.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Sensor
 from autograder.observe.quiet_node import QuietNode
 from autograder.observe.spinner import MOST_AT_ONCE, Spinner
@@ -41,8 +41,8 @@ def test_messages_come_in_order_whatever_a_callback_raises(
 
     node = QuietNode("ear", session.context)
     spinner.add_node(node)
-    node.create_subscription(String, "words", hear, lossless())
-    words = node.create_publisher(String, "words", lossless())
+    node.create_subscription(String, "words", hear, lossless_profile())
+    words = node.create_publisher(String, "words", lossless_profile())
     spinner.until(words.get_subscription_count, 5.0, "a listener")
     for number in range(MANY):
         words.publish(String(data=str(number)))
@@ -89,8 +89,8 @@ def test_a_reading_is_known_as_it_went_out_and_altered_if_anything_differs(
         out.publish(message)
 
     driver = session.run(QuietNode, "driver")
-    out = driver.create_publisher(sensor.type, sensor.topic, lossless())
-    driver.create_subscription(sensor.type, f"hardware/{sensor.name}", relay, lossless())
+    out = driver.create_publisher(sensor.type, sensor.topic, lossless_profile())
+    driver.create_subscription(sensor.type, f"hardware/{sensor.name}", relay, lossless_profile())
     hardware = node.hardware[sensor.name]
     spinner.until(
         lambda: hardware.get_subscription_count() and out.get_subscription_count(), 5.0, "a link"

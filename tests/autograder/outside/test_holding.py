@@ -17,7 +17,7 @@ from rclpy.node import Node
 from std_msgs.msg import Int32
 
 from autograder.processes.outside import holding
-from autograder.processes.outside.holding import HoldError, held
+from autograder.processes.outside.holding import HoldError, hold_threads
 from course import Session
 from course.runtime.waiting import Deadline
 
@@ -77,7 +77,7 @@ def family(pid: int) -> list[int]:
 
 def soon(condition: Callable[[], Any], seconds: float = 30.0) -> bool:
     deadline, never = Deadline(seconds), threading.Event()
-    while not condition() and deadline.left:
+    while not condition() and deadline.seconds_left:
         never.wait(0.01)
     return bool(condition())
 
@@ -99,7 +99,7 @@ def test_a_held_node_receives_as_much_as_its_queue_keeps_and_hands_it_on_when_le
         node.create_subscription(Int32, "echo", hear, 100)
         assert soon(lambda: count.get_subscription_count() and node.count_publishers("echo"))
         assert soon(probe)
-        with held(lambda: [listener.pid]):
+        with hold_threads(lambda: [listener.pid]):
             before = list(heard)
             for number in range(10):
                 count.publish(Int32(data=number))
@@ -125,9 +125,9 @@ def test_own_threads_and_children_stand_still_and_go_on(tmp_path: Path) -> None:
         for _ in range(3):
             first = counts()
             assert soon(lambda first=first: all_grow(first))  # type: ignore[misc]
-            with held(lambda: family(running.pid)) as hold:
+            with hold_threads(lambda: family(running.pid)) as hold:
                 assert hold.threads >= 4
-                assert not hold.jams()
+                assert not hold.is_jammed()
                 before = counts()
                 threading.Event().wait(0.05)  # fifty turns of each
                 assert counts() == before
@@ -140,7 +140,7 @@ def test_a_thread_with_a_name_of_those_of_dds_is_held_all_the_same(tmp_path: Pat
     with process(name + COUNTERS, shared) as running:
         comm = Path(f"/proc/{running.pid}/comm")
         assert comm.read_bytes() == b"dds.udp.7400\n"
-        with held(lambda: family(running.pid)):
+        with hold_threads(lambda: family(running.pid)):
             before = shared.read_bytes()
             threading.Event().wait(0.05)
             assert shared.read_bytes() == before
@@ -164,7 +164,7 @@ def test_code_counts_as_that_of_dds_only_where_ros_is_installed(tmp_path: Path) 
 
 def test_who_is_killed_while_held_is_gone_at_once() -> None:
     with process("print(flush=True); import time; time.sleep(600)") as running:
-        with held(lambda: [running.pid]):
+        with hold_threads(lambda: [running.pid]):
             running.kill()
             assert running.wait(timeout=30) == -9
         assert holding._has_ended(running.pid)
@@ -172,7 +172,7 @@ def test_who_is_killed_while_held_is_gone_at_once() -> None:
 
 def test_a_signal_that_comes_while_held_is_not_lost() -> None:
     with process("print(flush=True); import time; time.sleep(600)") as running:
-        with held(lambda: [running.pid]):
+        with hold_threads(lambda: [running.pid]):
             running.terminate()
             with pytest.raises(subprocess.TimeoutExpired):
                 running.wait(timeout=0.1)
@@ -187,6 +187,6 @@ def test_where_nobody_may_trace_a_sentence_says_so(monkeypatch: pytest.MonkeyPat
         with monkeypatch.context() as patch:
             patch.setattr(holding, "_ptrace", refuse)
             refused = pytest.raises(HoldError, match="does not let the grader trace")
-            with refused, held(lambda: [running.pid]):
+            with refused, hold_threads(lambda: [running.pid]):
                 pass
-        assert soon(lambda: holding._state(running.pid) == b"S")
+        assert soon(lambda: holding._thread_state(running.pid) == b"S")

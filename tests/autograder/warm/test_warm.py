@@ -19,7 +19,7 @@ from autograder.running import runner
 from autograder.sandbox.prefork import ForkedProcess, Nursery, Zygote, ZygoteError
 from autograder.sandbox.prefork import nursery as nursery_module
 from autograder.sandbox.prefork.task import Task
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 from tests.machine import needs_warm_starts
 
 PROGRAM = """
@@ -148,13 +148,13 @@ def test_a_nursery_has_one_zygote_for_a_module_and_environment(tmp_path: Path) -
     (tmp_path / "forked_program.py").write_text(PROGRAM)
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
     nursery = Nursery()
-    first = nursery.zygote("forked_program", environment)
-    assert nursery.zygote("forked_program", environment) is first
-    second = nursery.zygote("forked_program", {**environment, "NAME": "other"})
+    first = nursery.get_zygote("forked_program", environment)
+    assert nursery.get_zygote("forked_program", environment) is first
+    second = nursery.get_zygote("forked_program", {**environment, "NAME": "other"})
     assert second is not first
-    assert not first.alive
+    assert not first.is_alive
     nursery.close()
-    assert not second.alive
+    assert not second.is_alive
 
 
 MEETING = """
@@ -178,10 +178,10 @@ def test_the_zygotes_of_two_modules_start_side_by_side(
     nursery = Nursery()
     with ThreadPoolExecutor(2) as pool:
         starts = [
-            pool.submit(nursery.zygote, f"meets_{what}", environment)
+            pool.submit(nursery.get_zygote, f"meets_{what}", environment)
             for what in ("reading", "writing")
         ]
-    assert all(start.result().alive for start in starts)
+    assert all(start.result().is_alive for start in starts)
     nursery.close()
 
 
@@ -255,7 +255,7 @@ runner.run((Cell("while True: pass"),), cell_timeout=600)
 """
     engine = subprocess.Popen([sys.executable, "-c", program])
     try:
-        (subject,) = poll(lambda: subjects_of(engine.pid), 120, Pulse()) or [0]
+        (subject,) = poll_condition(lambda: subjects_of(engine.pid), 120, Pulse()) or [0]
         assert subject
         handle = os.pidfd_open(subject)
     finally:

@@ -44,9 +44,9 @@ def test_every_installed_type_with_room_gives_back_what_it_was_marked_with(tag: 
     marked = 0
     for msg_type in message_types():
         message = msg_type()
-        assert dye.read(message) is None, msg_type
+        assert dye.read_tag(message) is None, msg_type
         if dye.mark(message, tag):
-            assert dye.read(message) == tag, msg_type
+            assert dye.read_tag(message) == tag, msg_type
             assert isinstance(message, msg_type)
             marked += 1
     assert marked >= 90
@@ -86,18 +86,18 @@ def test_frame_ids_come_first_and_readings_stay_untouched() -> None:
      Float32(data=2_000_000.5), Twist(), Float32(data=-2_000_000.0)],
 )  # fmt: skip
 def test_an_ordinary_reading_is_no_tag(message: Any) -> None:
-    assert dye.read(message) is None
+    assert dye.read_tag(message) is None
 
 
 def test_a_tag_survives_text_around_it() -> None:
-    assert dye.read(String(data="seen: dye-2000000 (left)")) == 2_000_000
+    assert dye.read_tag(String(data="seen: dye-2000000 (left)")) == 2_000_000
 
 
 def test_an_answer_carries_several_tags_and_carry_passes_all_of_them_on() -> None:
     path, command, distance = Path(), Twist(), Float32()
     assert dye.mark(path, 2_000_000, 3_000_000) == {2_000_000, 3_000_000}
     assert dye.read_all(path) == [2_000_000, 3_000_000]
-    assert dye.read(path) == 2_000_000
+    assert dye.read_tag(path) == 2_000_000
     assert carry(path, command)
     assert set(dye.read_all(command)) == {2_000_000, 3_000_000}
     assert dye.mark(distance, 2_000_000, 3_000_000) == {2_000_000}
@@ -112,8 +112,8 @@ def test_no_flood_of_tags_fits_into_a_text() -> None:
 def test_the_time_of_a_reading_is_no_tag() -> None:
     scan = LaserScan()
     scan.header.stamp.nanosec = 2_000_000
-    assert dye.read(scan) is None
-    assert dye.read(Time(nanosec=2_000_000)) == 2_000_000
+    assert dye.read_tag(scan) is None
+    assert dye.read_tag(Time(nanosec=2_000_000)) == 2_000_000
 
 
 def test_carry_copies_a_tag_and_says_if_there_was_none() -> None:
@@ -121,7 +121,7 @@ def test_carry_copies_a_tag_and_says_if_there_was_none() -> None:
     assert not carry(pose, command)
     dye.mark(pose, 3_000_000)
     assert carry(pose, command)
-    assert dye.read(command) == 3_000_000
+    assert dye.read_tag(command) == 3_000_000
     assert not carry(pose, Bool())
 
 

@@ -12,21 +12,21 @@ from nav_msgs.srv import GetPlan
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
 
 from course.design import dye
-from course.design.lifelike import lifelike
+from course.design.lifelike import lifelike_message
 
 from .test_dye import message_types
 
 
 @pytest.mark.parametrize("msg_type", list(message_types()), ids=lambda cls: cls.__name__)
 def test_every_installed_type_is_filled_and_has_room_for_a_mark_as_before(msg_type: Any) -> None:
-    message = lifelike(msg_type)
-    assert dye.read(message) is None
+    message = lifelike_message(msg_type)
+    assert dye.read_tag(message) is None
     assert bool(dye.mark(message, 2_000_000)) == dye.has_room(msg_type)
-    assert dye.read(message) == (2_000_000 if dye.has_room(msg_type) else None)
+    assert dye.read_tag(message) == (2_000_000 if dye.has_room(msg_type) else None)
 
 
 def test_a_scan_has_an_obstacle_where_its_angles_say() -> None:
-    scan = lifelike(LaserScan, ahead=0.7)
+    scan = lifelike_message(LaserScan, ahead=0.7)
     beams = [scan.angle_min + n * scan.angle_increment for n in range(len(scan.ranges))]
     assert len(beams) == 180
     assert beams[-1] == pytest.approx(scan.angle_max, abs=1e-4)
@@ -37,7 +37,11 @@ def test_a_scan_has_an_obstacle_where_its_angles_say() -> None:
 
 
 def test_images_clouds_and_grids_have_as_many_data_as_they_say() -> None:
-    image, cloud, grid = lifelike(Image), lifelike(PointCloud2), lifelike(OccupancyGrid)
+    image, cloud, grid = (
+        lifelike_message(Image),
+        lifelike_message(PointCloud2),
+        lifelike_message(OccupancyGrid),
+    )
     assert len(image.data) == image.step * image.height
     assert image.step == 3 * image.width
     assert len(cloud.data) == cloud.row_step * cloud.height
@@ -46,7 +50,7 @@ def test_images_clouds_and_grids_have_as_many_data_as_they_say() -> None:
 
 
 def test_a_grid_has_the_robot_what_is_ahead_and_a_goal_in_it() -> None:
-    grid = lifelike(OccupancyGrid, ahead=0.7)
+    grid = lifelike_message(OccupancyGrid, ahead=0.7)
     row = round(-grid.info.origin.position.y / grid.info.resolution)
 
     def cell(x: float) -> int:
@@ -58,9 +62,9 @@ def test_a_grid_has_the_robot_what_is_ahead_and_a_goal_in_it() -> None:
 
 
 def test_places_are_ahead_and_orientations_are_rotations() -> None:
-    goal = lifelike(GetPlan.Request, ahead=5.0).goal
+    goal = lifelike_message(GetPlan.Request, ahead=5.0).goal
     assert (goal.pose.position.x, goal.pose.orientation.w) == (5.0, 1.0)
-    assert lifelike(PoseArray).poses[0].position.x == 0.5
-    assert lifelike(GetPlan.Response).plan.poses
-    odometry = lifelike(Odometry)
+    assert lifelike_message(PoseArray).poses[0].position.x == 0.5
+    assert lifelike_message(GetPlan.Response).plan.poses
+    odometry = lifelike_message(Odometry)
     assert (odometry.pose.pose.position.x, odometry.pose.pose.orientation.w) == (0.0, 1.0)

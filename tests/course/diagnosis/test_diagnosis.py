@@ -39,7 +39,7 @@ def _no_domain_is_set(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def about(found: Diagnosis, name: str) -> str:
     """Return the findings of that name as one text."""
-    return "\n".join(finding.text() for finding in found if finding.name == name)
+    return "\n".join(finding.as_text() for finding in found if finding.name == name)
 
 
 def in_vain(session: Session) -> str:
@@ -70,7 +70,7 @@ def test_an_object_that_stands_for_one_that_is_gone_is_passed_over(session: Sess
 
     proxy = weakref.proxy(Gone())
     assert gc.is_tracked(proxy)
-    assert not list(nodes.unspun(session))
+    assert not list(nodes.find_unspun(session))
     del proxy
 
 
@@ -385,12 +385,12 @@ def test_whoever_asks_nonsense_gets_no_answer_and_does_no_harm(session: Session)
     session.run(talker)
     session.until(lambda: session.offered(["/scan"]))
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as sock:
-        sock.sendto(b"", leases.address(session.domain_id))  # from nowhere
+        sock.sendto(b"", leases.lease_address(session.domain_id))  # from nowhere
         sock.bind("")
         sock.settimeout(10)
         for nonsense in (b"", b"{", b"5", b"[1, null, {}]", b'["not a name", "~"]', b"[" * 9000):
-            sock.sendto(nonsense, leases.address(session.domain_id))
-        sock.sendto(b'["/scan"]', leases.address(session.domain_id))
+            sock.sendto(nonsense, leases.lease_address(session.domain_id))
+        sock.sendto(b'["/scan"]', leases.lease_address(session.domain_id))
         while not (answer := json.loads(sock.recv(65536)))["offers"]:
             pass
     assert answer["offers"] == {"/scan": ["/talker"]}
@@ -413,7 +413,7 @@ def test_a_dead_service_in_another_process(
     process = start_script(REMOTE.format(domain=session.domain_id))
     assert process.stdout is not None
     assert process.stdout.readline().strip() == "ready"
-    session.until(lambda: "/remote" in reader.read(session.observer).nodes, 30)
+    session.until(lambda: "/remote" in reader.read_graph(session.observer).nodes, 30)
     session.until(lambda: session.observer.count_services("/remote/list_parameters"), 30)
     session.until(lambda: not about(session.diagnose(), "node"), 30)
     os.kill(process.pid, signal.SIGSTOP)
@@ -449,8 +449,8 @@ def test_a_wait_in_vain_says_what_a_diagnosis_says(session: Session) -> None:
 
 
 def test_a_diagnosis_is_escaped_in_a_notebook(session: Session) -> None:
-    from course.doctor.finding import problem
+    from course.doctor.finding import make_problem
 
-    shown = Diagnosis([problem("x", "<b>", "a & b")])._repr_html_()
+    shown = Diagnosis([make_problem("x", "<b>", "a & b")])._repr_html_()
     assert "&lt;b&gt;" in shown
     assert "a &amp; b" in shown

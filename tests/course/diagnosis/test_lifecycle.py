@@ -14,7 +14,7 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from course import Session
-from course.runtime.callbacks.transitions import failed
+from course.runtime.callbacks.transitions import failed_transitions
 
 SUCCESS = TransitionCallbackReturn.SUCCESS
 
@@ -53,7 +53,7 @@ def refuse_work() -> object:
 
 
 def said(session: Session) -> str:
-    return "\n".join(one.text() for one in session.diagnose() if one.name == "lifecycle")
+    return "\n".join(one.as_text() for one in session.diagnose() if one.name == "lifecycle")
 
 
 def test_an_inactive_publisher_publishes_nothing_and_is_named(session: Session) -> None:
@@ -244,7 +244,7 @@ def test_what_a_transition_raised_keeps_nothing_alive(session: Session) -> None:
     assert isinstance(node, Camera)
     node.trigger_configure()
     gc.collect()
-    assert len(failed(node)) == 1
+    assert len(failed_transitions(node)) == 1
     assert [reference() for reference in kept] == [None]
 
 

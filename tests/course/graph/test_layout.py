@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from course.graph import layout
-from course.graph.mermaid import mermaid
+from course.graph.mermaid import draw_mermaid
 from course.graph.model import Endpoint, Graph, Mismatch, Topic
 
 TYPE = "std_msgs/msg/String"
@@ -26,11 +26,11 @@ def robot(*topics: str, refused: str = "") -> Graph:
 
 
 def test_an_empty_graph_has_no_size() -> None:
-    assert layout.draw(Graph()) == layout.Drawing((), (), 0, 0)
+    assert layout.draw_graph(Graph()) == layout.Drawing((), (), 0, 0)
 
 
 def test_arrows_that_end_at_one_box_end_beside_each_other() -> None:
-    drawing = layout.draw(robot("/a", "/b", "/c"))
+    drawing = layout.draw_graph(robot("/a", "/b", "/c"))
     display = next(box for box in drawing.boxes if box.label == "/display")
     ends = [float(line.path.rpartition(",")[2]) for line in drawing.lines]
     here = sorted(y for line, y in zip(drawing.lines, ends, strict=True) if "requests" in line.tip)
@@ -42,7 +42,7 @@ def test_arrows_that_end_at_one_box_end_beside_each_other() -> None:
 
 
 def test_a_label_has_room_between_the_boxes() -> None:
-    drawing = layout.draw(robot("/a", "/b", refused="/b"))
+    drawing = layout.draw_graph(robot("/a", "/b", refused="/b"))
     (label,) = (line for line in drawing.lines if line.label)
     assert (label.label, label.bad) == ("reliability", True)
     half = len(label.label) * 8 / 2
@@ -63,7 +63,7 @@ def crowd(writers: str, readers: str, *broken: str) -> tuple[Graph, set[str], di
             ),
         ),
     )
-    lines = layout.draw(graph).lines
+    lines = layout.draw_graph(graph).lines
     red = {line.tip[1] for line in lines if line.bad}
     return graph, red, {line.tip[1]: line.label for line in lines if line.label}
 
@@ -76,8 +76,8 @@ def test_a_broken_pair_is_red_from_end_to_end_and_says_why_once() -> None:
 def test_of_two_publishers_only_the_one_that_nobody_hears_is_red() -> None:
     graph, red, labels = crowd("ab", "x", "ax")
     assert (red, labels) == ({"a"}, {"a": "durability"})
-    assert "linkStyle 0 stroke" in mermaid(graph)
-    assert mermaid(graph).count("does not fit") == 1
+    assert "linkStyle 0 stroke" in draw_mermaid(graph)
+    assert draw_mermaid(graph).count("does not fit") == 1
 
 
 def test_of_two_readers_only_the_deaf_one_is_red() -> None:
@@ -95,6 +95,6 @@ def test_the_qos_of_every_endpoint_of_a_node_is_told_at_its_arrow() -> None:
     writers = tuple(Endpoint("/a", "publisher", TYPE, qos) for qos in (reliable, lossy, lossy))
     readers = (Endpoint("/x", "subscription", TYPE, reliable),)
     broken = (Mismatch("/a", "/x", ("offers BEST_EFFORT",), ("RELIABILITY",)),)
-    lines = layout.draw(Graph(("/a", "/x"), (Topic("/t", writers, readers, broken),))).lines
+    lines = layout.draw_graph(Graph(("/a", "/x"), (Topic("/t", writers, readers, broken),))).lines
     (tip,) = (line.tip for line in lines if "offers" in line.tip.splitlines()[0])
     assert tip.splitlines()[:2] == ["/a offers RELIABLE", "/a offers BEST_EFFORT"]

@@ -20,7 +20,7 @@ from test_msgs.msg import Empty
 
 from course import Session
 from course.graph import reader, words
-from course.graph.mermaid import mermaid
+from course.graph.mermaid import draw_mermaid
 from course.views.graph import MAX_BOXES, GraphView
 
 RELIABLE = QoSProfile(depth=10)
@@ -47,7 +47,7 @@ def test_topics_have_their_endpoints_with_qos_and_depth(session: Session) -> Non
     (publisher,), (subscription,) = topic.publishers, topic.subscriptions
     assert (topic.name, topic.types) == ("/chatter", ("std_msgs/msg/String",))
     assert (publisher.node, publisher.qos["depth"]) == ("/talker", "7")
-    assert words.qos(subscription) == "BEST_EFFORT, VOLATILE, KEEP_LAST(1)"
+    assert words.describe_qos(subscription) == "BEST_EFFORT, VOLATILE, KEEP_LAST(1)"
     assert topic.mismatches == ()
 
 
@@ -65,7 +65,7 @@ def test_services_and_actions_have_both_sides(session: Session) -> None:
     assert (service.name, service.servers, service.clients) == ("/lamp", ("/robot",), ("/robot",))
     assert (action.name, action.type) == ("/navigate", "test_msgs/action/Fibonacci")
     assert graph.topics == (), "the topics of an action, /rosout and the like are plumbing"
-    text = words.describe(graph)
+    text = words.describe_graph(graph)
     assert "action /navigate (test_msgs/action/Fibonacci)\n  served by /robot" in text
 
 
@@ -100,7 +100,7 @@ def test_ddss_own_event_names_what_breaks_a_pair(
         elif order == "writer, reader, view":
             session.run(talker, offered)
             session.run(listener, requested)
-            session.until(lambda: reader.read(session.observer).mismatches)
+            session.until(lambda: reader.read_graph(session.observer).mismatches)
             view = GraphView(session)
         else:
             other.run(talker, offered)
@@ -141,7 +141,7 @@ def test_a_pair_that_was_there_before_is_told_from_the_announced_qos(session: Se
 
 
 def _with_mismatch(session: Session) -> reader.Graph | None:
-    graph = reader.read(session.observer)
+    graph = reader.read_graph(session.observer)
     return graph if graph.mismatches else None
 
 
@@ -160,13 +160,13 @@ def test_two_nodes_of_one_name_are_told(session: Session) -> None:
     for _ in range(2):
         session.run_beside(lambda: talker(RELIABLE))
     graph = session.until(lambda: _with_twins(session))
-    assert graph.twins == ("/talker",)
-    assert "Two nodes are called /talker: rename one." in words.describe(graph)
+    assert graph.duplicate_names == ("/talker",)
+    assert "Two nodes are called /talker: rename one." in words.describe_graph(graph)
 
 
 def _with_twins(session: Session) -> reader.Graph | None:
-    graph = reader.read(session.observer)
-    return graph if graph.twins else None
+    graph = reader.read_graph(session.observer)
+    return graph if graph.duplicate_names else None
 
 
 def test_the_mermaid_text_names_everything_once_and_marks_what_is_broken(session: Session) -> None:
@@ -174,9 +174,9 @@ def test_the_mermaid_text_names_everything_once_and_marks_what_is_broken(session
     session.run(listener, RELIABLE)
     session.run(talker, BEST_EFFORT)
     session.until(lambda: view.graph.mismatches)
-    assert view.frame()["title"] == "2 nodes, 1 topic, 1 pair that does not connect"
+    assert view.make_frame()["title"] == "2 nodes, 1 topic, 1 pair that does not connect"
     text = str(view.mermaid)
-    assert text == mermaid(view.graph)
+    assert text == draw_mermaid(view.graph)
     assert text.splitlines()[0] == "flowchart LR"
     for name in ("/talker", "/listener", "/chatter<br/>String"):
         assert text.count(name) == 1
@@ -210,8 +210,8 @@ def test_a_graph_too_large_to_draw_is_said_and_its_words_keep_all(session: Sessi
     assert "everything" not in frame["note"]
     for number in range(MAX_BOXES):
         assert f"topic /topic_{number} (std_msgs/msg/String)" in text
-    assert "leave out everything=True" in GraphView(session, everything=True).frame()["note"]
+    assert "leave out everything=True" in GraphView(session, everything=True).make_frame()["note"]
     session.stop("crowd")
     session.run(crowd, 3)
     session.until(lambda: len(view.graph.topics) == 3)
-    assert (view.frame()["note"], len(view.frame()["boxes"])) == ("", 4)
+    assert (view.make_frame()["note"], len(view.make_frame()["boxes"])) == ("", 4)

@@ -290,7 +290,7 @@ def test_a_unit_that_is_being_built_or_was_used_just_now_stays(cache: Path) -> N
     aged(old, pruning.UNUSED_FOR + 60)
     with locked(pruning.lock_of(old)):
         assert pruning.prune(cache) == []
-    pruning.touch(old)
+    pruning.touch_manifest(old)
     assert pruning.prune(cache) == []
     assert old.exists()
 

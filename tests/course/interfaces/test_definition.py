@@ -142,12 +142,12 @@ def test_references_are_sorted_out() -> None:
 
 def test_every_installed_interface_passes() -> None:
     names = [
-        TypeName(p, *i.split("/")) for p, found in installed.interfaces().items() for i in found
+        TypeName(p, *i.split("/")) for p, found in installed.read_index().items() for i in found
     ]
     assert len(names) > 150
     for name in names:
-        text = installed.prefix_of(name.package) / "share" / name.package / name.file
-        own = installed.messages(name.package)
+        text = installed.prefix_of(name.package) / "share" / name.package / name.relative_path
+        own = installed.message_names(name.package)
         assert parse_name(str(name)) == name
         define_text(name, text.read_text(encoding="utf-8"), own)
 

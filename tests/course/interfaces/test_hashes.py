@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from course.interfaces import installed
-from course.interfaces.build import Unit, generate
+from course.interfaces.build import Unit, generate_sources
 from course.interfaces.definition import define_text
 from course.interfaces.names import TypeName
 
@@ -54,10 +54,10 @@ def test_an_installed_package_generated_again_has_its_own_hashes(
     names = [TypeName(package, *t.split("/")) for t in types]
     # A unit is generated as a whole, so its definitions may refer to each other.
     own = [name.name for name in names if name.kind == "msg"]
-    texts = [(name, (share / name.file).read_text(encoding="utf-8")) for name in names]
+    texts = [(name, (share / name.relative_path).read_text(encoding="utf-8")) for name in names]
     unit = Unit(package, tuple(define_text(name, text, own) for name, text in texts))
     sources = tmp_path / "sources" / package
-    generate(unit, tmp_path, sources)
+    generate_sources(unit, tmp_path, sources)
     for name in names:
         path = Path(name.kind) / f"{name.name}.json"
         assert hashes(sources / path) == hashes(share / path)

@@ -29,10 +29,10 @@ def ran(cell: str, error: Exception | None = None) -> ExecutionResult:
 
 
 def test_cells_and_checks_are_remembered(journal: Journal) -> None:
-    journal.ran("a")
-    journal.checked("qos", 9.0, 10.0, ["starts", "flows"], ["newest"])
-    journal.checked("qos", 8.0, 10.0, ["starts"], ["flows", "newest"])
-    journal.ran("b")
+    journal.record_run("a")
+    journal.record_checks("qos", 9.0, 10.0, ["starts", "flows"], ["newest"])
+    journal.record_checks("qos", 8.0, 10.0, ["starts"], ["flows", "newest"])
+    journal.record_run("b")
     entries = Journal(journal.folder).read()
     assert list(entries.cells) == ["a", "b"]
     found = entries.checks["qos"]
@@ -42,17 +42,17 @@ def test_cells_and_checks_are_remembered(journal: Journal) -> None:
 
 
 def test_the_best_of_an_exam_with_other_points_does_not_count(journal: Journal) -> None:
-    journal.checked("qos", 9.0, 10.0, [], [])
-    journal.checked("qos", 3.0, 5.0, [], [])
+    journal.record_checks("qos", 9.0, 10.0, [], [])
+    journal.record_checks("qos", 3.0, 5.0, [], [])
     assert journal.read().checks["qos"].best == 3.0
 
 
 def test_a_journal_is_bounded(journal: Journal, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(store, "MAX_CELLS", 3)
     for cell in ("a", "b", "c", "a", "d"):
-        journal.ran(cell)
+        journal.record_run(cell)
     assert list(journal.read().cells) == ["c", "a", "d"]
-    journal.checked("qos", 1.0, 1.0, ["x" * 1000] * 1000, [])
+    journal.record_checks("qos", 1.0, 1.0, ["x" * 1000] * 1000, [])
     assert journal.path.stat().st_size < 50_000
 
 
@@ -84,10 +84,10 @@ def test_a_damaged_journal_is_kept_aside_and_begins_anew(journal: Journal, conte
     assert (entries.cells, entries.checks) == ({}, {})
     assert f"kept as {FILE}.corrupt-1" in entries.notice
     assert (journal.folder / f"{FILE}.corrupt-1").read_bytes() == content
-    journal.ran("a")
+    journal.record_run("a")
     assert list(journal.read().cells) == ["a"]
     journal.path.write_bytes(content)
-    journal.ran("b")  # a damaged one does not stop a note, either
+    journal.record_run("b")  # a damaged one does not stop a note, either
     assert (journal.folder / f"{FILE}.corrupt-2").read_bytes() == content
 
 
@@ -100,12 +100,12 @@ def test_a_folder_in_the_place_of_the_journal_is_said(journal: Journal) -> None:
     journal.path.mkdir()
     assert "cannot be read (it is not a file)" in journal.read().notice
     with pytest.raises(JournalError, match=r"Your progress cannot be noted in .*itself is not"):
-        journal.ran("a")
+        journal.record_run("a")
 
 
 def test_a_place_that_takes_no_files_is_said() -> None:
     with pytest.raises(JournalError, match="cannot be noted in /proc"):
-        Journal(Path("/proc")).ran("a")
+        Journal(Path("/proc")).record_run("a")
 
 
 def test_a_program_that_holds_the_journal_is_said(
@@ -116,12 +116,12 @@ def test_a_program_that_holds_the_journal_is_said(
         FileLock(journal.folder / f".{FILE}.lock"),
         pytest.raises(JournalError, match="another program has held"),
     ):
-        journal.ran("a")
+        journal.record_run("a")
 
 
 def _note(folder: Path, name: str, count: int) -> None:
     for number in range(count):
-        Journal(folder).ran(f"{name}-{number}")
+        Journal(folder).record_run(f"{name}-{number}")
 
 
 def test_notebooks_that_note_at_once_lose_nothing(journal: Journal) -> None:
@@ -142,12 +142,12 @@ def test_a_kernel_notes_a_cell_once_and_only_if_it_ran_well(
     folder.mkdir()
     monkeypatch.chdir(folder)
     notes = CellNotes()
-    assert notes.after(ran("failed", ValueError())) == ""
-    assert notes.after(ran("a")) == ""
+    assert notes.note_cell(ran("failed", ValueError())) == ""
+    assert notes.note_cell(ran("a")) == ""
     first = journal.path.stat().st_mtime_ns
-    assert notes.after(ran("a")) == ""
-    assert notes.after(None) == ""
-    assert notes.after(ExecutionResult(None)) == ""
+    assert notes.note_cell(ran("a")) == ""
+    assert notes.note_cell(None) == ""
+    assert notes.note_cell(ExecutionResult(None)) == ""
     assert journal.path.stat().st_mtime_ns == first
     assert list(journal.read().cells) == ["a"]
 
@@ -158,8 +158,8 @@ def test_a_note_that_cannot_be_made_is_said_once(
     monkeypatch.chdir(journal.folder)
     journal.path.mkdir()
     notes = CellNotes()
-    assert "cannot be noted" in notes.after(ran("a"))
-    assert notes.after(ran("b")) == ""
+    assert "cannot be noted" in notes.note_cell(ran("a"))
+    assert notes.note_cell(ran("b")) == ""
 
 
 def test_outside_of_a_working_copy_nothing_is_written(
@@ -167,5 +167,5 @@ def test_outside_of_a_working_copy_nothing_is_written(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert journal_here() is None
-    assert CellNotes().after(ran("a")) == ""
+    assert CellNotes().note_cell(ran("a")) == ""
     assert list(tmp_path.iterdir()) == []

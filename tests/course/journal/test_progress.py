@@ -82,7 +82,7 @@ def write_explanations(path: Path, which: str = "-explanation-") -> None:
 def take_quiz(folder: Path) -> None:
     quiz = Quiz(load_bank("ch05"), student="ada", folder=folder)
     for item in quiz.items:
-        quiz.answer(item.number, model.key(item))
+        quiz.answer(item.number, model.right_answer(item))
     quiz.submit()
 
 
@@ -91,7 +91,7 @@ def test_a_new_copy_has_everything_left(folder: Path) -> None:
     (chapter,) = progress.chapters
     assert (chapter.done, chapter.total) == (0, len(ids(folder / CHAPTER)))
     assert [exercise.notebook.exam for exercise in progress.exercises] == EXERCISES
-    assert not any(exercise.done for exercise in progress.exercises)
+    assert not any(exercise.is_done for exercise in progress.exercises)
     assert [quiz.notebook.quiz for quiz in progress.quizzes] == ["ch05"]
     assert progress.notices == ()
     text = repr(progress)
@@ -103,9 +103,9 @@ def test_a_new_copy_has_everything_left(folder: Path) -> None:
 def test_what_was_run_checked_written_and_passed_counts(folder: Path) -> None:
     journal = Journal(folder)
     for cell in ids(folder / CHAPTER)[:3]:
-        journal.ran(cell)
-    journal.ran("a cell of the student's own")
-    journal.checked("qos", 8.0, 10.0, ["It starts."], ["The newest comes first."])
+        journal.record_run(cell)
+    journal.record_run("a cell of the student's own")
+    journal.record_checks("qos", 8.0, 10.0, ["It starts."], ["The newest comes first."])
     progress = course.progress(folder / "ch05")
     assert progress.chapters[0].done == 3
     exercise = progress.exercises[0].notebook
@@ -114,15 +114,15 @@ def test_what_was_run_checked_written_and_passed_counts(folder: Path) -> None:
     assert "8 of 10 points (today, " in text
     assert "Still open: The newest comes first\n" in text
     assert "Explanations: 0 of 5 written" in text
-    journal.checked("qos", 10.0, 10.0, ["It starts.", "The newest comes first."], [])
+    journal.record_checks("qos", 10.0, 10.0, ["It starts.", "The newest comes first."], [])
     write_explanations(folder / EXERCISE, "-explanation-stop")
-    assert course.progress().exercises[0].done is False
+    assert course.progress().exercises[0].is_done is False
     assert "Explanations: 1 of 5 written" in repr(course.progress())
     write_explanations(folder / EXERCISE)
     take_quiz(folder / QUIZ)
     progress = course.progress()
-    assert [exercise.done for exercise in progress.exercises] == [True, *[False] * 4]
-    assert (progress.quizzes[0].passed, len(progress.quizzes[0].attempts)) == (True, 1)
+    assert [exercise.is_done for exercise in progress.exercises] == [True, *[False] * 4]
+    assert (progress.quizzes[0].is_passed, len(progress.quizzes[0].attempts)) == (True, 1)
     assert f"1 of {len(EXERCISES)} exercises ready to hand in, the quiz passed." in repr(progress)
     assert "Best attempt: 5 of 5" in repr(progress)
 
@@ -138,13 +138,13 @@ def test_next_leads_through_everything_and_ends(folder: Path) -> None:
 
     assert str(CHAPTER) in next_()
     for cell in ids(folder / CHAPTER):
-        journal.ran(cell)
+        journal.record_run(cell)
     for exercise in course.progress().exercises:
         where = str(exercise.notebook.path)
         assert next_().startswith(f"Next: {where}: do the task")
-        journal.checked(exercise.notebook.exam, 1.0, 10.0, ["a"], ["It moves."])
+        journal.record_checks(exercise.notebook.exam, 1.0, 10.0, ["a"], ["It moves."])
         assert next_() == f"Next: {where}: “It moves.” is still open."
-        journal.checked(exercise.notebook.exam, 10.0, 10.0, ["a", "It moves."], [])
+        journal.record_checks(exercise.notebook.exam, 10.0, 10.0, ["a", "It moves."], [])
         assert next_() == f"Next: {where}: write the explanations, and save."
         write_explanations(folder / exercise.notebook.path)
     assert next_() == "Next: ch05-quiz/quiz.ipynb: take the quiz."
@@ -154,7 +154,7 @@ def test_next_leads_through_everything_and_ends(folder: Path) -> None:
 
 def test_the_page_has_tables_with_links_and_shows_titles_as_they_are(folder: Path) -> None:
     title = "A | B <img src=x onerror=alert(1)> *c* [d](e) `f` $g$ \\ _h_"
-    Journal(folder).checked("qos", 1.0, 10.0, [], [title])
+    Journal(folder).record_checks("qos", 1.0, 10.0, [], [title])
     html = MarkdownIt("commonmark").enable("table").render(course.progress()._repr_markdown_())
     assert html.count("<table>") == 3
     assert f'<a href="{EXERCISE}">Exercise 1: QoS profile design</a>' in html
@@ -205,7 +205,7 @@ def test_a_damaged_journal_and_damaged_attempts_are_said(folder: Path) -> None:
     with (folder / QUIZ / "quiz-ch05.attempts.jsonl").open("a") as file:
         file.write("nonsense\n")
     progress = course.progress()
-    assert progress.quizzes[0].passed
+    assert progress.quizzes[0].is_passed
     assert "progress.json was damaged: it is kept as progress.json.corrupt-1" in repr(progress)
     assert "quiz-ch05.attempts.jsonl has 1 damaged lines" in repr(progress)
 

@@ -59,14 +59,14 @@ CASES = {
     ],
 )
 def test_dds_does_what_the_rules_say(experiment: Experiment) -> None:
-    outcome = lab.run(experiment)
+    outcome = lab.run_experiment(experiment)
     assert outcome.remark == ""
-    assert outcome.connected == rules.connects(experiment)
-    assert len(outcome.received) == rules.expected(experiment)
+    assert outcome.connected == rules.can_connect(experiment)
+    assert len(outcome.received) == rules.expected_count(experiment)
     assert outcome.in_order
     assert outcome.lossy == (experiment.loss > 0)
     if not outcome.connected:
-        broken = [r.policy for r in rules.compare(*_pair(experiment)) if not r.fits]
+        broken = [r.policy for r in rules.compare_profiles(*_pair(experiment)) if not r.fits]
         assert outcome.broken.lower() in broken
     if experiment.scenario == "slow reader":
         assert outcome.received[-1] == COUNT - 1, "the newest are kept"
@@ -78,9 +78,9 @@ def _pair(experiment: Experiment) -> tuple[Profile, Profile]:
 
 @needs_lossy_link
 def test_what_is_lost_is_lost_under_best_effort() -> None:
-    outcome = lab.run(Experiment(best_effort(), best_effort(), "stream", loss=60))
-    assert outcome.missing > 0
-    assert "never sends anything twice" in rules.explain(
+    outcome = lab.run_experiment(Experiment(best_effort(), best_effort(), "stream", loss=60))
+    assert outcome.missing_count > 0
+    assert "never sends anything twice" in rules.explain_outcome(
         Experiment(best_effort(), best_effort(), "stream", 60), outcome
     )
 
@@ -90,20 +90,20 @@ def test_what_is_older_than_a_lifespan_is_not_replayed_to_a_late_reader(side: st
     short, long = durable(depth=30, lifespan=0.05), durable(depth=30)
     pair = (short, long) if side == "writer" else (long, short)
     experiment = Experiment(*pair, "late joiner")
-    assert rules.expected(experiment) is None
-    outcome = lab.run(experiment)
+    assert rules.expected_count(experiment) is None
+    outcome = lab.run_experiment(experiment)
     assert (outcome.connected, outcome.received) == (True, [])
-    why = rules.explain(experiment, outcome)
+    why = rules.explain_outcome(experiment, outcome)
     assert "30 would fit into both queues, and 0 came." in why
     assert f"What is older than the {side}'s lifespan (0.05 s) is dropped." in why
 
 
 def test_a_slow_readers_own_lifespan_empties_its_queue() -> None:
     experiment = Experiment(Profile(), Profile(history="KEEP_ALL", lifespan=0.05), "slow reader")
-    assert rules.expected(experiment) is None
-    outcome = lab.run(experiment)
-    assert outcome.missing > 0
-    why = rules.explain(experiment, outcome)
+    assert rules.expected_count(experiment) is None
+    outcome = lab.run_experiment(experiment)
+    assert outcome.missing_count > 0
+    why = rules.explain_outcome(experiment, outcome)
     assert "pushed out" not in why
     assert "What is older than the reader's lifespan (0.05 s) is dropped." in why
 
@@ -112,9 +112,9 @@ def test_a_slow_readers_own_lifespan_empties_its_queue() -> None:
 def test_a_slow_reader_misses_what_the_link_has_lost() -> None:
     deep = best_effort(depth=30)
     experiment = Experiment(deep, deep, "slow reader", loss=60)
-    outcome = lab.run(experiment)
-    assert outcome.missing > 0
-    why = rules.explain(experiment, outcome)
+    outcome = lab.run_experiment(experiment)
+    assert outcome.missing_count > 0
+    why = rules.explain_outcome(experiment, outcome)
     assert "pushed out" not in why
     assert "The link lost some, and a best-effort connection never sends anything twice." in why
 
@@ -123,9 +123,9 @@ def test_a_slow_reader_misses_what_the_link_has_lost() -> None:
 def test_what_grew_old_before_it_was_sent_again_is_said() -> None:
     brief = Profile(depth=30, lifespan=0.2)  # lost messages are sent again after seconds
     experiment = Experiment(brief, Profile(depth=30), "stream", loss=60)
-    outcome = lab.run(experiment)
-    assert outcome.missing > 0
-    why = rules.explain(experiment, outcome)
+    outcome = lab.run_experiment(experiment)
+    assert outcome.missing_count > 0
+    why = rules.explain_outcome(experiment, outcome)
     assert "before they could be sent again, by the writer's lifespan (0.2 s)." in why
 
 
@@ -146,48 +146,52 @@ def test_the_reason_is_one_that_can_be(
     experiment: Experiment, received: list[int], sentence: str
 ) -> None:
     outcome = Outcome(connected=True, sent=COUNT, received=received, lossy=True)
-    assert sentence in rules.explain(experiment, outcome)
+    assert sentence in rules.explain_outcome(experiment, outcome)
 
 
 @pytest.mark.parametrize("scenario", ["late joiner", "deadline", "liveliness"])
 def test_a_loss_is_not_claimed_where_nothing_is_lost(scenario: str) -> None:
     experiment = Experiment(durable(), durable(), scenario, loss=50)
-    outcome = lab.run(experiment)
+    outcome = lab.run_experiment(experiment)
     assert not outcome.lossy
     assert (
         outcome.remark == "The link lost nothing here: it does so in stream and slow reader only."
     )
-    assert len(outcome.received) == rules.expected(experiment)
+    assert len(outcome.received) == rules.expected_count(experiment)
 
 
 @needs_lossy_link
 def test_a_shallow_writer_cannot_repair() -> None:
     experiment = Experiment(Profile(depth=1), Profile(depth=1), "stream", loss=60)
-    outcome = lab.run(experiment)
-    assert outcome.missing > 0
-    assert "although the connection is reliable" in rules.explain(experiment, outcome)
+    outcome = lab.run_experiment(experiment)
+    assert outcome.missing_count > 0
+    assert "although the connection is reliable" in rules.explain_outcome(experiment, outcome)
 
 
 def test_a_missed_deadline_is_an_event() -> None:
     experiment = Experiment(Profile(deadline=0.2), Profile(deadline=0.2), "deadline")
-    outcome = lab.run(experiment)
+    outcome = lab.run_experiment(experiment)
     assert outcome.deadlines_missed > 0
-    assert "deadline had passed" in rules.explain(experiment, outcome)
+    assert "deadline had passed" in rules.explain_outcome(experiment, outcome)
 
 
 @pytest.mark.parametrize("manual", [True, False])
 def test_silence_is_noticed_where_life_has_to_be_asserted(manual: bool) -> None:
     kind = "MANUAL_BY_TOPIC" if manual else "AUTOMATIC"
     profile = Profile(liveliness=kind, lease=0.3)
-    assert lab.run(Experiment(profile, profile, "liveliness")).liveliness_lost is manual
+    assert lab.run_experiment(Experiment(profile, profile, "liveliness")).liveliness_lost is manual
 
 
 def test_without_namespaces_the_loss_is_left_out_and_that_is_said(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(link, "problem", lambda: "No namespaces here.")
-    outcome = lab.run(Experiment(loss=50))
-    assert (outcome.remark, outcome.lossy, outcome.missing) == ("No namespaces here.", False, 0)
+    outcome = lab.run_experiment(Experiment(loss=50))
+    assert (outcome.remark, outcome.lossy, outcome.missing_count) == (
+        "No namespaces here.",
+        False,
+        0,
+    )
 
 
 @pytest.mark.parametrize(
@@ -200,7 +204,7 @@ def test_without_namespaces_the_loss_is_left_out_and_that_is_said(
 )
 def test_what_cannot_be_run_is_said(experiment: Experiment, sentence: str) -> None:
     with pytest.raises(LabError, match=sentence):
-        lab.run(experiment)
+        lab.run_experiment(experiment)
 
 
 @pytest.mark.parametrize(
@@ -224,10 +228,10 @@ def test_profiles_go_there_and_back() -> None:
     profile = QoSProfile(
         depth=7, reliability=ReliabilityPolicy.BEST_EFFORT, deadline=Duration(seconds=0.5)
     )
-    data = Profile.of(profile)
+    data = Profile.from_rclpy(profile)
     assert str(data) == "BEST_EFFORT, VOLATILE, KEEP_LAST(7), deadline 0.5 s"
-    assert Profile.of(data.qos()) == data
-    assert Profile.from_data(data.data()) == data
+    assert Profile.from_rclpy(data.to_rclpy()) == data
+    assert Profile.from_data(data.to_data()) == data
 
 
 def test_experiments_and_outcomes_go_over_a_pipe() -> None:
@@ -240,7 +244,7 @@ def test_experiments_and_outcomes_go_over_a_pipe() -> None:
 def test_the_view_keeps_the_prediction_beside_what_was_seen(session: Session) -> None:
     view = session.qos_lab(qos_profile_sensor_data, QoSProfile(depth=10))
     trial = view.run("stream", connects=True, arrive=30)
-    assert trial.right is False
+    assert trial.is_right is False
     words = view.words()
     assert "not connected (reliability)" in words
     durable_ten = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -251,19 +255,19 @@ def test_the_view_keeps_the_prediction_beside_what_was_seen(session: Session) ->
     assert "reliability: BEST_EFFORT -> RELIABLE does not fit. BEST_EFFORT never satis" in words
     assert "You said: connected, 30 messages. It came out otherwise." in words
     asked = {
-        "offered": Profile().data(), "requested": Profile().data(), "scenario": "stream",
+        "offered": Profile().to_data(), "requested": Profile().to_data(), "scenario": "stream",
         "connects": True, "arrive": 30, "loss": 0,
     }  # fmt: skip
-    view._heard(view.widget, {"run": asked}, [])
+    view._on_message(view.widget, {"run": asked}, [])
     session.until(lambda: len(view.trials) == 3, timeout=60)
-    assert view.trials[2].right is True
+    assert view.trials[2].is_right is True
     session.until(lambda: not view.widget.frame["running"])
     for wrong, sentence in (
         ({"offered": {"depth": 0}}, "depth is 1 to 5000"),
         ({"loss": 2.5}, "0 to 90 % of its packets, a whole number, not 2.5."),
         ({"arrive": 2.5}, "A prediction is a whole number of messages, 0 to 30, not 2.5."),
     ):
-        view._heard(view.widget, {"run": {**asked, **wrong}}, [])
+        view._on_message(view.widget, {"run": {**asked, **wrong}}, [])
         session.until(lambda said=sentence: said in view.widget.frame["problem"])  # type: ignore[misc]
         assert not view.widget.frame["running"]
     assert len(view.trials) == 3
@@ -273,15 +277,17 @@ def test_an_experiment_that_fails_says_so_and_the_next_one_runs(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     view = session.qos_lab()
-    asked = {"offered": Profile().data(), "requested": Profile().data(), "scenario": "stream",
+    asked = {"offered": Profile().to_data(), "requested": Profile().to_data(), "scenario": "stream",
              "connects": True, "arrive": None, "loss": 0}  # fmt: skip
     with monkeypatch.context() as patch:
         patch.setattr(lab.sys, "executable", "/nowhere/python")
-        view._heard(view.widget, {"run": asked}, [])
-        session.until(lambda: "The experiment failed (FileNotFoundErr" in view.frame()["problem"])
-    assert not view.frame()["running"]
-    view._heard(view.widget, {"run": asked}, [])
-    session.until(lambda: view.trials and not view.frame()["problem"], timeout=60)
+        view._on_message(view.widget, {"run": asked}, [])
+        session.until(
+            lambda: "The experiment failed (FileNotFoundErr" in view.make_frame()["problem"]
+        )
+    assert not view.make_frame()["running"]
+    view._on_message(view.widget, {"run": asked}, [])
+    session.until(lambda: view.trials and not view.make_frame()["problem"], timeout=60)
 
 
 def children() -> list[psutil.Process]:
@@ -295,9 +301,10 @@ def children() -> list[psutil.Process]:
 def test_an_experiment_ends_with_its_session() -> None:
     with Session() as session:
         view = session.qos_lab()
-        asked = {"offered": Profile(deadline=60).data(), "requested": Profile(deadline=60).data(),
+        asked = {"offered": Profile(deadline=60).to_data(),
+                 "requested": Profile(deadline=60).to_data(),
                  "scenario": "deadline", "connects": True, "loss": 0}  # fmt: skip
-        view._heard(view.widget, {"run": asked}, [])
+        view._on_message(view.widget, {"run": asked}, [])
         session.until(lambda: len(children()) == 2, timeout=60)  # the bench and its writer
         running = children()
     _, alive = psutil.wait_procs(running, timeout=20)
@@ -314,6 +321,6 @@ def test_the_tools_of_a_lossy_link_are_found_by_an_ordinary_user(
     link.problem.cache_clear()
     request.addfinalizer(link.problem.cache_clear)
     experiment = Experiment(best_effort(), best_effort(), "stream", loss=60)
-    outcome = lab.run(experiment)
+    outcome = lab.run_experiment(experiment)
     assert (outcome.remark, outcome.lossy) == ("", True)
-    assert outcome.missing > 0
+    assert outcome.missing_count > 0

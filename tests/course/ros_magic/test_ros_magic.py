@@ -315,7 +315,9 @@ def test_what_does_not_fit_is_a_sentence(robot: Robot, line: str, sentence: str)
     test_a_mistake_is_a_sentence(robot, line, sentence)
 
 
-COMMANDS = [(noun, verb) for noun, module in arguments.nouns().items() for verb in module.VERBS]
+COMMANDS = [
+    (noun, verb) for noun, module in arguments.noun_modules().items() for verb in module.VERBS
+]
 
 
 @pytest.mark.parametrize(("noun", "verb"), COMMANDS)
@@ -393,7 +395,7 @@ def test_a_node_without_parameter_services_hides_no_other(
         text = answer(capsys, "param list")
         assert "/bare:\n  (its parameter services do not answer, or it has none)" in text
         assert "/forgotten:\n  (its parameter services do not answer" in text
-        assert magic.candidates(["param", "get", "forgotten", ""]) == []
+        assert magic.find_candidates(["param", "get", "forgotten", ""]) == []
         with pytest.raises(CourseError, match="/bare has no parameter services"):
             magic.ros("param list bare")
     finally:
@@ -544,7 +546,7 @@ def test_help_is_shown_and_ends_nothing(capsys: pytest.CaptureFixture[str]) -> N
     ],
 )
 def test_the_tab_key_offers_what_may_follow(robot: Robot, words: list[str], expected: str) -> None:
-    course.until(lambda: expected in magic.candidates(words), 30)
+    course.until(lambda: expected in magic.find_candidates(words), 30)
 
 
 @pytest.mark.parametrize(
@@ -561,7 +563,7 @@ def test_the_tab_key_offers_what_may_follow(robot: Robot, words: list[str], expe
 def test_the_tab_key_offers_nothing_where_nothing_can_follow(
     robot: Robot, words: list[str]
 ) -> None:
-    assert magic.candidates(words) == []
+    assert magic.find_candidates(words) == []
 
 
 def test_braces_are_yaml_also_where_a_variable_has_the_name_of_a_field(

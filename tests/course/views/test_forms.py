@@ -20,21 +20,21 @@ from course.watch import forms
 PARTS = {"msg": ("",), "srv": ("Request", "Response"), "action": ("Goal", "Result", "Feedback")}
 
 
-@pytest.mark.parametrize("package", sorted(installed.interfaces()))
+@pytest.mark.parametrize("package", sorted(installed.read_index()))
 def test_the_defaults_of_every_interface_can_be_submitted(package: str) -> None:
-    for name in sorted(installed.interfaces()[package]):
+    for name in sorted(installed.read_index()[package]):
         kind = name.partition("/")[0]
         interface = load_type(f"{package}/{name}")
         for part in PARTS[kind]:
             msg_type = getattr(interface, part) if part else interface
-            inputs = forms.fields(msg_type)
+            inputs = forms.form_fields(msg_type)
             json.dumps([field.default for field in inputs], allow_nan=False)
-            same = forms.message(msg_type, {field.path: field.default for field in inputs})
+            same = forms.build_message(msg_type, {field.path: field.default for field in inputs})
             assert same == msg_type(), f"{package}/{name} {part}"
 
 
 def test_there_are_interfaces_to_try() -> None:
-    assert {"test_msgs", "sensor_msgs", "std_srvs", "lifecycle_msgs"} <= set(installed.interfaces())
+    assert {"test_msgs", "sensor_msgs", "std_srvs", "lifecycle_msgs"} <= set(installed.read_index())
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_there_are_interfaces_to_try() -> None:
     ],
 )
 def test_what_is_typed_arrives(msg_type: Any, path: str, typed: str, expected: Any) -> None:
-    found = getattr(forms.message(msg_type, {path: typed}), path)
+    found = getattr(forms.build_message(msg_type, {path: typed}), path)
     assert (list(found) if isinstance(expected, list) else found) == expected
 
 
@@ -85,7 +85,7 @@ def test_what_does_not_fit_is_a_sentence(
     msg_type: Any, path: str, typed: str, sentence: str
 ) -> None:
     with pytest.raises(MisfitError) as caught:
-        forms.message(msg_type, {path: typed})
+        forms.build_message(msg_type, {path: typed})
     assert sentence in str(caught.value)
     assert "\n" not in str(caught.value)
 

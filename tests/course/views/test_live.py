@@ -17,7 +17,7 @@ from course.graph import reader
 from course.views import live
 from course.views.graph import GraphView
 from course.views.live import LiveView
-from course.views.saved import saved
+from course.views.saved import saved_output
 from course.watch.callbacks import CallbackTap
 from tests.kernel import Kernel
 
@@ -28,7 +28,7 @@ class Counter(LiveView):
     script = "graph"
     looks = 0
 
-    def frame(self) -> dict[str, Any]:
+    def make_frame(self) -> dict[str, Any]:
         self.looks += 1
         return {"looks": self.looks}
 
@@ -68,7 +68,7 @@ def test_a_browser_that_confirms_nothing_gets_a_frame_a_second(
     view.widget.number = live.PATIENCE + 5
     now = time.monotonic()
     assert view.tick(now + 60) - time.monotonic() > 0.9
-    view._heard(view.widget, {"drawn": view.widget.number}, [])
+    view._on_message(view.widget, {"drawn": view.widget.number}, [])
     assert view.tick(now + 120) - time.monotonic() <= live.FASTEST
 
 
@@ -76,7 +76,7 @@ def test_what_has_not_changed_is_not_sent_again(session: Session) -> None:
     view = GraphView(session)
     number = view.widget.number
     for _ in range(3):
-        view._look()
+        view._refresh_widget()
     assert view.widget.number == number
 
 
@@ -110,7 +110,7 @@ def test_a_closed_session_ends_its_views_and_their_thread() -> None:
 
 def test_a_view_that_fails_says_so_and_the_others_go_on(session: Session) -> None:
     class Broken(Counter):
-        def frame(self) -> dict[str, Any]:
+        def make_frame(self) -> dict[str, Any]:
             raise ZeroDivisionError("no rate yet")
 
     broken, sound = Broken(session), Counter(session)
@@ -134,8 +134,8 @@ def test_a_view_whose_frame_cannot_be_sent_takes_no_other_down(
     unsent.widget.observe(refuse, "number")
     if also_at_its_end:
         unsent.widget.observe(refuse, "ended")
-    session.until(lambda: unsent.over)
-    assert unsent.over == "This view has stopped (OSError: no such comm)."
+    session.until(lambda: unsent.end_reason)
+    assert unsent.end_reason == "This view has stopped (OSError: no such comm)."
     before = sound.widget.number
     session.until(lambda: sound.widget.number > before)
     later = Counter(session)
@@ -148,10 +148,10 @@ def test_a_node_that_is_destroyed_under_a_look_does_not_end_the_view(session: Se
         period = 60.0  # s: only this test looks
         over_what: Node | None = None
 
-        def frame(self) -> dict[str, Any]:
+        def make_frame(self) -> dict[str, Any]:
             if self.over_what is not None:
                 self.over_what.get_fully_qualified_name()
-            return super().frame()
+            return super().make_frame()
 
     gone = Node("gone", context=session.context)
     gone.destroy_node()
@@ -160,21 +160,21 @@ def test_a_node_that_is_destroyed_under_a_look_does_not_end_the_view(session: Se
         before = view.widget.number
         view.over_what = gone
         for _ in range(live.STUMBLES - 1):
-            view._look()
+            view._refresh_widget()
         assert (view.widget.ended, view.widget.number) == ("", before)
         view.over_what = None
-        view._look()
+        view._refresh_widget()
         assert view.widget.number > before
     view.over_what = gone
     for _ in range(live.STUMBLES):
-        view._look()
+        view._refresh_widget()
     assert view.widget.ended.startswith("This view has stopped (InvalidHandle")
 
 
 def test_what_is_destroyed_in_between_is_passed_over(session: Session) -> None:
     gone, sound = Node("gone", context=session.context), session.run(lambda: Node("sound"))
     gone.destroy_node()
-    reader.read(session.observer, own=[gone, sound])
+    reader.read_graph(session.observer, own=[gone, sound])
     CallbackTap("/chatter").watch([gone, sound])
 
 
@@ -212,7 +212,7 @@ def test_in_a_kernel_a_view_leaves_its_words_for_a_reader_without_one(kernel: Ke
 
 
 def test_saved_words_are_escaped_and_bounded() -> None:
-    data = saved("ROS graph", "<img src=x>" + "x" * 100_000)
+    data = saved_output("ROS graph", "<img src=x>" + "x" * 100_000)
     assert "<img" not in data["text/html"]
     assert "[the rest was not saved]" in data["text/html"]
     assert len(data["text/html"]) < 30_000
@@ -222,8 +222,8 @@ def test_a_frame_that_does_not_fit_is_said(session: Session) -> None:
     class Large(Counter):
         large = False
 
-        def frame(self) -> dict[str, Any]:
-            return {**super().frame(), "text": "x" * live.MAX_FRAME * self.large}
+        def make_frame(self) -> dict[str, Any]:
+            return {**super().make_frame(), "text": "x" * live.MAX_FRAME * self.large}
 
     view = Large(session)
     number = view.widget.number
@@ -237,5 +237,5 @@ def test_a_frame_that_does_not_fit_is_said(session: Session) -> None:
 def test_messages_that_are_none_are_passed_over(session: Session) -> None:
     view = GraphView(session)
     for message in ("x", None, [], {}, {"drawn": "9"}, {"drawn": None}):
-        view._heard(view.widget, message, [])
+        view._on_message(view.widget, message, [])
     assert view.widget.ended == ""

@@ -43,7 +43,7 @@ def shown(view: LiveView) -> dict[str, Any]:
 
 def say(view: LiveView, **message: Any) -> None:
     """Do what the browser does."""
-    view._heard(view.widget, message, [])
+    view._on_message(view.widget, message, [])
 
 
 def test_a_service_is_called_by_its_form(session: Session) -> None:
@@ -95,7 +95,7 @@ def test_what_does_not_fit_is_said_beside_the_form(session: Session) -> None:
     session.run(Robot)
     view = session.action("count")
     say(view, goal={"order": "many"})
-    assert view.frame()["problem"] == "order takes int32, not 'many'."
+    assert view.make_frame()["problem"] == "order takes int32, not 'many'."
     with pytest.raises(MisfitError, match="order takes int32"):
         view.send(order=0.5)
 
@@ -108,16 +108,16 @@ def test_goals_pass_through_their_states(busy: Session) -> None:
     busy.until(lambda: view.goals and view.goals[0].state == GoalState.EXECUTING)
     # The answer to the goal, and its state and feedback, come by different ways.
     busy.until(lambda: view.goals[0].feedback == 1 and view.goals[0].asked)
-    (shown,) = view.frame()["goals"]
+    (shown,) = view.make_frame()["goals"]
     assert shown["text"] == ["asked: {order: 2}", "feedback 1: {sequence: [0, 1]}"]
     robot.go.set()
-    busy.until(lambda: view.goals[0].result is not None and view.goals[0].over)
+    busy.until(lambda: view.goals[0].result is not None and view.goals[0].is_over)
     (goal,) = view.goals
     assert goal.state == GoalState.SUCCEEDED
     assert goal.result == {"sequence": [0, 1, 1]}
     assert goal.asked == {"order": 2}
     assert "SUCCEEDED" in view.words()
-    assert [name for name, _ in view.frame()["goals"][0]["states"]][-1] == "SUCCEEDED"
+    assert [name for name, _ in view.make_frame()["goals"][0]["states"]][-1] == "SUCCEEDED"
 
 
 def test_a_goal_of_somebody_else_is_seen_and_can_be_cancelled(busy: Session) -> None:
@@ -128,7 +128,7 @@ def test_a_goal_of_somebody_else_is_seen_and_can_be_cancelled(busy: Session) -> 
     say(view, cancel=view.goals[0].number)
     run.wait()
     assert run.status == GoalState.CANCELED
-    busy.until(lambda: view.goals[0].over)
+    busy.until(lambda: view.goals[0].is_over)
     assert view.goals[0].state == GoalState.CANCELED
 
 
@@ -138,13 +138,13 @@ def test_a_goal_sent_from_a_cell_shows_its_progress_and_its_result(busy: Session
     view = busy.action("count")
     busy.send_goal(Fibonacci, "count", Fibonacci.Goal(order=3))
     busy.until(lambda: view.goals and view.goals[0].feedback)
-    (goal,) = view.frame()["goals"]
+    (goal,) = view.make_frame()["goals"]
     assert goal["text"] == ["feedback 1: {sequence: [0, 1]}"]
     assert goal["way"]["text"] == "sequence (number of values): 2"
     assert [value for _, value in goal["way"]["points"]] == [2.0]
     robot.go.set()
     busy.until(lambda: view.goals[0].result is not None)
-    (goal,) = view.frame()["goals"]
+    (goal,) = view.make_frame()["goals"]
     assert goal["outcome"] == "result: {sequence: [0, 1, 1]}"
     assert "sequence (number of values): 2; result: {sequence: [0, 1, 1]}" in view.words()
 
@@ -175,7 +175,7 @@ def test_a_result_that_comes_late_is_asked_for_again(
     view = busy.action("fib")
     view.send(order=1)
     busy.until(lambda: view.goals and view.goals[0].note)
-    (goal,) = view.frame()["goals"]
+    (goal,) = view.make_frame()["goals"]
     assert (goal["outcome"], goal["bad"]) == ("Its server has not given its result yet.", False)
     release.set()
     busy.until(lambda: view.goals[0].result == {"sequence": [7]})
@@ -188,7 +188,7 @@ def test_a_rejected_goal_is_said(busy: Session) -> None:
     view.send(order=-1)
     busy.until(lambda: view.goals)
     assert view.goals[0].problem == "The server rejected this goal."
-    assert view.goals[0].over
+    assert view.goals[0].is_over
 
 
 class Server(Node):
@@ -215,11 +215,11 @@ def test_a_refused_cancel_is_said_until_the_goal_ends(busy: Session) -> None:
     view.send(order=3)
     busy.until(lambda: view.goals and view.goals[0].state == GoalState.EXECUTING)
     view.cancel(1)
-    (goal,) = view.frame()["goals"]
+    (goal,) = view.make_frame()["goals"]
     assert (goal["over"], goal["outcome"]) == (False, "The server refused to cancel.")
     server.go.set()
-    busy.until(lambda: view.goals[0].over and view.goals[0].result)
-    (goal,) = view.frame()["goals"]
+    busy.until(lambda: view.goals[0].is_over and view.goals[0].result)
+    (goal,) = view.make_frame()["goals"]
     assert (goal["over"], goal["outcome"]) == (True, "result: {sequence: [3]}")
 
 
@@ -247,13 +247,13 @@ def test_goals_that_were_let_go_of_do_not_come_back(
     for order in range(30):  # the server lists all of them for minutes, in each status message
         run = busy.send_goal(Fibonacci, "fib", Fibonacci.Goal(order=order))
         run.wait()
-    busy.until(lambda: len(view.goals) == 8 and all(goal.over for goal in view.goals))
+    busy.until(lambda: len(view.goals) == 8 and all(goal.is_over for goal in view.goals))
     assert [goal.number for goal in view.goals] == list(range(23, 31))
     server.go.clear()
     busy.send_goal(Fibonacci, "fib", Fibonacci.Goal(order=1))
     busy.until(lambda: view.goals[-1].state == GoalState.EXECUTING)
     server.go.set()
-    busy.until(lambda: all(goal.over for goal in view.goals))
+    busy.until(lambda: all(goal.is_over for goal in view.goals))
     assert [goal.number for goal in view.goals] == list(range(24, 32))
 
 
@@ -299,10 +299,10 @@ def test_a_parameter_is_changed_and_a_refusal_has_its_reason(session: Session) -
     say(panel, set="speed", value="1.5")
     assert robot.get_parameter("speed").value == 1.5
     say(panel, set="legs", value="100")
-    assert "no insect has so many" in panel.frame()["problem"]
+    assert "no insect has so many" in panel.make_frame()["problem"]
     assert robot.get_parameter("legs").value == 4
     say(panel, set="legs", value="6")
-    assert panel.frame()["problem"] == ""
+    assert panel.make_frame()["problem"] == ""
     session.until(lambda: {e["name"]: e["value"] for e in shown(panel)["entries"]}["legs"] == 6)
 
 
@@ -374,7 +374,7 @@ def test_parameters_of_every_type_are_shown_and_set_as_they_are_shown(session: S
     for name in ODD:
         before = repr(node.get_parameter(name).get_parameter_value())
         say(panel, set=name, value=str(entries[name]["value"]))
-        assert panel.frame()["problem"] == ""
+        assert panel.make_frame()["problem"] == ""
         assert repr(node.get_parameter(name).get_parameter_value()) == before, name
     assert panel.widget.ended == ""
 
@@ -433,12 +433,12 @@ def test_the_log_panel_has_what_nodes_of_other_programs_log(
     start_script(REMOTE.format(domain=session.domain_id))
     robot.get_logger().info("here")
     session.until(lambda: "battery low" in panel.words(), 30)
-    rows = [row[1:] for row in panel.frame()["rows"]]
+    rows = [row[1:] for row in panel.make_frame()["rows"]]
     assert ["WARN", "/far/remote", "battery low"] in rows
     # What this process runs comes on the topic, too, and is there once.
     assert [row for row in rows if row[2] == "here"] == [["INFO", "/robot", "here"]]
     panel.filter("ERROR")
-    assert panel.frame()["found"] == 0
+    assert panel.make_frame()["found"] == 0
 
 
 def test_the_log_panel_filters_before_it_cuts(session: Session) -> None:
@@ -537,7 +537,7 @@ def test_a_panel_of_no_node_says_so(session: Session) -> None:
 
 
 def test_forms_flatten_nested_messages() -> None:
-    fields = {field.path: field for field in forms.fields(Nested)}
+    fields = {field.path: field for field in forms.form_fields(Nested)}
     assert fields["basic_types_value.bool_value"].kind == "checkbox"
-    message = forms.message(Nested, {"basic_types_value.int8_value": "-3"})
+    message = forms.build_message(Nested, {"basic_types_value.int8_value": "-3"})
     assert message.basic_types_value.int8_value == -3

@@ -89,7 +89,7 @@ class Plain(LiveView):
     label = "Plain"
     script = "graph"
 
-    def frame(self) -> dict[str, Any]:
+    def make_frame(self) -> dict[str, Any]:
         return {}
 
     def words(self) -> str:
@@ -120,8 +120,8 @@ def test_two_places_have_two_views_and_nobody_has_more_than_so_many(session: Ses
     one, two = Plain(session), Plain(session)
     assert (repr(one), repr(two)) == ("as ever", "as ever")
     views = [Plain(session, number) for number in range(shelf.MOST + 5)]
-    assert one.over == two.over == views[0].over == shelf.TOO_MANY
-    assert sum(not view.over for view in views) == shelf.MOST == len(shelf_of(session)._views)
+    assert one.end_reason == two.end_reason == views[0].end_reason == shelf.TOO_MANY
+    assert sum(not view.end_reason for view in views) == shelf.MOST == len(shelf_of(session)._views)
 
 
 def test_what_a_closed_session_left_on_the_page_goes_when_its_cell_is_run_again(
@@ -153,7 +153,7 @@ def test_closed_sessions_leave_so_many_views_on_the_page_at_most() -> None:
 def test_a_closed_widget_ends_its_view(session: Session) -> None:
     view = Plain(session)
     view.widget.close()
-    assert view.over == "Its widget has been closed."
+    assert view.end_reason == "Its widget has been closed."
     assert list(ticker_of(session)._views) == []
 
 

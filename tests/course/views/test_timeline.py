@@ -22,7 +22,7 @@ from std_msgs.msg import String
 from course import Session
 from course.errors import SessionError, WaitTimeout
 from course.messages.mcap_file import RecordingError
-from course.views.timeline import Timeline, describe
+from course.views.timeline import Timeline, describe_figures
 from course.watch import callbacks, timeline
 from course.watch.callbacks import CallbackTap
 from course.watch.timeline import Passage
@@ -40,7 +40,7 @@ def passages(*stamps_ms: int, latency_ms: int = 2, first: int = 1) -> list[Passa
 
 
 def test_rate_and_latency_are_taken_from_the_stamps() -> None:
-    found = timeline.figures(passages(*range(0, 1000, 100)))
+    found = timeline.compute_figures(passages(*range(0, 1000, 100)))
     assert found.rate == pytest.approx(10)
     assert found.latency_p50 == pytest.approx(0.002)
     assert found.latency_p95 == pytest.approx(0.002)
@@ -49,17 +49,17 @@ def test_rate_and_latency_are_taken_from_the_stamps() -> None:
 
 def test_a_pause_is_a_gap_and_a_missing_number_is_a_loss() -> None:
     late = passages(0, 100, 200, 300) + passages(900, 1000, first=7)
-    found = timeline.figures(late)
+    found = timeline.compute_figures(late)
     assert found.gaps == (pytest.approx((0.3, 0.9)),)
     assert found.lost == 2
-    assert "1 gap, the longest 0.60 s, 2 lost on the way" in describe(found)
+    assert "1 gap, the longest 0.60 s, 2 lost on the way" in describe_figures(found)
 
 
 def test_a_drop_has_a_place_and_a_gap_has_no_rate() -> None:
     seen = passages(*range(0, 1000, 50)) + passages(*range(3000, 4000, 50), first=24)
-    found = timeline.figures(seen)
+    found = timeline.compute_figures(seen)
     assert found.drops == ((3.0, 3),)
-    plots = timeline.plots(seen, 0, 4000 * MS)  # 50 parts of 80 ms
+    plots = timeline.compute_plots(seen, 0, 4000 * MS)  # 50 parts of 80 ms
     assert {round(rate, 6) for rate in plots.rate[1:12] if rate is not None} == {20.0}
     assert set(plots.rate[13:37]) == {0.0}
     assert set(plots.p50[13:37]) == {None}
@@ -68,22 +68,22 @@ def test_a_drop_has_a_place_and_a_gap_has_no_rate() -> None:
 
 def test_p50_and_p95_are_those_of_each_part() -> None:
     slow = [Passage(n * MS, (n + (30 if n % 10 == 0 else 1)) * MS, n + 1) for n in range(100)]
-    plots = timeline.plots(slow, 0, 100 * 50 * MS)  # all of them in the first part
+    plots = timeline.compute_plots(slow, 0, 100 * 50 * MS)  # all of them in the first part
     assert (plots.p50[0], plots.p95[0]) == (0.001, 0.03)
     assert plots.p50[1:] == [None] * 49
 
 
 def test_two_publishers_count_for_themselves_so_nothing_is_said_of_losses() -> None:
-    assert timeline.figures(passages(0, 1, 2) + passages(3, 4, 5)).lost == 0
+    assert timeline.compute_figures(passages(0, 1, 2) + passages(3, 4, 5)).lost == 0
 
 
 def test_nothing_is_said_of_nothing() -> None:
-    assert describe(timeline.figures([])) == "nothing"
-    assert timeline.figures(passages(5)).rate is None
+    assert describe_figures(timeline.compute_figures([])) == "nothing"
+    assert timeline.compute_figures(passages(5)).rate is None
 
 
 def test_columns_cover_the_window() -> None:
-    counts = timeline.columns([0, 1, 999, 1000, -1], 0, 1000)
+    counts = timeline.count_columns([0, 1, 999, 1000, -1], 0, 1000)
     assert (counts[0], counts[-1], sum(counts)) == (2, 1, 3)
 
 
@@ -115,8 +115,8 @@ def test_what_passed_a_slow_callback_by_is_marked_in_its_lane(session: Session) 
         session.until(slow.begun.is_set)  # from now on each message pushes out the one before
     slow.go.release(8)
     session.until(lambda: slow.seen == ["0", "7"])
-    session.until(lambda: len(view.runs("/chatter")) == 2)
-    lanes = {lane["label"]: lane["drops"] for lane in view.frame()["topics"][0]["lanes"]}
+    session.until(lambda: len(view.callback_runs("/chatter")) == 2)
+    lanes = {lane["label"]: lane["drops"] for lane in view.make_frame()["topics"][0]["lanes"]}
     assert lanes["received"] == []
     ((_, missed),) = lanes["callback of /slow"]
     assert missed == 6
@@ -154,13 +154,13 @@ def test_callbacks_run_as_before_and_are_seen(session: Session) -> None:
     for number in range(3):
         publisher.publish(String(data=f"{number}"))
     session.until(lambda: len(listener.seen) == 9)
-    session.until(lambda: len(view.runs("/chatter")) == 9)
+    session.until(lambda: len(view.callback_runs("/chatter")) == 9)
     session.until(lambda: view.figures()["/chatter"].count == 3)
     assert {kind for kind, _ in listener.seen} == {"one", "two", "later"}
-    runs = view.runs("/chatter")
+    runs = view.callback_runs("/chatter")
     assert all(run.published <= run.started <= run.ended for run in runs)
     assert "callbacks of /listener: 9" in view.words()
-    (topic,) = view.frame()["topics"]
+    (topic,) = view.make_frame()["topics"]
     assert [lane["label"] for lane in topic["lanes"]] == [
         "published", "received", "callback of /listener",
     ]  # fmt: skip
@@ -168,12 +168,12 @@ def test_callbacks_run_as_before_and_are_seen(session: Session) -> None:
     view.stop()
     publisher.publish(String(data="unseen"))
     session.until(lambda: len(listener.seen) == 12)
-    assert len(view.runs("/chatter")) == 9
+    assert len(view.callback_runs("/chatter")) == 9
     again = Timeline(session, [("chatter", None)])
     inner = [subscription.callback.__wrapped__ for subscription in listener.subscriptions]
     assert inner == originals, "wrapped once, however many timelines there were"
     publisher.publish(String(data="seen"))
-    session.until(lambda: len(again.runs("/chatter")) == 3)
+    session.until(lambda: len(again.callback_runs("/chatter")) == 3)
 
 
 def test_a_callback_is_given_what_it_takes_while_timelines_come_and_go(
@@ -219,7 +219,7 @@ def test_a_callback_that_raises_is_reported_as_ever(session: Session) -> None:
     session.until(lambda: session.errors)
     assert str(session.errors[0].exception) == "as ever"
     assert session.errors[0].callback == "test_a_callback_that_raises_is_reported_as_ever.broken"
-    assert len(tap.since(0)) == 1
+    assert len(tap.runs_since(0)) == 1
 
 
 class Broken:
@@ -252,7 +252,7 @@ def test_a_callback_keeps_its_name_under_a_timeline(
         known = sum(error.count for error in session.errors)
         session.publish("chatter", String())
         session.until(lambda known=known: sum(e.count for e in session.errors) > known)  # type: ignore[misc]
-    assert len(tap.since(0)) == 1
+    assert len(tap.runs_since(0)) == 1
     assert [error.callback for error in session.errors] == [name]
 
 
@@ -282,8 +282,8 @@ def test_a_window_with_more_than_is_kept_says_since_when_it_is_whole(
     view = session.timeline("chatter", window=60.0)
     assert "s only: a timeline keeps" not in view.words()
     (trace, tap) = view._rows[0]
-    session.until(lambda: len(trace.since(0)) >= 50 and len(tap.since(0)) >= 50)
-    (topic,) = view.frame()["topics"]
+    session.until(lambda: len(trace.passages_since(0)) >= 50 and len(tap.runs_since(0)) >= 50)
+    (topic,) = view.make_frame()["topics"]
     for text in (view.words(), topic["text"]):
         found = re.search(r"\(of the last (\d+\.\d) s only: a timeline keeps \d+ messages", text)
         assert found, text
@@ -305,10 +305,10 @@ def test_the_memory_that_its_messages_take_is_bounded_and_given_back(
         for _ in range(30):
             publisher.publish(String(data="x" * size))
         session.until(lambda n=before + 30: view.figures()["/chatter"].count == n, 20)  # type: ignore[misc]
-        assert len(trace.messages) == kept
-        assert trace._size == sum(len(cdr) for _, cdr in trace.messages)
+        assert len(trace.latest_messages) == kept
+        assert trace._size == sum(len(cdr) for _, cdr in trace.latest_messages)
     view.stop()
-    assert (trace.messages, trace._size) == ([], 0)
+    assert (trace.latest_messages, trace._size) == ([], 0)
 
 
 def test_a_talker_that_comes_back_as_best_effort_is_heard(session: Session) -> None:
@@ -324,7 +324,7 @@ def test_a_talker_that_comes_back_as_best_effort_is_heard(session: Session) -> N
     session.run(talker, qos_profile_sensor_data)
     here = time.time_ns()
     (trace, _) = view._rows[0]
-    session.until(lambda: view.figures() and len(trace.since(here)) > 10)
+    session.until(lambda: view.figures() and len(trace.passages_since(here)) > 10)
     before = session.observer.count_subscribers("/chatter")
     view.figures()
     assert session.observer.count_subscribers("/chatter") == before == 1
@@ -341,7 +341,7 @@ def test_what_was_published_before_is_no_late_message(session: Session) -> None:
     for number in range(3):
         publisher.publish(String(data=f"{number}"))
     session.until(lambda: view.figures()["/map"].count >= 3)
-    kept = [deserialize_message(cdr, String) for _, cdr in view._rows[0][0].messages]
+    kept = [deserialize_message(cdr, String) for _, cdr in view._rows[0][0].latest_messages]
     assert [message.data for message in kept] == ["0", "1", "2"]
 
 

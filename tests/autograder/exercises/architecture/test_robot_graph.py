@@ -95,17 +95,17 @@ def test_information_flows_along_the_kinds_that_are_asked_for() -> None:
         services=[Offer("/plan", "", {"/planner"}, {"/navigation"})],
         actions=[Offer("/follow", "", {"/controller"}, {"/navigation"})],
     )
-    assert seen.reached({"/lidar"}, ("topic",)) == {"/lidar", "/navigation"}
-    assert "/planner" in seen.reached({"/lidar"}, ("topic", "request"))
-    assert "/controller" in seen.reached({"/lidar"}, ("topic", "goal"))
-    assert seen.reached({"/planner"}, ("topic", "request")) == {"/planner"}
-    assert "/navigation" in seen.reached({"/planner"}, ("response",))
-    assert "/navigation" in seen.reached({"/controller"}, ("feedback",))
+    assert seen.reachable_nodes({"/lidar"}, ("topic",)) == {"/lidar", "/navigation"}
+    assert "/planner" in seen.reachable_nodes({"/lidar"}, ("topic", "request"))
+    assert "/controller" in seen.reachable_nodes({"/lidar"}, ("topic", "goal"))
+    assert seen.reachable_nodes({"/planner"}, ("topic", "request")) == {"/planner"}
+    assert "/navigation" in seen.reachable_nodes({"/planner"}, ("response",))
+    assert "/navigation" in seen.reachable_nodes({"/controller"}, ("feedback",))
 
 
 def test_a_cycle_ends() -> None:
     seen = graph(topic("/a", TWIST, "x", "y"), topic("/b", TWIST, "y", "x"))
-    assert seen.reached({"/x"}, ("topic",)) == {"/x", "/y"}
+    assert seen.reachable_nodes({"/x"}, ("topic",)) == {"/x", "/y"}
 
 
 def test_a_filtered_scan_is_still_a_scan() -> None:
@@ -212,12 +212,12 @@ def test_a_pose_that_comes_from_no_sensor_is_not_held_against_navigation() -> No
     pose = "geometry_msgs/msg/PoseStamped"
     made_up = topic("/pose", pose, "estimator", "navigation")
     actions = [Offer("/navigate_to", "", {"/navigation"})]
-    assert Jobs(graph(made_up, actions=actions)).informed == {"/navigation"}
+    assert Jobs(graph(made_up, actions=actions)).informed_navigators == {"/navigation"}
     estimated = [
         topic("/wheel/odometry", "nav_msgs/msg/Odometry", "wheels", "odometer"),
         topic("/odometry", "nav_msgs/msg/Odometry", "odometer", "display"),
     ]
-    assert not Jobs(graph(made_up, *estimated, actions=actions)).informed
+    assert not Jobs(graph(made_up, *estimated, actions=actions)).informed_navigators
 
 
 def test_a_debugging_pose_is_not_held_against_a_busy_node() -> None:
@@ -254,7 +254,7 @@ def test_only_endpoints_that_came_later_are_new() -> None:
         topic("/goal", ARRAY, "", "planner"),
         services=[plan, Offer("/reset", "", set(), {"/controller"})],
     )
-    assert link_faults(later.since(earlier)) == [
+    assert link_faults(later.added_since(earlier)) == [
         "planner reads /goal, but nobody publishes on it.",
         "controller calls /reset, but no node is its server.",
     ]
@@ -304,9 +304,9 @@ def test_hidden_nodes_and_those_that_bear_the_examiners_name_count() -> None:
             return read_graph(reader)
 
         examiner.until(lambda: seen().nodes == {"/_god", "/examiner"}, timeout=20)
-        examiner.until(lambda: seen().topic("/_motors/whispers").readers, timeout=20)
-        assert seen().topic("/motors/command").written_by == {"/_god"}
-        assert seen().topic("/_motors/whispers").read_by == {"/examiner"}
+        examiner.until(lambda: seen().get_topic("/_motors/whispers").readers, timeout=20)
+        assert seen().get_topic("/motors/command").written_by == {"/_god"}
+        assert seen().get_topic("/_motors/whispers").read_by == {"/examiner"}
         plan = Offer("/plan", "nav_msgs/srv/GetPlan", {"/examiner"}, {"/_god"})
         examiner.until(lambda: seen().services == {"/plan": plan}, timeout=20)
         assert not seen().namesakes

@@ -10,7 +10,7 @@ import pytest
 from autograder.exercises.qos.consumer_lag import QUIET, WATCHED, Pursuit
 from autograder.exercises.qos.readings import IMU, Sensor
 from autograder.exercises.qos.rig import SensorRig
-from course.runtime.waiting import Pulse, poll
+from course.runtime.waiting import Pulse, poll_condition
 
 S = 10**9  # ns
 PERIOD = S // 100
@@ -23,11 +23,11 @@ class Recorded:
         """Have heard these."""
         self._published, self._handed = dict(enumerate(published)), handed
 
-    def publications(self, sensor: Sensor, phase: str) -> dict[int, int]:
+    def publication_times(self, sensor: Sensor, phase: str) -> dict[int, int]:
         """Return when the readings were published."""
         return self._published
 
-    def handed(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
+    def handed_readings(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
         """Return which were handed on, and when."""
         return self._handed
 
@@ -49,7 +49,7 @@ def test_a_consumer_that_hands_on_fresh_readings_keeps_up(late: int) -> None:
     resumed = time.time_ns() - (late + 2) * S
     published = at_rate(resumed, 2)
     watched = pursuit(published, prompt(published), resumed)
-    assert watched.settled()
+    assert watched.is_settled()
     assert watched.behind is None
 
 
@@ -58,7 +58,7 @@ class Late(Recorded):
 
     looks = 0
 
-    def handed(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
+    def handed_readings(self, sensor: Sensor, phase: str) -> list[tuple[int, int]]:
         """Return one more than the last time."""
         self.looks += 1
         return self._handed[: self.looks]
@@ -68,7 +68,7 @@ def test_a_consumer_of_which_the_examiner_hears_late_is_not_silent() -> None:
     resumed = time.time_ns() - 8 * S
     published = at_rate(resumed, 5)[::2]
     watched = Pursuit(cast(SensorRig, Late(published, prompt(published))), IMU, "phase", resumed)
-    assert not poll(watched.settled, QUIET + 0.5, Pulse())
+    assert not poll_condition(watched.is_settled, QUIET + 0.5, Pulse())
     assert watched.behind is None
 
 
@@ -77,7 +77,7 @@ def test_an_examiner_that_hears_late_does_not_take_that_for_silence() -> None:
     resumed = time.time_ns() - int((QUIET + 5) * S)
     published = at_rate(resumed, 3)[::2]
     watched = pursuit(published, prompt(published), resumed)
-    assert not watched.settled()
+    assert not watched.is_settled()
     assert not watched.able
 
 
@@ -88,23 +88,23 @@ def test_readings_that_come_at_the_last_moment_do_not_show_that_a_slow_consumer_
     published = [start + n * 2 * S // 1000 for n in range(100)]
     handed = [(n, start + n * 2 * PERIOD) for n in range(9)]
     watched = pursuit(published, handed, resumed)
-    assert not watched.settled()
+    assert not watched.is_settled()
     assert not watched.able
 
 
 def test_a_consumer_that_hands_on_nothing_while_readings_go_on_has_shown_all_there_is() -> None:
     resumed = time.time_ns() - 4 * S
     published = at_rate(resumed, 4)
-    assert pursuit(published, prompt(published[:100]), resumed).settled()
+    assert pursuit(published, prompt(published[:100]), resumed).is_settled()
 
 
 def test_a_list_that_fills_faster_than_it_is_emptied_falls_behind() -> None:
     resumed = time.time_ns() - 8 * S
     published = at_rate(resumed, 8)
     watched = pursuit(published, [(n, resumed + n * 2 * PERIOD) for n in range(400)], resumed)
-    assert watched.settled()
+    assert watched.is_settled()
     assert watched.behind is not None
-    assert "newer ones were waiting" in watched.behind.told(IMU)
+    assert "newer ones were waiting" in watched.behind.describe_lag(IMU)
 
 
 def every_second(published: list[int]) -> list[tuple[int, int]]:
@@ -116,7 +116,7 @@ def test_a_list_that_drops_each_second_reading_leaves_them_out() -> None:
     resumed = time.time_ns() - 4 * S
     published = at_rate(resumed, 4)
     watched = pursuit(published, every_second(published), resumed)
-    assert watched.settled()
+    assert watched.is_settled()
     assert watched.omits is not None
     assert watched.omits.published == 2 * watched.omits.handed
 
@@ -127,7 +127,7 @@ def test_what_is_left_out_shows_however_few_readings_a_busy_machine_brings() -> 
     published = list(range(resumed + S // 60, resumed + 4 * S, S // 60))
     handed = [(n, when + S // 5) for n, when in enumerate(published) if n % 6]
     watched = pursuit(published, handed, resumed)
-    assert watched.settled()
+    assert watched.is_settled()
     assert watched.omits is not None
 
 
@@ -155,5 +155,5 @@ def test_a_quick_consumer_is_able_only_if_something_it_hands_on_is_not_too_old(
     late = (when - (when - resumed) % (5 * PERIOD) + 5 * PERIOD for when in published)
     handed = [(n, when + int(delay * S)) for n, when in enumerate(late)]
     watched = pursuit(published, handed, resumed)
-    assert not watched.settled()
+    assert not watched.is_settled()
     assert watched.able is able
