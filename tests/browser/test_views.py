@@ -405,7 +405,8 @@ def test_what_is_read_only_stays_so_and_gaps_and_drops_are_marked(open_cells: Op
     timeline = region(page, "Timeline")
     expect(timeline.locator(".rostimeline-rate")).to_have_attribute("points", re.compile(r"\S"))
     # The hidden reader keeps the last 1000: what is published while it is held is lost.
-    held = "with session._requests.probe.executor.held():\n    for _ in range(1500): robot.talk()"
+    probe = "session._requests.probe.executor"
+    held = f"with {probe}.hold_still():\n    for _ in range(1500): robot.talk()"
     run_in_kernel(page, held)
     expect(timeline.locator(".rostimeline-drop title").first).to_contain_text("lost on the way")
     expect(timeline.locator(".rostimeline-gap title").first).to_contain_text("gap of")

@@ -723,7 +723,7 @@ def test_what_cannot_be_taken_is_said_and_its_node_lives(opened, threads):
 
     node = opened.run(Node, "program", threads=threads)
     ticks = []
-    with executor_of(node).held():
+    with executor_of(node).hold_still():
         box = Wrong(node)
     for letter in ("torn", "a"):
         box.post(letter)

@@ -142,7 +142,7 @@ def require_trial(rig: RobotRig, name: str) -> None:
         rig.memory[__name__] = _Findings()
         # The checks come in this order: what those before this one are about has failed already.
         names = list(TRIALS)[list(TRIALS).index(name) :]
-        rig.memory[__name__].note(_run_trials(rig.bench, programs, names, hasty=True))
+        rig.memory[__name__].note_outcomes(_run_trials(rig.bench, programs, names, hasty=True))
     found: _Findings = rig.memory[__name__]
     if name not in found.right and name not in found.patient:
         found.patient.add(name)

@@ -78,12 +78,14 @@ class Stage:
             if part.serves is not None and TIMED in part.acts
         }
         players = self.players.values()
-        program.wait(lambda: not any(player.missing() for player in players), MEET_S)
+        program.wait(lambda: not any(player.describe_missing() for player in players), MEET_S)
         for player in players:
-            player.attend()
+            player.subscribe_all()
         # They may be known here before they know of anybody: a request would then be lost.
         Patience(still, idle=MEET_IDLE_S).wait(program.session, lambda: False)
-        self.there = {name for name, player in self.players.items() if not player.missing()}
+        self.there = {
+            name for name, player in self.players.items() if not player.describe_missing()
+        }
         self.under_way = {part.name: next(iter(part.acts)) for part in parts}
         self.ended = dict[str, str]()
         self._due: dict[str, tuple[float, Act]] = {
@@ -144,7 +146,7 @@ class Stage:
 
     def _note_ended(self) -> None:
         for name in self.there - {*self.ended}:
-            if self.players[name].missing():
+            if self.players[name].describe_missing():
                 self.ended[name] = self.under_way[name]
                 if name in self._due:
                     _, acts = self._due.pop(name)

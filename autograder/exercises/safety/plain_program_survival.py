@@ -86,7 +86,7 @@ def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
 def require_time(name: str, what: str, bench: Bench, still: Stillness) -> None:
     """Fail if a node takes far too long for something in a plain program, or far too short.
 
-    Nothing where there are none. See `plain_program_times.require`.
+    Nothing where there are none. See `plain_program_times.require_timing`.
     """
     if bench.programs is None:
         return

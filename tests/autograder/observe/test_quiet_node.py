@@ -47,10 +47,10 @@ def test_a_guest_hears_in_its_block_only() -> None:
         )
 
         def stop(number: int) -> None:
-            tag = Tag(node.nonce, node.phase("event"), number)
-            stops.publish(STOP.make_message(node.words(STOP, tag)))
+            tag = Tag(node.nonce, node.phase_number("event"), number)
+            stops.publish(STOP.make_message(node.replacement_tag(STOP, tag)))
 
-        with suppress(ZeroDivisionError), node.guests():
+        with suppress(ZeroDivisionError), node.temporary_listeners():
             node.listen(STOP, STOP.topic, lossless_profile(), guest)
             session.until(lambda: stops.get_subscription_count() == 2)
             stop(0)

@@ -192,7 +192,7 @@ def test_nodes_that_come_and_go_all_the_time_do_not_end_views(session: Session) 
     for _ in range(20):
         session.run(talker)
         session.stop("talker")
-    assert [view.over for view in views] == ["", ""]
+    assert [view.end_reason for view in views] == ["", ""]
 
 
 def test_without_a_front_end_a_view_is_words_and_makes_no_widget(session: Session) -> None:

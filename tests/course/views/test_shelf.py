@@ -109,7 +109,7 @@ def test_a_call_in_a_program_that_is_made_again_replaces_its_view(session: Sessi
     assert len(shelf_of(session)._views) == 2
     session.until(lambda: session.observer.count_subscribers("/chatter") == before + 1)
     for view in views[-2:]:
-        assert not view.over
+        assert not view.end_reason
         view.stop()
     session.until(lambda: session.observer.count_subscribers("/chatter") == before)
     assert heard.callback.__wrapped__ == original, "wrapped once for all of them"

@@ -32,11 +32,11 @@ def test_what_both_readers_hear_is_one_picture_and_the_list_only_grows() -> None
         for number in range(20):
             (offers if number % 3 else keeps).publish(_picture(number))
             keeps.publish(_picture(number, "rear-1"))
-            session.until(lambda least=number: len(node.of("front-1")) > least)  # type: ignore[misc]
-            lists.append(node.of("front-1"))
+            session.until(lambda least=number: len(node.pictures_of("front-1")) > least)  # type: ignore[misc]
+            lists.append(node.pictures_of("front-1"))
         keeps.publish(_picture(20))
-        session.until(lambda: len(node.of("front-1")) > 20)
-        last = node.of("front-1")
+        session.until(lambda: len(node.pictures_of("front-1")) > 20)
+        last = node.pictures_of("front-1")
         assert [picture.number for picture in last] == list(range(21))
         assert all(last[: len(earlier)] == earlier for earlier in lists)
 
@@ -50,5 +50,5 @@ def test_a_picture_that_is_sent_again_counts_again() -> None:
         for _ in range(3):
             pictures.publish(_picture(7))
         pictures.publish(Image(data=b"noise"))
-        session.until(lambda: len(node.of("front-1")) == 3 and node.strange() == 1)
-        assert {picture.number for picture in node.of("front-1")} == {7}
+        session.until(lambda: len(node.pictures_of("front-1")) == 3 and node.count_strange() == 1)
+        assert {picture.number for picture in node.pictures_of("front-1")} == {7}
