@@ -107,8 +107,7 @@ def collect_class(root: Path, assignment: str) -> ClassData:
     except SQLAlchemyError as error:
         raise InsightError(
             f"The gradebook of {gradebook.root} cannot be read ({_error_reason(error)}): if "
-            "another "
-            "program uses it, wait until that is done; if it is damaged, put a copy back."
+            "another program uses it, wait until that is done; if it is damaged, put a copy back."
         ) from None
     if not grades:
         raise InsightError(

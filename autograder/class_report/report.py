@@ -99,8 +99,7 @@ def export_remarks(export: Export) -> list[str]:
     if export.absent:
         remarks.append(
             f"Empty for {format_count(len(export.absent), 'student')} who handed in nothing: "
-            "whether "
-            "that is a 0 is your course's rule, which the platforms can apply themselves "
+            "whether that is a 0 is your course's rule, which the platforms can apply themselves "
             "(--zero-absent writes it)."
         )
     if export.guarded:

@@ -44,8 +44,7 @@ def keep_claim(
     if not folder.is_dir():
         raise ClaimError(
             f"There is nothing in {root / 'submitted'} that {join_names([student])} has handed in "
-            "for "
-            f"{join_names([assignment])}: look at the student's name, or put the files there."
+            f"for {join_names([assignment])}: look at the student's name, or put the files there."
         )
     if bool(file) + nothing + withdraw != 1:
         raise ClaimError(

@@ -293,8 +293,7 @@ def _parse_marks(path: Path) -> _File:
     if missing:
         raise MarksError(
             f"{path.name} is no file of marks: it lacks the {_name_columns(missing)}. Make one "
-            "with "
-            "`autograder marks export`."
+            "with `autograder marks export`."
         )
     file = _File()
     faults: list[str] = []

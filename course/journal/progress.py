@@ -61,8 +61,7 @@ def progress_of(journal: Journal) -> Progress:
     quizzes = tuple(_quiz_progress(journal.folder, n) for n in sound if n.quiz)
     notices += [
         f"{attempts_filename(quiz.notebook.quiz)} has {quiz.damaged} damaged lines: run the quiz "
-        "again, "
-        "which keeps them aside."
+        "again, which keeps them aside."
         for quiz in quizzes if quiz.damaged
     ]  # fmt: skip
     return Progress(

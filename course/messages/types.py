@@ -90,8 +90,7 @@ def load_type(name: str, who: str = "", kind: str = "") -> Any:
     if found is None:
         raise SessionError(
             f"{yaml_text.short_repr(name)} is not the name of an interface: write "
-            "package/kind/Name, as "
-            f"in {_EXAMPLES[kind or 'msg']}."
+            f"package/kind/Name, as in {_EXAMPLES[kind or 'msg']}."
         )
     package, actual, cls = found["package"], found["kind"] or kind or "msg", found["name"]
     if kind and actual != kind:

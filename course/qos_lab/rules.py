@@ -98,8 +98,7 @@ def _explain_stream(experiment: Experiment, outcome: Outcome) -> str:
     if not is_reliable(experiment):
         return (
             f"Lost on the way: {outcome.missing_count}. A best-effort connection never sends "
-            "anything "
-            f"twice.{_too_old(_describe_lifespans(experiment))}"
+            f"anything twice.{_too_old(_describe_lifespans(experiment))}"
         )
     missing = f"Missing, although the connection is reliable: {outcome.missing_count}."
     return f"{missing} {_not_repaired(experiment)}"

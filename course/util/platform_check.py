@@ -70,8 +70,7 @@ def find_problem(
     if implementation != "CPython" or not OLDEST <= version <= NEWEST:
         return (
             f"This course needs CPython {_version_text(OLDEST)} to {_version_text(NEWEST)}, not "
-            f"{implementation} "
-            f"{_version_text(version)}: run it with another Python, for example "
+            f"{implementation} {_version_text(version)}: run it with another Python, for example "
             f"`uv run --python {_version_text((3, 12))} course lab`."
         )
     return None

@@ -43,8 +43,7 @@ class Answers(Cells):
                 self._join_cells(written)
                 self.said.notes.append(
                     f"Your answer to '{self.cell_title(name)}' stood in {len(written)} cells; all "
-                    "of "
-                    "them count."
+                    "of them count."
                 )
 
     def _join_cells(self, texts: list[NotebookNode]) -> None:

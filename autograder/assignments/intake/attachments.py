@@ -53,14 +53,12 @@ def files_beside(folder: Path) -> Attachments:
     if too_large:
         beside.notes.append(
             f"Your code was run without {summarise_names(too_large)}: the files beside the "
-            "notebooks may "
-            f"have {MAX_BYTES // 2**20} MB together. Hand in smaller ones."
+            f"notebooks may have {MAX_BYTES // 2**20} MB together. Hand in smaller ones."
         )
     if links:
         beside.notes.append(
             f"Your code was run without {summarise_names(links)}: a link leads out of the "
-            "submission. Hand "
-            "in the file itself."
+            "submission. Hand in the file itself."
         )
     if len(paths) >= MAX_FILES:
         beside.notes.append(

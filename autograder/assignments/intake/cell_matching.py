@@ -190,8 +190,7 @@ class _Recognition(Answers):
                 self.cells.insert(number + 1, self._make_piece(cell, cell.source, ""))
                 self.said.notes.append(
                     f"You have added to the given cell '{self.cell_title(grade_id(cell))}': it is "
-                    "run "
-                    "as it was given, and then as you have it."
+                    "run as it was given, and then as you have it."
                 )
 
     def _doubt_work_behind_its_exam(self) -> None:

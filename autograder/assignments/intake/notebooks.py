@@ -273,8 +273,7 @@ class Intake:
             assert notebook is not None
             said = (
                 f"There was no {name}.ipynb, but '{printable_name(item.place)}' holds its cells, "
-                "so it was "
-                f"{GRADED_AS} that."
+                f"so it was {GRADED_AS} that."
             )
             return Found(notebook, item, (said,), (said,))
         missing = f"There is no {name}.ipynb in the submission"
@@ -315,8 +314,7 @@ class Intake:
             "person has to say what counts.",
             f"Move {them} into that folder if that is this assignment's work, and to another place "
             f"if not, or say with `autograder claim {self._whose} {quote_name(name)} --nothing` "
-            "that "
-            "it was not handed in; then grade again.",
+            "that it was not handed in; then grade again.",
         )
 
     def _distinct_candidates(self, found: list[_Candidate], name: str) -> list[_Candidate]:

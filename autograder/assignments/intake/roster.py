@@ -71,8 +71,7 @@ def find_submissions(
             if not problem and student in good:
                 problem = wrong[good[student]] = (
                     f"There are two folders whose names read '{printable_name(student)}': put what "
-                    "the "
-                    "student handed in into one of them, and remove the other."
+                    "the student handed in into one of them, and remove the other."
                 )
             elif not problem:
                 good[student] = folder.name
@@ -179,9 +178,8 @@ def _placement_problem(folder: Path, assignment: str, assignments: Collection[st
         verb, them = ("is", "it") if len(names) == 1 else ("are", "them")
         return (
             f"There is no {there}/{assignment}, but there {verb} {join_names(names)} in {there}: "
-            "move "
-            f"{them} to {there}/{assignment} if that is this assignment's work, or out of {there} "
-            "if not; then grade again."
+            f"move {them} to {there}/{assignment} if that is this assignment's work, or out of "
+            f"{there} if not; then grade again."
         )
     return ""
 

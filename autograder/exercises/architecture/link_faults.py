@@ -59,8 +59,7 @@ def why_no_obstacles(jobs: Jobs) -> str:
     if not jobs.detectors:
         return (
             f"Only {who_does(jobs.eye_readers, 'read')} /scan or /camera/image: navigation or "
-            "control does "
-            "the detection as well."
+            "control does the detection as well."
         )
     outputs = {t.name: t for node in sorted(jobs.detectors) for t in graph.published_topics(node)}
     tried = [t for t in outputs.values() if t.name not in SENSORS and not set(t.types) & POSES]
@@ -82,8 +81,7 @@ def why_no_obstacles(jobs: Jobs) -> str:
     if busy := [t for t in graph.topics.values() if _of_busy(t, jobs)]:
         return (
             f"{name_nodes(busy[0].written_by)}, not {name_nodes(jobs.detectors)}, publishes "
-            f"{busy[0].name}: "
-            "navigation and control do not do the detection."
+            f"{busy[0].name}: navigation and control do not do the detection."
         )
     return f"{reading} nothing of the kind is published."
 
@@ -130,8 +128,7 @@ def _why_no_obstacle(topic: Topic, jobs: Jobs) -> str:
     if not bears_marks(types):
         return (
             f"({join_names(topic.types)}) has no room for a mark: take a type with a number of 32 "
-            "bits "
-            "or a text"
+            "bits or a text"
         )
     if types & NOT_OBSTACLES or topic.name in (MAP, MOTORS):
         return f"({join_names(topic.types)}) is no obstacle information"
@@ -159,8 +156,7 @@ def why_no_pose(jobs: Jobs) -> str:
     if own := wheels.written_by & jobs.find_readers(SENSORS, IMAGES | CLOUDS):
         return (
             f"{who_does(own, 'publish')} {'its' if len(own) == 1 else 'their'} pose on {WHEELS}, "
-            "the "
-            "encoders' topic: it needs one of its own."
+            "the encoders' topic: it needs one of its own."
         )
     return "No node publishes a topic with a pose type."
 
