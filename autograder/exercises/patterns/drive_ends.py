@@ -22,8 +22,8 @@ stop to become visible, and for one that was under way when the result came."""
 STOPS = 0.5
 """Seconds of the node's clock within which a robot that is called off is told to stop."""
 WATCHED, STANDS, SELDOM = 2.0, 0.5, 0.25
-"""Seconds of the node's clock for which a robot that was called off must stay where it is, for
-which any must at the end, and between two moments of these that nodes get to see."""
+"""Seconds of the node's clock: for which a cancelled robot must stay where it is; for which every
+robot must at the end of a drive; and between two clock messages meanwhile."""
 
 
 def to_the_end(drive: Drive, *, blocked: bool = False) -> None:
@@ -128,6 +128,7 @@ def cancel_drive(drive: Drive, seconds: float, looking: float = LOOKING) -> int:
     rig.wait(stopped, looking)
     while not stopped() and seconds - (rig.elapsed - began) > STEP / 2:
         rig.step(STEP)
+    # The robot has had its time: only a message that is under way is waited for.
     rig.start_patience(STOPPING, stepped=IDLE_S).wait(rig.session, stopped)
     over = time.time_ns()
     rig.await_answer(answer, "to cancel")

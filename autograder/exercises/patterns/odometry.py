@@ -26,13 +26,13 @@ def position_fault(rig: RobotRig, asker: Asker, position: float, age: float = AG
     """
     answer, right = "", False
 
-    def known() -> bool:
+    def is_settled() -> bool:
         nonlocal answer, right
         answer, found = asker(rig)
         right = any(abs(number - position) < CLOSE for number in found)
         return right or answer == NO_ANSWER
 
-    rig.wait_stepping(known, age)
+    rig.wait_stepping(is_settled, age)
     if right:
         return ""
     return answer if answer.endswith("?") else f"{answer}{rig.error_note()}."

@@ -40,13 +40,13 @@ ANSWERED, AGAIN = 1.0, 0.1
 """Seconds of wall time for an answer before the clock moves on, which it may wait for: the first
 time, and where one has been found to wait."""
 LATEST = 10.0
-"""Seconds of simulated time after which nothing comes any more that is to come at once."""
+"""Seconds of simulated time for which an examiner waits, unless a task gives a time."""
 LEAST_IDLE = 0.5
-"""Seconds in which all sleep, after the clock has run: what the last step brought comes in."""
+"""Seconds for which all threads sleep after the last step, before the wait is given up."""
 LEVEL_MARGIN = 1e-3
 STEP, GRAIN, FINE = 0.1, 0.01, 2.0
-"""Seconds of simulated time in one step, between two moments of it that nodes get to see, and for
-which they do: whoever waits for longer sees the steps only."""
+"""Seconds of simulated time: in one step; between two clock messages within a step; and into a wait
+after which there is only one such message a step."""
 
 
 class RobotRig:
@@ -157,8 +157,8 @@ class RobotRig:
     def start_patience(self, seconds: float, stepped: float = 0.0) -> Patience:
         """Return for how long something is waited for that may never come: so many s at most.
 
-        ``stepped`` is for how long (s of wall time) the clock has run meanwhile: all were at rest
-        between two steps, so a lost message has been repaired in that time, too.
+        ``stepped`` is how long (s of wall time) the clock has been moving before: DDS has repaired
+        lost messages in that time, too, so it counts as idle.
         """
         return Patience(self._threads, seconds, max(LEAST_IDLE, IDLE_S - stepped))
 
@@ -188,7 +188,7 @@ class RobotRig:
                 now = time.monotonic()
                 patience = self.start_patience(max(0.0, deadline - now), now - started)
                 return patience.wait(self.session, condition)
-            # What takes so long is no matter of moments any more.
+            # After so long a wait it does not matter when exactly in a step something happens.
             self.step(step, GRAIN if self.elapsed - began < FINE else step)
             self.wait(condition, 0.01)
         return True
