@@ -65,6 +65,8 @@ class Patience:
 
     def wait(self, session: Waits, condition: Callable[[], Any]) -> bool:
         """Wait until ``condition`` holds; return whether it did before the patience was over."""
+        if condition():  # before the first look, which costs as much as many a wait
+            return True
         if self.has_time_left() and _is_met_within(
             session, condition, min(_AT_FIRST_S, self.seconds_left)
         ):

@@ -78,6 +78,7 @@ def _probe_abilities() -> Abilities:
         )
     with ThreadPoolExecutor() as pool:  # each mostly waits for one process
         loss, warm = pool.submit(_try_sandbox), pool.submit(_try_warm)
+        pool.submit(warmth.examiner_zygote)  # it is needed next; who needs it hears what is wrong
         try:
             return Abilities(loss=loss.result(), warm=warm.result())
         except BoxError as error:
@@ -91,10 +92,8 @@ def warm_up() -> None:
     """
 
     def begin() -> None:
-        # One after the other: of two processors, one is left to whoever goes on meanwhile.
-        for step in (abilities, warmth.examiner_zygote):
-            with suppress(Exception):
-                step()
+        with suppress(Exception):
+            abilities()
 
     threading.Thread(target=begin).start()
 

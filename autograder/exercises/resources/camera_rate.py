@@ -14,6 +14,7 @@ STEPS = 10  # at least, in which a rate is counted
 LONGEST_STEP = 0.4  # s: a timer that is too fast would come just once in a longer one
 KEEP_UP = 0.1  # s of wall time that a picture which is due is waited for before time moves on
 ARRIVES, ARRIVES_ASLEEP = 1.0, 0.6  # s, see `Patience`: a slow camera takes 0.3 s for a picture
+UNPUBLISHED = 10  # pictures, read in a row while time stands still: who reads so reads all the time
 STANDSTILL = 0.4  # s of wall time without two pictures: they stand still
 BACKLOG = 3.0  # s of wall time in which pictures may come that had been ordered before
 AT_REST = 1  # picture in a step of time that begins and ends with all at rest
@@ -124,9 +125,17 @@ def let_arrive(rig: CameraRig, device: str) -> None:
     Not for long: a thread may read all the time, and publish just some of what it reads.
     """
 
+    def unpublished() -> int:
+        return asked() - len(rig.get_pictures(device))
+
+    def asked() -> int:
+        return max(rig.open_cameras(device), default=0)
+
+    before = unpublished()
+
     def newest_is_here() -> bool:
         newest = [picture.number for picture in rig.get_pictures(device)[-1:]]
-        return newest >= [max(rig.open_cameras(device), default=0) - 1]
+        return newest >= [asked() - 1] or unpublished() - before >= UNPUBLISHED
 
     rig.start_patience(ARRIVES_ASLEEP, ARRIVES).wait(rig.session, newest_is_here)
 

@@ -239,7 +239,7 @@ def _watch_last_life(seen: ProgramObserver, lives: Lives, device: str, stuck: st
     )
     left = ["a camera open"] if open_ else []
     left += ["an endpoint on the graph"] if last.left_on_graph else []
-    if not left and not seen.wait(lambda: len(seen.find_nodes()) <= nodes):
+    if not left and not seen.wait_for_end(lambda: len(seen.find_nodes()) <= nodes):
         left = ["a node on the graph"]
 
     def kept() -> list[str]:
