@@ -220,10 +220,13 @@ def _watch_last_life(seen: ProgramObserver, lives: Lives, device: str, stuck: st
     of it where each of its own lives leaves something.
     """
     rig, before, nodes = seen.rig, seen.rig.process.read_usage(), len(seen.find_nodes())
+    came = len(seen.node.pictures_of(device))
     seen.program.interrupt()
     # Its pictures come when the starts are over, each of which may take its second.
-    if not seen.wait(lambda: seen.node.pictures_of(device), SETTLE_S + TRIED * ENDED):
-        return replace(lives, raised=True) if seen.is_gone() else lives
+    if not seen.wait(lambda: len(seen.node.pictures_of(device)) > came, SETTLE_S + TRIED * ENDED):
+        if seen.is_gone():
+            return replace(lives, raised=True)
+        return replace(lives, pace="None came once others had failed to start.")
     lives = replace(lives, pace=seen.pace_fault(device, 1 / PERIOD))
     last = _end_life(seen, lives, device)
     if last.raised:
