@@ -82,9 +82,12 @@ def require_closed(rig: CameraRig, device: str, when: str) -> None:
 
 def require_gone(rig: CameraRig, device: str, when: str, node: str = "") -> None:
     """Fail if an endpoint or a node of the driver is on the graph: it may have made several."""
-    if rig.wait(lambda: not rig.graph.list_leftovers(node)):
+    if rig.wait(lambda: not rig.graph.list_leftovers(node), idle=ENDED):
         return
-    when_seen, left = rig.end_of_wait, rig.graph.list_leftovers(node)
+    when_seen = rig.end_of_wait
+    rig.catch_up()  # what was said of an end by then may have been lost, and is said again
+    if not (left := rig.graph.list_leftovers(node)):
+        return
     before = len(rig.get_pictures(device))
     rig.advance(1.0)
     sent = len(rig.get_pictures(device)) - before

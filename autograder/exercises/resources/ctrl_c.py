@@ -42,9 +42,9 @@ class Lives:
     later; ``others`` tells of processes that were left then.
     ``pace`` tells of pictures that do not come ten times a second, ``harmed`` of what a second
     destroy_node() does, if that is not nothing. ``of_starts`` tells of what starts left that failed
-    beside one more life. ``own_nodes`` are those that the notebook's cells have made. ``managed``
-    is what was seen of a managed camera, and ``start_raises`` whether the program ended where its
-    driver could not start; None if it did not go so far.
+    beside one more life. ``own_nodes`` is whether the notebook's cells may have made nodes of their
+    own. ``managed`` is what was seen of a managed camera, and ``start_raises`` whether the program
+    ended where its driver could not start; None if it did not go so far.
     """
 
     worked: bool = True
@@ -56,7 +56,7 @@ class Lives:
     pace: str = ""
     harmed: str = ""
     of_starts: str = ""
-    own_nodes: tuple[str, ...] = ()
+    own_nodes: bool = True
     managed: ManagedLife | None = None
     start_raises: bool | None = None
 
@@ -134,12 +134,15 @@ def _list_leaks(kept: Usage) -> list[str]:
 
 def seen_lives(rig: CameraRig) -> Lives | None:
     """Return what was seen, once a notebook; None where there are no such programs."""
-    if rig.programs is None:
-        return None
-    if Lives.__name__ not in rig.memory:
+    if rig.programs is not None and Lives.__name__ not in rig.memory:
         rig.memory[Lives.__name__] = _watch_twice(rig, rig.programs)
-    found = rig.memory[Lives.__name__]
-    assert isinstance(found, Lives)
+    return lives_so_far(rig)
+
+
+def lives_so_far(rig: CameraRig) -> Lives | None:
+    """Return what was seen; None where nobody has looked: the driver does not even work."""
+    found = rig.memory.get(Lives.__name__)
+    assert found is None or isinstance(found, Lives)
     return found
 
 
@@ -260,10 +263,10 @@ def _watch_last_life(seen: ProgramObserver, lives: Lives, device: str, stuck: st
 
 def _watch_others(seen: ProgramObserver, lives: Lives) -> Lives:
     """Watch a managed camera in the program of drivers that gave everything back."""
-    others = tuple({*seen.find_nodes().values()})
-    lives = replace(lives, own_nodes=others)
+    own = {*seen.find_nodes()}
+    lives = replace(lives, own_nodes=bool(own))
     seen.program.interrupt()
-    managed = watch_managed(seen, others=others)
+    managed = watch_managed(seen, own=own)
     if not managed.is_clean:
         return replace(lives, managed=managed)
     seen.program.interrupt()

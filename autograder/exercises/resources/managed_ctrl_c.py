@@ -11,7 +11,7 @@ from itertools import pairwise
 
 from autograder.examination.exam import Failed, NotExaminable
 from autograder.examination.plain_programs import Programs
-from autograder.exercises.resources.ctrl_c import seen_lives
+from autograder.exercises.resources.ctrl_c import lives_so_far
 from autograder.exercises.resources.managed_life import MANAGED, ManagedLife, watch_managed
 from autograder.exercises.resources.process_usage import Usage
 from autograder.exercises.resources.program_observer import ProgramObserver
@@ -79,7 +79,7 @@ def _require_active(life: ManagedLife) -> None:
 
 def _in_shared_program(rig: CameraRig) -> ManagedLife | None:
     """Return what was seen after the driver's lives; None if these did not go so far."""
-    lives = seen_lives(rig)
+    lives = lives_so_far(rig)
     return lives.managed if lives is not None else None
 
 
@@ -95,19 +95,23 @@ def _in_own_program(rig: CameraRig, node: str) -> ManagedLife | None:
 
 
 def _watch_alone(rig: CameraRig, programs: Programs, node: str) -> ManagedLife:
-    """Watch some lives; what the program has more after each of them is left by it."""
-    lives = seen_lives(rig)
-    others = lives.own_nodes if lives is not None else ()
+    """Watch some lives; what the program has more after each of them is left by it.
+
+    So is a node that is there after a later one, and was not after the first.
+    """
+    lives = lives_so_far(rig)
+    own: set[bytes] | None = None if lives is None or lives.own_nodes else set()
     with programs.program([(MANAGED, [])], twice=True) as program:
         seen, usages = ProgramObserver(rig, program), list[Usage]()
         for _ in range(LIVES):
-            again = watch_managed(seen, node, others)
+            again = watch_managed(seen, node, own)
             if usages and again.failed is not None:
                 break  # rclpy 7.1 leaves an ended node's services: one of them may have been asked
             life = again
             if not life.went_on or life.left or life.pace:
                 return life
             usages.append(rig.process.read_usage())
+            own = {*seen.find_nodes()} if own is None else own
             program.interrupt()
     grown = [after.growth_since(before) for before, after in pairwise(usages)]
     if not grown:

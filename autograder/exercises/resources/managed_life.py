@@ -52,12 +52,13 @@ class ManagedLife:
 
 
 def watch_managed(
-    seen: ProgramObserver, node: str = "", others: Collection[str] = ()
+    seen: ProgramObserver, node: str = "", own: Collection[bytes] | None = None
 ) -> ManagedLife:
     """Have a managed camera, which is being made, send pictures, and interrupt its program then.
 
     ``node`` is its full name where that is known; else, or if it is not there, the one lifecycle
-    node is taken for it. ``others`` are nodes of the notebook's own, which stay.
+    node is taken for it. ``own`` are nodes that the notebook's cells have made, which stay, as in
+    `ProgramObserver.find_nodes`; without them only one of its name is known to be left by it.
     """
     rig = seen.rig
     seen.wait(lambda: node in seen.lifecycle_nodes() or (not node and seen.lifecycle_nodes()))
@@ -66,7 +67,8 @@ def watch_managed(
         return ManagedLife(made=False, raised=seen.is_gone())
     device = rig.new_device()
     rate = rig.draws.whole("a rate by the machine's clock", RATE, 15, 25)
-    managed = Managed(seen, node if node in there else there[0])
+    name = node if node in there else there[0]
+    managed = Managed(seen, name)
     threads, before = rig.process.thread_ids(), rig.process.read_usage()
     try:
         if not managed.set_parameters(device=device, rate=float(rate)):  # that is another check's
@@ -85,7 +87,8 @@ def watch_managed(
         left.append(f"its publisher on {IMAGE}")
 
     def nodes_left() -> list[str]:
-        return sorted({*seen.find_nodes().values()}.difference(others))
+        found = seen.find_nodes().items()
+        return sorted({n for end, n in found if (n == name if own is None else end not in own)})
 
     if not seen.wait_for_end(lambda: not nodes_left()):
         left += [f"the node {name}" for name in nodes_left()]

@@ -19,8 +19,9 @@ COUNTED = 6
 """Pictures whose rate is taken."""
 SLOWEST, FASTEST = 0.6, 1.6
 """Times a rate that are taken for it: a busy machine is no fault of a node's."""
-TAKES = 6
-"""Of a rate, as pictures that have been held up come many at a time."""
+TAKES, SLOW_TAKES = 6, 2
+"""Of a rate, as pictures that have been held up come many at a time; and of one that is too slow,
+although it is the subject's own time that counts."""
 CHANGE_STATE = "/change_state"
 """What is added to the name of a lifecycle node for that of a service which each has."""
 
@@ -74,6 +75,7 @@ class ProgramObserver(Observer):
         def came() -> int:
             return len(self.node.pictures_of(device))
 
+        slow = 0
         for _ in range(TAKES):
             begun, before = time.monotonic(), came()
             deadline = FairDeadline(COUNTED / (SLOWEST * rate), self.rig.outside.delay)
@@ -84,4 +86,7 @@ class ProgramObserver(Observer):
             number, seconds = came() - before, time.monotonic() - begun
             if number >= COUNTED and number <= seconds * FASTEST * rate:
                 return ""
+            slow += number < COUNTED
+            if slow == SLOW_TAKES:
+                break
         return f"{capitalize_first(pictures_phrase(number))} came in {seconds:.1f} s."
