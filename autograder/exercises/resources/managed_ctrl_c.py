@@ -12,7 +12,13 @@ from itertools import pairwise
 from autograder.examination.exam import Failed, NotExaminable
 from autograder.examination.plain_programs import Programs
 from autograder.exercises.resources.ctrl_c import lives_so_far
-from autograder.exercises.resources.managed_life import MANAGED, ManagedLife, watch_managed
+from autograder.exercises.resources.managed_life import (
+    MANAGED,
+    MEMORY,
+    ROUNDS,
+    ManagedLife,
+    watch_managed,
+)
 from autograder.exercises.resources.process_usage import Usage
 from autograder.exercises.resources.program_observer import ProgramObserver
 from autograder.exercises.resources.rig import CameraRig
@@ -24,13 +30,22 @@ ENDED = f"{ALONE} which is ended by Ctrl-C while it is active,"
 
 
 def require_managed_pace(rig: CameraRig, node: str) -> None:
-    """Fail unless a managed camera, ``node``, keeps its rate by the machine's clock."""
+    """Fail unless a managed camera, ``node``, keeps its rate by the machine's clock.
+
+    Nor may the rounds before that keep memory.
+    """
     life = _in_shared_program(rig)
     if life is None or not life.has_worked:
         life = _in_own_program(rig, node)
     if life is None:
         return
     _require_active(life)
+    if life.kept >= MEMORY:
+        raise Failed(
+            expected=f"{ALONE} rounds from “configure” to “cleanup” leave less than 1 MiB of "
+            "memory each.",
+            actual=f"Each of {ROUNDS} rounds left {life.kept // 1024} MiB.{rig.process_note()}",
+        )
     if life.pace:
         raise Failed(
             expected=f"{ALONE} it sends as many pictures a second by the machine's clock as its "

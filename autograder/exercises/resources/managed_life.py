@@ -9,11 +9,14 @@ from autograder.examination.exam import Failed
 from autograder.exercises.resources.examiner_node import IMAGE
 from autograder.exercises.resources.managed import Managed
 from autograder.exercises.resources.program_observer import ProgramObserver
-from autograder.exercises.resources.rig import ENDED
+from autograder.exercises.resources.rig import ENDED, CameraRig
 
 MANAGED = "ManagedCamera"
 RATE, USUAL_RATE = 20, 10
 """Pictures a second: a rate is taken in half the time that the usual one takes."""
+FIRST_ROUNDS, ROUNDS = 2, 5
+"""From “configure” to “cleanup”: some may cost what no later ones do."""
+MEMORY = 1024  # KiB a round, as in a harness that has garbage collected
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,8 @@ class ManagedLife:
     ``made`` is whether it was found, ``failed`` what kept it from being active, ``pace`` tells of
     pictures that do not come at their rate. ``raised`` is whether its end was that of the program,
     ``left`` what it had not given back then. ``new_threads`` and ``new_files`` are how many there
-    are since it was made, some of which the middleware may keep.
+    are since it was made, some of which the middleware may keep. ``kept`` is the memory in KiB that
+    it had more after each round through its states.
     """
 
     made: bool = True
@@ -34,11 +38,12 @@ class ManagedLife:
     left: tuple[str, ...] = ()
     new_threads: int = 0
     new_files: int = 0
+    kept: int = 0
 
     @property
     def has_worked(self) -> bool:
-        """Whether it was active and sent its pictures."""
-        return self.made and self.failed is None and not self.pace
+        """Whether it was active and sent its pictures, and its rounds kept no memory."""
+        return self.made and self.failed is None and not self.pace and self.kept < MEMORY
 
     @property
     def went_on(self) -> bool:
@@ -74,6 +79,7 @@ def watch_managed(
         if not managed.set_parameters(device=device, rate=float(rate)):  # that is another check's
             rate = USUAL_RATE
             managed.require_parameters(device=device)
+        kept = _measure_rounds(rig, managed)
         managed.make_transitions("configure", "activate")
     except Failed as failed:
         return ManagedLife(failed=failed, raised=seen.is_gone())
@@ -93,7 +99,7 @@ def watch_managed(
     if not seen.wait_for_end(lambda: not nodes_left()):
         left += [f"the node {name}" for name in nodes_left()]
     if seen.is_gone():
-        return ManagedLife(rate=rate, pace=pace, raised=True)
+        return ManagedLife(rate=rate, pace=pace, raised=True, kept=kept)
 
     def new_threads() -> int:
         return len(rig.process.thread_ids() - threads)
@@ -103,5 +109,15 @@ def watch_managed(
 
     seen.wait_for_end(lambda: new_threads() <= 0 and new_files() <= 0)
     return ManagedLife(
-        rate=rate, pace=pace, left=tuple(left), new_threads=new_threads(), new_files=new_files()
-    )
+        rate=rate, pace=pace, left=tuple(left), new_threads=new_threads(), new_files=new_files(),
+        kept=kept,
+    )  # fmt: skip
+
+
+def _measure_rounds(rig: CameraRig, managed: Managed) -> int:
+    """Return what memory in KiB the program has more after each of some rounds: nobody collects."""
+    for rounds in (FIRST_ROUNDS, ROUNDS):
+        before = rig.process.read_usage()
+        for _ in range(rounds):
+            managed.make_transitions("configure", "activate", "deactivate", "cleanup")
+    return rig.process.read_usage().growth_since(before).memory // ROUNDS
