@@ -216,8 +216,11 @@ class Robot:
         A thread or a timer on the wall clock would go on. ``what`` it would be, as a clause.
         """
         self._require_no_wall_wait()
-        if happened() or not self._still.wait_for_rest() or self.wait(happened, NAP_S):
+        if happened() or not self._still.wait_for_rest():
             return  # it came by then, or somebody is at work all the time: that proves nothing
+        self._require_no_wall_wait()  # on a busy machine one may not have begun at the first look
+        if self.wait(happened, NAP_S):
+            return
         if self.wait(happened, seconds):
             raise WallWait(
                 expected=self._by_the_clock,
