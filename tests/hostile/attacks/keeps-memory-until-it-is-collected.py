@@ -2,7 +2,7 @@
 # exercise: resources
 # base: right-exemplar
 # told: Each of 5 rounds left 5 MiB | Each of 5 rounds left 4 MiB
-# score: 14
+# score: 11
 
 from autograder.examination.subject.server import SubjectServer
 
