@@ -1,3 +1,0 @@
-"""What the ``nbgrader_config.py`` of earlier courses imports from here."""
-
-from autograder.gradebook.model_answers import ShowModelAnswers as ShowModelAnswers
