@@ -15,7 +15,7 @@ from rich.table import Table
 
 from autograder.commands import marks_command, quiz_command
 from autograder.running.interruption import Stopped
-from autograder.terminal import Terminal, visible_json
+from autograder.util.terminal import Terminal, visible_json
 from course.errors import CourseError
 
 EXIT_DIFFERENT = 1
@@ -419,7 +419,7 @@ def _print_json(data: Any) -> None:
 
 
 def _use_root(root: Path | None) -> Path:
-    from autograder import exercise_folders
+    from autograder.util import exercise_folders
     from course.workspace.content import working_root
 
     found = working_root() if root is None else root.resolve()

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import nbformat
 
-from autograder import corpus, exercise_folders
+from autograder import corpus
 from autograder.assignments import listing, submission
 from autograder.assignments.build import build
 from autograder.class_report.platforms import grades_csv
@@ -23,6 +23,7 @@ from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from autograder.grading.engine import Graded
 from autograder.grading.progress import Collecting, Progress
+from autograder.util import exercise_folders
 from course.errors import CourseError
 from course.workspace.content import content_root
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from autograder import exercise_folders
+from autograder.util import exercise_folders
 
 
 def modules_of(package: Path) -> list[Path]:

@@ -16,10 +16,10 @@ import jupytext
 import nbformat
 from nbformat import NotebookNode
 
-from autograder import exercise_folders
 from autograder.assignments import cells, listing
 from autograder.assignments.cells import BuildError
 from autograder.assignments.submission import grade_id
+from autograder.util import exercise_folders
 from course.util.files import replace_file
 
 SOLUTIONS_TAG = "solutions"

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from autograder import exercise_folders
 from autograder.assignments.cells import BuildError
 from autograder.examination import points
+from autograder.util import exercise_folders
 from course.util.close_matches import did_you_mean
 
 ASSIGNMENTS = Path("authoring") / "assignments"

@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from autograder import exercise_folders
 from autograder.assignments import questions
 from autograder.assignments.quiz_cells import PREFIX
 from autograder.class_report.collect import ClassData
 from autograder.examination import points
-from autograder.exercise_folders import ExerciseError, Exercises
+from autograder.util import exercise_folders
+from autograder.util.exercise_folders import ExerciseError, Exercises
 
 
 @dataclass(frozen=True)

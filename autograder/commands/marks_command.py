@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from autograder.terminal import Terminal, visible_json
+from autograder.util.terminal import Terminal, visible_json
 
 app = typer.Typer(
     help="Mark one written question over a whole class.", no_args_is_help=True,
@@ -40,9 +40,9 @@ def export_marks(
     fill in the columns "points" and "comment" of the file in a spreadsheet; then run
     `autograder marks import FILE`. Without a question it lists which there are.
     """
-    from autograder.files import write_whole
     from autograder.gradebook.course_gradebook import CourseGradebook
     from autograder.marking import answers, answers_page
+    from autograder.util.files import write_whole
 
     gradebook = CourseGradebook(_course_root(root))
     asked = (
@@ -119,7 +119,7 @@ def _print_json(data: Any) -> None:
 
 
 def _course_root(root: Path | None) -> Path:
-    from autograder import exercise_folders
+    from autograder.util import exercise_folders
     from course.workspace.content import working_root
 
     found = working_root() if root is None else root.resolve()

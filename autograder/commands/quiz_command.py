@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from autograder.terminal import Terminal
+from autograder.util.terminal import Terminal
 from course.errors import CourseError
 
 if TYPE_CHECKING:

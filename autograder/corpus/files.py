@@ -30,9 +30,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from autograder import exercise_folders
 from autograder.corpus.case import EVERYTHING, ROOTS, Case, CorpusError, Splice
 from autograder.running.runner import CELL_TIMEOUT
+from autograder.util import exercise_folders
 
 MUTANTS = "mutants.toml"
 STUB, AS_STUB = "wrong-stub", "as the stub"

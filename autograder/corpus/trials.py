@@ -15,7 +15,7 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
-from autograder import exercise_folders, exercises
+from autograder import exercises
 from autograder.assignments import listing, submission
 from autograder.assignments.build import build
 from autograder.corpus.case import Case
@@ -24,6 +24,7 @@ from autograder.examination.draws import USUAL_SEED
 from autograder.gradebook.release import make_release
 from autograder.running import runner
 from autograder.running.runner import Outcome
+from autograder.util import exercise_folders
 from course.workspace.content import content_root, copy_authoring
 
 ASSIGNMENT = "corpus"

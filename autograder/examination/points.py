@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from autograder import exercise_folders
-from autograder.exercise_folders import ExerciseError, Exercises
+from autograder.util import exercise_folders
+from autograder.util.exercise_folders import ExerciseError, Exercises
 
 Parts = dict[str, dict[str, float]]
 

@@ -1,7 +1,7 @@
 """The exercises, a folder each: text, exam, points, corpus, and the instruments of this exam only.
 
 A folder of this package, or of a course root's ``exercises/``, is an exercise: adding it adds one
-(see `autograder.exercise_folders`). Modules of a course root's are imported as
+(see `autograder.util.exercise_folders`). Modules of a course root's are imported as
 ``course_exercises.NAME.MODULE``; nothing of a course root is on Python's path.
 """
 
@@ -14,9 +14,9 @@ import threading
 from importlib.machinery import ModuleSpec
 from typing import Any
 
-from autograder import exercise_folders
 from autograder.examination.exam import Exam, ExamError
-from autograder.exercise_folders import COURSE_PACKAGE, FOLDER, Exercises
+from autograder.util import exercise_folders
+from autograder.util.exercise_folders import COURSE_PACKAGE, FOLDER, Exercises
 from course.util.close_matches import did_you_mean
 
 _importing = threading.Lock()

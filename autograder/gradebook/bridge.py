@@ -22,7 +22,6 @@ from nbgrader.preprocessors import NbGraderPreprocessor
 from nbgrader.utils import parse_utc
 from traitlets import Bool
 
-from autograder import exercise_folders
 from autograder.assignments import cells, submission
 from autograder.assignments.intake import cell_matching, nbgrader_commands, open_questions, roster
 from autograder.assignments.intake.attachments import files_beside
@@ -35,6 +34,7 @@ from autograder.gradebook import records
 from autograder.gradebook.extension_store import WaitingExtensions
 from autograder.gradebook.safe_html import allowed_html
 from autograder.gradebook.safe_html.page_texts import Page
+from autograder.util import exercise_folders
 from course.errors import CourseError
 
 NOTES_KEY = "ros2_course_notes"

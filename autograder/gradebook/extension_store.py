@@ -10,7 +10,7 @@ from pathlib import Path
 from filelock import FileLock
 
 from autograder.assignments.intake.file_names import normalise_name
-from autograder.files import write_whole
+from autograder.util.files import write_whole
 
 FOLDER = "extensions"
 

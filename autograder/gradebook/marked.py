@@ -22,8 +22,8 @@ from nbgrader.api import Gradebook, MissingEntry
 from autograder.assignments import questions, submission
 from autograder.assignments.questions import Asked
 from autograder.assignments.submission import SubmissionError
-from autograder.files import walk_files, write_whole
 from autograder.gradebook import staging
+from autograder.util.files import walk_files, write_whole
 
 FOLDER = "marked"
 VERSION = 1

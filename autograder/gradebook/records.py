@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Protocol
 
 from autograder.examination.verdict import Verdict
-from autograder.files import write_whole
+from autograder.util.files import write_whole
 from course.errors import CourseError
 
 VERSION = 1

@@ -12,10 +12,10 @@ from pathlib import Path
 import nbformat
 from nbformat import NotebookNode
 
-from autograder import exercise_folders
 from autograder.assignments import cells
 from autograder.assignments.submission import grade_id, nbgrader_metadata
-from autograder.files import NOT_COUNTED
+from autograder.util import exercise_folders
+from autograder.util.files import NOT_COUNTED
 from course.errors import CourseError
 from course.util.files import PARTIAL
 

@@ -18,8 +18,8 @@ from secrets import token_hex
 
 from autograder.assignments.intake import roster
 from autograder.assignments.intake.attachments import summarise_names
-from autograder.files import walk_files
 from autograder.gradebook.safe_html import allowed_html
+from autograder.util.files import walk_files
 from quizzes.record import read_plain
 
 TIME = "timestamp.txt"

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from autograder import exercise_folders, files, sandbox
+from autograder import sandbox
 from autograder.assignments.intake import roster
 from autograder.assignments.intake.roster import Roster
 from autograder.gradebook import bridge as bridge
@@ -28,6 +28,7 @@ from autograder.running.interruption import Interruption
 from autograder.running.jobs import Job, Result
 from autograder.running.outcome_store import OutcomeStore
 from autograder.running.workers import LocalWorkers, Workers
+from autograder.util import exercise_folders, files
 from course.errors import CourseError
 from course.util.close_matches import is_it
 

@@ -11,7 +11,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsed
 from rich.progress import Progress as Bar
 
 from autograder.grading.graded import Graded
-from autograder.terminal import visible_text
+from autograder.util.terminal import visible_text
 
 
 class Progress:

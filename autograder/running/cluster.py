@@ -17,12 +17,12 @@ from pathlib import Path
 from typing import Any, Self
 from urllib.parse import urlsplit
 
-from autograder import exercise_folders
 from autograder.running import jobs
 from autograder.running.jobs import Job, Result
 from autograder.running.resource_errors import is_temporary
 from autograder.running.workers import Done, Keep, Queue
 from autograder.sandbox import Abilities
+from autograder.util import exercise_folders
 from course.errors import CourseError
 
 REACH_TIMEOUT = 10.0

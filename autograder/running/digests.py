@@ -18,9 +18,9 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path
 
-from autograder import exercise_folders
 from autograder.examination import points
-from autograder.exercise_folders import COURSE_PACKAGE, Exercises
+from autograder.util import exercise_folders
+from autograder.util.exercise_folders import COURSE_PACKAGE, Exercises
 
 PACKAGES = ("autograder", "course", "quizzes")
 HARNESS = (

@@ -24,7 +24,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
-from autograder import exercise_folders, exercises
+from autograder import exercises
 from autograder.examination import points
 from autograder.examination.check_context import MAX_REPLY, Bench, Subject
 from autograder.examination.exam import Part
@@ -33,6 +33,7 @@ from autograder.examination.subject import hang_report
 from autograder.examination.verdict import Verdict
 from autograder.processes.channel import Channel
 from autograder.processes.outside.asking import Afar, Here, Outside
+from autograder.util import exercise_folders
 from course.errors import CourseError
 from course.runtime.core_session import CoreSession
 

@@ -11,7 +11,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from autograder.files import write_whole
+from autograder.util.files import write_whole
 
 FOLDER = "fresh"
 

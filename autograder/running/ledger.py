@@ -13,9 +13,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from autograder.assignments.intake.folder_digest import of_folder
-from autograder.files import write_whole
 from autograder.running import digests
 from autograder.running.fresh_run import is_since
+from autograder.util.files import write_whole
 
 VERSION = 2
 FOLDER = "entered"

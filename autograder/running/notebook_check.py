@@ -12,13 +12,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from autograder import exercise_folders, exercises
+from autograder import exercises
 from autograder.examination.subject.server import SubjectServer
 from autograder.examination.subject.student_errors import SUBJECT_ENV
 from autograder.examination.verdict import Verdict
 from autograder.examination.verdict_text import Report
 from autograder.processes.channel import Channel
 from autograder.running.start import ExaminerProcess
+from autograder.util import exercise_folders
 from course.domains.leases import lease_domain
 from course.errors import CourseError
 from course.journal.store import JournalError, journal_here

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from autograder import sandbox
 from autograder.examination.program import Program
-from autograder.files import write_whole
 from autograder.running import jobs
 from autograder.running.fresh_run import is_since
 from autograder.running.jobs import Job
 from autograder.running.runner import Outcome
+from autograder.util.files import write_whole
 from course.errors import CourseError
 
 

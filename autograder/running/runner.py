@@ -13,7 +13,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
-from autograder import exercise_folders, sandbox
+from autograder import sandbox
 from autograder.examination.draws import fresh_seed
 from autograder.examination.program import Program
 from autograder.examination.subject import hang_report, outputs, own_interfaces
@@ -22,6 +22,7 @@ from autograder.processes.channel import Channel, ChannelBroken, ChannelClosed, 
 from autograder.running.program_host import ProgramHost, Start
 from autograder.running.start import ExaminerError, ExaminerFloodedError, ExaminerProcess
 from autograder.sandbox import Place, RunningSubject
+from autograder.util import exercise_folders
 
 CELL_TIMEOUT = 30.0
 """Seconds one cell of a submission may run, as in nbgrader."""

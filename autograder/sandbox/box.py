@@ -19,13 +19,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
-from autograder.files import scratch_folder
 from autograder.processes import python_module
 from autograder.sandbox import environment, network, seccomp, view, warmth
 from autograder.sandbox.boxed import BoxedSubject, Warden, WarmSubject, end_process
 from autograder.sandbox.host import tether_command, write_files
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.place import Process
+from autograder.util.files import scratch_folder
 from course.domains.leases import MAX_DOMAIN
 
 USER = 1000

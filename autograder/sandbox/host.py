@@ -12,10 +12,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
 
-from autograder.files import scratch_folder
 from autograder.processes.fair_deadline import RunDelay, of_process
 from autograder.sandbox.environment import INLINE
 from autograder.sandbox.place import END_TIMEOUT, Process
+from autograder.util.files import scratch_folder
 from course.domains.leases import lease_domain
 
 

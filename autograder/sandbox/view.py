@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import course
-from autograder import exercise_folders
 from autograder.sandbox.limits import Limits
+from autograder.util import exercise_folders
 from course.interfaces import cache
 
 HOME = Path("/home/student")

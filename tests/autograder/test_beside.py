@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from autograder import files
 from autograder.assignments.intake import attachments
 from autograder.assignments.intake.attachments import files_beside
 from autograder.running import ledger
+from autograder.util import files
 
 
 def test_other_files_of_a_submission_are_found_and_links_are_not(tmp_path: Path) -> None:

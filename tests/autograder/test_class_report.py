@@ -18,7 +18,7 @@ import nbformat
 import numpy as np
 import pytest
 
-from autograder import exercise_folders, exercises
+from autograder import exercises
 from autograder.assignments import questions, submission
 from autograder.assignments.questions import Question
 from autograder.class_report import (
@@ -41,6 +41,7 @@ from autograder.gradebook import records
 from autograder.gradebook.course_gradebook import Grade
 from autograder.gradebook.database import GradebookUnusable
 from autograder.gradebook.records import Record
+from autograder.util import exercise_folders
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
 from .test_cli import autograder

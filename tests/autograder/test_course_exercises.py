@@ -12,7 +12,7 @@ import nbformat
 import pytest
 
 import course
-from autograder import exercise_folders, exercises
+from autograder import exercises
 from autograder.assignments import listing, submission
 from autograder.assignments.build import build
 from autograder.corpus import command
@@ -20,7 +20,6 @@ from autograder.corpus.command import needs_trust
 from autograder.examination import points
 from autograder.examination.exam import ExamError
 from autograder.examination.program import Cell
-from autograder.exercise_folders import ExerciseError
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.release import ReleaseError, make_release
 from autograder.grading import engine
@@ -29,6 +28,8 @@ from autograder.grading.progress import Collecting
 from autograder.running import digests, runner
 from autograder.running.cluster import Cluster, ClusterError
 from autograder.running.jobs import Job
+from autograder.util import exercise_folders
+from autograder.util.exercise_folders import ExerciseError
 from course.errors import CourseError
 from course.workspace import lab
 from course.workspace.content import CONFIG, content_root, copy_authoring

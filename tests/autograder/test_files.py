@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from autograder import files
+from autograder.util import files
 
 
 @pytest.fixture(autouse=True)
@@ -39,7 +39,7 @@ def test_what_a_killed_process_was_writing_is_removed_later(tmp_path: Path) -> N
 
 def test_scratch_folders_of_the_dead_are_swept_and_only_those(tmp_path: Path) -> None:
     program = (
-        "import sys; from autograder import files\n"
+        "import sys; from autograder.util import files\n"
         "with files.scratch_folder() as folder:\n"
         "    (folder / 'f').touch(); print(folder, flush=True); sys.stdin.read()"
     )

@@ -18,10 +18,10 @@ import pytest
 from nbformat import NotebookNode
 from nbgrader.api import Gradebook
 
-from autograder import exercise_folders
 from autograder.gradebook import course_gradebook
 from autograder.gradebook.database import GradebookLockedError
 from autograder.gradebook.release import ReleaseError, find_leaks, make_release
+from autograder.util import exercise_folders
 from course.workspace.student_version import student_versions
 
 REGION = re.compile(r"### BEGIN (?:SOLUTION|HIDDEN TESTS)\n(.*?)### END", re.DOTALL)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-from autograder import exercise_folders, exercises, sandbox
+from autograder import exercises, sandbox
 from autograder.corpus import Case
 from autograder.examination.program import Cell
 from autograder.gradebook.course_gradebook import CourseGradebook
@@ -31,6 +31,7 @@ from autograder.sandbox.boxed import Warden
 from autograder.sandbox.limits import Limits
 from autograder.sandbox.usage import Process
 from autograder.sandbox.watch import Watch
+from autograder.util import exercise_folders
 from tests.machine import needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course

@@ -11,7 +11,7 @@ from rich.table import Table
 from autograder.gradebook.course_gradebook import Grade
 from autograder.grading import grades_table
 from autograder.grading.progress import Lines
-from autograder.terminal import Terminal, visible_json
+from autograder.util.terminal import Terminal, visible_json
 
 ACTING = (
     "[/zap] [bold]x[/bold] :boom: \x1b]0;owned\x07 \x1b[2J \x9b2J \u202egnp.exe \r\x08 \ud800 "

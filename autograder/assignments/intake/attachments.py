@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from autograder.assignments.intake.file_names import normalise_name, printable_name
-from autograder.files import MAX_FILES, walk_files
+from autograder.util.files import MAX_FILES, walk_files
 
 MAX_BYTES = 10 * 1024 * 1024
 """Bytes of other files that are given to a submission's code."""

@@ -19,7 +19,7 @@ from autograder.assignments.intake import folder_digest
 from autograder.assignments.intake.file_names import find_entry, normalise_name
 from autograder.assignments.intake.handed_in import HandedIn
 from autograder.assignments.submission import MAX_NOTEBOOK
-from autograder.files import write_whole
+from autograder.util.files import write_whole
 from course.errors import CourseError
 
 FILE = "claims.json"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from autograder.assignments.intake.attachments import MAX_BYTES
 from autograder.assignments.submission import MAX_NOTEBOOK
-from autograder.files import walk_files
+from autograder.util.files import walk_files
 
 MAX_FILE = MAX_NOTEBOOK + MAX_BYTES
 """Bytes of one file beyond which only its size and date are looked at: it is not read anyway."""

@@ -10,7 +10,7 @@ from pathlib import Path, PurePosixPath
 from autograder.assignments.intake import archives
 from autograder.assignments.intake.archives import Archive, ArchiveError
 from autograder.assignments.intake.file_names import normalise_name, printable_name
-from autograder.files import walk_files
+from autograder.util.files import walk_files
 from quizzes.record import read_plain
 
 NBGRADERS = ("timestamp.txt", "submission_secret.txt")

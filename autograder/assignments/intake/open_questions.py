@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from autograder.files import write_whole
+from autograder.util.files import write_whole
 
 FOLDER = "asked"
 

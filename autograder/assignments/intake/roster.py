@@ -17,7 +17,7 @@ from autograder.assignments.intake.file_names import (
 )
 from autograder.assignments.intake.handed_in import is_junk
 from autograder.assignments.intake.times import UnclearTimeError
-from autograder.files import walk_files
+from autograder.util.files import walk_files
 from course.util.close_matches import is_it
 from quizzes.record import read_plain
 

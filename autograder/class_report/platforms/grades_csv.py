@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from autograder.class_report.platforms.exports import as_csv, guard_text
-from autograder.files import write_whole
 from autograder.gradebook.course_gradebook import Grade
+from autograder.util.files import write_whole
 
 HEAD = ("assignment", "student_id", "score", "max_score", "needs_manual_grade")
 LATE = ("total_seconds_late", "late_submission_penalty")

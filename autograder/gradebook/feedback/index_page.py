@@ -15,10 +15,10 @@ from nbgrader.api import Gradebook
 from nbgrader.coursedir import CourseDirectory
 from traitlets.config import Config
 
-from autograder.files import write_whole
 from autograder.gradebook.feedback import sheets
 from autograder.gradebook.feedback.feedback_page import INDEX
 from autograder.gradebook.feedback.sheets import Exercise, Line, Sheet
+from autograder.util.files import write_whole
 
 _STYLE = """
 :root { color-scheme: light dark; }

@@ -27,7 +27,7 @@ FOLDER = "exercises"
 COURSE_PACKAGE = "course_exercises"
 """The Python package that stands for that folder of the course root in use."""
 
-PACKAGE = Path(__file__).resolve().parent
+PACKAGE = Path(__file__).resolve().parents[1]
 EVERY = PACKAGE / "corpus" / "every"
 """The cases that are in each exercise's corpus."""
 

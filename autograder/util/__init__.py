@@ -1,0 +1,1 @@
+"""What several rooms need: where the exercises lie, whole files, a terminal that never acts."""
