@@ -369,11 +369,11 @@ def demo(
     as_json: AsJson = False,
 ) -> None:
     """Build, release, collect a bundled class, grade it on real DDS, and show the grades."""
-    from autograder import demo as demo_run
+    from autograder.commands import demo_command
     from autograder.grading import progress
 
     shown = progress.for_console(out, err, machine=as_json)
-    done = demo_run.run_demo(
+    done = demo_command.run_demo(
         folder, every=every, jobs=jobs, say=_line_printer(as_json), progress=shown
     )
     if as_json:

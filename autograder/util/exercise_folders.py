@@ -34,7 +34,7 @@ EVERY = PACKAGE / "corpus" / "every"
 TABLE = PACKAGE / "corpus" / "README.md"
 """Which cases each check must catch, and which designs are right."""
 
-DEMO_CLASS = PACKAGE / "demo_class.toml"
+DEMO_CLASS = PACKAGE / "commands" / "demo_class.toml"
 """What the class of ``autograder demo`` hands in."""
 
 
