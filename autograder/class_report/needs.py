@@ -9,8 +9,8 @@ from autograder.assignments import questions, quiz_cells
 from autograder.class_report import feedback
 from autograder.class_report.collect import ClassData
 from autograder.gradebook.course_gradebook import Grade
+from autograder.gradebook.quizzes import shared_attempts
 from autograder.gradebook.records import Record
-from autograder.quiz import sharing
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def _shared_attempts(data: ClassData) -> Iterator[Need]:
     for name in sorted(cell for cell in graded if cell.startswith(quiz_cells.PREFIX)):
         quiz = name.removeprefix(quiz_cells.PREFIX)
         students = [grade.student for grade in data.grades]
-        for group in sharing.same_attempts(data.root, data.assignment, quiz, students):
+        for group in shared_attempts.same_attempts(data.root, data.assignment, quiz, students):
             why = (
                 f"The same attempts at the quiz {quiz} were handed in by several, who all have "
                 "their points: find out whose they are."

@@ -98,7 +98,7 @@ class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ship
 
     def preprocess(self, nb: NotebookNode, resources: Resources) -> tuple[NotebookNode, Resources]:
         """Mend ``nb`` against the source and the released notebook; remember what was mended."""
-        from autograder.quiz import marks
+        from autograder.gradebook.quizzes import quiz_marks
 
         coursedir, (assignment, student, notebook) = (
             _course_directory(self),
@@ -120,7 +120,7 @@ class RestoreCells(NbGraderPreprocessor):  # type: ignore[misc]  # nbgrader ship
             Path(coursedir.root),
         )
         class_ = nbgrader_commands.known_students(coursedir)
-        quizzes = marks.quiz_questions(nb, folder, student, root, class_)
+        quizzes = quiz_marks.quiz_questions(nb, folder, student, root, class_)
         for name, (why, command) in quizzes.items():
             ask_about_cells(nb, f"{why} Say it with `{command}`.", [name])
         allowed_html.screen_texts(nb, released, Page())
@@ -175,7 +175,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
 
     def _compute_outcome(self, nb: NotebookNode, resources: Resources, unreadable: str) -> Any:
         """Return what comes of a notebook that the engine has not run before."""
-        from autograder.quiz import marks
+        from autograder.gradebook.quizzes import quiz_marks
         from autograder.running import runner
         from autograder.running.outcome_store import OutcomeStore
 
@@ -196,7 +196,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
                 store.get_or_run(program, attachments.files), attachments.notes
             )
         class_ = nbgrader_commands.known_students(coursedir)
-        return marks.with_quizzes(outcome, nb, folder, student, root, class_)
+        return quiz_marks.with_quizzes(outcome, nb, folder, student, root, class_)
 
 
 class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]

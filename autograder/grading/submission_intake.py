@@ -25,9 +25,9 @@ from autograder.gradebook.course_gradebook import CourseGradebook, GradebookErro
 from autograder.gradebook.feedback.feedback_page import INDEX
 from autograder.gradebook.marked import Marks
 from autograder.gradebook.once import FeedbackExporter
+from autograder.gradebook.quizzes import quiz_marks
 from autograder.gradebook.safe_html import allowed_html
 from autograder.gradebook.safe_html.page_texts import Page
-from autograder.quiz import marks
 from autograder.running import runner
 from autograder.running.jobs import Job
 from autograder.running.ledger import Standing
@@ -145,8 +145,8 @@ class SubmissionIntake:
         for name in self.notebooks:
             notebook, piece = self._stage_notebook(work, name, intake)
             whose = notebook, submitted, work.student, self.root, self._class
-            quizzes = marks.with_quizzes(Outcome(), *whose)
-            asked = marks.quiz_questions(*whose)
+            quizzes = quiz_marks.with_quizzes(Outcome(), *whose)
+            asked = quiz_marks.quiz_questions(*whose)
             for cell, (why, command) in asked.items():
                 said = f"{why} Say it with `{command}`, or with --nothing in place of the file."
                 work.problems.append(said)
@@ -161,7 +161,9 @@ class SubmissionIntake:
         for name in self.notebooks:
             notebook, outcome = self._blank_notebook(name, reason, "grader_error")
             nbformat.write(notebook, staged / f"{name}.ipynb")  # type: ignore[no-untyped-call]
-            work.outcomes[name] = marks.with_unmarked_quizzes(outcome, notebook, self.root, reason)
+            work.outcomes[name] = quiz_marks.with_unmarked_quizzes(
+                outcome, notebook, self.root, reason
+            )
 
     def refused_outcome(self, piece: NotebookRun, reason: str, status: Status) -> Outcome:
         """Return the outcome of a notebook that could not be run after all, for ``reason``."""

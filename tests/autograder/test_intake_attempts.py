@@ -12,7 +12,7 @@ from autograder.assignments.intake import claim_records
 from autograder.assignments.intake.claim_records import Claim
 from autograder.assignments.intake.handed_in import look_through
 from autograder.examination.verdict import Verdict
-from autograder.quiz import marks
+from autograder.gradebook.quizzes import quiz_marks
 from quizzes.loader import load_bank
 
 from .test_quiz_marks import FILE, take
@@ -28,7 +28,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def verdict(folder: Path, student: str = "ada") -> Verdict:
-    return marks.mark_best_attempt(load_bank("ch05"), folder, student)
+    return quiz_marks.mark_best_attempt(load_bank("ch05"), folder, student)
 
 
 def rename(folder: Path, name: str) -> None:
@@ -174,7 +174,7 @@ def test_a_login_of_somebody_else_in_the_class_is_asked_about(folder: Path, name
 def test_the_class_is_whom_the_gradebook_knows_too(folder: Path) -> None:
     take(folder, "bob", 5)
     (folder.parents[1] / "carl").mkdir()
-    found = marks.mark_best_attempt(load_bank("ch05"), folder, "ada", roster=("ada", "bob"))
+    found = quiz_marks.mark_best_attempt(load_bank("ch05"), folder, "ada", roster=("ada", "bob"))
     assert "under the login of 'bob', who is in the class" in asked(found)
 
 

@@ -20,11 +20,11 @@ from autograder.class_report.collect import collect_class
 from autograder.class_report.needs import people_needed
 from autograder.examination.verdict import Verdict
 from autograder.gradebook.course_gradebook import CourseGradebook, Grade
+from autograder.gradebook.quizzes import quiz_marks
 from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from autograder.grading.engine import Graded
 from autograder.grading.progress import Collecting
-from autograder.quiz import marks
 from course.workspace.content import content_root, copy_authoring
 from course.workspace.student_version import student_versions
 from quizzes import model
@@ -98,7 +98,7 @@ def points(root: Path) -> dict[str, float | None]:
 
 
 def verdict(folder: Path, student: str = "ada") -> Verdict:
-    return marks.mark_best_attempt(load_bank("ch05"), folder, student)
+    return quiz_marks.mark_best_attempt(load_bank("ch05"), folder, student)
 
 
 @needs_isolation
