@@ -41,7 +41,7 @@ def export_marks(
     `autograder marks import FILE`. Without a question it lists which there are.
     """
     from autograder.gradebook.course_gradebook import CourseGradebook
-    from autograder.marking import answers, answers_page
+    from autograder.gradebook.written_answers import answers, answers_page
     from autograder.util.files import write_whole
 
     gradebook = CourseGradebook(_course_root(root))
@@ -91,7 +91,7 @@ def import_marks(
     whose answer or mark has changed since the export is left out and named.
     """
     from autograder.gradebook.course_gradebook import CourseGradebook
-    from autograder.marking import answers
+    from autograder.gradebook.written_answers import answers
     from course.messages.yaml_text import format_count
 
     entered = answers.enter_marks(CourseGradebook(_course_root(root)), file)

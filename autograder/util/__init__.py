@@ -1,1 +1,1 @@
-"""What several rooms need: where the exercises lie, whole files, a terminal that never acts."""
+"""What several rooms need: where the exercises lie, whole files, CSV, the terminal."""

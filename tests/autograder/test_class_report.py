@@ -41,7 +41,7 @@ from autograder.gradebook import records
 from autograder.gradebook.course_gradebook import Grade
 from autograder.gradebook.database import GradebookUnusable
 from autograder.gradebook.records import Record
-from autograder.util import exercise_folders
+from autograder.util import csv_text, exercise_folders
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
 from .test_cli import autograder
@@ -393,7 +393,7 @@ def test_no_cell_of_an_export_is_a_formula(student: str) -> None:
         export = write(data)
         assert export.guarded == (student,)
         for cell in (cell for row in rows_of(export.text) for cell in row):
-            assert not cell.lstrip().startswith(exports.FORMULA), cell
+            assert not cell.lstrip().startswith(csv_text.FORMULA), cell
         assert f"'{student}" in [cell for row in rows_of(export.text) for cell in row]
 
 

@@ -18,9 +18,9 @@ from autograder.assignments import questions, submission
 from autograder.assignments.questions import Question
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.model_answers import FORMGRADER_KEYS, ShowModelAnswers
+from autograder.gradebook.written_answers import answers, answers_page
+from autograder.gradebook.written_answers.answers import Answer, Answers, MarksError
 from autograder.grading import engine
-from autograder.marking import answers, answers_page
-from autograder.marking.answers import Answer, Answers, MarksError
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
 from .test_cli import autograder

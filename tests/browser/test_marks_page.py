@@ -9,8 +9,8 @@ import pytest
 from playwright.sync_api import Browser, expect
 
 from autograder.assignments.questions import Question
-from autograder.marking import answers_page
-from autograder.marking.answers import COLUMNS, Answer, Answers
+from autograder.gradebook.written_answers import answers_page
+from autograder.gradebook.written_answers.answers import COLUMNS, Answer, Answers
 
 pytestmark = pytest.mark.xdist_group("browser")
 

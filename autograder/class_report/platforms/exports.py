@@ -15,20 +15,16 @@ neither of us. A course in which it is a 0 asks for it.
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from autograder.class_report.collect import ClassData, Person
 from autograder.gradebook.course_gradebook import Grade
+from autograder.util.csv_text import as_csv, guard_text, is_formula
 
 CANVAS_COLUMNS = ("Student", "ID", "SIS User ID", "SIS Login ID", "Section")
 POINTS_POSSIBLE = "    Points Possible"
 MOODLE_COLUMNS = ("Username", "ID number", "First name", "Last name", "Email address")
-
-# The full-width forms are taken for their ASCII ones by spreadsheets in some languages.
-FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "\0", "＝", "＋", "－", "＠")  # noqa: RUF001
 
 
 @dataclass(frozen=True)
@@ -36,7 +32,7 @@ class Export:
     """One file: its text, how many students have points in it, and whose cell is empty, and why.
 
     ``waiting`` are those whose grades are not complete, ``absent`` those who handed in nothing;
-    ``guard_text`` are ids that were written with an apostrophe in front (see `guarded`).
+    ``guarded`` are ids that were written with an apostrophe in front (see `guard_text`).
     """
 
     text: str
@@ -89,26 +85,6 @@ def export_moodle(
         )
         rows.append((*map(guard_text, cells), points[person.student]))
     return _make_export(data, rows, points)
-
-
-def guard_text(text: str) -> str:
-    """Return ``text`` with an apostrophe in front if a spreadsheet would run it as a formula.
-
-    See OWASP, "CSV Injection" (CWE-1236).
-    """
-    return f"'{text}" if is_formula(text) else text
-
-
-def is_formula(text: str) -> bool:
-    """Whether a spreadsheet could take a cell for a formula, blanks in front of it or not."""
-    return text.startswith(FORMULA) or text.lstrip().startswith(FORMULA)
-
-
-def as_csv(rows: Iterable[Sequence[str]]) -> str:
-    """Return rows as CSV (RFC 4180)."""
-    buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\r\n").writerows(rows)
-    return buffer.getvalue()
 
 
 def _make_export(data: ClassData, rows: list[Sequence[str]], points: Mapping[str, str]) -> Export:

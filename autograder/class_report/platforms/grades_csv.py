@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from autograder.class_report.platforms.exports import as_csv, guard_text
 from autograder.gradebook.course_gradebook import Grade
+from autograder.util.csv_text import as_csv, guard_text
 from autograder.util.files import write_whole
 
 HEAD = ("assignment", "student_id", "score", "max_score", "needs_manual_grade")

@@ -12,7 +12,7 @@ import json
 from html import escape
 from pathlib import Path
 
-from autograder.marking.answers import COLUMNS, Answer, Answers
+from autograder.gradebook.written_answers.answers import COLUMNS, Answer, Answers
 from course.messages.yaml_text import format_count
 from quizzes import rendering
 

@@ -23,10 +23,10 @@ from autograder.assignments.intake import open_questions
 from autograder.assignments.intake.file_names import match_name
 from autograder.assignments.questions import Question
 from autograder.assignments.submission import SubmissionError
-from autograder.class_report.platforms.exports import as_csv, guard_text, is_formula
 from autograder.gradebook.bridge import WORK_FOLDER
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.database import of_cells
+from autograder.util.csv_text import as_csv, guard_text, is_formula
 from course.errors import CourseError
 
 COLUMNS = (
