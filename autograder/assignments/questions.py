@@ -20,7 +20,7 @@ from autograder.assignments import cells, submission
 from autograder.assignments.quiz_cells import PREFIX
 from autograder.assignments.submission import SubmissionError
 from autograder.examination import points
-from quizzes import rendering
+from quizzes.text import rendering
 
 PARTS = {"visible": "Checks in the notebook", "hidden": "Checks at grading"}
 """What the parts of an exam are called; another one is called by its own name."""

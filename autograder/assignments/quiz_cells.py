@@ -9,8 +9,8 @@ from nbformat import NotebookNode
 
 from autograder.assignments import submission
 from course.errors import CourseError
-from quizzes import loader
-from quizzes.bank import Bank
+from quizzes.bank import loader
+from quizzes.bank.contents import Bank
 from quizzes.errors import QuizError
 
 PREFIX = "quiz-"

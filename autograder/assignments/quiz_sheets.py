@@ -9,7 +9,8 @@ from nbformat import NotebookNode
 
 from autograder.assignments import quiz_cells
 from course.errors import CourseError
-from quizzes import closing, loader
+from quizzes.bank import loader
+from quizzes.marking import closing
 
 
 class QuizSheetError(CourseError):

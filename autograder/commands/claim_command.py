@@ -12,7 +12,7 @@ from autograder.assignments.intake.file_names import join_names, printable_name,
 from autograder.assignments.intake.handed_in import HandedIn, Item, look_through
 from autograder.assignments.submission import MAX_NOTEBOOK
 from autograder.gradebook import bridge as bridge
-from quizzes import record
+from quizzes.attempts import record
 
 
 def keep_claim(

@@ -76,7 +76,7 @@ def import_command(
 @app.command()
 def lint(quizzes: Quizzes, root: Root = None) -> None:
     """Look for all that is wrong with quizzes: faults, and questions easy to guess or unfair."""
-    from quizzes import lint as bank_lint
+    from quizzes.bank import lint as bank_lint
     from quizzes.errors import BankError
     from quizzes.exchange import files
 
@@ -110,7 +110,7 @@ def schema(
     ] = False,
 ) -> None:
     """Print the format of a bank: each field, its bounds, who needs it, and two examples."""
-    from quizzes import schema as bank_schema
+    from quizzes.bank import schema as bank_schema
 
     if as_json:
         text = json.dumps(bank_schema.json_schema(), indent=2, ensure_ascii=False) + "\n"

@@ -15,10 +15,10 @@ from autograder.assignments.intake.file_names import normalise_name
 from autograder.commands.quiz_command import QuizCommandError, as_course_errors
 from autograder.gradebook import bridge as bridge
 from autograder.gradebook.course_gradebook import CourseGradebook, GradebookError
-from quizzes import record, sharing
+from quizzes.attempts import record, sharing
 
 if TYPE_CHECKING:
-    from quizzes.bank import Bank
+    from quizzes.bank.contents import Bank
     from quizzes.insight.analysis import Analysis
 
 

@@ -19,7 +19,7 @@ from nbgrader.coursedir import CourseDirectory
 from autograder.assignments import questions, submission
 from autograder.assignments.questions import Question
 from autograder.assignments.submission import SubmissionError
-from quizzes import rendering
+from quizzes.text import rendering
 
 FORMGRADER_KEYS = {"submission_id", "assignment_id", "notebook_id"}
 """Resources that the formgrader alone hands to its exporter; its page shows them."""

@@ -20,7 +20,7 @@ from autograder.assignments.intake import roster
 from autograder.assignments.intake.attachments import summarise_names
 from autograder.gradebook.safe_html import allowed_html
 from autograder.util.files import walk_files
-from quizzes.record import read_plain
+from quizzes.attempts.record import read_plain
 
 TIME = "timestamp.txt"
 SECRET = "submission_secret.txt"

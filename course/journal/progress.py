@@ -16,7 +16,7 @@ from course.journal.store import (
     journal_here,
 )
 from course.journal.work import Chapter, Exercise, QuizTaken, WorkDone
-from quizzes.record import MAX_FILE, attempts_filename, parse_attempts
+from quizzes.attempts.record import MAX_FILE, attempts_filename, parse_attempts
 
 WELCOME = Path("start-here.ipynb")
 """The notebook that `course lab` opens first; it is not a chapter."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from course.journal.notebooks import Notebook, Section
 from course.journal.store import Checked
-from quizzes.record import Attempt
+from quizzes.attempts.record import Attempt
 
 
 @dataclass(frozen=True)

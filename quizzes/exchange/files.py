@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from quizzes import closing, loader
-from quizzes.bank import Bank
+from quizzes.bank import loader
+from quizzes.bank.contents import Bank
 from quizzes.errors import BankError
 from quizzes.exchange import gift, limits, merge, questions
 from quizzes.exchange.questions import ExchangeError
+from quizzes.marking import closing
 
 FORMATS = {"gift": ".gift", "qti": ".qti.zip"}
 """What a bank can be exported as, and how such a file's name ends."""

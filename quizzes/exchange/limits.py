@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 
-from quizzes.bank import Bank, Matching, Multiple, Numeric, Ordering, Predict, Variant
-from quizzes.fields import Part
+from quizzes.bank.contents import Bank, Matching, Multiple, Numeric, Ordering, Predict, Variant
+from quizzes.bank.fields import Part
 
 PICTURE = re.compile(r"!\[([^\]]*)\]\([^)]*\)")
 LATEX = re.compile(r"(?<![\\$])\$(?![\s$])([^$\n]+?)(?<!\s)\$(?![\d$])")

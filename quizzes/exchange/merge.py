@@ -16,8 +16,8 @@ from typing import Any
 
 import yaml
 
-from quizzes import loader
-from quizzes.bank import Bank, Concept
+from quizzes.bank import loader
+from quizzes.bank.contents import Bank, Concept
 from quizzes.errors import BankError
 from quizzes.exchange.questions import (
     BOTH,

@@ -13,7 +13,7 @@ from text2qti.err import Text2qtiError
 from text2qti.qti import QTI
 from text2qti.quiz import GroupStart, Quiz
 
-from quizzes.bank import Bank, Matching, Multiple, Numeric, Ordering, Variant
+from quizzes.bank.contents import Bank, Matching, Multiple, Numeric, Ordering, Variant
 from quizzes.exchange import limits
 from quizzes.exchange.questions import ExchangeError, code_block, unit_line
 

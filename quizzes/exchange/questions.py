@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from quizzes.bank import Bank, Concept, Matching, Multiple, Numeric, Ordering, Variant
+from quizzes.bank.contents import Bank, Concept, Matching, Multiple, Numeric, Ordering, Variant
 from quizzes.errors import QuizError
 from quizzes.exchange.limits import CODE, LATEX, PICTURE
 

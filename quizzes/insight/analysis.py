@@ -13,10 +13,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from quizzes import lint
-from quizzes.bank import Bank
-from quizzes.marking import Result
-from quizzes.marks import Mark
+from quizzes.bank import lint
+from quizzes.bank.contents import Bank
+from quizzes.marking.marks import Mark
+from quizzes.marking.scoring import Result
 
 FEW = 10
 """Learners below which figures say little; they are shown all the same, and marked."""

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from quizzes import record, regrade
-from quizzes.bank import Bank
-from quizzes.marking import Result
+from quizzes.attempts import record
+from quizzes.bank.contents import Bank
+from quizzes.marking import regrade
+from quizzes.marking.scoring import Result
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
 
+from quizzes.attempts.sharing import CANNOT_KNOW
 from quizzes.errors import QuizError
 from quizzes.insight import plots
 from quizzes.insight.analysis import FEW, Analysis, ItemFigures
-from quizzes.sharing import CANNOT_KNOW
 
 ITEM_COLUMNS = ("item", "kind", "learners", "difficulty", "discrimination", "advice")
 BELIEF_COLUMNS = ("misconception", "belief", "holders", "met", "share")

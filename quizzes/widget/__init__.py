@@ -14,7 +14,7 @@ import anywidget
 import traitlets
 
 from quizzes.errors import QuizError
-from quizzes.quiz_core import QuizCore
+from quizzes.taking.quiz_core import QuizCore
 from quizzes.widget import view
 
 _HERE = Path(__file__).parent

@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from quizzes import model, rendering, text
-from quizzes.bank import Matching, Multiple, Numeric
-from quizzes.marks import Mark
-from quizzes.model import Item
-from quizzes.quiz_core import QuizCore
+from quizzes.bank import selection
+from quizzes.bank.contents import Matching, Multiple, Numeric
+from quizzes.bank.selection import Item
+from quizzes.marking import wording
+from quizzes.marking.marks import Mark
+from quizzes.taking.quiz_core import QuizCore
+from quizzes.text import rendering
 
 
 def paper_data(quiz: QuizCore) -> dict[str, Any]:
@@ -49,7 +51,7 @@ def _question_data(item: Item, folder: Path) -> dict[str, Any]:
     return {
         "number": item.number,
         "kind": variant.kind,
-        "instruction": text.INSTRUCTIONS[variant.kind],
+        "instruction": wording.INSTRUCTIONS[variant.kind],
         "stem": rendering.render_block(variant.stem, folder),
         "code": rendering.render_code(variant.code) if variant.code else "",
         "unit": variant.unit if isinstance(variant, Numeric) else "",
@@ -88,12 +90,14 @@ def _mark_data(mark: Mark, folder: Path) -> dict[str, Any]:
     variant = mark.item.variant
     several = isinstance(variant, Multiple)
     key = (
-        "" if mark.is_right or several else text.of_answer(mark.item, model.right_answer(mark.item))
+        ""
+        if mark.is_right or several
+        else wording.of_answer(mark.item, selection.right_answer(mark.item))
     )
     return {
         "number": mark.item.number,
         "right": mark.is_right,
-        "verdict": text.describe_mark(mark),
+        "verdict": wording.describe_mark(mark),
         "key": rendering.render_inline(key, folder) if key else "",
         "run": _cell_data(variant.code) if variant.kind == "predict" and variant.code else None,
         "remarks": [

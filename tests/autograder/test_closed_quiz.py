@@ -24,7 +24,8 @@ from autograder.gradebook.release import ReleaseError, make_release
 from autograder.grading import engine
 from course.workspace.content import content_root, copy_authoring
 from course.workspace.lab import make_copy
-from quizzes import closing, loader, model, schema
+from quizzes.bank import loader, schema, selection
+from quizzes.marking import closing
 from tests.machine import needs_isolation
 from tests.quizzes import sample
 
@@ -80,8 +81,10 @@ def hand_in(root: Path, student: str, *, right: int) -> Path:
     shutil.copytree(root / "release" / ASSIGNMENT, folder)
     quiz = quizzes.load(QUIZ, student=student, folder=folder)
     bank = loader.load_bank(QUIZ, root / "authoring" / "banks")
-    for item in model.draw(bank, student, 1).items:
-        quiz.answer(item.number, model.right_answer(item) if item.number <= right else wrong(item))
+    for item in selection.draw(bank, student, 1).items:
+        quiz.answer(
+            item.number, selection.right_answer(item) if item.number <= right else wrong(item)
+        )
     quiz.submit()
     return folder
 

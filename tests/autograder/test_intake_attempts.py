@@ -13,7 +13,7 @@ from autograder.assignments.intake.claim_records import Claim
 from autograder.assignments.intake.handed_in import look_through
 from autograder.examination.verdict import Verdict
 from autograder.gradebook.quizzes import quiz_marks
-from quizzes.loader import load_bank
+from quizzes.bank.loader import load_bank
 
 from .test_quiz_marks import FILE, take
 

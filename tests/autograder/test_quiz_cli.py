@@ -20,8 +20,10 @@ from autograder.class_report import needs
 from autograder.class_report.collect import ClassData
 from autograder.commands import quiz_report
 from autograder.gradebook.course_gradebook import Grade
-from quizzes import loader, marking, model, record, regrade, schema, sharing
-from quizzes.record import Attempt, Given
+from quizzes.attempts import record, sharing
+from quizzes.attempts.record import Attempt, Given
+from quizzes.bank import loader, schema, selection
+from quizzes.marking import regrade, scoring
 
 BANK = loader.load_bank("ch05")
 EXAM = schema.EXAMPLES / "exam.yaml"
@@ -51,8 +53,10 @@ def autograder(
 
 def hand_in(root: Path, student: str) -> Path:
     """Hand in an attempt in which everything is right; return its file."""
-    paper = model.draw(BANK, student, 1)
-    result = marking.mark_paper(paper, {i.concept.id: model.right_answer(i) for i in paper.items})
+    paper = selection.draw(BANK, student, 1)
+    result = scoring.mark_paper(
+        paper, {i.concept.id: selection.right_answer(i) for i in paper.items}
+    )
     given = {m.item.concept.id: Given(m.item.variant.id, m.answer) for m in result.marks}
     attempt = Attempt("ch05", student, 1, BANK.edition, "2026-01-01T00:00:00+00:00",
                       given, 0.0, 0, False)  # fmt: skip
@@ -209,7 +213,7 @@ def test_a_classs_quiz_is_analysed(tmp_path: Path) -> None:
         "quiz-ch05-report.html",
     ]
     items, beliefs, _ = report.as_tables()
-    dealt = {i.variant.id for s in ("ann", "ben") for i in model.draw(BANK, s, 1).items}
+    dealt = {i.variant.id for s in ("ann", "ben") for i in selection.draw(BANK, s, 1).items}
     assert items.row_count == len(BANK.concepts) + len(dealt)
     assert beliefs.row_count == 0
 

@@ -27,10 +27,10 @@ from autograder.grading.engine import Graded
 from autograder.grading.progress import Collecting
 from course.workspace.content import content_root, copy_authoring
 from course.workspace.student_version import student_versions
-from quizzes import model
-from quizzes.loader import load_bank
-from quizzes.model import Item
-from quizzes.quiz import Quiz
+from quizzes.bank import selection
+from quizzes.bank.loader import load_bank
+from quizzes.bank.selection import Item
+from quizzes.notebook.quiz import Quiz
 from tests.machine import needs_isolation
 
 ASSIGNMENT, NOTEBOOK, CELL = "ch05-quiz", "quiz", "quiz-ch05"
@@ -74,14 +74,14 @@ def take(folder: Path, student: str, *rights: int) -> None:
             quiz.retry()
         for item in quiz.items:
             quiz.answer(
-                item.number, model.right_answer(item) if item.number <= right else wrong(item)
+                item.number, selection.right_answer(item) if item.number <= right else wrong(item)
             )
         quiz.submit()
 
 
 def wrong(item: Item) -> str | float:
     """Return an answer that fits the question and is not right."""
-    key = model.right_answer(item)
+    key = selection.right_answer(item)
     if isinstance(key, float):
         return key + 1000
     if item.variant.kind in ("ordering", "matching"):

@@ -9,10 +9,10 @@ from typing import Any
 import nbformat.v4
 from playwright.sync_api import Locator
 
-from quizzes import model
-from quizzes.answers import Answer
-from quizzes.model import Item
-from quizzes.quiz import Quiz
+from quizzes.attempts.answers import Answer
+from quizzes.bank import selection
+from quizzes.bank.selection import Item
+from quizzes.notebook.quiz import Quiz
 
 from .notebook_page import NotebookPage
 
@@ -156,7 +156,7 @@ class Learner:
     def take(self, *, right: int, says: str = "needed") -> None:
         """Answer all questions by keyboard, the first ``right`` of them rightly, and submit."""
         for item in self.quiz.items:
-            key = model.right_answer(item)
+            key = selection.right_answer(item)
             answer = key if item.number <= right else WRONG[item.variant.kind](item, key)
             self.answer_by_keyboard(item, answer)
         self.tab_to(self.submit)

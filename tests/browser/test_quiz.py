@@ -12,9 +12,11 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 
-from quizzes import closing, model, regrade, rendering
-from quizzes.loader import load_bank, read_bank
-from quizzes.quiz import Quiz
+from quizzes.bank import selection
+from quizzes.bank.loader import load_bank, read_bank
+from quizzes.marking import closing, regrade
+from quizzes.notebook.quiz import Quiz
+from quizzes.text import rendering
 from tests.quizzes import sample
 
 from .conftest import OpenNotebook
@@ -76,7 +78,7 @@ def test_fail_with_three_of_five_then_try_again_and_pass_by_keyboard_alone(sit: 
     )
     quiz = learner.quiz
     for item in quiz.items:  # the same attempt here, so that the next one is dealt
-        quiz.answer(item.number, model.right_answer(item))
+        quiz.answer(item.number, selection.right_answer(item))
     quiz.submit()
     quiz.retry()
     learner.take(right=5)
@@ -199,7 +201,7 @@ def test_a_screen_reader_finds_roles_names_and_states(sit: Sit) -> None:
 def test_a_double_click_records_one_attempt(sit: Sit) -> None:
     learner = sit()
     for item in learner.quiz.items:
-        learner.answer_by_keyboard(item, model.right_answer(item))
+        learner.answer_by_keyboard(item, selection.right_answer(item))
     learner.submit.dblclick()
     learner.result.filter(has_text="needed").wait_for()
     learner.window.command("notebook:run-all-cells")
@@ -211,18 +213,18 @@ def test_answers_are_there_after_a_reload_and_after_a_restart(sit: Sit) -> None:
     learner = sit()
     items = learner.quiz.items
     for item in items[:3]:
-        learner.answer_by_keyboard(item, model.right_answer(item))
+        learner.answer_by_keyboard(item, selection.right_answer(item))
     learner.saved()
     learner.window.save()
 
     def still_there() -> None:
-        for letter in str(model.right_answer(items[1])):
+        for letter in str(selection.right_answer(items[1])):
             expect(learner.question(2).locator(f'input[value="{letter}"]')).to_be_checked()
         expect(learner.question(1).locator("input:checked")).to_have_value(
-            str(model.right_answer(items[0]))
+            str(selection.right_answer(items[0]))
         )
         expect(learner.question(3).locator("input")).to_have_value(
-            f"{model.right_answer(items[2]):g}"
+            f"{selection.right_answer(items[2]):g}"
         )
 
     learner.window.reload()
@@ -240,7 +242,7 @@ def test_answers_are_there_after_a_reload_and_after_a_restart(sit: Sit) -> None:
     still_there()
     expect(alarm).to_have_text("")
     for item in items[3:]:
-        learner.answer_by_keyboard(item, model.right_answer(item))
+        learner.answer_by_keyboard(item, selection.right_answer(item))
     learner.tab_to(learner.submit)
     learner.page.keyboard.press("Enter")
     expect(learner.result).to_have_text(re.compile("^Passed: 5 of 5"))
@@ -260,7 +262,7 @@ def test_a_quiz_that_is_opened_again_without_its_kernel_says_what_to_do(sit: Sit
     gone = learner.page.locator(".quiz-gone")
     expect(gone).to_be_hidden()
     item = learner.quiz.items[0]
-    learner.answer_by_keyboard(item, model.right_answer(item))
+    learner.answer_by_keyboard(item, selection.right_answer(item))
     learner.saved()
     learner.window.save()
     learner.window.restart_kernel()
@@ -271,7 +273,7 @@ def test_a_quiz_that_is_opened_again_without_its_kernel_says_what_to_do(sit: Sit
     learner.start()
     expect(gone).to_be_hidden()
     expect(learner.question(1).locator("input:checked")).to_have_value(
-        str(model.right_answer(item))
+        str(selection.right_answer(item))
     )
 
 
@@ -280,12 +282,12 @@ def test_a_second_window_shows_the_same_quiz_and_records_no_second_attempt(
 ) -> None:
     learner = sit()
     for item in learner.quiz.items:
-        learner.answer_by_keyboard(item, model.right_answer(item))
+        learner.answer_by_keyboard(item, selection.right_answer(item))
     learner.saved()
     learner.window.save()
     other = Learner(open_notebook(learner.window.path), learner.quiz)
     expect(other.question(3).locator("input")).to_have_value(
-        f"{model.right_answer(learner.quiz.items[2]):g}"
+        f"{selection.right_answer(learner.quiz.items[2]):g}"
     )
     learner.submit.click()
     expect(other.result).to_have_text(re.compile("^Passed: 5 of 5"))
@@ -296,7 +298,7 @@ def test_a_second_window_shows_the_same_quiz_and_records_no_second_attempt(
 def test_no_key_leaves_the_kernel_before_submission(sit: Sit) -> None:
     learner = sit()
     for item in learner.quiz.items:
-        learner.answer_by_keyboard(item, model.right_answer(item))
+        learner.answer_by_keyboard(item, selection.right_answer(item))
     learner.saved()
 
     for place, text in everywhere(learner).items():
@@ -362,7 +364,7 @@ def test_a_kernel_that_does_not_answer_is_told_and_gets_the_answers_later(sit: S
     (kernel,) = learner.window.lab.kernel_processes()
     kernel.suspend()
     try:
-        learner.answer_by_keyboard(item, model.right_answer(item))
+        learner.answer_by_keyboard(item, selection.right_answer(item))
         expect(alarm).to_contain_text("The kernel does not answer.")
         expect(learner.question(1).locator("input").first).to_be_enabled()
     finally:
@@ -370,7 +372,7 @@ def test_a_kernel_that_does_not_answer_is_told_and_gets_the_answers_later(sit: S
     learner.saved()
     expect(alarm).to_have_text("")
     expect(learner.question(1).locator("input:checked")).to_have_value(
-        str(model.right_answer(item))
+        str(selection.right_answer(item))
     )
 
 
@@ -386,12 +388,12 @@ def test_answers_are_saved_while_another_cell_runs(sit: Sit) -> None:
     )
     window.wait_for_kernel("busy")
     item = learner.quiz.items[0]
-    learner.answer_by_keyboard(item, model.right_answer(item))
+    learner.answer_by_keyboard(item, selection.right_answer(item))
     pipe.write_text("go on")
     learner.saved()
     window.wait_for_kernel("idle")
     expect(learner.question(1).locator("input:checked")).to_have_value(
-        str(model.right_answer(item))
+        str(selection.right_answer(item))
     )
 
 

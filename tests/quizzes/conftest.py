@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from quizzes import model
-from quizzes.answers import Answer
-from quizzes.bank import Bank
-from quizzes.loader import read_bank
-from quizzes.model import Item
-from quizzes.quiz import Quiz
+from quizzes.attempts.answers import Answer
+from quizzes.bank import selection
+from quizzes.bank.contents import Bank
+from quizzes.bank.loader import read_bank
+from quizzes.bank.selection import Item
+from quizzes.notebook.quiz import Quiz
 
 from . import sample
 
@@ -38,7 +38,7 @@ def make_quiz(bank: Bank, tmp_path: Path) -> MakeQuiz:
 
 def wrong(item: Item) -> Answer:
     """Return an answer that is complete and earns nothing."""
-    kind, key = item.variant.kind, model.right_answer(item)
+    kind, key = item.variant.kind, selection.right_answer(item)
     if kind == "numeric":
         return float(key) + 50
     letters = str(key)
@@ -50,4 +50,6 @@ def wrong(item: Item) -> Answer:
 def answer_all(quiz: Quiz, *, right: int) -> None:
     """Answer the first ``right`` questions rightly and the others wrongly."""
     for item in quiz.items:
-        quiz.answer(item.number, model.right_answer(item) if item.number <= right else wrong(item))
+        quiz.answer(
+            item.number, selection.right_answer(item) if item.number <= right else wrong(item)
+        )

@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from quizzes import answers, model
-from quizzes.answers import Answer
-from quizzes.bank import Bank
+from quizzes.attempts import answers
+from quizzes.attempts.answers import Answer
+from quizzes.bank import selection
+from quizzes.bank.contents import Bank
+from quizzes.bank.selection import Item
 from quizzes.errors import AnswerError
-from quizzes.model import Item
 
 
 @pytest.fixture
 def items(bank: Bank) -> dict[str, Item]:
-    return {item.concept.id: item for item in model.draw(bank, "ada", 1).items}
+    return {item.concept.id: item for item in selection.draw(bank, "ada", 1).items}
 
 
 @pytest.mark.parametrize(

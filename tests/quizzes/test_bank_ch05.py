@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from quizzes import lint, loader
-from quizzes.bank import Bank, Predict
+from quizzes.bank import lint, loader
+from quizzes.bank.contents import Bank, Predict
 from tests.kernel import Kernel
 
 from .shown_ch05 import SHOWN

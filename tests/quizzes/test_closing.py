@@ -13,12 +13,14 @@ import pytest
 import yaml
 
 import quizzes
-from quizzes import closing, lint, loader, model, record, regrade
-from quizzes.bank import Bank, Matching
+from quizzes.attempts import record
+from quizzes.bank import lint, loader, selection
+from quizzes.bank.contents import Bank, Matching
+from quizzes.bank.loader import load_bank, read_bank
 from quizzes.errors import BankError, QuizError
 from quizzes.exchange import files
-from quizzes.loader import load_bank, read_bank
-from quizzes.quiz import Quiz
+from quizzes.marking import closing, regrade
+from quizzes.notebook.quiz import Quiz
 from quizzes.widget import QuizWidget, view
 
 from . import sample
@@ -55,8 +57,10 @@ def handed_out(bank: Bank, folder: Path) -> Path:
 
 def answer(quiz: Quiz, bank: Bank, *, right: int) -> None:
     """Answer with the instructor's keys: the first ``right`` rightly, the others wrongly."""
-    for item in model.draw(bank, quiz.student, quiz.attempt).items:
-        quiz.answer(item.number, model.right_answer(item) if item.number <= right else wrong(item))
+    for item in selection.draw(bank, quiz.student, quiz.attempt).items:
+        quiz.answer(
+            item.number, selection.right_answer(item) if item.number <= right else wrong(item)
+        )
 
 
 def marked(bank: Bank, folder: Path) -> regrade.Marked:
@@ -97,7 +101,7 @@ def test_letters_stand_for_the_same_in_the_questions_and_in_the_bank(
     sheet = closing.read_sheet(work / FILE, sample.NAME)
     assert sheet.edition == bank.edition
     for student in (f"student-{n}" for n in range(20)):
-        dealt, known = (model.draw(one, student, attempt).items for one in (sheet, bank))
+        dealt, known = (selection.draw(one, student, attempt).items for one in (sheet, bank))
         for mine, theirs in zip(dealt, known, strict=True):
             assert mine.variant.id == theirs.variant.id
             assert mine.letters == theirs.letters
@@ -168,8 +172,8 @@ def test_an_attempt_too_many_does_not_count_and_is_for_a_person(bank: Bank, work
     quiz.submit()
     path = work / record.attempts_filename(sample.NAME)
     second = json.loads(path.read_text())
-    for item in model.draw(bank, "ada", 2).items:
-        given = {"variant": item.variant.id, "answer": model.right_answer(item)}
+    for item in selection.draw(bank, "ada", 2).items:
+        given = {"variant": item.variant.id, "answer": selection.right_answer(item)}
         second["answers"][item.concept.id] = given
     path.write_text(path.read_text() + json.dumps({**second, "attempt": 2}) + "\n")
     found = marked(bank, work)
@@ -218,7 +222,7 @@ def test_few_variants_are_dealt_by_turns(count: int) -> None:
         del concept["variants"][count:]
     bank = Bank.model_validate(data)
     for student in (f"student-{n}" for n in range(30)):
-        dealt = [[item.variant.id for item in model.draw(bank, student, attempt).items]
+        dealt = [[item.variant.id for item in selection.draw(bank, student, attempt).items]
                  for attempt in range(1, 4 * count + 1)]  # fmt: skip
         for place in range(len(bank.concepts)):
             ids = [items[place] for items in dealt]

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 import yaml
 
-from quizzes import loader
-from quizzes.bank import Bank, Numeric
+from quizzes.bank import loader
+from quizzes.bank.contents import Bank, Numeric
+from quizzes.bank.loader import read_bank
 from quizzes.errors import BankError
-from quizzes.loader import read_bank
 
 from . import sample
 

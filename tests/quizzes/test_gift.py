@@ -14,8 +14,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from quizzes import loader
-from quizzes.bank import Bank
+from quizzes.bank import loader
+from quizzes.bank.contents import Bank
 from quizzes.exchange import files, gift, limits, merge, questions
 from quizzes.exchange.questions import (
     Choice,

@@ -14,13 +14,15 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from quizzes import insight, loader, marking, model
-from quizzes.answers import Answer
-from quizzes.bank import Matching, Multiple, Numeric, Ordering
+from quizzes import insight
+from quizzes.attempts.answers import Answer
+from quizzes.attempts.record import Attempt, Given
+from quizzes.bank import loader, selection
+from quizzes.bank.contents import Matching, Multiple, Numeric, Ordering
+from quizzes.bank.selection import Item, Paper
 from quizzes.insight import analysis, report
-from quizzes.marking import Result
-from quizzes.model import Item, Paper
-from quizzes.record import Attempt, Given
+from quizzes.marking import scoring
+from quizzes.marking.scoring import Result
 
 BANK = loader.load_bank("ch05")
 Choose = Callable[[Item], Answer]
@@ -28,7 +30,7 @@ Choose = Callable[[Item], Answer]
 
 def wrong(item: Item, rng: random.Random) -> Answer:
     """An answer that is not right."""
-    variant, key = item.variant, model.right_answer(item)
+    variant, key = item.variant, selection.right_answer(item)
     if isinstance(variant, Numeric):
         return float(rng.choice(variant.traps).value)
     letters = list(str(key))
@@ -40,7 +42,7 @@ def wrong(item: Item, rng: random.Random) -> Answer:
 
 
 def answered(paper: Paper, choose: Choose) -> Result:
-    return marking.mark_paper(paper, {item.concept.id: choose(item) for item in paper.items})
+    return scoring.mark_paper(paper, {item.concept.id: choose(item) for item in paper.items})
 
 
 def class_of(count: int, skill: Callable[[int], float], seed: int = 1) -> dict[str, Result]:
@@ -48,9 +50,9 @@ def class_of(count: int, skill: Callable[[int], float], seed: int = 1) -> dict[s
     rng = random.Random(seed)
     return {
         f"learner-{n}": answered(
-            model.draw(BANK, f"learner-{n}", 1),
+            selection.draw(BANK, f"learner-{n}", 1),
             lambda item, n=n: (  # type: ignore[misc]
-                model.right_answer(item) if rng.random() < skill(n) else wrong(item, rng)
+                selection.right_answer(item) if rng.random() < skill(n) else wrong(item, rng)
             ),
         )
         for n in range(count)
@@ -122,12 +124,12 @@ def test_a_key_that_those_who_know_get_wrong_is_pointed_out() -> None:
         rng = random.Random(n)
         knows = n % 2 == 0
         return lambda item: (
-            model.right_answer(item)
+            selection.right_answer(item)
             if knows != (item.concept.id == "qos-purpose")
             else wrong(item, rng)
         )
 
-    results = {f"s{n}": answered(model.draw(BANK, f"s{n}", 1), choose(n)) for n in range(40)}
+    results = {f"s{n}": answered(selection.draw(BANK, f"s{n}", 1), choose(n)) for n in range(40)}
     figures = figures_of(insight.analyse_results(BANK, results), "qos-purpose")
     assert figures.discrimination == pytest.approx(-1, abs=0.05)
     assert "check the key" in figures.advice
@@ -142,11 +144,11 @@ def test_nothing_is_advised_on_fewer_than_five_wrong_answers() -> None:
         def choose(n: int) -> Choose:
             fails = {asked: n < failing, other: n % 2 == 0}
             return lambda item: (
-                wrong(item, rng) if fails.get(item.concept.id) else model.right_answer(item)
+                wrong(item, rng) if fails.get(item.concept.id) else selection.right_answer(item)
             )
 
         results = {
-            f"s{n}": answered(model.draw(BANK, f"s{n}", 1), choose(n)) for n in range(learners)
+            f"s{n}": answered(selection.draw(BANK, f"s{n}", 1), choose(n)) for n in range(learners)
         }
         return figures_of(insight.analyse_results(BANK, results), asked).advice
 
@@ -163,13 +165,13 @@ def test_misconceptions_are_counted_among_those_whom_a_question_tempted() -> Non
             for place, option in enumerate(getattr(item.variant, "options", [])):
                 if option.misconception == belief:
                     return item.letters_of([place])
-            return model.right_answer(item)
+            return selection.right_answer(item)
 
         return choose
 
     belief = "topic-stores-messages"
     results = {
-        f"s{n}": answered(model.draw(BANK, f"s{n}", 1), falls_for(belief)) for n in range(50)
+        f"s{n}": answered(selection.draw(BANK, f"s{n}", 1), falls_for(belief)) for n in range(50)
     }
     found = insight.analyse_results(BANK, results)
     figures = {f.id: f for f in found.beliefs}
@@ -184,7 +186,7 @@ def test_misconceptions_are_counted_among_those_whom_a_question_tempted() -> Non
 
 
 def attempt(student: str, number: int, choose: Choose) -> Attempt:
-    paper = model.draw(BANK, student, number)
+    paper = selection.draw(BANK, student, number)
     result = answered(paper, choose)
     given = {m.item.concept.id: Given(m.item.variant.id, m.answer) for m in result.marks}
     return Attempt(
@@ -202,7 +204,7 @@ def all_wrong(item: Item) -> Answer:
 
 
 def test_the_first_attempt_counts_and_is_marked_again() -> None:
-    first, second = attempt("ann", 1, all_wrong), attempt("ann", 2, model.right_answer)
+    first, second = attempt("ann", 1, all_wrong), attempt("ann", 2, selection.right_answer)
     forged = Attempt(**{**vars(first), "score": 5.0, "right": 5, "passed": True})
     collected = insight.collect_class(BANK, {"ann": content(second, forged)})
     assert collected.results["ann"].paper.attempt == 1
@@ -210,9 +212,9 @@ def test_the_first_attempt_counts_and_is_marked_again() -> None:
 
 
 def test_what_cannot_be_counted_is_said_and_stops_nothing() -> None:
-    other = attempt("cem", 1, model.right_answer)
+    other = attempt("cem", 1, selection.right_answer)
     collected = insight.collect_class(BANK, {
-        "ann": content(attempt("ann", 1, model.right_answer)),
+        "ann": content(attempt("ann", 1, selection.right_answer)),
         "ben": None,
         "cem": content(Attempt(**{**vars(other), "edition": "0" * 16})),
         "dee": b"\xff\xfe not json\n[1, 2]\n{}\n",

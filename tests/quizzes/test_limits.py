@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from quizzes import loader
-from quizzes.bank import Bank, Concept, Option, Pair, Trap
+from quizzes.bank import loader
+from quizzes.bank.contents import Bank, Concept, Option, Pair, Trap
+from quizzes.bank.faults import KINDS
 from quizzes.exchange import files
-from quizzes.faults import KINDS
 
 from . import sample
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from quizzes import lint, loader
-from quizzes.bank import Bank
+from quizzes.bank import lint, loader
+from quizzes.bank.contents import Bank
 
 BANK = loader.load_bank("ch05")
 
@@ -114,7 +114,7 @@ def test_what_only_sounds_like_it_is_no_finding(text: str) -> None:
 
 
 def test_keys_that_are_dealt_to_one_place_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lint.model, "_shuffled", lambda count, seed: list(range(count)))
+    monkeypatch.setattr(lint.selection, "_shuffled", lambda count, seed: list(range(count)))
     data = BANK.model_dump()
     keys_first(data)
     assert any("stand in place 1" in text for text in problems(Bank.model_validate(data)))

@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 import quizzes
-from quizzes import loader
+from quizzes.bank import loader
+from quizzes.bank.loader import load_bank, read_bank
 from quizzes.errors import BankError
-from quizzes.loader import load_bank, read_bank
 
 from . import sample
 

@@ -14,8 +14,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from quizzes import loader
-from quizzes.bank import Bank, Matching, Multiple, Numeric, Ordering, Variant
+from quizzes.bank import loader
+from quizzes.bank.contents import Bank, Matching, Multiple, Numeric, Ordering, Variant
 from quizzes.exchange import qti
 from quizzes.exchange.questions import ExchangeError
 

@@ -12,10 +12,10 @@ import pytest
 from IPython.testing.globalipapp import start_ipython
 
 import quizzes
-from quizzes import model
-from quizzes.bank import COUNTED, Bank
+from quizzes.bank import selection
+from quizzes.bank.contents import COUNTED, Bank
 from quizzes.errors import AnswerError, AttemptsError, QuizError
-from quizzes.identity import current_login
+from quizzes.taking.identity import current_login
 from quizzes.widget import view
 
 from . import sample
@@ -27,7 +27,7 @@ def test_the_real_quiz_can_be_taken_without_a_widget(tmp_path: Path) -> None:
     assert "attempt 1 is open" in repr(quiz)
     for item in quiz.items:
         assert f"Question {item.number}" in repr(quiz.question(item.number))
-        quiz.answer(item.concept.id, model.right_answer(item))
+        quiz.answer(item.concept.id, selection.right_answer(item))
     result = quiz.submit()
     assert (result.right, result.passed) == (5, True)
     assert quiz.points() == 5.0
@@ -172,7 +172,7 @@ def test_a_number_that_can_be_submitted_can_be_read_again(make_quiz: MakeQuiz) -
     answer_all(quiz, right=5)
     with pytest.raises(AnswerError, match=r"1e\+305 does not fit question 3: answer with a number"):
         quiz.answer("numeric", 1e305)
-    assert quiz.given["numeric"] == model.right_answer(quiz.item("numeric"))
+    assert quiz.given["numeric"] == selection.right_answer(quiz.item("numeric"))
     quiz.answer("numeric", -1e300)
     quiz.submit()
     again = make_quiz()
@@ -198,7 +198,7 @@ def test_a_student_without_a_name_is_told(student: Any, tmp_path: Path) -> None:
 def test_an_unanswered_question_is_not_submitted(make_quiz: MakeQuiz) -> None:
     quiz = make_quiz()
     for item in quiz.items[:3]:
-        quiz.answer(item.number, model.right_answer(item))
+        quiz.answer(item.number, selection.right_answer(item))
     with pytest.raises(AnswerError, match="question 4 and 5 has no complete answer"):
         quiz.submit()
     assert quiz.attempts == []
@@ -303,8 +303,8 @@ def test_the_student_is_the_user_of_the_hub_or_of_the_machine(
 
 def test_a_crash_between_answers_loses_none(make_quiz: MakeQuiz, tmp_path: Path) -> None:
     code = (
-        "import os, sys; from pathlib import Path; from quizzes.loader import read_bank\n"
-        "from quizzes.quiz import Quiz\n"
+        "import os, sys; from pathlib import Path; from quizzes.bank.loader import read_bank\n"
+        "from quizzes.notebook.quiz import Quiz\n"
         "bank = read_bank(Path(sys.argv[1]) / 'banks' / 'sample.yaml')\n"
         "quiz = Quiz(bank, student='ada', folder=Path(sys.argv[1]) / 'work')\n"
         "quiz.answer('predict', 'c'); os.kill(os.getpid(), 9)"

@@ -11,12 +11,14 @@ from typing import Any
 
 import pytest
 
-from quizzes import model, record, regrade
-from quizzes.answers import Answer
-from quizzes.bank import COUNTED, Bank
-from quizzes.loader import read_bank
-from quizzes.record import Attempt, Given
-from quizzes.regrade import Marked
+from quizzes.attempts import record
+from quizzes.attempts.answers import Answer
+from quizzes.attempts.record import Attempt, Given
+from quizzes.bank import selection
+from quizzes.bank.contents import COUNTED, Bank
+from quizzes.bank.loader import read_bank
+from quizzes.marking import regrade
+from quizzes.marking.regrade import Marked
 
 from . import sample
 from .conftest import MakeQuiz, answer_all
@@ -141,7 +143,7 @@ def guesses(bank: Bank, count: int, *, seconds: int, logins: int = 1, first: int
     for number in range(count):
         student, turn = f"guesser-{number % logins}", first + number // logins
         given = {}
-        for item in model.draw(bank, student, turn).items:
+        for item in selection.draw(bank, student, turn).items:
             answer: Answer = dice.choice([2.5, 5.0, 7.5, 10.0])
             if item.letters:
                 length = {"multiple": dice.randint(1, 4), "ordering": 4, "matching": 3}

@@ -10,9 +10,9 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
-from quizzes import lint, loader, schema
-from quizzes.bank import COUNTED, MIN_VARIANTS, Bank, Concept, Option, Pair, Trap
-from quizzes.faults import KINDS
+from quizzes.bank import lint, loader, schema
+from quizzes.bank.contents import COUNTED, MIN_VARIANTS, Bank, Concept, Option, Pair, Trap
+from quizzes.bank.faults import KINDS
 
 PAGE = Path(__file__).parents[2] / "notebooks" / "authoring" / "quizzes.md"
 EXAMPLES = sorted(schema.EXAMPLES.glob("*.yaml"))

@@ -10,11 +10,12 @@ from typing import Any
 
 import pytest
 
-from quizzes import model, rendering
-from quizzes.bank import Bank
-from quizzes.loader import load_bank, names, read_bank
-from quizzes.quiz import Quiz
-from quizzes.rendering import RenderError
+from quizzes.bank import selection
+from quizzes.bank.contents import Bank
+from quizzes.bank.loader import load_bank, names, read_bank
+from quizzes.notebook.quiz import Quiz
+from quizzes.text import rendering
+from quizzes.text.rendering import RenderError
 from quizzes.widget import QuizWidget, view
 
 from . import sample
@@ -64,7 +65,7 @@ def other_keys(data: dict[str, Any]) -> dict[str, Any]:
 
 def turned(bank: Bank, student: str) -> bool:
     """Whether an ordering was turned by one, as those are that would show the right order."""
-    item = model.draw(bank, student, 1).find_item("ordering")
+    item = selection.draw(bank, student, 1).find_item("ordering")
     assert item is not None
     return [item.order[-1], *item.order[:-1]] == sorted(item.order)
 
@@ -84,7 +85,7 @@ def test_the_state_is_the_same_whatever_the_key_is(tmp_path: Path) -> None:
         for number, bank in enumerate(banks):
             quiz = Quiz(bank, student=student, folder=tmp_path / str(number))
             states.add(traits(QuizWidget(quiz)))
-            keys.update((item.concept.id, model.right_answer(item)) for item in quiz.items)
+            keys.update((item.concept.id, selection.right_answer(item)) for item in quiz.items)
         assert len(states) == 1
         assert len(keys) == 2 * len(kinds)
 
@@ -236,7 +237,7 @@ def test_what_the_page_shows_is_submitted_even_if_an_answer_is_on_its_way(
 ) -> None:
     quiz = make_quiz()
     widget = QuizWidget(quiz)
-    keys = {item.number: model.right_answer(item) for item in quiz.items}
+    keys = {item.number: selection.right_answer(item) for item in quiz.items}
     for order, (number, key) in enumerate(list(keys.items())[:-1], start=1):
         widget._on_message(widget, sent(quiz, order, type="answer", number=number, answer=key), [])
     shown = {str(number): key for number, key in keys.items()}

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from course.errors import CourseError
-from quizzes.record import read_plain
+from quizzes.attempts.record import read_plain
 
 MAX_ARCHIVE = 50 * 1024 * 1024
 """Bytes of a zip file that is looked into."""

@@ -24,7 +24,7 @@ from autograder.assignments.intake.file_names import (
     quote_name,
 )
 from autograder.assignments.intake.handed_in import NOTEBOOK, Item, handed_out, look_through
-from quizzes import record
+from quizzes.attempts import record
 
 MAX_OPENED, MAX_READ = 200, 20
 """Files that are opened, and that are read as attempts; further ones are left to a person."""

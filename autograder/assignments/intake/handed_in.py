@@ -11,7 +11,7 @@ from autograder.assignments.intake import archives
 from autograder.assignments.intake.archives import Archive, ArchiveError
 from autograder.assignments.intake.file_names import normalise_name, printable_name
 from autograder.util.files import walk_files
-from quizzes.record import read_plain
+from quizzes.attempts.record import read_plain
 
 NBGRADERS = ("timestamp.txt", "submission_secret.txt")
 """Files that nbgrader's exchange adds to what a student hands in."""

@@ -36,7 +36,7 @@ from autograder.assignments.intake.handed_in import (
     look_through,
 )
 from autograder.assignments.submission import MAX_NOTEBOOK, SubmissionError
-from quizzes.record import read_plain
+from quizzes.attempts.record import read_plain
 
 ALIKE = 0.5
 """Part of a notebook's given cells that a file must have to be taken for it."""

@@ -19,7 +19,7 @@ from autograder.assignments.intake.handed_in import is_junk
 from autograder.assignments.intake.times import UnclearTimeError
 from autograder.util.files import walk_files
 from course.util.close_matches import is_it
-from quizzes.record import read_plain
+from quizzes.attempts.record import read_plain
 
 GLOB = "*?[]"
 HTML = '<>"'

@@ -1,10 +1,10 @@
 """Quizzes in the gradebook: the saved answers of a submission, marked with the instructor's keys.
 
 A grade cell whose grade id is ``quiz-NAME`` stands for the quiz NAME, whose bank lies in the course
-(``authoring/banks``) or in the package. The scores in a student's
-attempts file are not looked at: its best attempt is marked again (see `quizzes.regrade`), so a
-file that was written by hand earns what its answers earn. How many attempts there are stands in
-the feedback; a file that looks machine-made is marked for a person, with the reason.
+(``authoring/banks``) or in the package. The scores in a student's attempts file are not looked at:
+its best attempt is marked again (see `quizzes.marking.regrade`), so a file that was written by hand
+earns what its answers earn. How many attempts there are stands in the feedback; a file that looks
+machine-made is marked for a person, with the reason.
 """
 
 from __future__ import annotations
@@ -21,9 +21,11 @@ from autograder.assignments.intake.file_names import is_same_name
 from autograder.assignments.quiz_cells import PREFIX, find_bank, in_cells, quiz_names
 from autograder.examination.verdict import CheckResult, Status, Verdict
 from autograder.running.runner import Outcome
-from quizzes import record, regrade, rendering, text
-from quizzes.bank import Bank
-from quizzes.marks import Mark
+from quizzes.attempts import record
+from quizzes.bank.contents import Bank
+from quizzes.marking import regrade, wording
+from quizzes.marking.marks import Mark
+from quizzes.text import rendering
 
 PART = "answers"
 
@@ -145,7 +147,7 @@ def mark_best_attempt(
 
 def _make_check(mark: Mark) -> CheckResult:
     wrong = [remark for remark in mark.remarks if not remark.right]
-    answer = rendering.render_plain(text.of_answer(mark.item, mark.answer))
+    answer = rendering.render_plain(wording.of_answer(mark.item, mark.answer))
     return CheckResult(
         mark.item.variant.id, rendering.render_plain(mark.item.concept.objective),
         "passed" if mark.is_right else "failed", round(mark.credit, 2), 1.0,

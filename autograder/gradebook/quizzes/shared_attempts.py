@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from autograder.assignments.intake import attempts, roster
-from quizzes import sharing
+from quizzes.attempts import sharing
 
 
 def same_attempts(

@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
-from quizzes.record import read_plain
+from quizzes.attempts.record import read_plain
 
 TYPES = {
     ".png": "image/png",

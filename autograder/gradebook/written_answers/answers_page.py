@@ -14,7 +14,7 @@ from pathlib import Path
 
 from autograder.gradebook.written_answers.answers import COLUMNS, Answer, Answers
 from course.messages.yaml_text import format_count
-from quizzes import rendering
+from quizzes.text import rendering
 
 _STYLE = """
 :root { color-scheme: light dark; }

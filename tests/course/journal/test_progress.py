@@ -21,9 +21,9 @@ from course.journal.progress import WELCOME
 from course.journal.store import FILE, MANIFEST, Journal
 from course.workspace import lab
 from course.workspace.content import CONFIG, content_root
-from quizzes import model
-from quizzes.loader import load_bank
-from quizzes.quiz import Quiz
+from quizzes.bank import selection
+from quizzes.bank.loader import load_bank
+from quizzes.notebook.quiz import Quiz
 
 CHAPTER, EXERCISE = Path("ch05-building-blocks.ipynb"), Path("ch05/qos-design.ipynb")
 QUIZ = Path("ch05-quiz")
@@ -82,7 +82,7 @@ def write_explanations(path: Path, which: str = "-explanation-") -> None:
 def take_quiz(folder: Path) -> None:
     quiz = Quiz(load_bank("ch05"), student="ada", folder=folder)
     for item in quiz.items:
-        quiz.answer(item.number, model.right_answer(item))
+        quiz.answer(item.number, selection.right_answer(item))
     quiz.submit()
 
 

@@ -14,9 +14,10 @@ from typing import Any
 
 import yaml
 
-from quizzes import loader, rendering
-from quizzes.bank import Bank, Matching, Numeric, Ordering, Variant
+from quizzes.bank import loader
+from quizzes.bank.contents import Bank, Matching, Numeric, Ordering, Variant
 from quizzes.errors import BankError
+from quizzes.text import rendering
 
 SAYS = "Your instructor marks this."
 PREFIX, SUFFIX = "quiz-", ".questions.yaml"

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from quizzes import model, text
-from quizzes.answers import NOTHING, OPEN, Answer, is_complete
-from quizzes.bank import Matching, Multiple, Numeric, Option, Ordering, Predict, Single
-from quizzes.marks import Mark, Remark
-from quizzes.model import Item, Paper
+from quizzes.attempts.answers import NOTHING, OPEN, Answer, is_complete
+from quizzes.bank import selection
+from quizzes.bank.contents import Matching, Multiple, Numeric, Option, Ordering, Predict, Single
+from quizzes.bank.selection import Item, Paper
+from quizzes.marking import wording
+from quizzes.marking.marks import Mark, Remark
 
 
 @dataclass(frozen=True, repr=False)
@@ -51,10 +52,10 @@ class Result:
 
     def __repr__(self) -> str:
         """Return the outcome and the feedback to each answer as text."""
-        return text.of_result(self)
+        return wording.of_result(self)
 
     def _repr_markdown_(self) -> str:
-        return text.of_result(self)
+        return wording.of_result(self)
 
 
 def mark_paper(paper: Paper, answers: Mapping[str, Answer]) -> Result:
@@ -71,7 +72,7 @@ def mark_paper(paper: Paper, answers: Mapping[str, Answer]) -> Result:
 
 
 def mark_answer(item: Item, answer: Answer) -> Mark:
-    """Mark one answer in its saved form (see `quizzes.answers`).
+    """Mark one answer in its saved form (see `quizzes.attempts.answers`).
 
     One choice is right or wrong. Of several choices each right one earns its share and each wrong
     one loses as much, down to nothing. In an ordering each thing in its place earns its share, in
@@ -121,7 +122,7 @@ def _mark_multiple(item: Item, variant: Multiple, letters: str) -> Mark:
 
 
 def _mark_built(item: Item, variant: Ordering | Matching, letters: str) -> Mark:
-    wanted = str(model.right_answer(item))
+    wanted = str(selection.right_answer(item))
     given = letters or OPEN * len(wanted)
     share = sum(a == b for a, b in zip(given, wanted, strict=True)) / len(wanted)
     if share == 1.0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from quizzes.quiz_core import QuizCore
+from quizzes.taking.quiz_core import QuizCore
 
 if TYPE_CHECKING:
     from quizzes.widget import QuizWidget

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from quizzes.errors import QuizError
-from quizzes.marks import Mark
+from quizzes.marking.marks import Mark
 
 
 def of_mark(mark: Mark) -> str:

@@ -10,16 +10,19 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from quizzes import answers, demonstration, marking, model, regrade
-from quizzes.answers import Answer
-from quizzes.attempts import AttemptsFile
-from quizzes.bank import Bank
+from quizzes.attempts import answers
+from quizzes.attempts.answers import Answer
+from quizzes.attempts.record import Attempt, Given
+from quizzes.attempts.storage import AttemptsFile
+from quizzes.bank import selection
+from quizzes.bank.contents import Bank
+from quizzes.bank.selection import Item, Paper
 from quizzes.errors import AnswerError, QuizError, UnwritableError
-from quizzes.identity import current_login, validate_name
-from quizzes.marking import Result
-from quizzes.model import Item, Paper
-from quizzes.record import Attempt, Given
-from quizzes.text import QuestionText
+from quizzes.marking import regrade, scoring
+from quizzes.marking.scoring import Result
+from quizzes.marking.wording import QuestionText
+from quizzes.taking import demonstration
+from quizzes.taking.identity import current_login, validate_name
 
 Arguments = ParamSpec("Arguments")
 Back = TypeVar("Back")
@@ -106,7 +109,7 @@ class QuizCore:
 
     @property
     def counted(self) -> list[Attempt]:
-        """The attempts that count; what comes after them is practice (see `quizzes.regrade`)."""
+        """The attempts that count; what comes after is practice (see `quizzes.marking.regrade`)."""
         return [attempt for attempt in self.attempts if attempt.attempt <= self.bank.attempt_limit]
 
     @property
@@ -187,7 +190,7 @@ class QuizCore:
         if self.open_questions:
             numbers = " and ".join(map(str, self.open_questions))
             raise AnswerError(f"Not submitted yet: question {numbers} has no complete answer.")
-        result = marking.mark_paper(self._paper, self._answers)
+        result = scoring.mark_paper(self._paper, self._answers)
         attempt = self._make_record(result)
         try:
             self._file.append(attempt)
@@ -253,7 +256,7 @@ class QuizCore:
     # What is kept
 
     def _begin_attempt(self, number: int) -> None:
-        self._paper = model.draw(self.bank, self.student, number)
+        self._paper = selection.draw(self.bank, self.student, number)
         self._answers, self._result = {}, None
 
     def _next_number(self) -> int:

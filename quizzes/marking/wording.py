@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from quizzes import answers
-from quizzes.answers import Answer
-from quizzes.bank import Matching, Multiple, Numeric, Ordering
-from quizzes.marks import Mark
-from quizzes.model import LETTERS, Item, Paper
+from quizzes.attempts import answers
+from quizzes.attempts.answers import Answer
+from quizzes.bank.contents import Matching, Multiple, Numeric, Ordering
+from quizzes.bank.selection import LETTERS, Item, Paper
+from quizzes.marking.marks import Mark
 
 INSTRUCTIONS = {
     "single": "Choose one.",
@@ -22,7 +22,7 @@ INSTRUCTIONS = {
 
 
 class Marked(Protocol):
-    """What is read of a marked quiz: see `quizzes.marking.Result`."""
+    """What is read of a marked quiz: see `quizzes.marking.scoring.Result`."""
 
     @property
     def paper(self) -> Paper:

@@ -9,13 +9,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from quizzes import checks, faults, yaml_text
-from quizzes.bank import Bank
+from quizzes.bank import checks, faults, yaml_text
+from quizzes.bank.contents import Bank
+from quizzes.bank.fields import is_closed
+from quizzes.bank.yaml_text import Document
 from quizzes.errors import BankError, suggest_name
-from quizzes.fields import is_closed
-from quizzes.yaml_text import Document
 
-BANKS = Path(__file__).resolve().parent / "banks"
+BANKS = Path(__file__).resolve().parents[1] / "banks"
 """The folder of the banks that are installed with the package."""
 
 MAX_SIZE = 4 * 1024 * 1024

@@ -23,7 +23,7 @@ from pygments.formatters import HtmlFormatter
 from pygments.lexers import get_lexer_by_name
 from pygments.util import ClassNotFound
 
-from quizzes.mathml import LatexError, from_latex
+from quizzes.text.mathml import LatexError, from_latex
 
 IMAGES = {"image/svg+xml", "image/png", "image/jpeg", "image/gif", "image/webp"}
 MAX_IMAGE = 512 * 1024

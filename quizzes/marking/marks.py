@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from quizzes.answers import Answer
-from quizzes.model import Item
+from quizzes.attempts.answers import Answer
+from quizzes.bank.selection import Item
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from quizzes import rendering
-from quizzes.bank import MIN_VARIANTS
-from quizzes.faults import Problem, get_part
-from quizzes.fields import is_closed
-from quizzes.yaml_text import Place
+from quizzes.bank.contents import MIN_VARIANTS
+from quizzes.bank.faults import Problem, get_part
+from quizzes.bank.fields import is_closed
+from quizzes.bank.yaml_text import Place
+from quizzes.text import rendering
 
 _DEEPEST = 4
 """Levels at which a variant has texts; aliases can nest YAML without end."""

@@ -1,9 +1,9 @@
 """Lint for a bank: what makes a question easy to guess, unfair, or useless as a lesson.
 
-The schema (`quizzes.bank`) refuses what cannot work. This finds what works and is still bad: keys
-that give themselves away by length or place, options that teach nothing, stems that ask two things.
-The rules follow Haladyna, Downing and Rodriguez, "A Review of Multiple-Choice Item-Writing
-Guidelines", Applied Measurement in Education 15 (2002).
+The schema (`quizzes.bank.contents`) refuses what cannot work. This finds what works and is still
+bad: keys that give themselves away by length or place, options that teach nothing, stems that ask
+two things. The rules follow Haladyna, Downing and Rodriguez, "A Review of Multiple-Choice
+Item-Writing Guidelines", Applied Measurement in Education 15 (2002).
 """
 
 from __future__ import annotations
@@ -13,8 +13,17 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from quizzes import model
-from quizzes.bank import Bank, Matching, Multiple, Numeric, Ordering, Predict, Single, Variant
+from quizzes.bank import selection
+from quizzes.bank.contents import (
+    Bank,
+    Matching,
+    Multiple,
+    Numeric,
+    Ordering,
+    Predict,
+    Single,
+    Variant,
+)
 
 LENGTH_RATIO = 2.0
 """How many times as long as the shortest option the longest may be."""
@@ -241,7 +250,7 @@ def _of_key_places(bank: Bank) -> Iterator[Finding]:
                 yield Finding(bank.quiz, "options", problem)
     dealt: defaultdict[int, Counter[int]] = defaultdict(Counter)
     for learner in range(LEARNERS):
-        for item in model.draw(bank, f"learner {learner}", 1 + learner % 3).items:
+        for item in selection.draw(bank, f"learner {learner}", 1 + learner % 3).items:
             if isinstance(item.variant, Single | Predict):
                 [key] = item.variant.right_positions
                 dealt[len(item.order)][item.order.index(key)] += 1

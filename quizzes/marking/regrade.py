@@ -19,12 +19,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
-from quizzes import answers, marking, model, record
-from quizzes.answers import Answer
-from quizzes.bank import Bank
+from quizzes.attempts import answers, record
+from quizzes.attempts.answers import Answer
+from quizzes.attempts.record import Attempt
+from quizzes.bank import selection
+from quizzes.bank.contents import Bank
 from quizzes.errors import AnswerError
-from quizzes.marking import Result
-from quizzes.record import Attempt
+from quizzes.marking import scoring
+from quizzes.marking.scoring import Result
 
 HASTE, WITHIN = 5, 60.0
 """More attempts than `HASTE` within so many seconds are not made by hand."""
@@ -123,7 +125,7 @@ def mark_again(bank: Bank, attempt: Attempt) -> Result | None:
     """Mark an attempt again; None if this edition of the bank could not have dealt it."""
     if (attempt.quiz, attempt.edition) != (bank.quiz, bank.edition):
         return None
-    paper = model.draw(bank, attempt.student, attempt.attempt)
+    paper = selection.draw(bank, attempt.student, attempt.attempt)
     if not attempt.answers.keys() <= {item.concept.id for item in paper.items}:
         return None
     given: dict[str, Answer] = {}
@@ -135,7 +137,7 @@ def mark_again(bank: Bank, attempt: Attempt) -> Result | None:
             given[item.concept.id] = answers.normalize_answer(item, saved.answer)
         except AnswerError:
             return None
-    return marking.mark_paper(paper, given)
+    return scoring.mark_paper(paper, given)
 
 
 def refresh_score(bank: Bank, attempt: Attempt) -> Attempt:

@@ -9,20 +9,20 @@ from collections import Counter
 
 import pytest
 
-from quizzes import model
-from quizzes.bank import Bank
+from quizzes.bank import selection
+from quizzes.bank.contents import Bank
 
 STUDENTS = [f"student-{number}" for number in range(200)]
 
 
 def test_the_same_student_and_attempt_is_dealt_the_same_quiz(bank: Bank) -> None:
-    assert model.draw(bank, "ada", 3) == model.draw(bank, "ada", 3)
+    assert selection.draw(bank, "ada", 3) == selection.draw(bank, "ada", 3)
 
 
 def test_the_deal_is_the_same_on_every_machine_and_python(bank: Bank) -> None:
     """Fixed for good: saved answers are letters, and mean nothing under another deal."""
     dealt = [
-        [(item.variant.id, item.order) for item in model.draw(bank, "ada", attempt).items]
+        [(item.variant.id, item.order) for item in selection.draw(bank, "ada", attempt).items]
         for attempt in (1, 2)
     ]
     assert dealt == DEALT
@@ -48,9 +48,9 @@ DEALT: list[list[tuple[str, tuple[int, ...]]]] = [
 
 def test_the_deal_does_not_depend_on_the_hash_seed(bank: Bank) -> None:
     code = (
-        "import sys; from pathlib import Path; from quizzes import model\n"
-        "from quizzes.loader import read_bank\n"
-        "paper = model.draw(read_bank(Path(sys.argv[1])), 'ada', 1)\n"
+        "import sys; from pathlib import Path; from quizzes.bank import selection\n"
+        "from quizzes.bank.loader import read_bank\n"
+        "paper = selection.draw(read_bank(Path(sys.argv[1])), 'ada', 1)\n"
         "print([(item.variant.id, item.order) for item in paper.items])"
     )
     path = bank.folder / "sample.yaml"
@@ -66,7 +66,7 @@ def test_the_deal_does_not_depend_on_the_hash_seed(bank: Bank) -> None:
 
 def test_a_retry_asks_other_questions_until_all_have_been_asked(bank: Bank) -> None:
     for student in STUDENTS:
-        papers = [model.draw(bank, student, attempt) for attempt in range(1, 25)]
+        papers = [selection.draw(bank, student, attempt) for attempt in range(1, 25)]
         for place in range(len(bank.concepts)):
             asked = [paper.items[place].variant.id for paper in papers]
             assert all(a != b for a, b in itertools.pairwise(asked)), asked
@@ -78,9 +78,9 @@ def test_each_variant_and_each_place_of_the_key_is_as_likely(bank: Bank) -> None
     variants: Counter[str] = Counter()
     keys: Counter[str] = Counter()
     for student in STUDENTS:
-        item = model.draw(bank, student, 1).items[0]
+        item = selection.draw(bank, student, 1).items[0]
         variants[item.variant.id] += 1
-        keys[str(model.right_answer(item))] += 1
+        keys[str(selection.right_answer(item))] += 1
     for counter in (variants, keys):
         assert len(counter) == 4
         assert min(counter.values()) > 200 / 4 * 0.6, counter
@@ -88,15 +88,15 @@ def test_each_variant_and_each_place_of_the_key_is_as_likely(bank: Bank) -> None
 
 def test_an_ordering_is_never_shown_in_the_right_order(bank: Bank) -> None:
     for student in STUDENTS:
-        item = model.draw(bank, student, 1).find_item("ordering")
+        item = selection.draw(bank, student, 1).find_item("ordering")
         assert item is not None
-        assert model.right_answer(item) != item.letters
+        assert selection.right_answer(item) != item.letters
 
 
 @pytest.mark.parametrize("attempt", [1, 2, 3, 4])
 def test_keys_are_in_terms_of_what_is_shown(bank: Bank, attempt: int) -> None:
-    for item in model.draw(bank, "ada", attempt).items:
-        key = model.right_answer(item)
+    for item in selection.draw(bank, "ada", attempt).items:
+        key = selection.right_answer(item)
         if item.concept.id == "predict":
             assert "gamma" in item.text_of(str(key))
         elif item.concept.id == "multiple":

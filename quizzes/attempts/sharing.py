@@ -11,9 +11,9 @@ import json
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 
-from quizzes import record
-from quizzes.answers import Answer, parse_number
-from quizzes.record import Attempt
+from quizzes.attempts import record
+from quizzes.attempts.answers import Answer, parse_number
+from quizzes.attempts.record import Attempt
 
 CANNOT_KNOW = (
     "A quiz knows what was answered, and under which login. It cannot know who answered, who "

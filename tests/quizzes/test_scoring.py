@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from quizzes import marking, model
-from quizzes.answers import Answer
-from quizzes.bank import Bank, Multiple
-from quizzes.marks import Mark
-from quizzes.model import Item
+from quizzes.attempts.answers import Answer
+from quizzes.bank import selection
+from quizzes.bank.contents import Bank, Multiple
+from quizzes.bank.selection import Item
+from quizzes.marking import scoring
+from quizzes.marking.marks import Mark
 
 from . import sample
 from .conftest import MakeQuiz, answer_all, wrong
@@ -16,21 +17,21 @@ from .conftest import MakeQuiz, answer_all, wrong
 
 @pytest.fixture
 def items(bank: Bank) -> dict[str, Item]:
-    return {item.concept.id: item for item in model.draw(bank, "ada", 1).items}
+    return {item.concept.id: item for item in selection.draw(bank, "ada", 1).items}
 
 
 def swapped(item: Item) -> str:
     """Return the key with its first two letters in each other's place."""
-    key = str(model.right_answer(item))
+    key = str(selection.right_answer(item))
     return key[1] + key[0] + key[2:]
 
 
 def multiple(items: dict[str, Item], right: int, wrong: int) -> Mark:
     item = items["multiple"]
     assert isinstance(item.variant, Multiple)
-    key = str(model.right_answer(item))
+    key = str(selection.right_answer(item))
     others = [letter for letter in item.letters if letter not in key]
-    return marking.mark_answer(item, "".join(sorted([*key[:right], *others[:wrong]])))
+    return scoring.mark_answer(item, "".join(sorted([*key[:right], *others[:wrong]])))
 
 
 @pytest.mark.parametrize("kind", sample.KINDS)
@@ -38,17 +39,17 @@ def test_the_key_earns_everything_and_a_wrong_answer_nothing(
     items: dict[str, Item], kind: str
 ) -> None:
     item = items[kind]
-    right = marking.mark_answer(item, model.right_answer(item))
+    right = scoring.mark_answer(item, selection.right_answer(item))
     assert (right.credit, right.is_right, right.misconceptions) == (1.0, True, ())
     assert all(remark.right for remark in right.remarks)
-    failed = marking.mark_answer(item, wrong(item))
+    failed = scoring.mark_answer(item, wrong(item))
     assert (failed.credit, failed.is_right) == (0.0, False)
     assert all(remark.feedback for remark in failed.remarks)
 
 
 @pytest.mark.parametrize("kind", sample.KINDS)
 def test_no_answer_earns_nothing_and_shows_no_belief(items: dict[str, Item], kind: str) -> None:
-    mark = marking.mark_answer(items[kind], "")
+    mark = scoring.mark_answer(items[kind], "")
     assert mark.credit == 0.0
     assert kind == "matching" or mark.misconceptions == ()
 
@@ -64,25 +65,25 @@ def test_several_choices(items: dict[str, Item], right: int, wrong_: int, credit
 
 
 def test_a_choice_shows_the_belief_behind_it(items: dict[str, Item]) -> None:
-    mark = marking.mark_answer(items["predict"], wrong(items["predict"]))
+    mark = scoring.mark_answer(items["predict"], wrong(items["predict"]))
     assert mark.misconceptions == (sample.BELIEF,)
     assert mark.remarks[0].show
 
 
 def test_a_number_is_right_within_the_tolerance_and_traps_are_known(bank: Bank) -> None:
-    (item,) = (i for i in model.draw(bank, "ada", 1).items if i.concept.id == "numeric")
-    key = float(model.right_answer(item))
+    (item,) = (i for i in selection.draw(bank, "ada", 1).items if i.concept.id == "numeric")
+    key = float(selection.right_answer(item))
     for number, credit in ((key + 0.1, 1.0), (key - 0.1, 1.0), (key + 0.11, 0.0)):
-        assert marking.mark_answer(item, number).credit == credit
-    trap = marking.mark_answer(item, 100.3)
+        assert scoring.mark_answer(item, number).credit == credit
+    trap = scoring.mark_answer(item, 100.3)
     assert trap.misconceptions == (sample.BELIEF,)
     assert "rate" in trap.remarks[0].feedback
-    assert marking.mark_answer(item, 77.0).misconceptions == ()
+    assert scoring.mark_answer(item, 77.0).misconceptions == ()
 
 
 @pytest.mark.parametrize(("kind", "credit"), [("ordering", 0.5), ("matching", 1 / 3)])
 def test_a_built_answer_earns_its_share(items: dict[str, Item], kind: str, credit: float) -> None:
-    mark = marking.mark_answer(items[kind], swapped(items[kind]))
+    mark = scoring.mark_answer(items[kind], swapped(items[kind]))
     assert mark.credit == pytest.approx(credit)
     assert mark.misconceptions == (sample.BELIEF,)
 

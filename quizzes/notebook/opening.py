@@ -10,9 +10,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from quizzes import closing, loader
+from quizzes.bank import loader
 from quizzes.errors import QuizError
-from quizzes.quiz import Quiz
+from quizzes.marking import closing
+from quizzes.notebook.quiz import Quiz
 
 
 def load(

@@ -13,9 +13,9 @@ from collections.abc import Set as AnySet
 from numbers import Real
 from typing import Any
 
-from quizzes.bank import Matching, Multiple, Numeric, Ordering
+from quizzes.bank.contents import Matching, Multiple, Numeric, Ordering
+from quizzes.bank.selection import Item
 from quizzes.errors import AnswerError
-from quizzes.model import Item
 
 Answer = str | float
 

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from quizzes.answers import Answer, parse_number
+from quizzes.attempts.answers import Answer, parse_number
 
 VERSION = 1
 MAX_LINE = 64 * 1024
@@ -35,8 +35,9 @@ class Given:
 class Attempt:
     """One submitted attempt.
 
-    ``edition`` is the bank's (`quizzes.bank.Bank.edition`), ``submitted`` the UTC time in ISO 8601,
-    ``answers`` is by concept. ``score``, ``right`` and ``passed`` are as marked at that time.
+    ``edition`` is the bank's (`quizzes.bank.contents.Bank.edition`), ``submitted`` the UTC time in
+    ISO 8601, ``answers`` is by concept. ``score``, ``right`` and ``passed`` are as marked at that
+    time.
     """
 
     quiz: str

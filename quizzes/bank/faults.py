@@ -11,10 +11,10 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
-from quizzes.bank import Bank, Concept, Option, Pair, Trap, Variant
+from quizzes.bank.contents import Bank, Concept, Option, Pair, Trap, Variant
+from quizzes.bank.fields import FieldError, validating_bank
+from quizzes.bank.yaml_text import Document, Place
 from quizzes.errors import suggest_name
-from quizzes.fields import FieldError, validating_bank
-from quizzes.yaml_text import Document, Place
 
 KINDS: dict[str, type[BaseModel]] = {
     get_args(model.model_fields["kind"].annotation)[0]: model

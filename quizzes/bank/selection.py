@@ -11,7 +11,7 @@ import string
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from quizzes.bank import Bank, Concept, Matching, Numeric, Ordering, Variant
+from quizzes.bank.contents import Bank, Concept, Matching, Numeric, Ordering, Variant
 
 LETTERS = string.ascii_lowercase
 
@@ -20,8 +20,8 @@ LETTERS = string.ascii_lowercase
 class Item:
     """One question as a learner sees it.
 
-    ``order`` says which of the variant's texts (see ``texts`` in `quizzes.bank`) each letter
-    stands for: the letter at position 0 is "a".
+    ``order`` says which of the variant's texts (see ``texts`` in `quizzes.bank.contents`) each
+    letter stands for: the letter at position 0 is "a".
     """
 
     number: int

@@ -2,7 +2,7 @@
 
 A line is added whole and synced, under a lock, so that neither a crash nor a second tab can spoil
 or lose one. What cannot be read is kept aside, never thrown away. Scores in the file are for
-people to read; whoever needs to know marks the answers again (see `quizzes.regrade`).
+people to read; whoever needs to know marks the answers again (see `quizzes.marking.regrade`).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
+from quizzes.attempts.record import MAX_FILE, Attempt, attempts_filename, parse_attempts
 from quizzes.errors import AttemptsError, UnwritableError
-from quizzes.record import MAX_FILE, Attempt, attempts_filename, parse_attempts
 
 LOCK_TIMEOUT = 10.0
 """Seconds to wait for another tab that is writing; it needs milliseconds."""

@@ -14,16 +14,16 @@ from pathlib import Path
 
 import pytest
 
-from quizzes.attempts import AttemptsFile
+from quizzes.attempts.record import Attempt, Given, parse_attempts
+from quizzes.attempts.storage import AttemptsFile
 from quizzes.errors import AttemptsError, UnwritableError
-from quizzes.record import Attempt, Given, parse_attempts
 
 WRITER = """
 import sys
 from pathlib import Path
-from quizzes.attempts import AttemptsFile
+from quizzes.attempts.storage import AttemptsFile
 from quizzes.errors import AttemptsError
-from quizzes.record import Attempt, Given
+from quizzes.attempts.record import Attempt, Given
 
 folder, student, first, last = sys.argv[1:]
 file = AttemptsFile(Path(folder), "sample")

@@ -1,7 +1,8 @@
 """What a bank holds: a quiz of concepts, each with variants that can stand in for one another.
 
-The classes are the schema of ``banks/NAME.yaml`` (see `quizzes.loader`, which reads it). Texts are
-Markdown: fenced code, ``$LaTeX$``, and images ``![alt](assets/NAME.svg)`` beside the bank.
+The classes are the schema of ``banks/NAME.yaml`` (see `quizzes.bank.loader`, which reads it).
+Texts are Markdown: fenced code, ``$LaTeX$``, and images ``![alt](assets/NAME.svg)`` beside the
+bank.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
-from quizzes import fields
-from quizzes.fields import Code, Finite, Id, Part, Proofs, Text, ToTeach
+from quizzes.bank import fields
+from quizzes.bank.fields import Code, Finite, Id, Part, Proofs, Text, ToTeach
 
 MIN_VARIANTS = 4
 """Variants a concept of a teaching bank has at least: with fewer, a retry is too soon the same."""
@@ -24,7 +25,7 @@ COUNTED = 20
 """How many attempts of a quiz count unless its bank says it; later ones are practice."""
 
 DEAL = 2
-"""How `quizzes.model` deals letters: answers saved under another number mean nothing."""
+"""How `quizzes.bank.selection` deals letters: answers saved under another number mean nothing."""
 
 
 class Option(Part):
@@ -290,7 +291,7 @@ class Bank(Part):
     """A quiz: its concepts in order, one question of each to every learner.
 
     A ``closed`` quiz is marked by the instructor alone: learners get it ``keyless``, without keys
-    and feedback (see `quizzes.closing`), and hand their answers in.
+    and feedback (see `quizzes.marking.closing`), and hand their answers in.
     """
 
     quiz: Id

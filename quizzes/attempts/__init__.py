@@ -1,0 +1,1 @@
+"""What learners answer: the form of an answer, and the attempts that are kept in files."""

@@ -1,0 +1,1 @@
+"""A quiz in a notebook: opened by its name, shown as a widget."""

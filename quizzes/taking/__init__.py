@@ -1,0 +1,1 @@
+"""A quiz as a learner takes it: answer, submit, see what was right, try another one."""

@@ -1,0 +1,1 @@
+"""The Markdown and the LaTeX of a bank as HTML that needs nothing else."""
