@@ -6,7 +6,7 @@ It needs nothing but the pages of feedback beside it: no script, no style, no re
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -19,20 +19,30 @@ from autograder.gradebook.feedback import sheets
 from autograder.gradebook.feedback.feedback_page import INDEX
 from autograder.gradebook.feedback.sheets import Exercise, Line, Sheet
 from autograder.util.files import write_whole
+from autograder.html_pages import fill_template
 
-_STYLE = """
-:root { color-scheme: light dark; }
-body { font: 1rem/1.5 system-ui, sans-serif; max-width: 48rem; margin: 2rem auto; padding: 0 1rem; }
-table { border-collapse: collapse; width: 100%; margin: 1rem 0; }
-th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid #8888;
-  vertical-align: top; overflow-wrap: anywhere; font-weight: normal; }
-thead th, tfoot th, tfoot td, .exercise th, .exercise td { font-weight: 600; }
-tbody th { padding-left: 1.6rem; }
-.exercise th { padding-left: .6rem; }
-td { white-space: nowrap; }
-.waits { font-style: italic; }
-.late { font-weight: 600; }
-"""
+_TEMPLATE = Path(__file__).with_name("index_page.html.jinja")
+
+
+@dataclass(frozen=True)
+class Row:
+    """A graded cell: its title, where it stands in the feedback, and what is said of it."""
+
+    title: str
+    link: str
+    said: str
+    waits: bool
+
+
+@dataclass(frozen=True)
+class Part:
+    """An exercise, the rows of its cells, and what lateness takes off, if anything."""
+
+    title: str
+    link: str
+    said: str
+    rows: list[Row]
+    penalty: str
 
 
 class IndexPages:
@@ -74,46 +84,29 @@ def write_page(coursedir: CourseDirectory, assignment: str, student: str, folder
 
 def render_page(sheet: Sheet) -> str:
     """Return a sheet as one HTML page."""
-    title = f"{sheet.assignment}: feedback for {sheet.name}"
-    body = "".join(_exercise_rows(exercise) for exercise in sheet.exercises)
-    late = f'<p class="late">{escape(sheet.late_sentence)}</p>' if sheet.late_sentence else ""
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta http-equiv="Content-Security-Policy" '
-        "content=\"default-src 'none'; style-src 'unsafe-inline'\">"
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n"
-        f"<body><main><h1>{escape(title)}</h1>"
-        f"<p><strong>{escape(sheet.score_sentence)}</strong></p>{late}{_handed_in(sheet)}"
-        '<table><thead><tr><th scope="col">Exercise</th><th scope="col">Points</th></tr></thead>'
-        f"<tbody>{body}</tbody></table></main></body></html>\n"
+    return fill_template(
+        _TEMPLATE,
+        title=f"{sheet.assignment}: feedback for {sheet.name}",
+        sheet=sheet,
+        handed_in=f"{sheet.handed_in:%Y-%m-%d at %H:%M}" if sheet.handed_in else "",
+        parts=[_show_exercise(exercise) for exercise in sheet.exercises],
     )
 
 
-def _exercise_rows(exercise: Exercise) -> str:
+def _show_exercise(exercise: Exercise) -> Part:
     link = quote(f"{exercise.notebook}.html")
-    penalty = f"<tr><th>Late</th><td>-{exercise.penalty:g}</td></tr>" if exercise.penalty else ""
-    return (
-        f'<tr class="exercise"><th scope="row"><a href="{link}">{escape(exercise.title)}</a></th>'
-        f"<td>{exercise.score:g} of {exercise.max_score:g}</td></tr>"
-        + "".join(_line_row(line, link) for line in exercise.lines)
-        + penalty
+    return Part(
+        exercise.title,
+        link,
+        f"{exercise.score:g} of {exercise.max_score:g}",
+        [_show_line(line, link) for line in exercise.lines],
+        f"{exercise.penalty:g}" if exercise.penalty else "",
     )
 
 
-def _line_row(line: Line, link: str) -> str:
-    kind = ' class="waits"' if line.waits else ""
-    comment = ", with a comment" if line.comment else ""
-    return (
-        f'<tr><th scope="row"><a href="{link}#{quote(line.grade_id)}">{escape(line.title)}</a></th>'
-        f"<td{kind}>{escape(line.said)}{comment}</td></tr>"
-    )
-
-
-def _handed_in(sheet: Sheet) -> str:
-    if sheet.handed_in is None:
-        return ""
-    return f"<p>Handed in on {sheet.handed_in:%Y-%m-%d at %H:%M} UTC.</p>"
+def _show_line(line: Line, link: str) -> Row:
+    said = f"{line.said}, with a comment" if line.comment else line.said
+    return Row(line.title, f"{link}#{quote(line.grade_id)}", said, line.waits)
 
 
 def configure_feedback(config: Config) -> None:
