@@ -5,30 +5,29 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Sequence
-from html import escape
+from dataclasses import dataclass
 from pathlib import Path
+
+from markupsafe import Markup
 
 from quizzes.attempts.sharing import CANNOT_KNOW
 from quizzes.errors import QuizError
+from quizzes.html_pages import fill_template
 from quizzes.insight import plots
 from quizzes.insight.analysis import FEW, Analysis, ItemFigures
 
 ITEM_COLUMNS = ("item", "kind", "learners", "difficulty", "discrimination", "advice")
 BELIEF_COLUMNS = ("misconception", "belief", "holders", "met", "share")
 
-_STYLE = """
-:root { color-scheme: light dark; }
-body { font: 1rem/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }
-figure { margin: 1rem 0; background: #fff; color: #000; border-radius: .4rem; padding: .5rem; }
-figure svg { width: 100%; height: auto; }
-table { border-collapse: collapse; width: 100%; }
-th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid #8888; }
-td.number { text-align: right; font-variant-numeric: tabular-nums; }
-th { font-weight: normal; white-space: nowrap; }
-thead th, tr.concept > * { font-weight: 600; }
-caption { text-align: left; padding: .4rem .6rem; }
-.scroll { overflow-x: auto; }
-"""
+_TEMPLATE = Path(__file__).with_name("report.html.jinja")
+
+
+@dataclass(frozen=True)
+class Plot:
+    """A plot and its caption; ``drawing`` is what follows its ``<svg``, which the page begins."""
+
+    drawing: Markup
+    caption: str
 
 
 class ReportError(QuizError):
@@ -82,82 +81,46 @@ def belief_rows(analysis: Analysis) -> list[tuple[str, ...]]:
 
 def render_page(analysis: Analysis) -> str:
     """Return the report as one HTML page."""
-    bank, learners = analysis.bank, analysis.learners
-    parts = [
-        f"<h1>{escape(bank.title)}</h1>",
-        f"<p>{escape(bank.chapter)}. First attempts of {learners} "
-        f"{'learner' if learners == 1 else 'learners'}; {analysis.passed} passed "
-        f"({escape(bank.pass_text)}).</p>",
-    ]
-    if learners < FEW:
-        few = f"With fewer than {FEW} learners these figures say little."
-        parts.append(f"<p><strong>{few}</strong></p>")
-    if learners:
-        parts.append(
-            _render_figure(plots.plot_scores(analysis), "How many learners have which score.")
-        )
-    parts += ["<h2>Questions</h2>", _EXPLAINED]
-    if any(v.discrimination is not None for v in analysis.variants):
-        caption = "Each mark is a variant, numbered within its concept; the table has the figures."
-        parts.append(_render_figure(plots.plot_items(analysis), caption))
-    parts.append(_render_table("Figures of each concept and of its variants", ITEM_COLUMNS,
-                        item_rows(analysis), numbers=(2, 3, 4)))  # fmt: skip
-    parts += _render_beliefs(analysis) if analysis.beliefs else []
-    if analysis.notes:
-        items = "".join(f"<li>{escape(note)}</li>" for note in analysis.notes)
-        parts.append(f"<h2>Notes</h2><ul>{items}</ul>")
-    parts.append(f"<h2>What a quiz cannot know</h2><p>{escape(CANNOT_KNOW)}</p>")
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(bank.title)}</title><style>{_STYLE}</style></head>\n"
-        f"<body><main>{''.join(parts)}</main></body></html>\n"
+    return fill_template(
+        _TEMPLATE,
+        bank=analysis.bank,
+        learners=analysis.learners,
+        passed=analysis.passed,
+        too_few=FEW if analysis.learners < FEW else 0,
+        scores=_plot_scores(analysis),
+        items=_plot_items(analysis),
+        item_columns=ITEM_COLUMNS,
+        item_rows=item_rows(analysis),
+        beliefs=_plot_beliefs(analysis),
+        belief_columns=BELIEF_COLUMNS,
+        belief_rows=belief_rows(analysis),
+        notes=analysis.notes,
+        cannot_know=CANNOT_KNOW,
     )
 
 
-def _render_beliefs(analysis: Analysis) -> list[str]:
-    parts = ["<h2>What the class believes</h2>"]
-    if drawn := plots.plot_beliefs(analysis):
-        caption = "The most common misconceptions among those whom a question tempted with them."
-        parts.append(_render_figure(drawn, caption))
-    parts.append(_render_table("All misconceptions of the bank", BELIEF_COLUMNS,
-                        belief_rows(analysis), numbers=(2, 3, 4)))  # fmt: skip
-    return parts
+def _plot_scores(analysis: Analysis) -> Plot | None:
+    if not analysis.learners:
+        return None
+    return _caption_plot(plots.plot_scores(analysis), "How many learners have which score.")
 
 
-_EXPLAINED = (
-    "<p><em>Difficulty</em> is the mean credit, from 0 (nobody) to 1 (everybody). "
-    "<em>Discrimination</em> is the correlation of the credit with the score on the other "
-    "questions: above 0.3 a question tells well who knows, near 0 it does not, and below 0 "
-    "something is wrong with it. Learners get one variant of each concept, so a variant has "
-    "fewer learners than its concept.</p>"
-)
+def _plot_items(analysis: Analysis) -> Plot | None:
+    if all(variant.discrimination is None for variant in analysis.variants):
+        return None
+    caption = "Each mark is a variant, numbered within its concept; the table has the figures."
+    return _caption_plot(plots.plot_items(analysis), caption)
 
 
-def _render_figure(svg: str, caption: str) -> str:
-    described = svg.replace("<svg", f'<svg role="img" aria-label="{escape(caption)}"', 1)
-    return f"<figure>{described}<figcaption>{escape(caption)}</figcaption></figure>"
+def _plot_beliefs(analysis: Analysis) -> Plot | None:
+    drawn = plots.plot_beliefs(analysis) if analysis.beliefs else ""
+    caption = "The most common misconceptions among those whom a question tempted with them."
+    return _caption_plot(drawn, caption) if drawn else None
 
 
-def _render_table(
-    caption: str, columns: Sequence[str], rows: Iterable[Sequence[str]], numbers: Sequence[int]
-) -> str:
-    head = "".join(f'<th scope="col">{escape(column)}</th>' for column in columns)
-    body = "".join(_render_row(row, numbers) for row in rows)
-    return (
-        f'<div class="scroll"><table><caption>{escape(caption)}</caption>'
-        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>"
-    )
-
-
-def _render_row(row: Sequence[str], numbers: Sequence[int]) -> str:
-    cells = "".join(
-        f'<td class="{"number" if place in numbers else "text"}">{escape(value)}</td>'
-        for place, value in enumerate(row)
-        if place
-    )
-    kind = ' class="concept"' if row[1] == "concept" else ""
-    return f'<tr{kind}><th scope="row">{escape(row[0])}</th>{cells}</tr>'
+def _caption_plot(svg: str, caption: str) -> Plot:
+    # It is safe as it is: matplotlib has escaped every text that it has drawn.
+    return Plot(Markup(svg.removeprefix("<svg")), caption)
 
 
 def _item_row(figures: ItemFigures) -> tuple[str, ...]:
