@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import csv
+import hashlib
 import io
+import re
 import unicodedata
 from collections.abc import Callable
 from pathlib import Path
@@ -226,6 +229,9 @@ def test_the_page_has_the_model_answer_and_shows_answers_as_text() -> None:
     shown = Text(html)
     assert html.count("<script") == 2, "the page's data and its own script"
     assert len(shown.loads) == 2
+    [script] = re.findall("<script>(.*?)</script>", html, re.DOTALL)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in html, "a browser runs what has this digest"
     for part in ("Who re-sends it?", "Nobody: best effort .", "Half a point if.", "*x*",
                  "Marked with 0.5 before"):  # fmt: skip
         assert part in shown.text
