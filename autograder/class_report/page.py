@@ -19,8 +19,8 @@ from autograder.class_report.feedback import Group
 from autograder.class_report.figures import FEW, CheckFigures
 from autograder.class_report.means import Mean
 from autograder.class_report.similarity import MOST_PAIRS, Pair, side_by_side
-from autograder.html_pages import fill_template
 from course.messages.yaml_text import format_count
+from quizzes.text.html_pages import fill_template
 
 CHECK_COLUMNS = (
     "check", "points", "passed", "failed", "not checked", "not handed in", "grader error", "n",

@@ -12,9 +12,9 @@ from markupsafe import Markup
 
 from quizzes.attempts.sharing import CANNOT_KNOW
 from quizzes.errors import QuizError
-from quizzes.html_pages import fill_template
 from quizzes.insight import plots
 from quizzes.insight.analysis import FEW, Analysis, ItemFigures
+from quizzes.text.html_pages import fill_template
 
 ITEM_COLUMNS = ("item", "kind", "learners", "difficulty", "discrimination", "advice")
 BELIEF_COLUMNS = ("misconception", "belief", "holders", "met", "share")
@@ -83,6 +83,7 @@ def render_page(analysis: Analysis) -> str:
     """Return the report as one HTML page."""
     return fill_template(
         _TEMPLATE,
+        title=analysis.bank.title,
         bank=analysis.bank,
         learners=analysis.learners,
         passed=analysis.passed,

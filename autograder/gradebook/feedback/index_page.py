@@ -19,7 +19,7 @@ from autograder.gradebook.feedback import sheets
 from autograder.gradebook.feedback.feedback_page import INDEX
 from autograder.gradebook.feedback.sheets import Exercise, Line, Sheet
 from autograder.util.files import write_whole
-from autograder.html_pages import fill_template
+from quizzes.text.html_pages import fill_template
 
 _TEMPLATE = Path(__file__).with_name("index_page.html.jinja")
 

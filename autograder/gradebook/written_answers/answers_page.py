@@ -16,10 +16,10 @@ from typing import Any
 from markupsafe import Markup
 
 from autograder.assignments.questions import Question
-from autograder.html_pages import fill_template
 from autograder.gradebook.written_answers.answers import COLUMNS, Answer, Answers
 from course.messages.yaml_text import format_count
 from quizzes.text import rendering
+from quizzes.text.html_pages import fill_template
 
 _TEMPLATE = Path(__file__).with_name("answers_page.html.jinja")
 _SCRIPT = Path(__file__).with_name("answers_page.js")

@@ -8,7 +8,7 @@ from pathlib import Path
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 _SHARED = Path(__file__).with_name("templates")
-"""What the pages of all rooms extend."""
+"""What pages extend, and what several of them show."""
 
 
 def fill_template(template: Path, **shown: object) -> str:
