@@ -46,8 +46,8 @@ class Plot:
 
 
 @dataclass(frozen=True)
-class Told:
-    """A plot, and what is said beside it."""
+class Summary:
+    """A sentence on figures, and their plot."""
 
     said: str
     plot: Plot
@@ -123,20 +123,20 @@ def render_page(report: ClassReport) -> str:
     return fill_template(
         _TEMPLATE,
         title=f"{report.data.assignment}: class report",
-        scores=_tell_scores(report),
+        scores=_summarise_scores(report),
         needs=[(need, _list_names(report, need.students)) for need in report.needs],
         missing=list(_find_missing(report)),
         means=list(_tabulate_means(report)),
         checks=list(_tabulate_checks(report)),
         too_few=FEW if report.examined_count < FEW else 0,
         feedback=_list_feedback(report),
-        times=_tell_times(report),
+        times=_summarise_times(report),
         alike=_show_alike(report),
         notes=report.notes,
     )
 
 
-def _tell_scores(report: ClassReport) -> Told:
+def _summarise_scores(report: ClassReport) -> Summary:
     grades, most = report.data.grades, report.data.max_score
     waiting = sum(grade.needs_manual_grade for grade in grades)
     said = (
@@ -149,7 +149,7 @@ def _tell_scores(report: ClassReport) -> Told:
             "person: points that are not given yet count as 0 here."
         )
     drawn = plots.plot_scores([grade.score for grade in grades], most)
-    return Told(said, _caption_plot(drawn, "How many students have how many points."))
+    return Summary(said, _caption_plot(drawn, "How many students have how many points."))
 
 
 def _find_missing(report: ClassReport) -> Iterator[tuple[str, Names]]:
@@ -227,7 +227,7 @@ def _list_feedback(report: ClassReport) -> Feedback:
     return Feedback(caption, [(group, _list_names(report, group.students)) for group in shown])
 
 
-def _tell_times(report: ClassReport) -> Told | None:
+def _summarise_times(report: ClassReport) -> Summary | None:
     seconds = report.times.seconds
     if not seconds:
         return None
@@ -240,7 +240,7 @@ def _tell_times(report: ClassReport) -> Told | None:
         f"{sum(seconds.values()) / 60:.1f} min one after another. The slowest: {slowest}."
     )
     drawn = plots.plot_times(list(seconds.values()))
-    return Told(said, _caption_plot(drawn, "How long the submissions took to run."))
+    return Summary(said, _caption_plot(drawn, "How long the submissions took to run."))
 
 
 def _show_alike(report: ClassReport) -> Alike:
