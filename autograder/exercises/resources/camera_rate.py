@@ -125,17 +125,17 @@ def let_arrive(rig: CameraRig, device: str) -> None:
     Not for long: a thread may read all the time, and publish just some of what it reads.
     """
 
-    def unpublished() -> int:
-        return asked() - len(rig.get_pictures(device))
-
-    def asked() -> int:
+    def count_read() -> int:
         return max(rig.open_cameras(device), default=0)
 
-    before = unpublished()
+    def count_unpublished() -> int:
+        return count_read() - len(rig.get_pictures(device))
+
+    before = count_unpublished()
 
     def newest_is_here() -> bool:
         newest = [picture.number for picture in rig.get_pictures(device)[-1:]]
-        return newest >= [asked() - 1] or unpublished() - before >= UNPUBLISHED
+        return newest >= [count_read() - 1] or count_unpublished() - before >= UNPUBLISHED
 
     rig.start_patience(ARRIVES_ASLEEP, ARRIVES).wait(rig.session, newest_is_here)
 

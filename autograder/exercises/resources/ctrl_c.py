@@ -42,9 +42,9 @@ class Lives:
     later; ``others`` tells of processes that were left then.
     ``pace`` tells of pictures that do not come ten times a second, ``harmed`` of what a second
     destroy_node() does, if that is not nothing. ``of_starts`` tells of what starts left that failed
-    beside one more life. ``own_nodes`` is whether the notebook's cells may have made nodes of their
-    own. ``managed`` is what was seen of a managed camera, and ``start_raises`` whether the program
-    ended where its driver could not start; None if it did not go so far.
+    beside one more life. ``own_nodes`` is False if no node of the notebook's cells stays between
+    the lives. ``managed`` is what was seen of a managed camera, and ``start_raises`` whether the
+    program ended where its driver could not start; None if it did not go so far.
     """
 
     worked: bool = True

@@ -1,4 +1,4 @@
-"""A page on which one question is marked for a whole class, beside its model answer.
+"""A page on which one question is marked for a whole class, next to its model answer.
 
 It works from a file and without a network. Answers are text, never HTML; the one script is the
 page's own, and a content security policy forbids every other one.
