@@ -20,10 +20,11 @@ class Backlog:
     ``replayed`` is how many the driver published from the first of them to the end of the pause: it
     may have lost some of its own, which nobody can have kept.
     ``oldest`` is how old the first of them was at the end of the pause, in s since its publication.
-    ``early`` says that some came out while the consumer was held back, ``behind`` what it handed on
-    when it had fallen far behind later on, if it did, ``omits`` what share it handed on then, if it
-    left out some again and again. ``altered`` says that the driver changed some reading, ``again``
-    how many stop events have been handed on more than once.
+    ``early`` says that some came out while the consumer was held back, ``expires`` that readings
+    are to expire by a LIFESPAN, ``behind`` what it handed on when it had fallen far behind later
+    on, if it did, ``omits`` what share it handed on then, if it left out some again and again.
+    ``altered`` says that the driver changed some reading, ``again`` how many stop events have been
+    handed on more than once.
     """
 
     sensor: Sensor
@@ -33,6 +34,7 @@ class Backlog:
     replayed: int
     oldest: float
     early: bool
+    expires: bool
     altered: bool
     again: int
     behind: Handing | None = None
@@ -54,6 +56,11 @@ class Backlog:
         """Whether the consumer acted on what was too old, by number and by age."""
         most = self.sensor.most
         return self.replayed > most and self.oldest > most / self.sensor.rate
+
+    @property
+    def may_have_expired_late(self) -> bool:
+        """Whether what was too old may be DDS's fault, which now and then expires it late."""
+        return self.expires and self.is_stale
 
     @property
     def is_disordered(self) -> bool:
