@@ -117,12 +117,12 @@ def _watch_alone(rig: CameraRig, programs: Programs, node: str) -> ManagedLife:
     lives = lives_so_far(rig)
     own: set[bytes] | None = None if lives is None or lives.own_nodes else set()
     with programs.program([(MANAGED, [])], twice=True) as program:
-        seen, usages = ProgramObserver(rig, program), list[Usage]()
+        seen, usages, life = ProgramObserver(rig, program), list[Usage](), ManagedLife()
         for _ in range(LIVES):
-            again = watch_managed(seen, node, own)
+            again = watch_managed(seen, node, own, weigh=not usages)
             if usages and again.failed is not None:
                 break  # rclpy 7.1 leaves an ended node's services: one of them may have been asked
-            life = again
+            life = replace(again, kept=max(life.kept, again.kept))
             if not life.went_on or life.left or life.pace:
                 return life
             usages.append(rig.process.read_usage())

@@ -14,6 +14,9 @@ from autograder.exercises.resources.rig import ENDED, CameraRig
 MANAGED = "ManagedCamera"
 RATE, USUAL_RATE = 20, 10
 """Pictures a second: a rate is taken in half the time that the usual one takes."""
+ROUND_RATE = 0.1
+"""Hz during the rounds: a timer that goes on while it is inactive does not come to a tick, whose
+error would end the program. That is another check's, and would depend on the machine here."""
 FIRST_ROUNDS, ROUNDS = 2, 5
 """From “configure” to “cleanup”: some may cost what no later ones do."""
 MEMORY = 1024  # KiB a round, as in a harness that has garbage collected
@@ -57,13 +60,18 @@ class ManagedLife:
 
 
 def watch_managed(
-    seen: ProgramObserver, node: str = "", own: Collection[bytes] | None = None
+    seen: ProgramObserver,
+    node: str = "",
+    own: Collection[bytes] | None = None,
+    *,
+    weigh: bool = True,
 ) -> ManagedLife:
     """Have a managed camera, which is being made, send pictures, and interrupt its program then.
 
     ``node`` is its full name where that is known; else, or if it is not there, the one lifecycle
     node is taken for it. ``own`` are nodes that the notebook's cells have made, which stay, as in
     `ProgramObserver.find_nodes`; without them only one of its name is known to be left by it.
+    ``weigh`` what memory its rounds keep.
     """
     rig = seen.rig
     seen.wait(lambda: node in seen.lifecycle_nodes() or (not node and seen.lifecycle_nodes()))
@@ -76,10 +84,11 @@ def watch_managed(
     managed = Managed(seen, name)
     threads, before = rig.process.thread_ids(), rig.process.read_usage()
     try:
-        if not managed.set_parameters(device=device, rate=float(rate)):  # that is another check's
+        managed.require_parameters(device=device)
+        kept = _measure_rounds(rig, managed) if weigh else 0
+        if not managed.set_parameters(rate=float(rate)):  # that is another check's
             rate = USUAL_RATE
-            managed.require_parameters(device=device)
-        kept = _measure_rounds(rig, managed)
+            managed.set_parameters(rate=float(rate))
         managed.make_transitions("configure", "activate")
     except Failed as failed:
         return ManagedLife(failed=failed, raised=seen.is_gone())
@@ -116,6 +125,7 @@ def watch_managed(
 
 def _measure_rounds(rig: CameraRig, managed: Managed) -> int:
     """Return what memory in KiB the program has more after each of some rounds: nobody collects."""
+    managed.set_parameters(rate=ROUND_RATE)
     for rounds in (FIRST_ROUNDS, ROUNDS):
         before = rig.process.read_usage()
         for _ in range(rounds):
