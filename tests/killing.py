@@ -15,7 +15,7 @@ import sqlite3
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ import psutil
 
 from autograder.gradebook.course_gradebook import CourseGradebook, Grade
 
+STATE = ".autograder/state.db"
 GONE = 20.0
 """Seconds in which what a dead engine has started must be gone."""
 
@@ -86,7 +87,7 @@ class Engine:
         self.check(before)
         return at_work
 
-    def check(self, before: dict[str, tuple[int, int]]) -> None:
+    def check(self, before: dict[str, int]) -> None:
         """Look whether the gradebook is whole, and every earlier outcome untouched."""
         with sqlite3.connect(self.root / "gradebook.db") as book:
             (verdict,) = book.execute("pragma integrity_check").fetchone()
@@ -98,18 +99,29 @@ class Engine:
         if again:
             raise LostError(f"outcomes were lost or made again: {again}")
 
-    def outcomes(self) -> dict[str, tuple[int, int]]:
-        """Return a mark of each outcome that is kept: a file that is written anew has another."""
-        found = {}
-        for path in (self.root / ".autograder/outcomes").glob("*.json"):
-            status = path.stat()
-            found[path.name] = (status.st_ino, status.st_mtime_ns)
-        return found
+    def outcomes(self) -> dict[str, int]:
+        """Return the revision of each outcome that is kept: one that is made again has another."""
+        file = self.root / STATE
+        if not file.exists():
+            return {}
+        with closing(sqlite3.connect(file, timeout=60)) as state:
+            if not state.execute("SELECT 1 FROM sqlite_schema").fetchall():
+                return {}
+            rows = "SELECT name, revision FROM state WHERE kind = 'outcome'"
+            return dict(state.execute(rows).fetchall())
 
     def grades(self) -> dict[str, Grade]:
         """Return what stands in the gradebook."""
         found = CourseGradebook(self.root).read_grades(self.assignment)
         return {grade.student: grade for grade in found}
+
+
+def copy_outcomes(graded: Path, root: Path) -> None:
+    """Let a course root have the outcomes of another, and nothing else of what was kept there."""
+    (root / STATE).parent.mkdir(exist_ok=True)
+    shutil.copyfile(graded / STATE, root / STATE)
+    with closing(sqlite3.connect(root / STATE)) as state, state:
+        state.execute("DELETE FROM state WHERE kind != 'outcome'")
 
 
 def fresh_copy(course: Path, folder: Path) -> Path:

@@ -189,9 +189,7 @@ class GradeByBehaviour(NbGraderPreprocessor):  # type: ignore[misc]
             outcome = runner.refused_outcome(program, unreadable)
         else:
             attachments = resources.pop(ATTACHMENTS_KEY, None) or files_beside(folder)
-            store = OutcomeStore(
-                root / WORK_FOLDER / "outcomes", trust=self.trust_submissions, hidden=[root]
-            )
+            store = OutcomeStore(root / WORK_FOLDER, trust=self.trust_submissions, hidden=[root])
             outcome = runner.with_notes(
                 store.get_or_run(program, attachments.files), attachments.notes
             )

@@ -1,18 +1,14 @@
-"""Extensions of students who have not handed in yet: they wait in the engine's folder."""
+"""Extensions of students who have not handed in yet: they wait in the state of the course."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
-from filelock import FileLock
-
 from autograder.assignments.intake.file_names import normalise_name
-from autograder.util.files import write_whole
+from autograder.util.state_table import StateTable
 
-FOLDER = "extensions"
+KIND = "extension"
 
 
 class WaitingExtensions:
@@ -23,31 +19,23 @@ class WaitingExtensions:
 
     def __init__(self, work: Path, assignment: str) -> None:
         """Keep them in the engine's folder ``work``."""
-        self._path = work / FOLDER / f"{assignment}.json"
+        self._table = StateTable(work, KIND, assignment)
+        self._take_over(work / "extensions" / f"{assignment}.json")
 
     def set_hours(self, student: str, hours: float) -> None:
         """Keep one for a student, or with 0 hours none."""
-        with self._open_for_change() as waiting:
-            waiting.pop(normalise_name(student), None)
-            if hours:
-                waiting[normalise_name(student)] = hours
+        if hours:
+            self._table.put(repr(float(hours)), normalise_name(student))
+        else:
+            self._table.remove(normalise_name(student))
 
     def hours_for(self, student: str) -> float:
         """Return the hours that wait for a student; 0 if none do."""
-        if not self._path.exists():
-            return 0.0
-        with self._open_for_change() as waiting:
-            return waiting.get(normalise_name(student), 0.0)
+        return float(self._table.get(normalise_name(student)) or 0)
 
-    @contextmanager
-    def _open_for_change(self) -> Iterator[dict[str, float]]:
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        with FileLock(self._path.with_suffix(".lock")):
-            try:
-                waiting = json.loads(self._path.read_text(encoding="utf-8"))
-            except FileNotFoundError:
-                waiting = {}
-            before = dict(waiting)
-            yield waiting
-            if waiting != before:
-                write_whole(self._path, json.dumps(waiting))
+    def _take_over(self, file: Path) -> None:
+        """Keep what an earlier version of the course package has left in a file."""
+        if file.exists():
+            for student, hours in json.loads(file.read_text(encoding="utf-8")).items():
+                self.set_hours(student, hours)
+            file.unlink()

@@ -23,10 +23,10 @@ from autograder.assignments import questions, submission
 from autograder.assignments.questions import Asked
 from autograder.assignments.submission import SubmissionError
 from autograder.gradebook import staging
-from autograder.util.files import walk_files, write_whole
+from autograder.util.files import walk_files
+from autograder.util.state_table import StateTable
 
-FOLDER = "marked"
-VERSION = 1
+KIND = "marked"
 
 CellName = tuple[str, str]
 """A notebook and a grade id in it."""
@@ -117,7 +117,7 @@ class Marks:
         """
         self._assignment = assignment
         self._questions = asked
-        self._folder = work / FOLDER / assignment
+        self._table = StateTable(work, KIND, assignment)
 
     def remember(self, book: Gradebook, student: str, copy: Path) -> None:
         """Note what is marked for good, and what it is of: the graded ``copy`` is replaced next.
@@ -138,8 +138,7 @@ class Marks:
         # Of a run that was ended in between: its marks are asked for, and the copy may be gone.
         if before := {**self.remembered_cells(student), **with_copy(scores, copy)}:
             rows = [[*name, asdict(marked)] for name, marked in before.items()]
-            data = {"version": VERSION, "student": student, "cells": rows}
-            write_whole(self._record_path(student), json.dumps(data))
+            self._table.put(json.dumps(rows), student)
 
     def settle(self, book: Gradebook, student: str, copy: Path, *, same: bool) -> str:
         """Take the marks of what is still the same for good again, once a student is entered.
@@ -159,7 +158,7 @@ class Marks:
             if name not in asked and grade.manual_score is not None:
                 grade.needs_manual_grade = False
         book.db.commit()
-        self._record_path(student).unlink(missing_ok=True)
+        self._table.remove(student)
         return describe_changes({
             questions.describe_cell(self._questions, *name): why
             for name, why in asked.items()
@@ -167,17 +166,11 @@ class Marks:
 
     def remembered_cells(self, student: str) -> MarkedCells:
         """Return what is remembered of a student who is not entered yet."""
+        rows = json.loads(self._table.get(student) or "[]")
         try:
-            data = json.loads(self._record_path(student).read_text(encoding="utf-8"))
-            if (data["version"], data["student"]) != (VERSION, student):
-                return {}
-            return {(notebook, cell): Marked(**marked) for notebook, cell, marked in data["cells"]}
-        except (OSError, ValueError, KeyError, TypeError):
+            return {(notebook, cell): Marked(**marked) for notebook, cell, marked in rows}
+        except (ValueError, TypeError):  # of another version
             return {}
-
-    def _record_path(self, student: str) -> Path:
-        name = hashlib.sha256(student.encode(errors="surrogateescape")).hexdigest()[:32]
-        return self._folder / f"{name}.json"
 
 
 def _digest_answer(cell: NotebookNode, folder: Path) -> str:

@@ -1,7 +1,7 @@
 """The verdicts behind a grade, kept beside the gradebook, which holds only points.
 
-One small JSON file for each student and notebook is written when the scores are entered, by
-whichever door they come in: ``autograder grade``, ``nbgrader autograde`` or the formgrader.
+One record of each student and notebook is written when the scores are entered, by whichever door
+they come in: ``autograder grade``, ``nbgrader autograde`` or the formgrader.
 """
 
 from __future__ import annotations
@@ -14,17 +14,16 @@ from pathlib import Path
 from typing import Protocol
 
 from autograder.examination.verdict import Verdict
-from autograder.util.files import write_whole
+from autograder.util.state_table import StateTable
 from course.errors import CourseError
 
-VERSION = 1
-FOLDER = "verdicts"
-MAX_BYTES = 4 * 1024 * 1024
-"""Largest record that is read; one of a notebook of this course has 10 kB."""
+KIND = "verdicts"
+MAX_CHARACTERS = 4 * 1024 * 1024
+"""Longest record that is read; one of a notebook of this course has 10,000."""
 
 
 class RecordError(CourseError):
-    """A record that is damaged, or of another version."""
+    """A record that cannot be read, as one of another version."""
 
 
 class Outcome(Protocol):
@@ -50,25 +49,17 @@ class Record:
     unreadable: bool = False
 
 
-def record_path(work: Path, assignment: str, student: str, notebook: str) -> Path:
-    """Return where a record lies in the engine's work folder."""
-    return work / FOLDER / assignment / student / f"{notebook}.json"
-
-
 def write_record(
     work: Path, assignment: str, student: str, notebook: str, outcome: Outcome
 ) -> None:
     """Write the record of an outcome in place of an earlier one; raises OSError if it cannot."""
     data = {
-        "version": VERSION,
         "verdicts": {name: v.as_data() for name, v in outcome.verdicts.items()},
         "notes": list(outcome.notes),
         "seconds": outcome.seconds,
         "unreadable": outcome.unreadable,
     }
-    write_whole(
-        record_path(work, assignment, student, notebook), json.dumps(data, ensure_ascii=False)
-    )
+    StateTable(work, KIND, assignment).put(json.dumps(data), student, notebook)
 
 
 def load_record(work: Path, assignment: str, student: str, notebook: str) -> Record | None:
@@ -77,22 +68,20 @@ def load_record(work: Path, assignment: str, student: str, notebook: str) -> Rec
     Raises:
         RecordError: there is one, and it cannot be read.
     """
-    file = record_path(work, assignment, student, notebook)
+    text = StateTable(work, KIND, assignment).get(student, notebook)
+    if text is None:
+        return None
     try:
-        if not file.is_file():
-            return None
-        if file.stat().st_size > MAX_BYTES:
-            raise ValueError("too large")
-        data = json.loads(file.read_text(encoding="utf-8"))
-        if data["version"] != VERSION:
-            raise ValueError(f"version {data['version']}")
+        if len(text) > MAX_CHARACTERS:
+            raise ValueError("too long")
+        data = json.loads(text)
         seconds = float(data["seconds"])
         if not math.isfinite(seconds) or seconds < 0:
             raise ValueError(f"{seconds} s")
         verdicts = {str(name): Verdict.from_data(v) for name, v in data["verdicts"].items()}
         notes = tuple(str(note) for note in data["notes"])
         return Record(verdicts, notes, seconds, data["unreadable"] is True)
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, CourseError, OSError):
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, CourseError):
         raise RecordError(
             f"The record of {student}'s check results for {notebook} is damaged, so it is left "
             f"out: run `autograder grade {assignment}` again to have it written anew."

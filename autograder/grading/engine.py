@@ -108,24 +108,23 @@ def grade(
     refused = [Graded(s, {}, problem=problem, entered=False) for s, problem in wrong.items()]
     refused += [Graded(s, {}, problem=EXCLUDED) for s in found if s in gradebook.excluded_students]
     found = [s for s in found if s not in gradebook.excluded_students]
-    store = OutcomeStore(root / bridge.WORK_FOLDER / "outcomes", trust=trust, hidden=[root])
+    store = OutcomeStore(root / bridge.WORK_FOLDER, trust=trust, hidden=[root])
     with ExitStack() as stack:
         stack.enter_context(_lock_course(root))
         stack.callback(progress.end)
         files.sweep_scratch()
-        files.remove_partial(root / bridge.WORK_FOLDER)
         workers = stack.enter_context(_make_workers(jobs, store, trust, scheduler, root, progress))
         interruption = stack.enter_context(Interruption(workers.wake))
         intake = SubmissionIntake(gradebook, assignment, names, trust=trust)
         whole = FreshRun(intake.work_folder, assignment)
         fresh_run = FreshRun(intake.work_folder, assignment, students) if students else whole
-        if fresh_run.began_ns:
+        if fresh_run.began:
             progress.say("Going on with the run with --fresh that was ended before it was through.")
         if fresh:
             fresh_run.begin()
         run = GradingRun(
             intake, store, workers, interruption, progress, feedback=feedback,
-            since=max(fresh_run.began_ns, whole.began_ns),
+            since=max(fresh_run.began, whole.began),
         )  # fmt: skip
         graded = [*refused, *run.grade(found, refused)]
         fresh_run.end()

@@ -14,11 +14,9 @@ from pathlib import Path
 
 from autograder.assignments.intake.folder_digest import of_folder
 from autograder.running import digests
-from autograder.running.fresh_run import is_since
-from autograder.util.files import write_whole
+from autograder.util.state_table import StateTable
 
-VERSION = 2
-FOLDER = "entered"
+KIND = "entered"
 
 
 @dataclass(frozen=True)
@@ -60,35 +58,26 @@ class Ledger:
 
     def __init__(self, work: Path, assignment: str) -> None:
         """Keep them in the engine's folder ``work``."""
-        # A folder of its own whatever the name; a student's folder name may be as long as a
-        # file name can be, so a record goes by its digest.
-        self._folder = work / FOLDER / assignment
+        self._table = StateTable(work, KIND, assignment)
 
     def get(self, student: str, since: int = 0) -> Entry | None:
         """Return a student's record, or None if there is no sound one from after ``since``."""
-        path = self._record_path(student)
+        text = self._table.get(student, since=since)
+        if text is None:
+            return None
         try:
-            if not is_since(path, since):
-                return None
-            data = json.loads(path.read_text(encoding="utf-8"))
-            if data.pop("version") != VERSION or data.pop("student") != student:
-                return None
+            data = json.loads(text)
             return Entry(**{**data, "standing": Standing(**data["standing"])})
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        except (ValueError, KeyError, TypeError):  # of another version
             return None
 
     def put(self, student: str, entry: Entry) -> None:
         """Keep a student's record; raises OSError if it cannot be written."""
-        data = {"version": VERSION, "student": student, **asdict(entry)}
-        write_whole(self._record_path(student), json.dumps(data))
+        self._table.put(json.dumps(asdict(entry)), student)
 
     def remove(self, student: str) -> None:
         """Forget a student's record."""
-        self._record_path(student).unlink(missing_ok=True)
-
-    def _record_path(self, student: str) -> Path:
-        name = hashlib.sha256(student.encode(errors="surrogateescape")).hexdigest()[:32]
-        return self._folder / f"{name}.json"
+        self._table.remove(student)
 
 
 def of_course(

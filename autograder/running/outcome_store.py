@@ -1,4 +1,4 @@
-"""Outcomes kept on disk, so that what did not change is not run again."""
+"""Outcomes kept in the state of a course, so that what did not change is not run again."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from pathlib import Path
 from autograder import sandbox
 from autograder.examination.program import Program
 from autograder.running import jobs
-from autograder.running.fresh_run import is_since
 from autograder.running.jobs import Job
 from autograder.running.runner import Outcome
-from autograder.util.files import write_whole
+from autograder.util.state_table import StateTable
 from course.errors import CourseError
+
+KIND = "outcome"
 
 
 class StoreError(CourseError):
@@ -20,14 +21,14 @@ class StoreError(CourseError):
 
 
 class OutcomeStore:
-    """A folder of outcomes, one file a program, named by the program's digest."""
+    """The outcomes of programs, each known by the program's digest."""
 
-    def __init__(self, folder: Path, *, trust: bool = False, hidden: Iterable[Path] = ()) -> None:
-        """Keep outcomes in ``folder``, which is made when the first one is written.
+    def __init__(self, work: Path, *, trust: bool = False, hidden: Iterable[Path] = ()) -> None:
+        """Keep outcomes in the engine's folder ``work``, made when the first one is written.
 
         ``trust`` and ``hidden`` are those of `runner.run`.
         """
-        self._folder = folder
+        self._work, self._table = work, StateTable(work, KIND)
         self._trust, self._hidden = trust, tuple(hidden)
 
     def get_or_run(self, program: Program, files: Mapping[str, bytes]) -> Outcome:
@@ -52,14 +53,17 @@ class OutcomeStore:
         return self.get_by_key(self.outcome_key(program, files, mode))
 
     def get_by_key(self, key: str, since: int = 0) -> Outcome | None:
-        """Return the outcome whose key is ``key``, if there is a sound one from after ``since``."""
-        path = self._outcome_path(key)
-        try:
-            if not is_since(path, since):
-                return None
-            return Outcome.from_json(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError, KeyError, TypeError, AttributeError, CourseError):
+        """Return the outcome whose key is ``key``, if there is a sound one from after ``since``.
+
+        ``since`` is a revision of the state (see `autograder.util.state_table`).
+        """
+        text = self._table.get(key, since=since)
+        if text is None:
             return None
+        try:
+            return Outcome.from_json(text)
+        except (ValueError, KeyError, TypeError, AttributeError, CourseError):
+            return None  # of another version
 
     def put(
         self, program: Program, files: Mapping[str, bytes], outcome: Outcome, mode: str = ""
@@ -67,16 +71,15 @@ class OutcomeStore:
         """Keep an outcome; one that a grader error spoilt is not kept.
 
         Raises:
-            StoreError: the folder cannot be written (a full disk, say).
+            StoreError: it cannot be written (a full disk, say).
         """
         if outcome.has_grader_error:
             return
-        path = self._outcome_path(self.outcome_key(program, files, mode))
         try:
-            write_whole(path, outcome.to_json())
+            self._table.put(outcome.to_json(), self.outcome_key(program, files, mode))
         except OSError as error:
             raise StoreError(
-                f"The outcome of a submission could not be written to {path.parent} "
+                f"The outcome of a submission could not be written to {self._work} "
                 f"({error.strerror}): make room there and run the same command again; what was "
                 "graded so far is kept."
             ) from error
@@ -86,6 +89,3 @@ class OutcomeStore:
         # What a sandbox or its lossy network finds is not found without.
         mode = mode or sandbox.abilities().mode_name(trust=self._trust)
         return Job(program, files, self._trust).outcome_key(mode)
-
-    def _outcome_path(self, key: str) -> Path:
-        return self._folder / f"{key}.json"

@@ -1,8 +1,7 @@
 """Files that are there as a whole or not at all, and folders that a killed process leaves behind.
 
-A process that is killed cleans nothing up. What it was writing lies beside the file that it was to
-become, and its scratch folders lie about; both carry a mark by which the next one knows that
-nobody uses them any more, and removes them.
+A process that is killed cleans nothing up. Its scratch folders carry a mark by which the next one
+knows that nobody uses them any more, and removes them.
 """
 
 from __future__ import annotations
@@ -11,13 +10,12 @@ import fcntl
 import os
 import shutil
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
 
-from course.util.files import PARTIAL, replace_file
+from course.util.files import replace_file
 
 SCRATCH = "ros2-course-scratch-"
 PRIVATE = 0o600
@@ -31,9 +29,6 @@ NOT_COUNTED = {".ipynb_checkpoints", "__pycache__"}
 
 MAX_DEPTH = 20
 """Folders within each other in which they are found."""
-
-_OLD = 600.0
-"""Seconds after which a partial file belongs to nobody: writing one takes a moment."""
 
 
 def write_whole(path: Path, text: str) -> None:
@@ -79,15 +74,6 @@ def _list_folder(folder: Path) -> tuple[list[Path], list[Path]]:
     except OSError:
         return [], []
     return [p for p, deeper in kinds if not deeper], [p for p, deeper in kinds if deeper]
-
-
-def remove_partial(folder: Path) -> None:
-    """Remove what killed processes were writing anywhere in ``folder``."""
-    now = time.time()
-    for partial in folder.rglob(f"*{PARTIAL}"):
-        with suppress(OSError):
-            if now - partial.stat().st_mtime > _OLD:
-                partial.unlink()
 
 
 @contextmanager

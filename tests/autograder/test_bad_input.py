@@ -32,7 +32,7 @@ from autograder.gradebook.database import (
 from autograder.grading import engine
 from autograder.grading.engine import AssignmentError, Graded
 from autograder.grading.progress import Progress
-from tests.killing import fresh_copy
+from tests.killing import STATE, copy_outcomes, fresh_copy
 from tests.machine import needs_own_mounts, needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed
@@ -41,14 +41,12 @@ from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed
 # it does any error, so it must be far off on a busy machine, too.
 pytestmark = [needs_sandbox, pytest.mark.xdist_group("class"), pytest.mark.timeout(900)]
 
-OUTCOMES = ".autograder/outcomes"
-
 
 @pytest.fixture
 def course(class_: Undisturbed, tmp_path: Path) -> Course:
     """A class whose submissions have been run, and not one of them entered."""
     root = fresh_copy(class_.ungraded, tmp_path / "course")
-    shutil.copytree(class_.graded / OUTCOMES, root / OUTCOMES)
+    copy_outcomes(class_.graded, root)
     return Course(root)
 
 
@@ -239,7 +237,7 @@ def test_what_the_machine_is_short_of_costs_no_student_a_grade(
 ) -> None:
     scratch = tmp_path / "scratch"
     scratch.mkdir()
-    shutil.rmtree(course.root / OUTCOMES)
+    (course.root / STATE).unlink()
     script = SHORT.format(assignment=ASSIGNMENT, shortage=shortage)
     done = subprocess.run(
         ["unshare", "-rm", "bash", "-c", script, "bash", course.root],
@@ -250,7 +248,7 @@ def test_what_the_machine_is_short_of_costs_no_student_a_grade(
     assert (course.root / "code").read_text() == "1\n", said
     assert re.search(sentence, said), said
     assert len(said.strip().splitlines()) == 1, said
-    shutil.copytree(class_.graded / OUTCOMES, course.root / OUTCOMES, dirs_exist_ok=True)
+    copy_outcomes(class_.graded, course.root)
     grade(course)
     assert grades(course) == class_.grades
 

@@ -42,6 +42,7 @@ from autograder.gradebook.course_gradebook import Grade
 from autograder.gradebook.database import GradebookUnusable
 from autograder.gradebook.records import Record
 from autograder.util import csv_text, exercise_folders
+from autograder.util.state_table import StateTable
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
 from .test_cli import autograder
@@ -672,7 +673,7 @@ def test_answers_of_notebooks_that_came_without_metadata_are_compared(graded: Pa
     "damage", ["", "[]", '{"version": 1}', '{"version": 99}', "\x00" * 20, "[" * 100_000]
 )
 def test_a_damaged_record_costs_its_own_figures_and_says_so(graded: Path, damage: str) -> None:
-    records.record_path(graded / ".autograder", ASSIGNMENT, "bob", NOTEBOOK).write_text(damage)
+    StateTable(graded / ".autograder", records.KIND, ASSIGNMENT).put(damage, "bob", NOTEBOOK)
     report = reports.make_report(graded, ASSIGNMENT)
     assert set(report.times.seconds) == {"ann", "cy", "-dan"}
     [note] = report.data.notes
@@ -681,7 +682,7 @@ def test_a_damaged_record_costs_its_own_figures_and_says_so(graded: Path, damage
 
 
 def test_a_grade_from_before_records_were_kept_is_counted(graded: Path) -> None:
-    records.record_path(graded / ".autograder", ASSIGNMENT, "bob", NOTEBOOK).unlink()
+    StateTable(graded / ".autograder", records.KIND, ASSIGNMENT).remove("bob", NOTEBOOK)
     [note] = reports.make_report(graded, ASSIGNMENT).data.notes
     assert "1 notebook has a grade but no record" in note
 

@@ -27,16 +27,6 @@ def test_what_is_written_is_whole_and_for_its_owner_only(tmp_path: Path) -> None
     assert [file.name for file in path.parent.iterdir()] == ["file.json"]
 
 
-def test_what_a_killed_process_was_writing_is_removed_later(tmp_path: Path) -> None:
-    old, new = tmp_path / "a" / f"x{files.PARTIAL}", tmp_path / f"y{files.PARTIAL}"
-    old.parent.mkdir()
-    for path in (old, new):
-        path.write_text("{")
-    os.utime(old, (0, 0))
-    files.remove_partial(tmp_path)
-    assert (old.exists(), new.exists()) == (False, True), "somebody may be writing the new one"
-
-
 def test_scratch_folders_of_the_dead_are_swept_and_only_those(tmp_path: Path) -> None:
     program = (
         "import sys; from autograder.util import files\n"

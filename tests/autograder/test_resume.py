@@ -23,7 +23,7 @@ from autograder.grading.engine import BusyError, Graded
 from autograder.grading.progress import Progress
 from autograder.running import runner
 from autograder.sandbox import SandboxError
-from tests.killing import Engine, episode, fresh_copy
+from tests.killing import Engine, copy_outcomes, episode, fresh_copy
 from tests.machine import needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed
@@ -32,7 +32,6 @@ from .conftest import ASSIGNMENT, NOTEBOOK, Course, Undisturbed
 pytestmark = [needs_sandbox, pytest.mark.xdist_group("class"), pytest.mark.timeout(900)]
 
 KILL, INT, TERM = signal.SIGKILL, signal.SIGINT, signal.SIGTERM
-OUTCOMES = ".autograder/outcomes"
 BUBBLEWRAP = shutil.which("bwrap")
 
 
@@ -50,7 +49,7 @@ def test_an_engine_that_is_killed_goes_on_where_it_was(
 ) -> None:
     course = course_of(class_, tmp_path, graded=False)
     if kept:
-        shutil.copytree(class_.graded / OUTCOMES, course.root / OUTCOMES)
+        copy_outcomes(class_.graded, course.root)
     whole = Engine(course.root, ASSIGNMENT, tmp_path / "scratch")
     seed = random.SystemRandom().randrange(10**6)
     kills = episode(whole, random.Random(seed), class_.seconds, signals)

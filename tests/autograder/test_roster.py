@@ -144,6 +144,14 @@ def test_a_decomposed_folder_name_is_the_student_of_the_roster(submitted: Path) 
     assert (roster.student_folder(root, MUELLER) / "ch05").is_dir()
 
 
+def test_an_extension_that_an_earlier_version_kept_in_a_file_still_waits(tmp_path: Path) -> None:
+    (tmp_path / "extensions").mkdir()
+    (tmp_path / "extensions" / "ch05.json").write_text('{"ada": 24.0}')
+    assert WaitingExtensions(tmp_path, "ch05").hours_for("ada") == 24.0
+    WaitingExtensions(tmp_path, "ch05").set_hours("ada", 0)
+    assert WaitingExtensions(tmp_path, "ch05").hours_for("ada") == 0
+
+
 @pytest.mark.parametrize(("kept", "asked"), [("NFC", "NFD"), ("NFD", "NFC")])
 def test_what_waits_for_a_student_is_found_in_either_form_of_the_name(
     tmp_path: Path, kept: str, asked: str

@@ -17,10 +17,11 @@ from autograder.examination.program import Cell, Program
 from autograder.examination.subject import outputs
 from autograder.processes.channel import Channel
 from autograder.running import jobs, runner
-from autograder.running.outcome_store import OutcomeStore
+from autograder.running.outcome_store import KIND, OutcomeStore
 from autograder.running.runner import Outcome
 from autograder.running.start import ExaminerError, ExaminerProcess
 from autograder.sandbox import BoxError
+from autograder.util.state_table import StateTable
 from course.domains.leases import lease_domain
 from tests.machine import needs_sandbox
 
@@ -323,12 +324,13 @@ except DomainError:
 
 
 def test_an_outcome_survives_the_store_and_a_damaged_one_is_ignored(tmp_path: Path) -> None:
-    store = OutcomeStore(tmp_path / "outcomes")
+    store = OutcomeStore(tmp_path)
     outcome = Outcome([[]], {}, ["note"], 1.5)
     store.put(program(), {}, outcome)
     assert store.get(program(), {}) == outcome
-    (file,) = (tmp_path / "outcomes").iterdir()
-    file.write_text(file.read_text()[:20])
+    table = StateTable(tmp_path, KIND)
+    ((name, text),) = table.rows().items()
+    table.put(text[:20], *name)
     assert store.get(program(), {}) is None
 
 

@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import json
 import random
-import shutil
 import signal
 import sys
 import tempfile
@@ -31,11 +30,10 @@ from autograder.assignments.build import build
 from autograder.corpus.trials import one_notebook
 from autograder.gradebook.course_gradebook import Grade
 from autograder.gradebook.release import make_release
-from tests.killing import Engine, LostError, episode, fresh_copy
+from tests.killing import Engine, LostError, copy_outcomes, episode, fresh_copy
 
 ASSIGNMENT, NOTEBOOK = "ch05", "qos-design"
 CASES = ("right-chapter", "right-sensor-data", "wrong-stub", "broken-syntax")
-OUTCOMES = ".autograder/outcomes"
 SIGNALS = [signal.SIGKILL] * 4 + [signal.SIGINT, signal.SIGTERM]
 
 
@@ -87,7 +85,7 @@ def run(kills: int, workers: list[int], figures: Figures, folder: Path) -> None:
         root = fresh_copy(ungraded, folder / "course")
         engine = Engine(root, ASSIGNMENT, folder / "scratch")
         if figures.classes % 2:
-            shutil.copytree(first.root / OUTCOMES, root / OUTCOMES)
+            copy_outcomes(first.root, root)
             entering = entering or timed(Engine(fresh_copy(root, folder / "e"), ASSIGNMENT,
                                                 folder / "scratch"))  # fmt: skip
         longest = entering if figures.classes % 2 else figures.undisturbed_seconds

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from autograder.util.files import write_whole
+from autograder.util.state_table import StateTable
 
-FOLDER = "asked"
+KIND = "question"
 
 
 @dataclass(frozen=True)
@@ -29,24 +29,20 @@ def keep_question(
     work: Path, assignment: str, student: str, notebook: str, question: Question | None
 ) -> None:
     """Keep the question about a notebook, or that there is none; raises OSError if it cannot."""
-    path = work / FOLDER / assignment / student / f"{notebook}.json"
+    table = StateTable(work, KIND, assignment)
     if question is None:
-        path.unlink(missing_ok=True)
+        table.remove(student, notebook)
     else:
-        data = {"student": student, "why": question.why, "cells": question.cells}
-        write_whole(path, json.dumps(data))
+        table.put(json.dumps(asdict(question)), student, notebook)
 
 
 def of_assignment(work: Path, assignment: str) -> dict[str, dict[str, Question]]:
-    """Return {student: {notebook: question}}; what cannot be read is left out."""
+    """Return {student: {notebook: question}}."""
     found: dict[str, dict[str, Question]] = {}
-    for path in sorted((work / FOLDER / assignment).glob("*/*.json")):
-        try:
-            data = json.loads(path.read_text(encoding="utf-8"))
-            question = Question(str(data["why"]), tuple(map(str, data["cells"])))
-            found.setdefault(str(data["student"]), {})[path.stem] = question
-        except (OSError, ValueError, KeyError, TypeError):
-            continue
+    for (student, notebook), text in StateTable(work, KIND, assignment).rows().items():
+        data = json.loads(text)
+        question = Question(str(data["why"]), tuple(map(str, data["cells"])))
+        found.setdefault(student, {})[notebook] = question
     return found
 
 
