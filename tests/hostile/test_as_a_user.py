@@ -19,13 +19,18 @@ from tests.machine import needs_isolation, needs_users
 GROUPS = 4
 LEFT_OUT = {
     "What an exam sees or hears, over DDS and its channel, is the same whoever grades": """
-        answers-a-second-cleanup by-heart-battery by-heart-limits by-heart-zooms declares-no-nodes
-        doubles-the-time drains-when-let-go fakes-a-failed-start fakes-its-cleanup
-        fakes-its-shutdown fakes-the-gap hides-that-it-never-plans is-made-for-the-harness-alone
-        knows-it-is-graded leaks-when-nobody-looks lies-about-errors monolith-as-examiner
+        answers-a-second-cleanup by-heart-battery by-heart-events by-heart-limits by-heart-zooms
+        declares-no-nodes doubles-the-robots-time doubles-the-time doubles-the-time-of-a-robot
+        drains-when-let-go drives-after-a-shutdown drives-by-the-time fakes-a-failed-start
+        fakes-an-idle-shutdown fakes-its-cleanup fakes-its-shutdown fakes-the-gap
+        halves-the-managed-pace halves-the-time hides-that-it-never-plans is-destroyed-late
+        is-made-for-the-harness-alone keeps-memory-until-it-is-collected knows-it-is-graded
+        leaks-when-nobody-looks lies-about-errors monolith-as-examiner monolith-hidden
         monolith-other-context no-name-of-a-node stamps-before-an-answer stamps-of-a-late-consumer
         stamps-of-a-late-driver stamps-of-an-inactive-node stamps-while-time-stands-still
-        state-of-no-kind two-results-for-one two-values-for-one type-name-no-text""",
+        state-of-no-kind stretches-the-robots-time talks-over-the-examiner
+        tidies-its-failed-starts-for-the-harness two-results-for-one two-values-for-one
+        type-name-no-text""",
     "Outputs are cut, and ends told, before or after any sandbox": """
         exits output-display output-flood segfault""",
     "Only the clock ends them, which takes the longest of all and asks nobody for his rights": """
