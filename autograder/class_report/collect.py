@@ -16,10 +16,10 @@ from autograder.assignments.intake.notebooks import GRADED_AS
 from autograder.assignments.intake.roster import Roster
 from autograder.assignments.questions import Question
 from autograder.class_report import InsightError
-from autograder.gradebook import records
+from autograder.gradebook import verdict_records
 from autograder.gradebook.bridge import WORK_FOLDER
 from autograder.gradebook.course_gradebook import CourseGradebook, Grade
-from autograder.gradebook.records import Record, RecordError
+from autograder.gradebook.verdict_records import Record, RecordError
 from quizzes.errors import suggest_name
 
 
@@ -157,7 +157,7 @@ def _load_records(
         of_student = found.setdefault(grade.student, {})
         for notebook in grade.cells:
             try:
-                record = records.load_record(
+                record = verdict_records.load_record(
                     root / WORK_FOLDER, assignment, grade.student, notebook
                 )
             except RecordError as error:

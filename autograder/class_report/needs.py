@@ -10,7 +10,7 @@ from autograder.class_report import feedback
 from autograder.class_report.collect import ClassData
 from autograder.gradebook.course_gradebook import Grade
 from autograder.gradebook.quizzes import shared_attempts
-from autograder.gradebook.records import Record
+from autograder.gradebook.verdict_records import Record
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from autograder.assignments.submission import SubmissionError
 from autograder.examination.subject import outputs
 from autograder.examination.verdict import Verdict
 from autograder.examination.verdict_text import Report
-from autograder.gradebook import records
+from autograder.gradebook import verdict_records
 from autograder.gradebook.extension_store import WaitingExtensions
 from autograder.gradebook.safe_html import allowed_html
 from autograder.gradebook.safe_html.page_texts import Page
@@ -213,7 +213,7 @@ class FlagForHumans(NbGraderPreprocessor):  # type: ignore[misc]
             waiting.set_hours(student, 0)  # it is in the gradebook from now on
         if "ros2_course_outcome" in resources:
             work = Path(_course_directory(self).root) / WORK_FOLDER
-            records.write_record(
+            verdict_records.write_record(
                 work, assignment, student, notebook, resources["ros2_course_outcome"]
             )
             asked = resources[ASKED_KEY]

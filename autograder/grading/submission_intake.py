@@ -23,11 +23,11 @@ from autograder.gradebook import bridge as bridge
 from autograder.gradebook import staging
 from autograder.gradebook.course_gradebook import CourseGradebook, GradebookError
 from autograder.gradebook.feedback.feedback_page import INDEX
-from autograder.gradebook.marked import Marks
 from autograder.gradebook.once import FeedbackExporter
 from autograder.gradebook.quizzes import quiz_marks
 from autograder.gradebook.safe_html import allowed_html
 from autograder.gradebook.safe_html.page_texts import Page
+from autograder.gradebook.written_answers.settled_marks import Marks
 from autograder.running import runner
 from autograder.running.jobs import Job
 from autograder.running.ledger import Standing

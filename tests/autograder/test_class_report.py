@@ -37,10 +37,10 @@ from autograder.class_report.own_text import GivenText, OwnText, own_tokens
 from autograder.class_report.platforms import exports
 from autograder.examination import points
 from autograder.examination.verdict import CheckResult, Status, Verdict
-from autograder.gradebook import records
+from autograder.gradebook import verdict_records
 from autograder.gradebook.course_gradebook import Grade
 from autograder.gradebook.database import GradebookUnusable
-from autograder.gradebook.records import Record
+from autograder.gradebook.verdict_records import Record
 from autograder.util import csv_text, exercise_folders
 from autograder.util.state_table import StateTable
 
@@ -673,7 +673,9 @@ def test_answers_of_notebooks_that_came_without_metadata_are_compared(graded: Pa
     "damage", ["", "[]", '{"version": 1}', '{"version": 99}', "\x00" * 20, "[" * 100_000]
 )
 def test_a_damaged_record_costs_its_own_figures_and_says_so(graded: Path, damage: str) -> None:
-    StateTable(graded / ".autograder", records.KIND, ASSIGNMENT).put(damage, "bob", NOTEBOOK)
+    StateTable(graded / ".autograder", verdict_records.KIND, ASSIGNMENT).put(
+        damage, "bob", NOTEBOOK
+    )
     report = reports.make_report(graded, ASSIGNMENT)
     assert set(report.times.seconds) == {"ann", "cy", "-dan"}
     [note] = report.data.notes
@@ -682,7 +684,7 @@ def test_a_damaged_record_costs_its_own_figures_and_says_so(graded: Path, damage
 
 
 def test_a_grade_from_before_records_were_kept_is_counted(graded: Path) -> None:
-    StateTable(graded / ".autograder", records.KIND, ASSIGNMENT).remove("bob", NOTEBOOK)
+    StateTable(graded / ".autograder", verdict_records.KIND, ASSIGNMENT).remove("bob", NOTEBOOK)
     [note] = reports.make_report(graded, ASSIGNMENT).data.notes
     assert "1 notebook has a grade but no record" in note
 

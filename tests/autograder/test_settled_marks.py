@@ -12,9 +12,9 @@ from nbgrader.api import Gradebook
 from autograder.assignments import submission
 from autograder.assignments.build import build
 from autograder.examination import points
-from autograder.gradebook import marked
-from autograder.gradebook.marked import Marked, Marks
 from autograder.gradebook.release import make_release
+from autograder.gradebook.written_answers import settled_marks
+from autograder.gradebook.written_answers.settled_marks import Marked, Marks
 from autograder.grading import engine
 from autograder.util.state_table import StateTable
 from tests.killing import fresh_copy
@@ -141,8 +141,10 @@ def test_an_engine_that_ends_in_between_forgets_no_mark(
 )
 def test_what_must_be_looked_at_again(old: Marked, new: Marked, same: bool, why: str) -> None:
     cell = ("notebook", "cell")
-    assert marked.find_changes({cell: old}, {cell: new}, same=same) == ({cell: why} if why else {})
-    assert marked.find_changes({cell: old}, {}, same=same) == {}
+    assert settled_marks.find_changes({cell: old}, {cell: new}, same=same) == (
+        {cell: why} if why else {}
+    )
+    assert settled_marks.find_changes({cell: old}, {}, same=same) == {}
 
 
 def test_what_was_marked_is_kept_and_that_of_another_version_is_not_read(course: Course) -> None:
@@ -154,5 +156,5 @@ def test_what_was_marked_is_kept_and_that_of_another_version_is_not_read(course:
     assert {cell for _, cell in marks.remembered_cells("right")} == {*ANSWERS, "qos-visible"}
     assert all(cell.content and cell.points for cell in marks.remembered_cells("right").values())
     assert marks.remembered_cells("wrong") == marks.remembered_cells("nobody") == {}
-    StateTable(course.root / ".autograder", marked.KIND, ASSIGNMENT).put('[["a"]]', "right")
+    StateTable(course.root / ".autograder", settled_marks.KIND, ASSIGNMENT).put('[["a"]]', "right")
     assert marks.remembered_cells("right") == {}
