@@ -23,7 +23,7 @@ from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.grading import engine
 from autograder.processes.descriptors import readable_descriptors
 from autograder.running import runner
-from autograder.running.outcome_store import OutcomeStore
+from autograder.running.outcome_store import KIND, OutcomeStore
 from autograder.running.start import ExaminerError, ExaminerProcess
 from autograder.sandbox import BoxError, SandboxError, network, probe, seccomp, usage, warmth
 from autograder.sandbox.box import Box
@@ -32,6 +32,7 @@ from autograder.sandbox.limits import Limits
 from autograder.sandbox.usage import Process
 from autograder.sandbox.watch import Watch
 from autograder.util import exercise_folders
+from autograder.util.state_table import StateTable
 from tests.machine import needs_sandbox
 
 from .conftest import ASSIGNMENT, NOTEBOOK, Course
@@ -116,7 +117,7 @@ def test_outcomes_of_different_places_are_kept_apart(
         monkeypatch.setattr(sandbox, "abilities", lambda x=loss: sandbox.Abilities(loss=x))
         assert OutcomeStore(tmp_path).get((Cell("1"),), {}) is None
         OutcomeStore(tmp_path).put((Cell("1"),), {}, outcome)
-    assert len(list(tmp_path.iterdir())) == 3
+    assert len(StateTable(tmp_path, KIND).rows()) == 3
 
 
 @needs_sandbox
