@@ -118,13 +118,13 @@ def grade(
         intake = SubmissionIntake(gradebook, assignment, names, trust=trust)
         whole = FreshRun(intake.work_folder, assignment)
         fresh_run = FreshRun(intake.work_folder, assignment, students) if students else whole
-        if fresh_run.began:
+        if fresh_run.start_revision:
             progress.say("Going on with the run with --fresh that was ended before it was through.")
         if fresh:
             fresh_run.begin()
         run = GradingRun(
             intake, store, workers, interruption, progress, feedback=feedback,
-            since=max(fresh_run.began, whole.began),
+            since=max(fresh_run.start_revision, whole.start_revision),
         )  # fmt: skip
         graded = [*refused, *run.grade(found, refused)]
         fresh_run.end()

@@ -57,7 +57,7 @@ class GradingRun:
             interruption: says when to stop.
             progress: is told how it goes.
             feedback: write HTML feedback, too.
-            since: take nothing from earlier runs that is older (see `FreshRun.began`).
+            since: take nothing from earlier runs that is older (see `FreshRun.start_revision`).
         """
         self._intake = intake
         self._store = store

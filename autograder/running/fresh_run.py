@@ -1,7 +1,7 @@
 """Grading anew: what ``--fresh`` has begun, so that a kill does not have it begin again.
 
-A mark says when such a run began, until it has come to its end. What was kept before the mark does
-not count; what was kept since does, whoever goes on after a kill.
+A mark says when such a run began, until it is complete. What was kept before the mark does not
+count. What was kept since then does, also for a run that continues after a kill.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ class FreshRun:
         self._students = sorted(students)
 
     @property
-    def began(self) -> int:
-        """The revision of the state at which the run that grades anew began; 0 if there is none."""
+    def start_revision(self) -> int:
+        """Revision of the state when the run started; 0 if no such run is under way."""
         return self._table.revision(*self._students)
 
     def begin(self) -> None:
         """Begin such a run; one that was ended before it was through goes on."""
-        if not self.began:
+        if not self.start_revision:
             self._table.put("", *self._students)
 
     def end(self) -> None:

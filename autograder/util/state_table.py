@@ -90,7 +90,7 @@ class StateTable:
             StateError: the file is damaged.
         """
         self._path.parent.mkdir(parents=True, exist_ok=True)
-        # Grades are nobody else's business; what SQLite writes beside the file has its mode.
+        # Only the owner may read grades. SQLite gives its journal the same mode as the file.
         os.close(os.open(self._path, os.O_RDWR | os.O_CREAT, PRIVATE))
         # Text of a submission may hold half a character, which is no UTF-8.
         text = text.encode(errors="replace").decode()

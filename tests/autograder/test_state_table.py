@@ -1,4 +1,4 @@
-"""The state of a course: rows that are there as a whole, whoever else writes, or one sentence."""
+"""The state of a course: rows are written whole, by several processes; damage is one sentence."""
 
 from __future__ import annotations
 

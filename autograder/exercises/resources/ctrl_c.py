@@ -42,9 +42,10 @@ class Lives:
     later; ``others`` tells of processes that were left then.
     ``pace`` tells of pictures that do not come ten times a second, ``harmed`` of what a second
     destroy_node() does, if that is not nothing. ``of_starts`` tells of what starts left that failed
-    beside one more life. ``own_nodes`` is False if no node of the notebook's cells stays between
-    the lives. ``managed`` is what was seen of a managed camera, and ``start_raises`` whether the
-    program ended where its driver could not start; None if it did not go so far.
+    during one more life. ``own_nodes`` is False if the notebook's own cells have left no node
+    running between the lives. ``managed`` is what was seen of a managed camera, and
+    ``start_raises`` whether the program ended where its driver could not start; None if it did not
+    go so far.
     """
 
     worked: bool = True
@@ -74,8 +75,8 @@ class Lives:
     def kept_per_life(self) -> Usage:
         """Return what a life leaves behind: the median, as something else may come or go once.
 
-        Of memory it is the least: the first life warms up, by more on a busy machine, and the last
-        one has failed starts beside it.
+        For memory it is the minimum: the first life also warms up, by more on a busy machine, and
+        failed starts happen during the last one.
         """
         grown = [after.growth_since(before) for before, after in pairwise(self.usages)]
         threads, files, memory = zip(*grown, strict=True)

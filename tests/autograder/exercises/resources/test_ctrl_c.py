@@ -21,7 +21,7 @@ def lives(*grown: tuple[int, int, int]) -> Lives:
 @pytest.mark.parametrize(
     ("seen", "clean"),
     [
-        # As measured of a right driver; the last life has failed starts beside it.
+        # Measured with a right driver; failed starts happen during the last life.
         (lives((0, 0, 350), (0, 0, 210), (0, 0, 1820)), True),
         # The same driver on a busy machine: one life alone has warmed up by more than usual.
         (lives((0, 0, 1100), (0, 0, 210), (0, 0, 1820)), True),
