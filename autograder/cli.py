@@ -57,7 +57,7 @@ def build(
     ] = False,
 ) -> None:
     """Build the notebooks from their text sources."""
-    from autograder.assignments.build import build as build_notebooks
+    from autograder.assignments.build_notebooks import build as build_notebooks
 
     for path in build_notebooks(_use_root(root), check=check, with_solutions=with_solutions):
         out.print(str(path), soft_wrap=True)
@@ -106,12 +106,12 @@ def grade(
         sandbox.warm_up()  # while nbgrader is imported, which takes seconds
     from autograder.class_report.platforms import grades_csv
     from autograder.gradebook.course_gradebook import CourseGradebook
-    from autograder.grading import engine, progress
+    from autograder.grading import engine, run_progress
 
     where = _use_root(root)
     done = engine.grade(
         where, assignment, students=student or (), jobs=jobs, fresh=fresh, trust=trust,
-        scheduler=scheduler, progress=progress.for_console(out, err, machine=as_json),
+        scheduler=scheduler, progress=run_progress.for_console(out, err, machine=as_json),
     )  # fmt: skip
     gradebook = CourseGradebook(where)
     every = {name: gradebook.read_grades(name) for name in gradebook.assignment_names()}
@@ -370,9 +370,9 @@ def demo(
 ) -> None:
     """Build, release, collect a bundled class, grade it on real DDS, and show the grades."""
     from autograder.commands import demo_command
-    from autograder.grading import progress
+    from autograder.grading import run_progress
 
-    shown = progress.for_console(out, err, machine=as_json)
+    shown = run_progress.for_console(out, err, machine=as_json)
     done = demo_command.run_demo(
         folder, every=every, jobs=jobs, say=_line_printer(as_json), progress=shown
     )

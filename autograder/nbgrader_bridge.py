@@ -1,6 +1,10 @@
 """What the ``nbgrader_config.py`` of earlier courses imports from here."""
 
-from autograder.gradebook.bridge import FlagForHumans as FlagForHumans
-from autograder.gradebook.bridge import GradeByBehaviour as GradeByBehaviour
-from autograder.gradebook.bridge import RestoreCells as RestoreCells
-from autograder.gradebook.bridge import SubmissionExporter as SubmissionExporter
+from autograder.gradebook.nbgrader_plugins.autograde_steps import FlagForHumans as FlagForHumans
+from autograder.gradebook.nbgrader_plugins.autograde_steps import (
+    GradeByBehaviour as GradeByBehaviour,
+)
+from autograder.gradebook.nbgrader_plugins.autograde_steps import RestoreCells as RestoreCells
+from autograder.gradebook.nbgrader_plugins.autograde_steps import (
+    SubmissionExporter as SubmissionExporter,
+)

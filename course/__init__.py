@@ -18,73 +18,73 @@ if platform_check.find_problem() is None:
     interfaces.install()
 
 if TYPE_CHECKING:
-    from course.default_session import call as call
-    from course.default_session import close as close
-    from course.default_session import logs as logs
-    from course.default_session import next_message as next_message
-    from course.default_session import pause as pause
-    from course.default_session import record as record
-    from course.default_session import resume as resume
-    from course.default_session import run as run
-    from course.default_session import send_goal as send_goal
-    from course.default_session import session as session
-    from course.default_session import spin as spin
-    from course.default_session import stop as stop
-    from course.default_session import until as until
-    from course.default_session import wait_for_service as wait_for_service
     from course.design.declaration import Design as Design
     from course.design.endpoints import DesignError as DesignError
     from course.errors import CourseError as CourseError
     from course.errors import DomainError as DomainError
     from course.errors import SessionError as SessionError
     from course.errors import WaitTimeout as WaitTimeout
-    from course.journal.progress import Progress as Progress
-    from course.journal.progress import progress as progress
-    from course.learner_session import Session as Session
+    from course.learner_session.default_session import call as call
+    from course.learner_session.default_session import close as close
+    from course.learner_session.default_session import logs as logs
+    from course.learner_session.default_session import next_message as next_message
+    from course.learner_session.default_session import pause as pause
+    from course.learner_session.default_session import record as record
+    from course.learner_session.default_session import resume as resume
+    from course.learner_session.default_session import run as run
+    from course.learner_session.default_session import send_goal as send_goal
+    from course.learner_session.default_session import session as session
+    from course.learner_session.default_session import spin as spin
+    from course.learner_session.default_session import stop as stop
+    from course.learner_session.default_session import until as until
+    from course.learner_session.default_session import wait_for_service as wait_for_service
+    from course.learner_session.session import Session as Session
     from course.notebook import load_ipython_extension as load_ipython_extension
     from course.notebook import unload_ipython_extension as unload_ipython_extension
-    from course.runtime.callbacks.errors import CallbackError as CallbackError
-    from course.runtime.context.closing import CloseReport as CloseReport
+    from course.runtime.callbacks.callback_errors import CallbackError as CallbackError
+    from course.runtime.context.close_order import CloseReport as CloseReport
     from course.runtime.logs.table import LogTable as LogTable
     from course.runtime.requests.actions import GoalRun as GoalRun
     from course.runtime.requests.actions import GoalState as GoalState
     from course.runtime.requests.recorder import Recorder as Recorder
     from course.runtime.requests.recorder import Stamped as Stamped
     from course.runtime.simulated_time import SimulatedTime as SimulatedTime
+    from course.workspace.journal.progress import Progress as Progress
+    from course.workspace.journal.progress import progress as progress
 
 _HOMES = {
-    "call": "course.default_session",
-    "close": "course.default_session",
-    "logs": "course.default_session",
-    "next_message": "course.default_session",
-    "pause": "course.default_session",
-    "record": "course.default_session",
-    "resume": "course.default_session",
-    "run": "course.default_session",
-    "send_goal": "course.default_session",
-    "session": "course.default_session",
-    "spin": "course.default_session",
-    "stop": "course.default_session",
-    "until": "course.default_session",
-    "wait_for_service": "course.default_session",
+    "call": "course.learner_session.default_session",
+    "close": "course.learner_session.default_session",
+    "logs": "course.learner_session.default_session",
+    "next_message": "course.learner_session.default_session",
+    "pause": "course.learner_session.default_session",
+    "record": "course.learner_session.default_session",
+    "resume": "course.learner_session.default_session",
+    "run": "course.learner_session.default_session",
+    "send_goal": "course.learner_session.default_session",
+    "session": "course.learner_session.default_session",
+    "spin": "course.learner_session.default_session",
+    "stop": "course.learner_session.default_session",
+    "until": "course.learner_session.default_session",
+    "wait_for_service": "course.learner_session.default_session",
     "Design": "course.design.declaration",
     "DesignError": "course.design.endpoints",
     "CourseError": "course.errors",
     "DomainError": "course.errors",
     "SessionError": "course.errors",
     "WaitTimeout": "course.errors",
-    "Progress": "course.journal.progress",
-    "progress": "course.journal.progress",
+    "Progress": "course.workspace.journal.progress",
+    "progress": "course.workspace.journal.progress",
     "load_ipython_extension": "course.notebook",
     "unload_ipython_extension": "course.notebook",
     "GoalRun": "course.runtime.requests.actions",
     "GoalState": "course.runtime.requests.actions",
-    "CallbackError": "course.runtime.callbacks.errors",
-    "CloseReport": "course.runtime.context.closing",
+    "CallbackError": "course.runtime.callbacks.callback_errors",
+    "CloseReport": "course.runtime.context.close_order",
     "LogTable": "course.runtime.logs.table",
     "Recorder": "course.runtime.requests.recorder",
     "Stamped": "course.runtime.requests.recorder",
-    "Session": "course.learner_session",
+    "Session": "course.learner_session.session",
     "SimulatedTime": "course.runtime.simulated_time",
 }
 

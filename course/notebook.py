@@ -9,13 +9,13 @@ from typing import Any
 from rclpy.exceptions import NotInitializedException
 
 from course.interfaces import magic
-from course.journal.notes import CellNotes
 from course.ros_magic import magic as ros_magic
-from course.runtime.callbacks.errors import CallbackError
-from course.runtime.context import closing
+from course.runtime.callbacks.callback_errors import CallbackError
+from course.runtime.context import close_order
 from course.runtime.core_session import CoreSession
+from course.workspace.journal.notes import CellNotes
 
-_LONG = 3.0  # s that a callback may hold all others up before the learner is told
+_LONG_S = 3.0  # s that a callback may hold all others up before the learner is told
 _INIT_TWICE = "Context.init() must only be called once"
 
 
@@ -24,7 +24,7 @@ def load_ipython_extension(shell: Any) -> None:
     magic.register(shell)
     ros_magic.register(shell)
     unload_ipython_extension(shell)
-    for session in closing.known_sessions():
+    for session in close_order.known_sessions():
         if isinstance(session, CoreSession) and session.closed:
             _reported.unseen_news(session)  # of cells that ran before: no news of the next one
     shell.events.register("post_run_cell", _report_news)
@@ -81,7 +81,7 @@ class _Reported:
         known = self._blocked.setdefault(session, set())
         for blocked in session.blocked_callbacks():
             # A goal may well take its time in one of several threads: only what is in the way.
-            serious = blocked.reason or (blocked.holds_up and blocked.seconds > _LONG)
+            serious = blocked.reason or (blocked.holds_up and blocked.seconds > _LONG_S)
             if serious and blocked.key not in known:
                 known.add(blocked.key)
                 news.append(News(str(blocked)))
@@ -125,7 +125,7 @@ def _report_news(result: Any) -> None:
                 "first."
             )
         )
-    for session in closing.known_sessions():
+    for session in close_order.known_sessions():
         if isinstance(session, CoreSession):
             if not session.closed:
                 session.take_back_stolen_nodes()

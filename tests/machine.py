@@ -10,7 +10,7 @@ import subprocess
 import pytest
 
 from autograder.sandbox import abilities
-from course.interfaces.toolchain import compiler_problem
+from course.interfaces.building.toolchain import compiler_problem
 from course.qos_lab import link
 from tests import people
 

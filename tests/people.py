@@ -25,7 +25,7 @@ PROJECT = Path(__file__).parents[1]
 
 PROBE = """
 from importlib.util import find_spec
-for name in ("autograder.cli", "course.cli", "nbgrader.apps", "rclpy"):
+for name in ("autograder.cli", "course.command_line.cli", "nbgrader.apps", "rclpy"):
     assert find_spec(name), name
 open("mine", "w").close()
 """

@@ -177,7 +177,7 @@ def run(code: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize("command", ["course", "autograder"])
 def test_a_command_on_a_foreign_platform_says_so_before_anything_is_imported(command: str) -> None:
     code = "import platform; platform.system = lambda: 'Darwin'\n"
-    code += f"from course.launch import {command}; {command}()"
+    code += f"from course.command_line.launch import {command}; {command}()"
     done = run(code)
     assert done.returncode == UnsupportedPlatformError.exit_code == 2
     assert done.stdout == ""
@@ -203,7 +203,7 @@ def test_a_command_without_rclpy_says_how_to_get_it_back(
         if path.name != "rclpy":
             (libraries / path.name).symlink_to(path)
     code = f"import sys; sys.path[:0] = {[str(ROOT), str(libraries)]}; sys.argv[1:] = {arguments}\n"
-    code += f"from course.launch import {command}; {command}()"
+    code += f"from course.command_line.launch import {command}; {command}()"
     done = subprocess.run(
         [sys.executable, "-S", "-c", code],
         cwd=tmp_path,
@@ -221,9 +221,9 @@ def test_a_command_without_rclpy_says_how_to_get_it_back(
 
 def test_the_commands_start_at_the_launcher_which_needs_nothing(project: dict[str, Any]) -> None:
     scripts = project["project"]["scripts"]
-    assert scripts == {n: f"course.launch:{n}" for n in ("course", "autograder")}
+    assert scripts == {n: f"course.command_line.launch:{n}" for n in ("course", "autograder")}
     done = run(
-        "import sys; before = set(sys.modules); import course.launch\n"
+        "import sys; before = set(sys.modules); import course.command_line.launch\n"
         "new = {name.partition('.')[0] for name in set(sys.modules) - before}\n"
         "print(sorted(new - set(sys.stdlib_module_names) - {'course'}))"
     )
@@ -241,7 +241,7 @@ def commands(app: typer.Typer) -> set[str]:
 
 def test_every_command_in_the_readme_exists() -> None:
     from autograder.cli import app as autograder
-    from course.cli import app as course
+    from course.command_line.cli import app as course
 
     named = set(re.findall(r"uv run (course|autograder) ([a-z]+)", README))
     there = {("course", name) for name in commands(course)}

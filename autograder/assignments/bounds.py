@@ -10,7 +10,7 @@ from nbformat import NotebookNode
 MAX_CELLS = 1000
 """Cells of a notebook; one of the course has some thirty."""
 
-MAX_CODE = 1024 * 1024
+MAX_CODE_BYTES = 1024 * 1024
 """Bytes of all its code, as it travels; one of the course has 20 kB. A subject takes twice that."""
 
 MAX_OUTPUTS, MAX_PARTS = 1000, 30_000
@@ -91,9 +91,9 @@ def excess_of_notebook(notebook: NotebookNode) -> str:
         return too_many
     sources = [cell.source for cell in notebook.cells if cell.cell_type == "code"]
     size = len(json.dumps(sources, ensure_ascii=False).encode())
-    if size > MAX_CODE:
+    if size > MAX_CODE_BYTES:
         return (
-            f"has {size / 2**20:.1f} MB of code, more than the {MAX_CODE // 2**20} MB that are "
-            "run: put data into a file beside it, and hand in both."
+            f"has {size / 2**20:.1f} MB of code, more than the {MAX_CODE_BYTES // 2**20} MB that "
+            "are run: put data into a file beside it, and hand in both."
         )
     return ""

@@ -26,7 +26,7 @@ _GRADE_ID = re.compile(r"[A-Za-z0-9_-]{1,64}")
 _MARKER = re.compile(rf"(BEGIN|END) ({'|'.join(MARKERS)})")
 
 
-class BuildError(CourseError):
+class AssignmentBuildError(CourseError):
     """A text source that makes no sound notebook; the message names the file and the cell."""
 
 
@@ -43,19 +43,21 @@ def validate_assignment(notebook: NotebookNode, name: str) -> None:
     """Return if nbgrader can work with every cell of an assignment.
 
     Raises:
-        BuildError: it cannot; names the assignment (``name``) and the cell.
+        AssignmentBuildError: it cannot; names the assignment (``name``) and the cell.
     """
     seen: set[str] = set()
     for number, cell in enumerate(notebook.cells, start=1):
         where = f"{name}, cell {number}" + (f" '{grade_id(cell)}'" if grade_id(cell) else "")
         _validate_cell(cell, where)
         if grade_id(cell) in seen:
-            raise BuildError(f"{where}: the grade_id is used twice, and nbgrader needs it unique.")
+            raise AssignmentBuildError(
+                f"{where}: the grade_id is used twice, and nbgrader needs it unique."
+            )
         seen |= {grade_id(cell)} - {""}
         for problem in _marker_problems(cell):
-            raise BuildError(f"{where}: {problem}")
+            raise AssignmentBuildError(f"{where}: {problem}")
     if not any(nbgrader_metadata(cell).get("grade") for cell in notebook.cells):
-        raise BuildError(f"{name} has no grade cell: nothing in it would be graded.")
+        raise AssignmentBuildError(f"{name} has no grade cell: nothing in it would be graded.")
 
 
 def marked_lines(source: str) -> Iterator[tuple[str, str]]:
@@ -92,22 +94,24 @@ def _validate_cell(cell: NotebookNode, where: str) -> None:
         return
     data = nbgrader_metadata(cell)
     if data.get("grade") and not data.get("points"):
-        raise BuildError(
+        raise AssignmentBuildError(
             f"{where}: a grade cell without points; add it to the points.toml of its exercise or "
             'write "points" into its metadata.'
         )
     if any(data.get(key) for key in ("grade", "solution", "locked")) and not _GRADE_ID.fullmatch(
         grade_id(cell)
     ):
-        raise BuildError(
+        raise AssignmentBuildError(
             f"{where}: a grade_id has 1 to 64 letters, digits, '-' and '_', not {grade_id(cell)!r}."
         )
     try:
         MetadataValidator().validate_cell(cell)
     except ValidationError as error:
-        raise BuildError(f"{where}: nbgrader refuses the metadata, {error.message}.") from error
+        raise AssignmentBuildError(
+            f"{where}: nbgrader refuses the metadata, {error.message}."
+        ) from error
     except (SchemaTooOldError, SchemaTooNewError, KeyError) as error:
-        raise BuildError(f"{where}: nbgrader refuses the metadata, {error}.") from error
+        raise AssignmentBuildError(f"{where}: nbgrader refuses the metadata, {error}.") from error
 
 
 def _marker_problems(cell: NotebookNode) -> Iterator[str]:

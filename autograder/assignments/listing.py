@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from autograder.assignments.cells import BuildError
+from autograder.assignments.cells import AssignmentBuildError
 from autograder.examination import points
 from autograder.util import exercise_folders
 from course.util.close_matches import did_you_mean
@@ -40,7 +40,7 @@ def of_course(root: Path) -> dict[str, Assignment]:
     """Return {name: assignment} of the course at ``root``, whose exercises must be in use.
 
     Raises:
-        BuildError: a list is not sound, or names what there is not.
+        AssignmentBuildError: a list is not sound, or names what there is not.
         ExerciseError: a table of points is not sound, or an exercise has no text.
     """
     return {name: read_assignment(root, name) for name in sorted(assignment_names(root))}
@@ -94,7 +94,9 @@ def read_assignment(root: Path, name: str) -> Assignment:
     for path in sorted((root / ASSIGNMENTS / name).glob("*.py")):
         _add_text(texts, path.stem, path, path)
     if not texts:
-        raise BuildError(f"{file} lists nothing: exercises = ['…'] names what the assignment has.")
+        raise AssignmentBuildError(
+            f"{file} lists nothing: exercises = ['…'] names what the assignment has."
+        )
     return Assignment(name, texts, tuple(data["exercises"]))
 
 
@@ -102,13 +104,15 @@ def _read_list(file: Path) -> dict[str, list[str]]:
     try:
         data: dict[str, Any] = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise BuildError(f"{file} is no TOML: {error}.") from error
+        raise AssignmentBuildError(f"{file} is no TOML: {error}.") from error
     listed = {"exercises": data.pop("exercises", []), "quizzes": data.pop("quizzes", [])}
     for key, names in listed.items():
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-            raise BuildError(f"{file}: {key} must be a list of names, as in {key} = ['…'].")
+            raise AssignmentBuildError(
+                f"{file}: {key} must be a list of names, as in {key} = ['…']."
+            )
     if data:
-        raise BuildError(
+        raise AssignmentBuildError(
             f"{file} has a '{next(iter(data))}', which an assignment has not: it has lists of "
             "exercises and quizzes."
         )
@@ -117,7 +121,7 @@ def _read_list(file: Path) -> dict[str, list[str]]:
 
 def _require_known(name: str, known: list[str], who: str) -> None:
     if name not in known:
-        raise BuildError(
+        raise AssignmentBuildError(
             f"{who} '{name}', which there is not: there is {', '.join(known) or 'none'}."
             f"{did_you_mean(name, known)}"
         )
@@ -125,7 +129,7 @@ def _require_known(name: str, known: list[str], who: str) -> None:
 
 def _add_text(texts: dict[str, Path], notebook: str, text: Path, file: Path) -> None:
     if notebook in texts:
-        raise BuildError(
+        raise AssignmentBuildError(
             f"{file}: the notebook '{notebook}' would be there twice, from {texts[notebook]} and "
             f"from {text}: leave one of them out, or give it another name."
         )

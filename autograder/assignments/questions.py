@@ -30,7 +30,7 @@ _FENCE = re.compile(r"\s*(```|~~~)")
 
 
 @dataclass(frozen=True)
-class Question:
+class GradedQuestion:
     """A graded cell of an assignment.
 
     Attributes:
@@ -55,7 +55,7 @@ class Question:
     stub: str = ""
 
 
-Asked = Mapping[str, Mapping[str, Question]]
+Asked = Mapping[str, Mapping[str, GradedQuestion]]
 """The questions of an assignment: {notebook: {grade id: question}}."""
 
 
@@ -66,14 +66,14 @@ class _Section:
     body: str
 
 
-def of_notebook(notebook: NotebookNode, name: str) -> dict[str, Question]:
+def of_notebook(notebook: NotebookNode, name: str) -> dict[str, GradedQuestion]:
     """Return {grade id: question} in the order of the cells; headings count in locked cells only.
 
     Args:
         notebook: any version of it; only the source has the model answers.
         name: the notebook's.
     """
-    found: dict[str, Question] = {}
+    found: dict[str, GradedQuestion] = {}
     above: list[_Section] = []
     for cell in notebook.cells:
         data = submission.nbgrader_metadata(cell)
@@ -87,7 +87,9 @@ def of_notebook(notebook: NotebookNode, name: str) -> dict[str, Question]:
     return found
 
 
-def of_assignment(coursedir: CourseDirectory, assignment: str) -> dict[str, dict[str, Question]]:
+def of_assignment(
+    coursedir: CourseDirectory, assignment: str
+) -> dict[str, dict[str, GradedQuestion]]:
     """Return {notebook: {grade id: question}} from an assignment's source; what is not there, not.
 
     Raises:
@@ -100,7 +102,9 @@ def of_assignment(coursedir: CourseDirectory, assignment: str) -> dict[str, dict
     }
 
 
-def known_questions(coursedir: CourseDirectory, assignment: str) -> dict[str, dict[str, Question]]:
+def known_questions(
+    coursedir: CourseDirectory, assignment: str
+) -> dict[str, dict[str, GradedQuestion]]:
     """Return what `of_assignment` does, and nothing where the source cannot be read."""
     try:
         return of_assignment(coursedir, assignment)
@@ -124,16 +128,18 @@ def title_of_notebook(notebook: str) -> str:
 
 
 @lru_cache(maxsize=64)
-def _of_file(path: Path, _changed_ns: int) -> Mapping[str, Question]:
+def _of_file(path: Path, _changed_ns: int) -> Mapping[str, GradedQuestion]:
     return of_notebook(submission.read_notebook(path), path.stem)
 
 
-def _make_question(cell: NotebookNode, name: str, title: str, above: list[_Section]) -> Question:
+def _make_question(
+    cell: NotebookNode, name: str, title: str, above: list[_Section]
+) -> GradedQuestion:
     data = submission.nbgrader_metadata(cell)
     grade_id, worth = submission.grade_id(cell), float(data.get("points") or 0)
     if not data.get("solution"):
-        return Question(name, grade_id, title, False, worth)
-    return Question(
+        return GradedQuestion(name, grade_id, title, False, worth)
+    return GradedQuestion(
         name, grade_id, title, True, worth,
         text=above[-1].body if above else "",
         rules=above[-2].body if len(above) > 1 and above[-2].level > 1 else "",

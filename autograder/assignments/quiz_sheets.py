@@ -10,7 +10,7 @@ from nbformat import NotebookNode
 from autograder.assignments import quiz_cells
 from course.errors import CourseError
 from quizzes.bank import loader
-from quizzes.marking import closing
+from quizzes.marking import closed_quizzes
 
 
 class QuizSheetError(CourseError):
@@ -36,9 +36,11 @@ def of_notebooks(root: Path, notebooks: Iterable[NotebookNode]) -> dict[Path, by
                 continue
             bank = quiz_cells.find_bank(root, name)
             if bank.closed:
-                found[Path(closing.sheet_filename(name))] = closing.make_sheet(bank).encode()
+                found[Path(closed_quizzes.sheet_filename(name))] = closed_quizzes.make_sheet(
+                    bank
+                ).encode()
                 found |= {Path(source): _read_picture(bank.folder / source)
-                          for source in closing.picture_files(bank)}  # fmt: skip
+                          for source in closed_quizzes.picture_files(bank)}  # fmt: skip
             elif name in own:
                 raise QuizSheetError(
                     f"{root / quiz_cells.BANKS / name}.yaml does not reach students with its keys: "

@@ -23,7 +23,7 @@ from autograder.examination import answer_keys, points
 from autograder.examination.program import Cell, Program
 from course.errors import CourseError
 
-MAX_NOTEBOOK = 20 * 1024 * 1024
+MAX_NOTEBOOK_BYTES = 20 * 1024 * 1024
 """Largest notebook file in bytes that is read; a course notebook with its outputs has 0.1 MB."""
 
 
@@ -88,10 +88,11 @@ def _read_text(path: Path) -> str:
         status = path.lstat()  # a link may lead to another student's work
         if not stat.S_ISREG(status.st_mode):
             raise SubmissionError(f"{path.name} is not a file: hand in the notebook itself.")
-        if status.st_size > MAX_NOTEBOOK:
+        if status.st_size > MAX_NOTEBOOK_BYTES:
             raise SubmissionError(
                 f"{path.name} has {status.st_size / 2**20:.0f} MB, more than the "
-                f"{MAX_NOTEBOOK // 2**20} MB that are read: clear its outputs and hand it in again."
+                f"{MAX_NOTEBOOK_BYTES // 2**20} MB that are read: clear its outputs and hand it in "
+                "again."
             )
         return decode_text(path.read_bytes(), path.name)
     except FileNotFoundError:

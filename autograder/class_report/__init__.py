@@ -5,5 +5,5 @@ from __future__ import annotations
 from course.errors import CourseError
 
 
-class InsightError(CourseError):
+class ClassReportError(CourseError):
     """A class report that cannot be made or written; the message says why and what to do."""

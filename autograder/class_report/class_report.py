@@ -6,9 +6,10 @@ import statistics
 from dataclasses import dataclass
 from typing import Any
 
-from autograder.class_report import feedback, figures, likeness, means, needs, similarity
-from autograder.class_report.collect import ClassData
-from autograder.class_report.own_text import GivenText
+from autograder.class_report import attention, feedback, figures, means
+from autograder.class_report.class_data import ClassData
+from autograder.class_report.similarity import alike_pairs, compared_work
+from autograder.class_report.similarity.own_text import GivenText
 
 
 @dataclass(frozen=True)
@@ -22,10 +23,10 @@ class ClassReport:
     data: ClassData
     checks: tuple[figures.CheckFigures, ...]
     times: figures.Times
-    feedback: list[feedback.Group]
-    needs: list[needs.Need]
-    alike: similarity.Likeness
-    texts: likeness.Texts
+    feedback: list[feedback.FeedbackGroup]
+    needs: list[attention.Need]
+    alike: alike_pairs.Similarity
+    texts: compared_work.Texts
     given: GivenText
     threshold: float
     notes: tuple[str, ...]

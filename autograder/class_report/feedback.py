@@ -7,11 +7,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from autograder.class_report import figures
-from autograder.class_report.collect import ClassData
+from autograder.class_report.class_data import ClassData
 
-MOST = 20
+MAX_GROUPS = 20
 """Most groups on the page."""
-LONGEST = 240
+MAX_CHARS = 240
 """Characters of an observation that count; a student's error message can be of any length."""
 
 # Quotes around something short: a name, a value. An apostrophe inside a word is none.
@@ -24,7 +24,7 @@ _LIST = re.compile(r"#(?:(?:, | and |, and |; )#)+")
 
 
 @dataclass(frozen=True)
-class Group:
+class FeedbackGroup:
     """One observation that several submissions share.
 
     Attributes:
@@ -38,12 +38,14 @@ class Group:
     students: tuple[str, ...]
 
 
-def common_groups(data: ClassData) -> list[Group]:
+def common_groups(data: ClassData) -> list[FeedbackGroup]:
     """Return the groups of what was observed, the most common first."""
     groups: dict[tuple[str, str], set[str]] = {}
     for student, about, text in _collect_observations(data):
         groups.setdefault((about, strip_details(text, [student])), set()).add(student)
-    found = (Group(about, text, tuple(sorted(who))) for (about, text), who in groups.items())
+    found = (
+        FeedbackGroup(about, text, tuple(sorted(who))) for (about, text), who in groups.items()
+    )
     return sorted(found, key=lambda group: (-len(group.students), group.about, group.text))
 
 
@@ -53,14 +55,14 @@ def strip_details(text: str, names: Iterable[str] = ()) -> str:
     Quoted words, what stands in angle brackets, topics and ``names`` become ``…``; numbers, and
     enumerations of numbers, ``#``.
     """
-    text = " ".join(text[: 4 * LONGEST].split())
+    text = " ".join(text[: 4 * MAX_CHARS].split())
     for name in names:
         if len(name) > 2:  # a shorter one stands inside too many ordinary words
             text = re.sub(rf"(?<!\w){re.escape(name)}(?!\w)", "…", text)
     text = _ANGLE.sub("…", _CURLY.sub("…", _QUOTED.sub("…", text)))
     text = _NUMBER.sub("#", _TOPIC.sub("…", text))
     text = _LIST.sub("#", text)
-    return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
+    return text if len(text) <= MAX_CHARS else text[: MAX_CHARS - 1] + "…"
 
 
 def _collect_observations(data: ClassData) -> Iterator[tuple[str, str, str]]:

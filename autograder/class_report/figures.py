@@ -1,4 +1,4 @@
-"""The figures of a class: how each check fared, whether it tells who knows, and how long it took.
+"""The figures of a class: how each check fared, how well it discriminates, and how long it took.
 
 The discrimination of a check is the point-biserial correlation of passing it with the *rest* score,
 the points on all other checks of the assignment: with its own points inside the total every check
@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from autograder.assignments.quiz_cells import PREFIX
-from autograder.class_report.collect import ClassData
+from autograder.class_report.class_data import ClassData
 from autograder.examination.verdict import CheckResult, Status
 from quizzes.insight.analysis import FEWEST_WRONG, compute_discrimination
 

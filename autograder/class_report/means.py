@@ -15,7 +15,7 @@ from pathlib import Path
 
 from autograder.assignments import questions
 from autograder.assignments.quiz_cells import PREFIX
-from autograder.class_report.collect import ClassData
+from autograder.class_report.class_data import ClassData
 from autograder.examination import points
 from autograder.util import exercise_folders
 from autograder.util.exercise_folders import ExerciseError, Exercises

@@ -1,1 +1,1 @@
-"""The commands of each room."""
+"""The subcommands of ``autograder``, a module each."""

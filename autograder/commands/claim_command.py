@@ -6,12 +6,20 @@ from pathlib import Path
 
 from autograder.assignments import quiz_cells, submission
 from autograder.assignments.intake import claim_records, roster
-from autograder.assignments.intake.archives import ArchiveError
 from autograder.assignments.intake.claim_records import Claim, ClaimError
-from autograder.assignments.intake.file_names import join_names, printable_name, quote_name
-from autograder.assignments.intake.handed_in import HandedIn, Item, look_through
-from autograder.assignments.submission import MAX_NOTEBOOK
-from autograder.gradebook import bridge as bridge
+from autograder.assignments.intake.handed_files.archives import ArchiveError
+from autograder.assignments.intake.handed_files.file_names import (
+    join_names,
+    printable_name,
+    quote_name,
+)
+from autograder.assignments.intake.handed_files.handed_in import (
+    HandedIn,
+    HandedInItem,
+    look_through,
+)
+from autograder.assignments.submission import MAX_NOTEBOOK_BYTES
+from autograder.gradebook.nbgrader_plugins import autograde_steps as bridge
 from quizzes.attempts import record
 
 
@@ -91,10 +99,10 @@ def _make_claim(folder: Path, name: str, proper: str, file: str) -> Claim:
     return Claim(place, claim_records.digest_state(folder, handed_in, proper, place))
 
 
-def _require_kind(item: Item, name: str) -> None:
+def _require_kind(item: HandedInItem, name: str) -> None:
     """Raise if a file cannot be what it is claimed to be."""
     try:
-        content = item.read(MAX_NOTEBOOK + 1)
+        content = item.read(MAX_NOTEBOOK_BYTES + 1)
     except (OSError, ArchiveError) as error:
         raise ClaimError(f"{join_names([item.place])} cannot be read ({error}).") from None
     if name.startswith(quiz_cells.PREFIX):

@@ -12,7 +12,7 @@ import nbformat
 
 from autograder import corpus
 from autograder.assignments import listing, submission
-from autograder.assignments.build import build
+from autograder.assignments.build_notebooks import build
 from autograder.class_report.platforms import grades_csv
 from autograder.corpus import Case
 from autograder.corpus.command import needs_trust
@@ -22,7 +22,7 @@ from autograder.gradebook.course_gradebook import CourseGradebook, Grade
 from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from autograder.grading.engine import Graded
-from autograder.grading.progress import Collecting, Progress
+from autograder.grading.run_progress import Collecting, RunProgress
 from autograder.util import exercise_folders
 from course.errors import CourseError
 from course.workspace.content import content_root
@@ -40,7 +40,7 @@ Cases = dict[str, dict[str, Case]]
 
 
 @dataclass(frozen=True)
-class Row:
+class DemoRow:
     """One student's line of the demo's table."""
 
     student: str
@@ -56,7 +56,7 @@ class Demo:
 
     root: Path
     csv: Path
-    rows: tuple[Row, ...]
+    rows: tuple[DemoRow, ...]
 
     @property
     def as_expected(self) -> bool:
@@ -70,7 +70,7 @@ def run_demo(
     every: bool = False,
     jobs: int = 2,
     say: Callable[[str], None] = lambda _line: None,
-    progress: Progress = engine.QUIET,
+    progress: RunProgress = engine.QUIET,
 ) -> Demo:
     """Build, release, collect the bundled class, grade it, and write feedback and grades.
 
@@ -170,7 +170,7 @@ def _course_root(folder: Path, exams: list[str]) -> Path:
     return notebooks_of(folder, exams, ASSIGNMENT)
 
 
-def _make_row(handed_in: dict[str, str], graded: Graded, grade: Grade, cases: Cases) -> Row:
+def _make_row(handed_in: dict[str, str], graded: Graded, grade: Grade, cases: Cases) -> DemoRow:
     """Return a student's line: what had to come out, and what came out differently."""
     expected, differences = [], []
     for exam, own in cases.items():
@@ -185,7 +185,7 @@ def _make_row(handed_in: dict[str, str], graded: Graded, grade: Grade, cases: Ca
             differences += [f"{exam}: {d}" for d in [own[name].verdict_of(outcome)] if d]
             fails = own[name].fails_in_words if own[name].fails else ""
             expected += [f"{exam}: {fails}" if len(cases) > 1 else fails] if fails else []
-    return Row(
+    return DemoRow(
         graded.student, handed_in["title"], grade, "; ".join(expected) or "nothing",
         "; ".join(differences),
     )  # fmt: skip

@@ -42,7 +42,7 @@ def export_marks(
     """
     from autograder.gradebook.course_gradebook import CourseGradebook
     from autograder.gradebook.written_answers import answers, answers_page
-    from autograder.util.files import write_whole
+    from autograder.util.work_files import write_whole
 
     gradebook = CourseGradebook(_course_root(root))
     asked = (

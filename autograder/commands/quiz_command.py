@@ -47,11 +47,11 @@ def export_command(
     root: Root = None,
 ) -> None:
     """Write a quiz for a learning platform, and say what its format cannot hold."""
-    from quizzes.exchange import files
+    from quizzes.exchange import bank_files
 
     with as_course_errors():
-        bank = files.open_bank(quiz, _banks_folder(root))
-        path, notes = files.export_bank(bank, format_name, to)
+        bank = bank_files.open_bank(quiz, _banks_folder(root))
+        path, notes = bank_files.export_bank(bank, format_name, to)
     points, variants = len(bank.concepts), sum(len(c.variants) for c in bank.concepts)
     worth = f"{points} of {variants} questions are drawn, {points} points"
     _print_notes(f"Written: {path} ({worth})", notes)
@@ -65,10 +65,12 @@ def import_command(
     root: Root = None,
 ) -> None:
     """Bring a quiz that was edited in Moodle back: writes the bank's YAML anew."""
-    from quizzes.exchange import files
+    from quizzes.exchange import bank_files
 
     with as_course_errors():
-        path, merged = files.import_gift(file, files.open_bank(into, _banks_folder(root)), to)
+        path, merged = bank_files.import_gift(
+            file, bank_files.open_bank(into, _banks_folder(root)), to
+        )
     changes = "nothing has changed" if not merged.changed else f"{merged.changed} new or changed"
     _print_notes(f"Written: {path} ({changes})", merged.notes)
 
@@ -78,12 +80,12 @@ def lint(quizzes: Quizzes, root: Root = None) -> None:
     """Look for all that is wrong with quizzes: faults, and questions easy to guess or unfair."""
     from quizzes.bank import lint as bank_lint
     from quizzes.errors import BankError
-    from quizzes.exchange import files
+    from quizzes.exchange import bank_files
 
     sound = True
     for quiz in quizzes:
         try:
-            bank = files.open_bank(quiz, _banks_folder(root))
+            bank = bank_files.open_bank(quiz, _banks_folder(root))
         except BankError as error:
             sound = False
             _print_faults(quiz, error)

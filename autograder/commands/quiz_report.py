@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 from rich.table import Table
 
 from autograder.assignments import quiz_cells
-from autograder.assignments.intake import attempts
-from autograder.assignments.intake.file_names import normalise_name
+from autograder.assignments.intake import attempts_search
+from autograder.assignments.intake.handed_files.file_names import normalise_name
 from autograder.commands.quiz_command import QuizCommandError, as_course_errors
-from autograder.gradebook import bridge as bridge
 from autograder.gradebook.course_gradebook import CourseGradebook, GradebookError
+from autograder.gradebook.nbgrader_plugins import autograde_steps as bridge
 from quizzes.attempts import record, sharing
 
 if TYPE_CHECKING:
@@ -52,13 +52,13 @@ class QuizReport:
 
     def as_tables(self) -> tuple[Table, ...]:
         """Return the items, the misconceptions that somebody holds, and who shares attempts."""
-        from quizzes.insight import report
+        from quizzes.insight import item_report
 
         items = Table("Item", "Kind", "Learners", "p", "r", "Remark", padding=(0, 0))
         items.caption = "p: difficulty, mean credit; r: discrimination, correlation with the rest"
         for column in items.columns[:5]:
             column.no_wrap = True
-        for row in report.item_rows(self.analysis):
+        for row in item_report.item_rows(self.analysis):
             if row[1] == "concept" or row[2] != "0":  # the page has the other variants, too
                 items.add_row(*row, style="bold" if row[1] == "concept" else None)
         beliefs = Table("Misconception", "Held by", "Share")
@@ -128,7 +128,7 @@ class _Taken:
 
 
 def _known_students(root: Path) -> frozenset[str]:
-    """Return whom the gradebook knows, if there is one."""
+    """Return the students in the gradebook, if there is one."""
     with suppress(GradebookError):
         return CourseGradebook(root).read_roster().known
     return frozenset()
@@ -140,7 +140,7 @@ def _collect_attempts(root: Path, assignment: str, quiz: str) -> _Taken:
     for folder in sorted((root / "submitted").glob(f"*/{assignment}")):
         learner = normalise_name(folder.parent.name)
         try:
-            found = attempts.find_attempts(folder, quiz, learner, root, class_)
+            found = attempts_search.find_attempts(folder, quiz, learner, root, class_)
         except OSError as error:
             name = record.attempts_filename(quiz)
             taken.unread.append(f"{name} of {learner} cannot be read ({error.strerror or error}).")

@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.table import Table
 
-from autograder.class_report import report
+from autograder.class_report import report_files
 from autograder.class_report.class_report import ClassReport
 from autograder.class_report.platforms import exports
 
@@ -62,16 +62,16 @@ def make_report(
     threshold: float,
     zero_absent: bool = False,
 ) -> Made:
-    """Make the report of an assignment and write it; arguments as in `report` and `exports`.
+    """Make the report of an assignment and write it; arguments as in `exports` and `alike_pairs`.
 
     Raises:
-        InsightError: no such assignment, nothing graded, or a folder that cannot be written.
+        ClassReportError: no such assignment, nothing graded, or a folder that cannot be written.
     """
-    made = report.make_report(root, assignment, threshold)
+    made = report_files.make_report(root, assignment, threshold)
     chosen = {"provisional": provisional, "zero_absent": zero_absent}
-    files = report.write_report(made, column, **chosen)
+    files = report_files.write_report(made, column, **chosen)
     export = exports.export_canvas(made.data, column, **chosen)
-    remarks = [*_absence_remarks(made), *made.notes, *report.export_remarks(export)]
+    remarks = [*_absence_remarks(made), *made.notes, *report_files.export_remarks(export)]
     return Made(made, files, remarks)
 
 

@@ -13,7 +13,7 @@ from autograder.assignments import submission
 from autograder.assignments.cells import without_markers
 from autograder.examination.draws import USUAL_SEED
 from autograder.examination.verdict import CheckResult
-from autograder.running.runner import CELL_TIMEOUT, Outcome
+from autograder.running.runner import CELL_TIMEOUT_S, Outcome
 from autograder.sandbox import abilities
 from course.errors import CourseError
 
@@ -61,7 +61,7 @@ class Case:
     stub: Mapping[str, str] = field(default_factory=dict)
     splices: Mapping[str, tuple[Splice, ...]] = field(default_factory=dict)
     blank: bool = False
-    cell_timeout: float = CELL_TIMEOUT
+    cell_timeout: float = CELL_TIMEOUT_S
     points: float | None = None
 
     @property

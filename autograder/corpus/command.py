@@ -6,9 +6,9 @@ import difflib
 from collections.abc import Callable, Sequence
 
 from autograder import exercises, sandbox
-from autograder.corpus import files, trials
+from autograder.corpus import corpus_files, trials
 from autograder.corpus.case import Case, CorpusError
-from autograder.corpus.trials import Trial
+from autograder.corpus.trials import CorpusTrial
 from autograder.examination.draws import USUAL_SEED
 
 
@@ -20,7 +20,7 @@ def load_cases(exam: str = "") -> dict[str, list[Case]]:
         CorpusError: a corpus is missing or not well formed.
     """
     chosen = [exercises.load_exam(exam).name] if exam else exercises.exercise_names()
-    return {name: files.load_cases(name) for name in chosen}
+    return {name: corpus_files.load_cases(name) for name in chosen}
 
 
 def run_corpus(
@@ -32,7 +32,7 @@ def run_corpus(
     load: int = 0,
     seed: int = USUAL_SEED,
     say: Callable[[str], None] = lambda _line: None,
-) -> list[Trial]:
+) -> list[CorpusTrial]:
     """Run the corpus of ``exam`` (of all exams if it is empty).
 
     Args:
@@ -83,7 +83,7 @@ def needs_trust(say: Callable[[str], None]) -> bool:
     return bool(problem)
 
 
-def _describe_trial(trial: Trial) -> str:
+def _describe_trial(trial: CorpusTrial) -> str:
     case = trial.case
     return (
         f"  {case.exam}/{case.name}: {trial.difference or 'as expected'} "

@@ -9,11 +9,11 @@ from rich.table import Table
 
 from autograder import exercises
 from autograder.corpus.case import Case
-from autograder.corpus.trials import Trial
+from autograder.corpus.trials import CorpusTrial
 from autograder.examination import points
 
 
-def trials_table(trials: list[Trial]) -> Table:
+def trials_table(trials: list[CorpusTrial]) -> Table:
     """Return one row a case: what it must fail, how often it came out so, and its time."""
     rows = Table("Case", "Must fail", "As expected", "Flips", "Seconds a run (median)")
     for (exam, name), runs in _by_case(trials).items():
@@ -25,7 +25,7 @@ def trials_table(trials: list[Trial]) -> Table:
     return rows
 
 
-def as_data(trials: list[Trial]) -> list[dict[str, Any]]:
+def as_data(trials: list[CorpusTrial]) -> list[dict[str, Any]]:
     """Return the same for machines, one entry a run."""
     return [
         {
@@ -37,13 +37,13 @@ def as_data(trials: list[Trial]) -> list[dict[str, Any]]:
     ]  # fmt: skip
 
 
-def flipped_checks(runs: list[Trial]) -> list[str]:
+def flipped_checks(runs: list[CorpusTrial]) -> list[str]:
     """Return the checks whose status was not the same in all runs of a case."""
     names = {name for run in runs for name in run.check_statuses}
     return sorted(name for name in names if len({run.check_statuses.get(name) for run in runs}) > 1)
 
 
-def all_flips(trials: list[Trial]) -> list[str]:
+def all_flips(trials: list[CorpusTrial]) -> list[str]:
     """Return "exam/case: check" for every verdict that changed between repeats."""
     return [
         f"{exam}/{name}: {check}"
@@ -93,8 +93,8 @@ def checks_matrix(cases: dict[str, list[Case]]) -> str:
     return "\n".join(lines)
 
 
-def _by_case(trials: list[Trial]) -> dict[tuple[str, str], list[Trial]]:
-    cases: dict[tuple[str, str], list[Trial]] = defaultdict(list)
+def _by_case(trials: list[CorpusTrial]) -> dict[tuple[str, str], list[CorpusTrial]]:
+    cases: dict[tuple[str, str], list[CorpusTrial]] = defaultdict(list)
     for trial in trials:
         cases[trial.case.exam, trial.case.name].append(trial)
     return dict(cases)

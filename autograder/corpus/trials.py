@@ -17,7 +17,7 @@ from nbformat import NotebookNode
 
 from autograder import exercises
 from autograder.assignments import listing, submission
-from autograder.assignments.build import build
+from autograder.assignments.build_notebooks import build
 from autograder.corpus.case import Case
 from autograder.examination import points
 from autograder.examination.draws import USUAL_SEED
@@ -35,7 +35,7 @@ Notebooks = tuple[NotebookNode, NotebookNode]
 
 
 @dataclass(frozen=True)
-class Trial:
+class CorpusTrial:
     """One run of a case: its outcome, and how that differs from what must come out."""
 
     case: Case
@@ -90,19 +90,19 @@ def run(
     repeat: int = 1,
     trust: bool = False,
     seed: int = USUAL_SEED,
-    done: Callable[[Trial], None] = lambda _trial: None,
-) -> list[Trial]:
+    done: Callable[[CorpusTrial], None] = lambda _trial: None,
+) -> list[CorpusTrial]:
     """Run every case ``repeat`` times, ``jobs`` at a time, and compare.
 
     ``trust`` and ``seed`` are those of `runner.run`; what cases say is worded for the usual seed.
     """
 
-    def one(case: Case) -> Trial:
+    def one(case: Case) -> CorpusTrial:
         handed_in = case.make_submission(source, released)
         notebook, _ = submission.restore_cells(handed_in, source, released)
         program = submission.extract_program(notebook)
         outcome = runner.run(program, cell_timeout=case.cell_timeout, trust=trust, seed=seed)
-        trial = Trial(case, outcome, case.verdict_of(outcome))
+        trial = CorpusTrial(case, outcome, case.verdict_of(outcome))
         done(trial)
         return trial
 

@@ -15,20 +15,20 @@ from autograder.processes.fair_deadline import FairDeadline, RunDelay, of_proces
 from autograder.processes.outside.asking import Outside
 from course.runtime.core_session import CoreSession
 
-REPLY_TIMEOUT = 10.0
+REPLY_TIMEOUT_S = 10.0
 """Seconds a subject may take over one request (making a node, say) before it counts as hung."""
 
-ALL_REPLIES_TIMEOUT = 150.0
+ALL_REPLIES_TIMEOUT_S = 150.0
 """Seconds that all replies of an examination may take together: the slowest right driver that is
 known, which needs a second to start and another one to end, comes to 85 s; most come to 10 s."""
 
 QUICK_REPLY_S = 0.5
-"""Seconds in which most replies come, of which a budget in all needs no account."""
+"""Seconds in which most replies come: of such a reply, the whole time counts."""
 
-MAX_REPLY = 512 * 1024
-"""Bytes of a reply that are received; a harness cuts values and errors well below it."""
+MAX_REPLY_BYTES = 512 * 1024
+"""Bytes of a reply that are received; the subject server cuts values and errors well below it."""
 
-MOST_TOLD = 200
+MAX_NOTES = 200
 """Nodes, errors and waits that a reply may list."""
 
 MAX_ERROR, MAX_TRACE, MAX_NAME = 2000, 4000, 500
@@ -36,7 +36,7 @@ MAX_ERROR, MAX_TRACE, MAX_NAME = 2000, 4000, 500
 NODE_NAME = re.compile(r"(?=.{2,200}$)(/[A-Za-z_][A-Za-z0-9_]*)+", re.ASCII)
 """What a node can be called (ROS 2 design, "Topic and Service name mapping"), if not longer."""
 
-PATIENCE = 3.0
+PATIENCE_S = 3.0
 """Seconds of wall time that a callback of a subject's may hold up a step of simulated time."""
 
 Endpoints = Mapping[str, Sequence[str]]
@@ -74,18 +74,18 @@ class StudentError(Exception):
 class Subject:
     """The examiner's end of the control channel. It asks; it does not believe.
 
-    What is no answer to what was asked comes from the student's code, not from the harness: it ends
-    the examination like a process that ended.
+    What is no answer to what was asked comes from the student's code, not from the subject server:
+    it ends the examination like a process that ended.
 
     ``name`` is always a name of the notebook's: of a class, or of anything that makes a node.
     ``hangs`` says in a sentence that the subject did not answer in time, once it did not.
     """
 
     def __init__(self, channel: Channel) -> None:
-        """Talk to the harness over ``channel``."""
+        """Talk to the subject server over ``channel``."""
         self._channel = channel
         self._gone: str | None = None
-        self._left = ALL_REPLIES_TIMEOUT
+        self._left = ALL_REPLIES_TIMEOUT_S
         self.hangs = ""
         self.delay: RunDelay = of_process(0)  # by which its deadlines are put off
 
@@ -154,7 +154,7 @@ class Subject:
     def mark(self, name: str) -> None:
         """Make a node called ``name`` with one publisher and one subscription on topic ``name``.
 
-        DDS announces a process's endpoints in order: whoever sees both on the graph has seen all
+        DDS announces a process's endpoints in order: once both are on the graph, so is everything
         that the subject's nodes had before. So what is missing then is missing, not late.
         """
         self._ask_harness("mark", name, doing="make a small node beside yours")
@@ -192,12 +192,12 @@ class Subject:
             Whether some callback has begun, and not ended by now.
 
         Raises:
-            StudentError: a callback held up a step for longer than PATIENCE.
+            StudentError: a callback held up a step for longer than PATIENCE_S.
             SubjectGone: it does not answer at all.
         """
         reply = self._ask_harness(
-            "advance", f"{seconds:g} s of simulated time", REPLY_TIMEOUT + PATIENCE,
-            seconds=seconds, step=step, patience=PATIENCE,
+            "advance", f"{seconds:g} s of simulated time", REPLY_TIMEOUT_S + PATIENCE_S,
+            seconds=seconds, step=step, patience=PATIENCE_S,
         )  # fmt: skip
         return self._read_reply(lambda: bool(reply["goes_on"]))
 
@@ -205,7 +205,7 @@ class Subject:
         """Tell its nodes that a nanosecond of simulated time has passed; wait for no callback."""
         self._ask_harness("nudge", "", doing="tell its nodes that time goes on")
 
-    def call(self, name: str, method: str, *args: Any, timeout: float = REPLY_TIMEOUT) -> Any:
+    def call(self, name: str, method: str, *args: Any, timeout: float = REPLY_TIMEOUT_S) -> Any:
         """Call a method of the node made of a class, in the main thread, while the node spins.
 
         Args:
@@ -285,7 +285,7 @@ class Subject:
         return self._read_reply(
             lambda: {
                 _bounded_text(error["told"], MAX_ERROR): int(error["count"])
-                for error in reply["errors"][:MOST_TOLD]
+                for error in reply["errors"][:MAX_NOTES]
             }
         )
 
@@ -293,7 +293,7 @@ class Subject:
         self,
         operation: str,
         what: str,
-        timeout: float = REPLY_TIMEOUT,
+        timeout: float = REPLY_TIMEOUT_S,
         *,
         doing: str = "",
         **more: Any,
@@ -315,9 +315,9 @@ class Subject:
                 f"Your program did not answer within {timeout:.0f} s when it was asked to "
                 f"{doing}: does a constructor, a callback or a cleanup wait for ever?"
                 if self._left
-                else f"Your program took {ALL_REPLIES_TIMEOUT:.0f} s in all for what it was asked "
-                f"to do, the last of which was to {doing}: which constructor, callback or cleanup "
-                "takes so long each time?"
+                else f"Your program took {ALL_REPLIES_TIMEOUT_S:.0f} s in all for what it was "
+                f"asked to do, the last of which was to {doing}: which constructor, callback or "
+                "cleanup takes so long each time?"
             )
             self.hangs = self._gone
             raise SubjectGone(self._gone) from None
@@ -336,7 +336,7 @@ class Subject:
         """Count the time of the block, as far as the subject was not kept from running by others.
 
         At least a third of it counts: a reply can be put off no further. Of a quick one all counts,
-        as to ask takes as long.
+        because asking how much to leave out would take as long.
         """
         began, mark = time.monotonic(), self.delay.mark()
         try:
@@ -348,7 +348,7 @@ class Subject:
             self._left = max(0.0, self._left - took)
 
     def _read_reply(self, found: Callable[[], T]) -> T:
-        """Return what is found in a reply, if it is one of the harness's.
+        """Return what is found in a reply, if it is one of the subject server's.
 
         Raises:
             SubjectGone: it is not.
@@ -363,7 +363,7 @@ class Subject:
         return SubjectGone(self._gone)
 
     def release(self) -> None:
-        """Let the harness go: it stops its nodes and returns to whoever started it."""
+        """Let the subject server go: it stops its nodes and returns to the code that started it."""
         try:
             self._channel.send({"op": "done"})
         except ChannelClosed:
@@ -379,10 +379,10 @@ def _bounded_text(found: Any, most: int) -> str:
 def _bounded_texts(found: Any, most: int) -> list[str]:
     if not isinstance(found, list):
         raise TypeError("no list")
-    return [_bounded_text(line, most) for line in found[:MOST_TOLD]]
+    return [_bounded_text(line, most) for line in found[:MAX_NOTES]]
 
 
-class Bench:
+class CheckContext:
     """The examiner's session on the subject's domain, and the subject."""
 
     def __init__(

@@ -15,7 +15,7 @@ from types import MappingProxyType, TracebackType
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from autograder.examination import points as points_table
-from autograder.examination.check_context import Bench, StudentError, SubjectGone
+from autograder.examination.check_context import CheckContext, StudentError, SubjectGone
 from autograder.examination.plain_programs import SlowProgramError
 from autograder.examination.verdict import CheckResult, Status, Verdict
 from autograder.processes.fair_deadline import FairDeadline
@@ -24,17 +24,17 @@ from course.errors import CourseError
 RigT = TypeVar("RigT")
 
 
-MAX_TEXT = 7000
+MAX_TEXT_CHARS = 7000
 """Characters of a text in a verdict: of an error in a student's code, 6000 are told."""
 
 SITTING_S = 180.0
 """Seconds in which checks of one sitting begin: a twelfth is enough for all of them, as a rule.
 
 A node that takes its time for each answer, and yet gives it, would keep the examiner for longer
-than it may take (`autograder.processes.EXAM_TIMEOUT`), and that would be the grader's fault.
+than it may take (`autograder.running.start.EXAM_TIMEOUT_S`), and that would be the grader's fault.
 """
 
-LONGEST_NAME = 200
+MAX_NAME_BYTES = 200
 """Bytes that are shown of a name that is no text."""
 
 
@@ -83,17 +83,17 @@ class Check(Generic[RigT]):
 class Exam(Generic[RigT]):
     """The checks of one exercise, and the rig they run on.
 
-    ``rig`` is a context manager around the bench: what it gives is what every check takes. With
-    ``fresh_parts`` each part has one of its own, for checks that leave their mark on what the nodes
-    do later: what failed in an earlier part is not tried again there, what passed is.
+    ``rig`` is a context manager around the check context: what it gives is what every check takes.
+    With ``fresh_parts`` each part has one of its own, for checks that leave their mark on what the
+    nodes do later: what failed in an earlier part is not tried again there, what passed is.
     """
 
     name: str
-    rig: Callable[[Bench], AbstractContextManager[RigT]]
+    rig: Callable[[CheckContext], AbstractContextManager[RigT]]
     fresh_parts: bool = False
     checks: dict[str, Check[RigT]] = field(default_factory=dict)
     _left_up: ExitStack | None = field(default=None, init=False, repr=False)
-    """What a bench that ends leaves up: it would be taken down if nobody referred to it."""
+    """What a check context that ends leaves up: it would be taken down if nobody referred to it."""
 
     def check(
         self, *, needs: Sequence[str] = (), hints: Sequence[str] = (), read: str = ""
@@ -137,7 +137,7 @@ class Exam(Generic[RigT]):
                 raise ExamError(f"points.toml names a check '{name}' that '{self.name}' lacks.")
         return table
 
-    def sit(self, parts: Iterable[Part], bench: Bench) -> Iterator[Verdict]:
+    def sit(self, parts: Iterable[Part], bench: CheckContext) -> Iterator[Verdict]:
         """Run the checks of each part, and what they need, each once; yield a verdict a part.
 
         All parts are one examination of the same running nodes, but for ``fresh_parts``. A check
@@ -217,7 +217,11 @@ def _with_points(result: CheckResult, points: float) -> CheckResult:
 
 
 def _shorten_text(text: str) -> str:
-    return text if len(text) <= MAX_TEXT else f"{text[:MAX_TEXT]} [{len(text) - MAX_TEXT} more]"
+    return (
+        text
+        if len(text) <= MAX_TEXT_CHARS
+        else f"{text[:MAX_TEXT_CHARS]} [{len(text) - MAX_TEXT_CHARS} more]"
+    )
 
 
 def _result_of(check: Check[RigT], status: Status) -> CheckResult:
@@ -301,7 +305,7 @@ def _failed_result(check: Check[RigT], expected: str, actual: str) -> CheckResul
 
 
 def _read_by_ros(error: BaseException) -> bool:
-    """Whether rclpy raised it: it makes text of what it has heard from others."""
+    """Whether rclpy raised it: its messages may quote what other processes have sent."""
     place = _innermost_frame(error)
     return place is not None and place.tb_frame.f_globals.get("__name__", "").startswith("rclpy.")
 
@@ -310,7 +314,7 @@ def _no_text(error: UnicodeDecodeError) -> tuple[str, str]:
     """Return what is needed of a name on the ROS graph, and what one was that is no text."""
     return (
         "The names and types on the ROS graph are text.",
-        f"A name on the ROS graph is no text: {error.object[:LONGEST_NAME]!r}. Did something in "
+        f"A name on the ROS graph is no text: {error.object[:MAX_NAME_BYTES]!r}. Did something in "
         "the notebook make a node, a topic or a type of that name?",
     )
 

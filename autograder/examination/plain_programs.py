@@ -1,7 +1,7 @@
 """Plain programs of the subject's nodes, as the examiner sees them: from outside, and only so.
 
-What a student's process says of itself, or does when its harness asks it to, can be made up there.
-A further process runs the notebook's cells and then its nodes, as `python program.py` would
+What a student's process says of itself, or does when its subject server asks it to, can be made up
+there. A further process runs the notebook's cells and then its nodes, as `python program.py` would
 (`autograder.examination.subject.plain_program`), and nobody asks it for anything.
 """
 
@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, TextIO
 
 from autograder.processes.outside.asking import Outside
-from autograder.processes.outside.requests import RequestError
-from course.domains.leases import MAX_DOMAIN
+from autograder.processes.outside.warden_requests import RequestError
 from course.errors import CourseError, WaitTimeout
 from course.runtime.core_session import CoreSession
+from course.runtime.domains.leases import MAX_DOMAIN
 
 DOMAINS = 100
 """Domains that programs take turns in: what one that was killed leaves is on the graph for long."""
@@ -55,7 +55,7 @@ class Program:
     _outside: Outside
 
     def interrupt(self) -> None:
-        """Have its nodes ended, or made anew if they are."""
+        """Have its nodes ended, or made again if they are ended."""
         self._ask(wants="interrupt")
 
     def has_ended(self) -> bool:
@@ -110,7 +110,7 @@ class Programs:
     ) -> Iterator[Program]:
         """Run nodes of the notebook's classes for the length of the block.
 
-        Interrupted twice, a program makes them anew, or what its life is ``then``, life by life;
+        Interrupted twice, a program makes them again, or what its life is ``then``, life by life;
         the last one is repeated. Where they are ``apart``, each has an executor of its own, with
         so many threads, and what leaves a callback ends its node alone. ``twice``: at the end of
         the first life of its kind each node is destroyed twice. ``shut_down``: at a first

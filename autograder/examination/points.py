@@ -24,7 +24,7 @@ Parts = dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True)
-class Entry:
+class PointsEntry:
     """One exercise: what it is called, what its notebook's file is called, and its points.
 
     ``parts`` maps each part to {check: points}; ``manual`` maps grade ids to points.
@@ -36,7 +36,7 @@ class Entry:
     manual: dict[str, float]
 
 
-def table() -> dict[str, Entry]:
+def table() -> dict[str, PointsEntry]:
     """Return {exercise: entry}, in the order of their titles: Exercise 2 comes before 10.
 
     Raises:
@@ -46,7 +46,7 @@ def table() -> dict[str, Entry]:
 
 
 @lru_cache(maxsize=2)
-def _load_table(exercises: Exercises) -> dict[str, Entry]:
+def _load_table(exercises: Exercises) -> dict[str, PointsEntry]:
     files = {name: folder / exercise_folders.POINTS for name, folder in exercises.folders.items()}
     entries = {name: read_points(file) for name, file in files.items() if file.is_file()}
     entries = dict(sorted(entries.items(), key=lambda named: _title_order(named[1])))
@@ -61,11 +61,11 @@ def _load_table(exercises: Exercises) -> dict[str, Entry]:
     return entries
 
 
-def _title_order(entry: Entry) -> tuple[list[int], str]:
+def _title_order(entry: PointsEntry) -> tuple[list[int], str]:
     return [int(n) for n in re.findall(r"\d+", entry.title)], entry.title
 
 
-def read_points(file: Path) -> Entry:
+def read_points(file: Path) -> PointsEntry:
     """Return what the table of points in an exercise's folder says.
 
     Raises:
@@ -80,7 +80,7 @@ def read_points(file: Path) -> Entry:
         }
         manual = parts.pop("manual", {})
         notebook = str(data.get("notebook", file.parent.name))
-        return Entry(str(data["title"]), notebook, parts, manual)
+        return PointsEntry(str(data["title"]), notebook, parts, manual)
     except KeyError:
         raise ExerciseError(f"{file} must begin with the exercise's title: title = '…'.") from None
     except (OSError, ValueError, TypeError) as error:

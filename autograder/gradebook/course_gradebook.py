@@ -23,20 +23,24 @@ from traitlets.config import Config
 from traitlets.config.loader import PyFileConfigLoader
 
 from autograder.assignments.intake import open_questions, roster
-from autograder.assignments.intake.open_questions import Question
+from autograder.assignments.intake.open_questions import OpenQuestion
 from autograder.assignments.intake.roster import Roster
 from autograder.gradebook import database, penalties
-from autograder.gradebook.bridge import WORK_FOLDER, RestoreCells, SubmissionExporter
 from autograder.gradebook.database import GradebookUnusable
 from autograder.gradebook.feedback import index_page
-from autograder.gradebook.once import Engines, FeedbackExporter
-from autograder.gradebook.staging import Limits
-from autograder.running.ledger import Standing
+from autograder.gradebook.nbgrader_plugins.autograde_steps import (
+    WORK_FOLDER,
+    RestoreCells,
+    SubmissionExporter,
+)
+from autograder.gradebook.nbgrader_plugins.nbgrader_speedups import Engines, FeedbackExporter
+from autograder.gradebook.staging import StagingLimits
+from autograder.running.outcomes.ledger import Standing
 from course.errors import CourseError
 
 CONFIG = "nbgrader_config.py"
 
-LOCK_PATIENCE = 30.0
+LOCK_PATIENCE_S = 30.0
 """Seconds that another program may hold the gradebook: SQLite itself waits 5 s at a time."""
 
 
@@ -206,11 +210,11 @@ class CourseGradebook:
             ) from error
 
     @property
-    def file_limits(self) -> Limits:
+    def file_limits(self) -> StagingLimits:
         """How much of what lies beside a notebook nbgrader takes, as its configuration says."""
         course = self.coursedir
         most = 1000 * course.max_dir_size
-        return Limits(tuple(course.ignore), 1000 * course.max_file_size or most, most)
+        return StagingLimits(tuple(course.ignore), 1000 * course.max_file_size or most, most)
 
     def read_roster(self) -> Roster:
         """Return which students the gradebook knows, and whether there may be others."""
@@ -224,7 +228,7 @@ class CourseGradebook:
     def _call_nbgrader(
         self, method: Any, *arguments: Any, options: dict[str, bool], of_one_pass: bool = False
     ) -> None:
-        deadline = time.monotonic() + LOCK_PATIENCE
+        deadline = time.monotonic() + LOCK_PATIENCE_S
         while True:
             with _quiet_logs(), self._engines.use_engines(of_one_pass=of_one_pass):
                 result = method(*arguments, **options)
@@ -289,7 +293,7 @@ def _digest_rows(rows: list[list[Any]]) -> str:
     return hashlib.sha256("\n".join(ordered).encode()).hexdigest()
 
 
-def _make_grade(submission: Any, asked: dict[str, Question]) -> Grade:
+def _make_grade(submission: Any, asked: dict[str, OpenQuestion]) -> Grade:
     cells: dict[str, dict[str, float | None]] = {}
     for notebook in submission.notebooks:
         cells[notebook.name] = {

@@ -50,7 +50,7 @@ class OldGradebookError(GradebookUnusable):
 
 
 FULL = ("disk is full", "No space left on device", "Disk quota exceeded", "File too large")
-ROOM = 8 * 1024 * 1024
+MIN_FREE_BYTES = 8 * 1024 * 1024
 """Bytes for which there is room on a disk that is not full: far more than one student needs."""
 
 
@@ -70,7 +70,7 @@ def disk_full_error(said: str, root: Path, folders: Iterable[Path]) -> DiskFullE
 def _has_room(folder: Path) -> bool:
     try:
         with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(bytes(ROOM))
+            file.write(bytes(MIN_FREE_BYTES))
     except OSError as error:
         return error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     return True

@@ -1,7 +1,7 @@
 """More time for a student: nbgrader's own extensions, also before there is a submission.
 
 nbgrader keeps an extension with a submission. One for a student who has not handed in yet waits in
-the engine's folder until the submission is entered, by whichever door.
+the engine's folder until the submission is entered, by whichever command.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from nbgrader.api import Gradebook, MissingEntry
 
 from autograder.assignments.intake.roster import Roster
 from autograder.gradebook.course_gradebook import CourseGradebook
-from autograder.gradebook.extension_store import WaitingExtensions
+from autograder.gradebook.waiting_extensions import WaitingExtensions
 from course.errors import CourseError
 from course.util.close_matches import is_it
 

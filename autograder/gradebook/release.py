@@ -15,7 +15,7 @@ from nbformat import NotebookNode
 from autograder.assignments import cells
 from autograder.assignments.submission import grade_id, nbgrader_metadata
 from autograder.util import exercise_folders
-from autograder.util.files import NOT_COUNTED
+from autograder.util.work_files import NOT_COUNTED
 from course.errors import CourseError
 from course.util.files import PARTIAL
 

@@ -17,16 +17,16 @@ from pathlib import Path
 from secrets import token_hex
 
 from autograder.assignments.intake import roster
-from autograder.assignments.intake.attachments import summarise_names
+from autograder.assignments.intake.handed_files.attachments import summarise_names
 from autograder.gradebook.safe_html import allowed_html
-from autograder.util.files import walk_files
+from autograder.util.work_files import walk_files
 from quizzes.attempts.record import read_plain
 
 TIME = "timestamp.txt"
 SECRET = "submission_secret.txt"
 """What ``nbgrader submit`` lays beside a hand-in: the exchange names a feedback file by it."""
 
-MAX_SECRET = 1024
+MAX_SECRET_BYTES = 1024
 """Bytes of a secret; nbgrader's have 128."""
 
 MAX_STAGED = 500
@@ -38,7 +38,7 @@ AS_TEXT = ".txt"
 
 
 @dataclass(frozen=True)
-class Limits:
+class StagingLimits:
     """What nbgrader's configuration says of files (``CourseDirectory``).
 
     Attributes:
@@ -105,15 +105,15 @@ def copy_marks(submitted: Path, staged: Path, zone: str = "") -> None:
 def _read_secret(path: Path) -> bytes:
     """Return the exchange's secret; nothing if there is none that is sound."""
     try:
-        secret = read_plain(path, MAX_SECRET + 1)
+        secret = read_plain(path, MAX_SECRET_BYTES + 1)
         secret.decode()
     except (OSError, UnicodeError):
         return b""
-    return secret if len(secret) <= MAX_SECRET else b""
+    return secret if len(secret) <= MAX_SECRET_BYTES else b""
 
 
 def copy_files(
-    submitted: Path, staged: Path, limits: Limits, notebooks: Iterable[str]
+    submitted: Path, staged: Path, limits: StagingLimits, notebooks: Iterable[str]
 ) -> list[str]:
     """Copy the files beside a submission's notebooks; return what of them is missing, and why.
 
@@ -155,7 +155,7 @@ def copy_files(
 
 
 def copy_around(
-    files: Mapping[str, bytes], staged: Path, limits: Limits, notebooks: Iterable[str]
+    files: Mapping[str, bytes], staged: Path, limits: StagingLimits, notebooks: Iterable[str]
 ) -> None:
     """Put what lay around a notebook that was found elsewhere, in a folder say, beside it.
 
@@ -195,5 +195,5 @@ def _is_passed_over(name: Path, ignored: Iterable[str], pages: set[str]) -> bool
 
 
 def _is_match(part: str, patterns: Iterable[str]) -> bool:
-    """Whether a name is one of ``patterns``, of which none but a hidden one is for hidden names."""
+    """Whether a name is one of ``patterns``; only hidden patterns are for hidden names."""
     return any(fnmatch(part, p) and (part[0] != "." or p[0] == ".") for p in patterns)

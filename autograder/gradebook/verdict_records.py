@@ -1,6 +1,6 @@
 """The verdicts behind a grade, kept beside the gradebook, which holds only points.
 
-One record of each student and notebook is written when the scores are entered, by whichever door
+One record of each student and notebook is written when the scores are entered, by whichever command
 they come in: ``autograder grade``, ``nbgrader autograde`` or the formgrader.
 """
 
@@ -18,7 +18,7 @@ from autograder.util.state_table import StateTable
 from course.errors import CourseError
 
 KIND = "verdicts"
-MAX_CHARACTERS = 4 * 1024 * 1024
+MAX_CHARS = 4 * 1024 * 1024
 """Longest record that is read; one of a notebook of this course has 10,000."""
 
 
@@ -26,7 +26,7 @@ class RecordError(CourseError):
     """A record that cannot be read, as one of another version."""
 
 
-class Outcome(Protocol):
+class RecordedOutcome(Protocol):
     """What of a run is recorded; see `autograder.running.runner.Outcome`."""
 
     verdicts: dict[str, Verdict]
@@ -50,7 +50,7 @@ class Record:
 
 
 def write_record(
-    work: Path, assignment: str, student: str, notebook: str, outcome: Outcome
+    work: Path, assignment: str, student: str, notebook: str, outcome: RecordedOutcome
 ) -> None:
     """Write the record of an outcome in place of an earlier one; raises OSError if it cannot."""
     data = {
@@ -72,7 +72,7 @@ def load_record(work: Path, assignment: str, student: str, notebook: str) -> Rec
     if text is None:
         return None
     try:
-        if len(text) > MAX_CHARACTERS:
+        if len(text) > MAX_CHARS:
             raise ValueError("too long")
         data = json.loads(text)
         seconds = float(data["seconds"])

@@ -16,19 +16,19 @@ from filelock import FileLock, Timeout
 from autograder import sandbox
 from autograder.assignments.intake import roster
 from autograder.assignments.intake.roster import Roster
-from autograder.gradebook import bridge as bridge
 from autograder.gradebook.course_gradebook import CourseGradebook
+from autograder.gradebook.nbgrader_plugins import autograde_steps as bridge
 from autograder.gradebook.safe_html import page_texts
 from autograder.grading.graded import Graded
 from autograder.grading.grading_run import GradingRun
-from autograder.grading.progress import Progress
+from autograder.grading.run_progress import RunProgress
 from autograder.grading.submission_intake import SubmissionIntake
-from autograder.running.fresh_run import FreshRun
+from autograder.running.grading_jobs import GradingJob, JobResult
 from autograder.running.interruption import Interruption
-from autograder.running.jobs import Job, Result
-from autograder.running.outcome_store import OutcomeStore
-from autograder.running.workers import LocalWorkers, Workers
-from autograder.util import exercise_folders, files
+from autograder.running.outcomes.fresh_run import FreshRun
+from autograder.running.outcomes.outcome_store import OutcomeStore
+from autograder.running.workers.local_workers import LocalWorkers, Workers
+from autograder.util import exercise_folders, work_files
 from course.errors import CourseError
 from course.util.close_matches import is_it
 
@@ -51,7 +51,7 @@ class BusyError(CourseError):
     """Another engine is grading in the same course."""
 
 
-QUIET = Progress()
+QUIET = RunProgress()
 
 
 def grade(
@@ -64,7 +64,7 @@ def grade(
     trust: bool = False,
     feedback: bool = True,
     scheduler: str = "",
-    progress: Progress = QUIET,
+    progress: RunProgress = QUIET,
 ) -> list[Graded]:
     """Grade every submission of an assignment into the gradebook of the course at ``root``.
 
@@ -75,8 +75,8 @@ def grade(
         assignment: its name.
         students: grade only these; all if there are none.
         jobs: how many notebooks are run at a time.
-        fresh: run also what was run before and has not changed. Until such a run is through,
-            whichever comes after it goes on with it.
+        fresh: run also what was run before and has not changed. Until such a run is through, the
+            next run goes on with it.
         trust: run submissions outside of a sandbox, with the rights of this process.
         feedback: write HTML feedback, too.
         scheduler: address of a Dask scheduler whose workers run the notebooks, in place of this
@@ -112,7 +112,7 @@ def grade(
     with ExitStack() as stack:
         stack.enter_context(_lock_course(root))
         stack.callback(progress.end)
-        files.sweep_scratch()
+        work_files.sweep_scratch()
         workers = stack.enter_context(_make_workers(jobs, store, trust, scheduler, root, progress))
         interruption = stack.enter_context(Interruption(workers.wake))
         intake = SubmissionIntake(gradebook, assignment, names, trust=trust)
@@ -132,14 +132,14 @@ def grade(
 
 
 def _make_workers(
-    count: int, store: OutcomeStore, trust: bool, scheduler: str, root: Path, progress: Progress
+    count: int, store: OutcomeStore, trust: bool, scheduler: str, root: Path, progress: RunProgress
 ) -> Workers:
-    def keep(job: Job, result: Result) -> None:
+    def keep(job: GradingJob, result: JobResult) -> None:
         store.put(job.program, job.files, result.outcome, result.mode)
 
     if not scheduler:
         return LocalWorkers(count, keep, trust=trust, hidden=[root])
-    from autograder.running.cluster import Cluster
+    from autograder.running.workers.cluster import Cluster
 
     return Cluster(scheduler, keep, trust=trust, hidden=[root], say=progress.say)
 

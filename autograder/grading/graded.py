@@ -13,7 +13,7 @@ class Graded:
 
     Attributes:
         student: whose it is.
-        outcomes: by notebook; only what `Progress.submission_done` is told has them, because a
+        outcomes: by notebook; only what `RunProgress.submission_done` is told has them, because a
             class's would fill the memory.
         points: automatic points, of ``max_points``.
         seconds: wall time that its notebooks ran.

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from rich.table import Table
 
-from autograder.assignments.intake.file_names import printable_name
+from autograder.assignments.intake.handed_files.file_names import printable_name
 from autograder.gradebook.course_gradebook import Grade
 from autograder.gradebook.penalties import lateness_text
 

@@ -15,15 +15,15 @@ from dataclasses import replace
 from autograder.assignments.submission import SubmissionError
 from autograder.gradebook.course_gradebook import GradebookError
 from autograder.grading.graded import Graded
-from autograder.grading.progress import Progress
+from autograder.grading.run_progress import RunProgress
 from autograder.grading.submission_intake import NotebookRun, SubmissionIntake, Work
-from autograder.running import ledger
 from autograder.running.interruption import Interruption
-from autograder.running.ledger import Entry, Ledger, Standing
-from autograder.running.outcome_store import OutcomeStore, StoreError
+from autograder.running.outcomes import ledger
+from autograder.running.outcomes.ledger import Ledger, LedgerEntry, Standing
+from autograder.running.outcomes.outcome_store import OutcomeStore, StoreError
 from autograder.running.resource_errors import is_full, is_temporary
 from autograder.running.runner import Outcome
-from autograder.running.workers import Done, Workers
+from autograder.running.workers.local_workers import Done, Workers
 from autograder.sandbox import SandboxError
 from course.errors import CourseError
 
@@ -43,7 +43,7 @@ class GradingRun:
         store: OutcomeStore,
         workers: Workers,
         interruption: Interruption,
-        progress: Progress,
+        progress: RunProgress,
         *,
         feedback: bool,
         since: int,
@@ -243,7 +243,7 @@ class GradingRun:
         if not any(outcome.has_grader_error for outcome in work.outcomes.values()):
             self._ledger.put(
                 work.student,
-                Entry(
+                LedgerEntry(
                     work.made_of, entered.standing, graded.points, graded.max_points,
                     graded.seconds, graded.problem, self._feedback and not missing,
                 ),

@@ -13,24 +13,31 @@ import nbformat
 from nbformat import NotebookNode
 
 from autograder.assignments import questions, submission
-from autograder.assignments.intake import cell_matching, claim_records, folder_digest, roster
-from autograder.assignments.intake.file_names import quote_name
-from autograder.assignments.intake.notebooks import Found, Intake, NotHandedInError, UnclearError
-from autograder.assignments.intake.notebooks import of_student as intake_of
+from autograder.assignments.intake import claim_records, roster
+from autograder.assignments.intake.handed_files import folder_digest
+from autograder.assignments.intake.handed_files.file_names import quote_name
+from autograder.assignments.intake.notebook_search import (
+    Found,
+    Intake,
+    NotHandedInError,
+    UnclearError,
+)
+from autograder.assignments.intake.notebook_search import of_student as intake_of
+from autograder.assignments.intake.recognition import cell_matching
 from autograder.assignments.submission import SubmissionError
 from autograder.examination.verdict import Status, Verdict
-from autograder.gradebook import bridge as bridge
 from autograder.gradebook import staging
 from autograder.gradebook.course_gradebook import CourseGradebook, GradebookError
 from autograder.gradebook.feedback.feedback_page import INDEX
-from autograder.gradebook.once import FeedbackExporter
+from autograder.gradebook.nbgrader_plugins import autograde_steps as bridge
+from autograder.gradebook.nbgrader_plugins.nbgrader_speedups import FeedbackExporter
 from autograder.gradebook.quizzes import quiz_marks
 from autograder.gradebook.safe_html import allowed_html
 from autograder.gradebook.safe_html.page_texts import Page
 from autograder.gradebook.written_answers.settled_marks import Marks
 from autograder.running import runner
-from autograder.running.jobs import Job
-from autograder.running.ledger import Standing
+from autograder.running.grading_jobs import GradingJob
+from autograder.running.outcomes.ledger import Standing
 from autograder.running.runner import Outcome
 from course.errors import CourseError
 
@@ -63,7 +70,7 @@ class NotebookRun:
 
     work: Work
     notebook: str
-    job: Job | None = None
+    job: GradingJob | None = None
     outcome: Outcome | None = None
     marks: Mapping[str, Verdict] = field(default_factory=dict)
 
@@ -232,7 +239,7 @@ class SubmissionIntake:
             )
         except SubmissionError as error:
             notebook, outcome = self._blank_notebook(name, str(error), "not_checked")
-            # Whoever hands in some of the notebooks has left the others out: nothing to look into.
+            # A student who hands in some of the notebooks has left the others out: no question.
             left_out = not intake.proper_path(name).exists() and intake.has_others
             settled = isinstance(error, NotHandedInError)
             outcome = replace(outcome, unreadable=not (left_out or settled))
@@ -243,7 +250,7 @@ class SubmissionIntake:
             notebook, outcome = self._blank_notebook(name, reason, "grader_error")
         else:
             notebook.metadata[bridge.NOTES_KEY] = [*notes, *beside.notes]
-            return notebook, NotebookRun(work, name, Job(program, beside.files, self._trust))
+            return notebook, NotebookRun(work, name, GradingJob(program, beside.files, self._trust))
         return notebook, NotebookRun(work, name, outcome=outcome)
 
     def _restore_notebook(

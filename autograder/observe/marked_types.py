@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from autograder.examination.subject.own_interfaces import DEFINITIONS
-from course.design import dye
+from course.design import message_tags
 from course.errors import CourseError
 from course.interfaces import define
 from course.messages import types
 
 
-class UnknownTypeError(Exception):
+class TypeNotInstalledError(Exception):
     """A type on the graph that is not installed where the examiner runs."""
 
 
@@ -20,14 +20,14 @@ def load_type(name: str) -> Any:
     """Return the class of a type on the graph.
 
     Raises:
-        UnknownTypeError: it is not installed.
+        TypeNotInstalledError: it is not installed.
     """
     if name in DEFINITIONS:
         return define(name, DEFINITIONS[name])
     try:
         return types.load_named(name)
     except (LookupError, CourseError):
-        raise UnknownTypeError(name) from None
+        raise TypeNotInstalledError(name) from None
 
 
 def bears_marks(names: Iterable[str]) -> bool:
@@ -37,6 +37,6 @@ def bears_marks(names: Iterable[str]) -> bool:
 
 def _bears_marks(name: str) -> bool:
     try:
-        return dye.has_room(load_type(name))
-    except UnknownTypeError:
+        return message_tags.has_room(load_type(name))
+    except TypeNotInstalledError:
         return True

@@ -1,4 +1,4 @@
-"""Whose an endpoint is: its GUID names the DDS participant, whatever its node is called.
+"""Tell whose an endpoint is: its GUID names the DDS participant, whatever its node is called.
 
 All nodes of one context share one participant (DDSI-RTPS 2.3, 9.3.1). Names on the graph are a
 stranger's words: a student's node may bear the examiner's name, or none.
@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import Empty
 
-from course.runtime.names import full_name
+from course.runtime.ros_names import full_name
 
 GUID_PREFIX_BYTES = 12
 """Bytes of an endpoint's GUID that name its participant."""

@@ -1,9 +1,9 @@
 """How long an examiner waits for what a wrong design may never do.
 
-Whoever waits for an answer that does not come must allow for a busy machine, and so waits for long.
-But while every thread of both processes sleeps, nobody is at work on it, and the machine is not
-what keeps it back: only a timer or DDS may still bring it. So such time is counted by itself, and
-little of it is enough.
+An examiner that waits for an answer must allow for a busy machine, and so waits for long if none
+comes. But while every thread of both processes sleeps, nobody is at work on the answer, and the
+machine is not what delays it: only a timer or DDS may still bring it. So such time is counted by
+itself, and little of it is enough.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from rclpy.duration import Duration
 from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 
-_ENDLESS = 10**17  # ns, three years: what rmw calls unlimited is longer
+_ENDLESS_NS = 10**17  # ns, three years: what rmw calls unlimited is longer
 
 
 class Refusal(NamedTuple):
@@ -57,6 +57,6 @@ def _is_refused(offered: QoSProfile, requested: QoSProfile) -> bool:
 
 
 def _describe_span(span: Duration, name: str) -> str:
-    if not 0 < span.nanoseconds < _ENDLESS:
+    if not 0 < span.nanoseconds < _ENDLESS_NS:
         return f"no {name}"
     return f"a {name} of {span.nanoseconds / 1e9:g} s"

@@ -18,7 +18,7 @@ class QuietNode(Node):
     """A node without services, without logs over DDS, and without events nobody asked for.
 
     rclpy would listen to two events of each endpoint, log what DDS does not connect as warnings,
-    and have its executor wait for all of them anew before each callback: half of its work.
+    and have its executor wait for all of them again before each callback: half of its work.
     """
 
     def __init__(self, name: str, context: Context | None = None) -> None:

@@ -1,7 +1,7 @@
 """Simulated time for the nodes of a plain program: the examiner publishes /clock itself.
 
 A session moves the time of its nodes through the student's process, where somebody may move it by
-more or by less. A program follows whoever publishes /clock (ROS 2 design, "Clock and Time").
+more or by less. A program follows any node that publishes /clock (ROS 2 design, "Clock and Time").
 """
 
 from __future__ import annotations

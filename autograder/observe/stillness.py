@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from autograder.processes.outside.asking import Outside
-from autograder.processes.outside.stillness import HANGS, RESTLESS
+from autograder.processes.outside.kernel_stillness import HANGS_S, RESTLESS_S
 
-__all__ = ["HANGS", "RESTLESS", "Stillness"]
+__all__ = ["HANGS_S", "RESTLESS_S", "Stillness"]
 
 
 class Stillness:
@@ -16,10 +16,10 @@ class Stillness:
         self._outside = outside
         outside.ask("watch")
 
-    def wait_for_rest(self, restless: float = RESTLESS, timeout: float = HANGS) -> bool:
+    def wait_for_rest(self, restless: float = RESTLESS_S, timeout: float = HANGS_S) -> bool:
         """Return once both are at rest, or prove to be restless; say which it was.
 
-        See `autograder.processes.outside.stillness.Stillness.wait_for_rest`.
+        See `autograder.processes.outside.kernel_stillness.KernelStillness.wait_for_rest`.
         """
         return bool(self._outside.ask("rest", restless=restless, timeout=timeout))
 

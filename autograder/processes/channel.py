@@ -14,7 +14,7 @@ from typing import Any
 
 from autograder.processes.fair_deadline import FairDeadline, RunDelay
 
-MAX_LINE = 2 * 1024 * 1024
+MAX_LINE_BYTES = 2 * 1024 * 1024
 """Largest message in bytes: the outputs of one cell are the largest, and are cut well below it."""
 
 
@@ -50,7 +50,7 @@ def parse_line(line: bytes) -> Any:
 class Channel:
     """A line-based JSON channel over a connected stream socket."""
 
-    def __init__(self, sock: socket.socket, most: int = MAX_LINE) -> None:
+    def __init__(self, sock: socket.socket, most: int = MAX_LINE_BYTES) -> None:
         """Take ownership of ``sock``; messages of more than ``most`` bytes are not received."""
         self._sock = sock
         self._most = most
@@ -65,11 +65,11 @@ class Channel:
 
         Raises:
             ChannelClosed: the other side is gone.
-            ValueError: the message is larger than ``MAX_LINE``.
+            ValueError: the message is larger than ``MAX_LINE_BYTES``.
         """
         line = json.dumps(message, ensure_ascii=False).encode(errors="replace") + b"\n"
-        if len(line) > MAX_LINE:
-            raise ValueError(f"control message of {len(line)} bytes is over {MAX_LINE}")
+        if len(line) > MAX_LINE_BYTES:
+            raise ValueError(f"control message of {len(line)} bytes is over {MAX_LINE_BYTES}")
         try:
             self._sock.settimeout(None)
             self._sock.sendall(line)

@@ -1,9 +1,9 @@
 """Deadlines that are fair on a busy machine: what other programs take of the time does not count.
 
 The kernel counts for how long each thread was ready to run and did not (proc(5): `schedstat`). Of a
-process its first thread counts, which runs a notebook's cells and answers an examiner. Sleeping is
-not being kept: whoever sleeps for too long is found after the same time on any machine. Nor is a
-program kept by others where its own threads and processes had the processor meanwhile.
+process its first thread counts, which runs a notebook's cells and answers an examiner. Time asleep
+does not count: a program that sleeps for too long is found after the same time on any machine. Time
+in which its own threads and processes had the processor does not count either.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Protocol
 
-from autograder.processes.process_folders import Processes, Single
+from autograder.processes.process_folders import Processes, SingleProcess
 
-_LONGEST = 2  # times its length by which a deadline can be put off
+_MAX_STRETCH = 2  # times its length by which a deadline can be put off
 _TICK = os.sysconf("SC_CLK_TCK")
 
 
@@ -38,8 +38,8 @@ class SeenDelay:
     ) -> None:
         """Look at the first thread of ``pid``, a number as the process itself has it.
 
-        ``spent`` tells of whoever counts what they all have computed, in s, with those that have
-        ended and that nobody has waited for: the kernel forgets these.
+        ``spent`` returns what a watcher has counted: how long they all have computed, in s, with
+        those that have ended and that nobody has waited for. The kernel forgets these.
         """
         self._processes, self._main, self._spent = processes, processes.folder_of(pid), spent
 
@@ -59,7 +59,7 @@ class SeenDelay:
 
 def of_process(pid: int) -> SeenDelay:
     """Return the delay of one process of this machine."""
-    return SeenDelay(Single(pid), pid)
+    return SeenDelay(SingleProcess(pid), pid)
 
 
 def _processor_seconds(process: str) -> float:
@@ -105,5 +105,5 @@ class FairDeadline:
         """Seconds left, not below 0."""
         left = self._timeout - (time.monotonic() - self._begun)
         if left <= 0:
-            left += min(self._delay.delay_since(self._mark), _LONGEST * self._timeout)
+            left += min(self._delay.delay_since(self._mark), _MAX_STRETCH * self._timeout)
         return max(0.0, left)

@@ -19,7 +19,7 @@ class Processes(Protocol):
         """Return the folder of one, by the number that it has for itself."""
 
 
-class Single:
+class SingleProcess:
     """One process of this machine; its children do not count."""
 
     def __init__(self, pid: int) -> None:

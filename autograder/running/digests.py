@@ -23,7 +23,7 @@ from autograder.util import exercise_folders
 from autograder.util.exercise_folders import COURSE_PACKAGE, Exercises
 
 PACKAGES = ("autograder", "course", "quizzes")
-HARNESS = (
+_RUNNING = (
     "autograder.running.runner",
     "autograder.examination.subject.process",
     "autograder.running.examiner",
@@ -98,7 +98,7 @@ def modules_of_exams(names: Iterable[str]) -> set[str]:
 
 def _of_run(names: Iterable[str], exercises: Exercises) -> list[str]:
     """Return where the code of a run begins: of a course root's exercise, with all its modules."""
-    begins = list(HARNESS)
+    begins = list(_RUNNING)
     for name in names:
         if name in exercises.own:
             begins += _own_modules(name, exercises)

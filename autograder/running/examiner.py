@@ -6,9 +6,9 @@ input, one JSON object a line, and writes for each part ``{"verdict": ..., "hang
 standard output; ``hangs`` says why the subject cannot be expected to go on, if so. ``KEY`` is the
 answer key of the part's hidden cell, ``pid`` the subject's process, ``seed`` what the exam's
 numbers are drawn from, ``last`` that nothing of the notebook runs after it.
-File descriptor ``FD`` is the control channel to the subject's harness. In a sandbox it also has
-``--outside FD``, its channel to a warden (`autograder.processes.outside`), and is alone with the
-subject on their network.
+File descriptor ``FD`` is the control channel to the subject's `SubjectServer`. In a sandbox it also
+has ``--outside FD``, its channel to a warden (`autograder.processes.outside`), and is alone with
+the subject on their network.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from typing import Any, TextIO
 
 from autograder import exercises
 from autograder.examination import points
-from autograder.examination.check_context import MAX_REPLY, Bench, Subject
+from autograder.examination.check_context import MAX_REPLY_BYTES, CheckContext, Subject
 from autograder.examination.exam import Part
 from autograder.examination.plain_programs import Programs
 from autograder.examination.subject import hang_report
@@ -53,7 +53,7 @@ def sit(
     ends = bool(request["last"]) and outside.own_network
     subject.delay = outside.delay
     try:
-        bench = Bench(session, subject, outside, int(request["seed"]), programs, ends)
+        bench = CheckContext(session, subject, outside, int(request["seed"]), programs, ends)
         exam = exercises.load_exam(request["exam"])
         for verdict in exam.sit([Part(name, key) for name, key in request["parts"]], bench):
             yield replace(verdict, seed=bench.draws.seed)
@@ -109,7 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     verdicts = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     hang_report.tell_when_asked(sys.stderr.fileno())
-    subject = Subject(Channel(socket.socket(fileno=options.control), MAX_REPLY))
+    subject = Subject(Channel(socket.socket(fileno=options.control), MAX_REPLY_BYTES))
     outside = None
     if options.outside is not None:
         outside = Afar(socket.socket(fileno=options.outside))

@@ -1,4 +1,4 @@
-"""The student's door: ``check("qos")`` in a notebook cell."""
+"""What a student calls: ``check("qos")`` in a notebook cell."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from autograder.examination.verdict_text import Report
 from autograder.processes.channel import Channel
 from autograder.running.start import ExaminerProcess
 from autograder.util import exercise_folders
-from course.domains.leases import lease_domain
 from course.errors import CourseError
-from course.journal.store import JournalError, journal_here
 from course.runtime.core_session import CoreSession
+from course.runtime.domains.leases import lease_domain
+from course.workspace.journal.journal_file import JournalError, journal_here
 
-STUCK = 3.0
+STUCK_AFTER_S = 3.0
 """Seconds after a verdict in which the student's node must have been stopped."""
 
 
@@ -109,10 +109,10 @@ class _Sitting:
         self._lock = threading.Lock()
         self._waiter = threading.Thread(target=self._watch_examiner, daemon=True)
 
-    def serve(self, harness: SubjectServer, channel: Channel) -> None:
+    def serve(self, server: SubjectServer, channel: Channel) -> None:
         self._waiter.start()
         try:
-            harness.serve(channel)
+            server.serve(channel)
             with self._lock:
                 self._served.set()
         except KeyboardInterrupt:
@@ -131,7 +131,7 @@ class _Sitting:
             self._verdict = self._examiner.verdict()
         except CourseError as error:
             self._error = error
-        if not self._served.wait(STUCK):
+        if not self._served.wait(STUCK_AFTER_S):
             with self._lock:
                 if not self._served.is_set():
                     self._interrupt_main()
@@ -158,7 +158,7 @@ def _note_checks(verdict: Verdict) -> Verdict:
 
 
 def _caller_globals() -> Mapping[str, Any]:
-    """Return the globals of whoever called `check`: in a notebook, its namespace."""
+    """Return the globals of the code that called `check`: in a notebook, its namespace."""
     frame = inspect.currentframe()
     assert frame is not None
     assert frame.f_back is not None

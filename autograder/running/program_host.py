@@ -16,9 +16,9 @@ from contextlib import ExitStack, suppress
 from typing import Any, Self
 
 from autograder.processes.channel import Channel, ChannelClosed, ChannelTimeout
-from autograder.sandbox import BoxError, RunningSubject, subject_command
+from autograder.sandbox import RunningSubject, SandboxStartError, subject_command
 from autograder.sandbox.prefork import ZygoteError
-from course.domains.leases import MAX_DOMAIN
+from course.runtime.domains.leases import MAX_DOMAIN
 
 UP_TIMEOUT_S = 30.0
 """Seconds until a program must have started, and until its cells have made its nodes."""
@@ -48,7 +48,7 @@ class ProgramHost:
         ``{"wants": "program", "nodes": [[class, arguments], ...], "then": [{"nodes", "tried"},
         ...], "threads", "sim_time", "apart", "twice", "shut_down", "goes_on", "domain"}`` starts
         one; ``{"wants": "interrupt"}`` sends SIGINT, ``{"wants": "end"}`` ends it. From its start
-        to its end whoever looks at the subject's processes sees the program's. The answer
+        to its end, the warden shows the program's processes in place of the subject's. The answer
         ``"slow"`` says that none is started any more.
         """
         match request.get("wants"):
@@ -78,7 +78,7 @@ class ProgramHost:
             with theirs:
                 program = self._start_program(theirs, domain)
             channel.receive(UP_TIMEOUT_S)
-        except (BoxError, ZygoteError, ChannelTimeout, ChannelClosed) as error:
+        except (SandboxStartError, ZygoteError, ChannelTimeout, ChannelClosed) as error:
             self._held.close()
             return {"error": f"it did not start ({error})"}
         program.ready()

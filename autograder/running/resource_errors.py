@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 
-from autograder.sandbox import BoxError
+from autograder.sandbox import SandboxStartError
 from autograder.sandbox.prefork import ZygoteError
 
 _PASSING = {errno.EAGAIN, errno.ENOMEM, errno.EMFILE, errno.ENFILE, errno.ENOBUFS}
@@ -13,7 +13,7 @@ _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 
 def is_temporary(error: BaseException | None) -> bool:
     """Whether an error may be over a moment later: no process, no memory to spare just now."""
-    if isinstance(error, (BoxError, ZygoteError, MemoryError)):
+    if isinstance(error, (SandboxStartError, ZygoteError, MemoryError)):
         return True
     if isinstance(error, OSError):
         return error.errno in _PASSING

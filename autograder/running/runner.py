@@ -21,16 +21,16 @@ from autograder.examination.verdict import Status, Verdict
 from autograder.processes.channel import Channel, ChannelBroken, ChannelClosed, ChannelTimeout
 from autograder.running.program_host import ProgramHost, Start
 from autograder.running.start import ExaminerError, ExaminerFloodedError, ExaminerProcess
-from autograder.sandbox import Place, RunningSubject
+from autograder.sandbox import Isolation, RunningSubject
 from autograder.util import exercise_folders
 
-CELL_TIMEOUT = 30.0
+CELL_TIMEOUT_S = 30.0
 """Seconds one cell of a submission may run, as in nbgrader."""
 
-START_TIMEOUT = 60.0
+START_TIMEOUT_S = 60.0
 """Seconds until a subject must have started: it takes half a second on a machine that is idle."""
 
-EXCESS_TIMEOUT = 1.0
+EXCESS_TIMEOUT_S = 1.0
 """Seconds in which a watch must have seen what is used: it counts sockets twice a second."""
 
 NOT_RUN = {
@@ -97,7 +97,7 @@ def run(
     program: Program,
     files: Mapping[str, bytes] = NO_FILES,
     *,
-    cell_timeout: float = CELL_TIMEOUT,
+    cell_timeout: float = CELL_TIMEOUT_S,
     trust: bool = False,
     hidden: Iterable[Path] = (),
     seed: int | None = None,
@@ -120,7 +120,9 @@ def run(
     outcome = Outcome(outputs=[[] for _ in program])
     with ExitStack() as stack:
         exams = exercise_folders.own_exam_files(cell.exam for cell in program)
-        place = stack.enter_context(sandbox.choose_place(trust=trust, hidden=hidden, exams=exams))
+        isolation = stack.enter_context(
+            sandbox.choose_isolation(trust=trust, hidden=hidden, exams=exams)
+        )
         # The lower number is the engine's: what writes to every descriptor in turn must find this
         # one, which is being read, before the examiner's, which is not until an exam begins.
         pairs = sorted((socket.socketpair() for _ in range(2)), key=lambda pair: pair[1].fileno())
@@ -129,12 +131,16 @@ def run(
             stack.enter_context(end)
         channel = Channel(engine)
         examiner = stack.enter_context(
-            ExaminerProcess(control, place.domain_id, spawn=place.spawn, course=place.course)
+            ExaminerProcess(
+                control, isolation.domain_id, spawn=isolation.spawn, course=isolation.course
+            )
         )
-        subject = stack.enter_context(_start_subject(place, subject_engine, subject_control, files))
+        subject = stack.enter_context(
+            _start_subject(isolation, subject_engine, subject_control, files)
+        )
 
         def start(command: Sequence[str], fds: Sequence[int]) -> RunningSubject:
-            return place.start_subject(command, files, fds)
+            return isolation.start_subject(command, files, fds)
 
         seed = fresh_seed() if seed is None else seed
         _follow_program(program, channel, examiner, subject, outcome, cell_timeout, seed, start)
@@ -147,12 +153,12 @@ def run(
 
 
 def _start_subject(
-    place: Place, engine: socket.socket, control: socket.socket, files: Mapping[str, bytes]
+    isolation: Isolation, engine: socket.socket, control: socket.socket, files: Mapping[str, bytes]
 ) -> RunningSubject:
     fds = [engine.fileno(), control.fileno()]
-    command = sandbox.subject_command(engine, control, place.domain_id)
+    command = sandbox.subject_command(engine, control, isolation.domain_id)
     with engine, control:
-        return place.start_subject(command, files, fds)
+        return isolation.start_subject(command, files, fds)
 
 
 def _follow_program(
@@ -167,7 +173,7 @@ def _follow_program(
 ) -> None:
     """Walk through the program with the subject; on its end, account for what was not reached."""
     status: Status
-    number, shown = 0, outputs.Notebook(outcome.outputs)
+    number, shown = 0, outputs.OutputNotebook(outcome.outputs)
     try:
         _await_start(channel, subject)
         outcome.begun = True
@@ -217,7 +223,7 @@ def _follow_program(
         _give_up(program, outcome, str(error), reached=number)
     except ExaminerError as error:
         # What there is too much of in a network fails an examiner, too, and is the subject's.
-        excess = subject.describe_excess(EXCESS_TIMEOUT)
+        excess = subject.describe_excess(EXCESS_TIMEOUT_S)
         reason = _describe_end(excess) if excess else str(error)
         status = "not_checked" if excess else "grader_error"
         _give_up(program, outcome, reason, status, reached=number)
@@ -254,7 +260,7 @@ def _describe_hang(
 def _await_start(channel: Channel, subject: RunningSubject) -> None:
     """Wait until the subject has started: nothing of the student's has run by then."""
     try:
-        channel.receive(START_TIMEOUT)
+        channel.receive(START_TIMEOUT_S)
     except (ChannelTimeout, ChannelClosed):
         raise ExaminerError(
             f"The notebook's process did not start: {subject.explain_failure()}."
@@ -285,7 +291,7 @@ def _await_cell(
     subject: RunningSubject,
     program: Program,
     number: int,
-    shown: outputs.Notebook,
+    shown: outputs.OutputNotebook,
     timeout: float,
     *,
     over: bool = False,

@@ -1,4 +1,4 @@
-"""Starting the examiner and talking to it, for both doors: a student's kernel and the engine."""
+"""Starting the examiner and talking to it, for both callers: a student's kernel and the engine."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from course.errors import CourseError
 from course.runtime.waiting import Deadline
 
 if TYPE_CHECKING:  # a student's kernel has no use for sandboxes
-    from autograder.sandbox.place import Process
+    from autograder.sandbox.isolation import StartedProcess
 
-MAX_ANSWER = 1024 * 1024
-EXAM_TIMEOUT = 360.0
+MAX_ANSWER_BYTES = 1024 * 1024
+EXAM_TIMEOUT_S = 360.0
 """Seconds one part of an exam may take in all: its own deadlines end it before.
 
-They are `check_context.ALL_REPLIES_TIMEOUT` for replies and `exam.SITTING_S` for all.
+They are `check_context.ALL_REPLIES_TIMEOUT_S` for replies and `exam.SITTING_S` for all.
 """
 
 MAX_HANGS = 1000
@@ -47,7 +47,7 @@ LAST_WORDS, LAST_LINE = 65536, 1000
 Answering = Callable[[dict[str, Any]], dict[str, Any]]
 """Answers a request of an examiner's, as JSON knows it."""
 
-Spawn = Callable[..., "Process"]
+Spawn = Callable[..., "StartedProcess"]
 
 
 class ExaminerError(CourseError):
@@ -135,7 +135,7 @@ class ExaminerProcess:
         )
 
     def verdict(
-        self, timeout: float = EXAM_TIMEOUT, answer_with: Answering | None = None
+        self, timeout: float = EXAM_TIMEOUT_S, answer_with: Answering | None = None
     ) -> Verdict:
         """Return the verdict of the next part that was asked for.
 
@@ -173,7 +173,7 @@ class ExaminerProcess:
                     continue
                 raise self._late_error(timeout)
             chunk = os.read(stream, 65536)
-            if not chunk or len(self._buffer) > MAX_ANSWER:
+            if not chunk or len(self._buffer) > MAX_ANSWER_BYTES:
                 raise self._ended_error("The examiner ended without a verdict")
             self._buffer += chunk
         line, self._buffer = self._buffer.split(b"\n", 1)
@@ -215,7 +215,7 @@ class ExaminerProcess:
         return ready
 
     def _describe_place(self) -> str:
-        """Return where it is stuck, for whoever looks for the mistake; empty if it does not say."""
+        """Return where it is stuck, to help find the mistake; empty if it does not say."""
         self._said = b""
         with suppress(ProcessLookupError, PermissionError):
             os.kill(self._process.pid, hang_report.ASK)

@@ -1,1 +1,1 @@
-"""What several rooms need: where the exercises lie, whole files, CSV, the terminal."""
+"""What several packages need: where the exercises lie, whole files, CSV, the terminal."""

@@ -166,7 +166,7 @@ def _is_needed(path: Path) -> bool:
 def own_exam_files(names: Iterable[str]) -> dict[str, bytes]:
     """Return {path in a course root: content} of what those of these exams need that are its own.
 
-    A folder with these files is a course root to whoever uses it.
+    A folder with these files can be used as a course root.
     """
     exercises = current_exercises()
     return {

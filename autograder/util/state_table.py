@@ -15,7 +15,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from autograder.util.files import PRIVATE
+from autograder.util.work_files import PRIVATE
 from course.errors import CourseError
 
 FILE = "state.db"

@@ -15,7 +15,7 @@ from rclpy.validate_namespace import validate_namespace
 from rclpy.validate_node_name import validate_node_name
 
 from course.design import drawing, findings
-from course.design.endpoints import DesignError, Endpoint, Role, make_endpoint, rclpy_reason
+from course.design.endpoints import DesignEndpoint, DesignError, Role, make_endpoint, rclpy_reason
 from course.design.node import DesignNode
 from course.runtime.core_session import CoreSession
 
@@ -30,7 +30,7 @@ class NodeDeclaration:
         self.name = name
         self.namespace = namespace
         self.factory = factory
-        self.endpoints: list[Endpoint] = []
+        self.endpoints: list[DesignEndpoint] = []
 
     @property
     def label(self) -> str:
@@ -77,7 +77,7 @@ class NodeDeclaration:
 class Design:
     """The nodes of a robot and what connects them, brought up as real ROS 2 nodes.
 
-    The nodes do no work of their own: each passes marked messages (see `course.design.dye`) from
+    The nodes do no work of their own: each passes tagged messages (see `message_tags`) from
     everything it reads to everything it writes. In a notebook a design shows itself as a graph.
 
     Example::
@@ -173,7 +173,7 @@ class Design:
         return findings.list_findings(self.nodes.values(), self.outside)
 
     def node_factories(self) -> dict[str, Callable[[], Node]]:
-        """Return {label: a function that makes the node}, for whoever runs them.
+        """Return {label: a function that makes the node}, for code that runs the nodes.
 
         Raises:
             DesignError: there is no node, or two endpoints of one name disagree about its type.
@@ -200,8 +200,10 @@ class Design:
             DesignError: see `node_factories`.
         """
         factories = self.node_factories()
-        # By name: who says which session is meant needs none of what the default one brings.
-        host = session or importlib.import_module("course.default_session").session()
+        # Imported by name: with a session given, nothing of the default one is needed.
+        host = (
+            session or importlib.import_module("course.learner_session.default_session").session()
+        )
         if earlier := _running.pop(host, []):
             host.stop(*earlier)
         nodes = _running.setdefault(host, [])

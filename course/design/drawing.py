@@ -7,7 +7,7 @@ from typing import Protocol
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from course.design.endpoints import Endpoint
+from course.design.endpoints import DesignEndpoint
 from course.design.findings import Declared, Link, find_links
 
 _SHAPES = {"msg": ('(["', '"])'), "srv": ('{{"', '"}}'), "action": ('[["', '"]]')}
@@ -74,7 +74,7 @@ def node_lines(node: Declared) -> list[str]:
     return [f"{node.label}{own}", *(f"    {_end_in_words(end)}" for end in node.endpoints)]
 
 
-def _end_in_words(end: Endpoint) -> str:
+def _end_in_words(end: DesignEndpoint) -> str:
     what = f"{end.role.replace('_', ' ')} {end.full_name} ({end.type_name}"
     return f"{what}; {qos_in_words(end.qos)})" if end.role.type_kind == "msg" else f"{what})"
 

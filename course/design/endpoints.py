@@ -51,7 +51,7 @@ _KINDS = {
 
 
 @dataclass(frozen=True)
-class Endpoint:
+class DesignEndpoint:
     """One endpoint of a node. `full_name` is its name as the ROS graph spells it."""
 
     role: Role
@@ -68,7 +68,7 @@ class Endpoint:
 
 def make_endpoint(
     role: Role, node: str, namespace: str, name: object, ros_type: object, qos: object
-) -> Endpoint:
+) -> DesignEndpoint:
     """Return the endpoint that a node declares.
 
     Raises:
@@ -77,7 +77,7 @@ def make_endpoint(
     where = f"{node}.{role}({_short_repr(name)}, …)"
     if not isinstance(name, str):
         raise DesignError(f"{where}: the name comes first and is a text, then the type.")
-    return Endpoint(
+    return DesignEndpoint(
         role,
         name,
         _full_name(where, node, namespace, name),

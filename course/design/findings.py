@@ -8,13 +8,13 @@ from typing import Any, Protocol
 
 from rclpy.qos import QoSCompatibility, qos_check_compatible
 
-from course.design.endpoints import Endpoint
+from course.design.endpoints import DesignEndpoint
 
 
 class Declared(Protocol):
     """What is read of a declared node."""
 
-    endpoints: list[Endpoint]
+    endpoints: list[DesignEndpoint]
     factory: Any
 
     @property
@@ -28,11 +28,11 @@ class Link:
 
     name: str
     kind: str
-    writers: list[tuple[str, Endpoint]] = field(default_factory=list)
-    readers: list[tuple[str, Endpoint]] = field(default_factory=list)
+    writers: list[tuple[str, DesignEndpoint]] = field(default_factory=list)
+    readers: list[tuple[str, DesignEndpoint]] = field(default_factory=list)
 
     @property
-    def all_ends(self) -> list[tuple[str, Endpoint]]:
+    def all_ends(self) -> list[tuple[str, DesignEndpoint]]:
         """Every (node, endpoint) of it."""
         return [*self.writers, *self.readers]
 
@@ -89,7 +89,7 @@ def _check_link(link: Link, outside: frozenset[str]) -> Iterator[str]:
 
 
 def _describe_clash(link: Link) -> str:
-    types: dict[str, list[tuple[str, Endpoint]]] = {}
+    types: dict[str, list[tuple[str, DesignEndpoint]]] = {}
     for label, end in link.all_ends:
         types.setdefault(end.type_name, []).append((label, end))
     if len(types) < 2:
@@ -98,7 +98,7 @@ def _describe_clash(link: Link) -> str:
     return f"{link.name} has more than one type: {uses}."
 
 
-def _describe_refusal(offered: Endpoint, requested: Endpoint) -> str:
+def _describe_refusal(offered: DesignEndpoint, requested: DesignEndpoint) -> str:
     verdict, reason = qos_check_compatible(offered.qos, requested.qos)
     if verdict != QoSCompatibility.ERROR:  # two default profiles give a warning
         return ""
@@ -106,5 +106,5 @@ def _describe_refusal(offered: Endpoint, requested: Endpoint) -> str:
     return ", ".join(p.removeprefix("ERROR: ") for p in parts if p.startswith("ERROR:")) or reason
 
 
-def _join_names(ends: list[tuple[str, Endpoint]]) -> str:
+def _join_names(ends: list[tuple[str, DesignEndpoint]]) -> str:
     return " and ".join(dict.fromkeys(label for label, _ in ends))

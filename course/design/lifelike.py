@@ -22,18 +22,18 @@ from rosidl_parser.definition import (
 )
 from sensor_msgs.msg import PointField
 
-from course.design import dye
+from course.design import message_tags
 
-AHEAD = 0.5
+AHEAD_M = 0.5
 """Metres to what is in the way."""
-FAR = 4.0
+FAR_M = 4.0
 """Metres to the walls around."""
 BEAMS = 180
 ROOM = (8.0, 4.0)
 """Metres that a grid is long and wide: the robot is in it, and so is a goal ahead of it."""
-BEHIND = 2.0
+BEHIND_M = 2.0
 """Metres of a grid that are behind the robot, and to either side of it."""
-CELL = 0.2
+CELL_M = 0.2
 """Metres that a grid's cell is wide."""
 _DEEPEST = 8
 """Messages within messages that are filled."""
@@ -41,7 +41,7 @@ _DEEPEST = 8
 _FLOATS = ("float", "double")
 
 
-def lifelike_message(msg_type: Any, ahead: float = AHEAD) -> Any:
+def lifelike_message(msg_type: Any, ahead: float = AHEAD_M) -> Any:
     """Return a message with content.
 
     Args:
@@ -86,7 +86,7 @@ def _type_name(message: Any) -> str:
 
 def _set_now(message: Any, _: float) -> None:
     message.sec, message.nanosec = divmod(time.time_ns(), 10**9)
-    if message.nanosec in dye.TAGS:
+    if message.nanosec in message_tags.TAGS:
         message.nanosec = 0  # a time must not look like a mark
 
 
@@ -108,9 +108,9 @@ def _fill_scan(message: Any, ahead: float) -> None:
     message.angle_min, message.angle_max = -math.pi / 2, math.pi / 2
     message.angle_increment = math.pi / (BEAMS - 1)
     message.scan_time, message.time_increment = 0.1, 0.1 / BEAMS
-    message.range_min, message.range_max = 0.05, 2 * FAR
+    message.range_min, message.range_max = 0.05, 2 * FAR_M
     middle = range(BEAMS // 2 - 5, BEAMS // 2 + 5)
-    message.ranges = [ahead if beam in middle else FAR for beam in range(BEAMS)]
+    message.ranges = [ahead if beam in middle else FAR_M for beam in range(BEAMS)]
     message.intensities = [1.0] * BEAMS
 
 
@@ -134,11 +134,11 @@ def _fill_cloud(message: Any, ahead: float) -> None:
 
 def _fill_grid(message: Any, ahead: float) -> None:
     message.header.frame_id = "map"
-    width, height = (round(metres / CELL) for metres in ROOM)
-    message.info.resolution, message.info.width, message.info.height = CELL, width, height
-    message.info.origin.position.x = message.info.origin.position.y = -BEHIND
+    width, height = (round(metres / CELL_M) for metres in ROOM)
+    message.info.resolution, message.info.width, message.info.height = CELL_M, width, height
+    message.info.origin.position.x = message.info.origin.position.y = -BEHIND_M
     cells = [0] * (width * height)
-    cells[height // 2 * width + min(width - 1, int((ahead + BEHIND) / CELL))] = 100
+    cells[height // 2 * width + min(width - 1, int((ahead + BEHIND_M) / CELL_M))] = 100
     message.data = array("b", cells)
 
 

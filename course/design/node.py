@@ -18,15 +18,15 @@ from rclpy.publisher import Publisher
 from rclpy.task import Future
 from sensor_msgs.msg import Imu
 
-from course.design import dye
-from course.design.endpoints import Endpoint, Role
+from course.design import message_tags
+from course.design.endpoints import DesignEndpoint, Role
 from course.design.lifelike import lifelike_message
 
 REMEMBERED = 1000
 """How many tags a node knows again; so many can be on their way at a time."""
 OF_ITSELF = (Imu, OccupancyGrid)
 """What a node that reads nothing sends unasked: others may do nothing before they have it."""
-PERIOD = 0.5
+PERIOD_S = 0.5
 """Seconds until it sends that again."""
 
 
@@ -39,7 +39,7 @@ class DesignNode(Node):
     wait for a map or an IMU, where no tag comes in: a node that reads nothing sends those unasked.
     """
 
-    def __init__(self, name: str, namespace: str, endpoints: Sequence[Endpoint]) -> None:
+    def __init__(self, name: str, namespace: str, endpoints: Sequence[DesignEndpoint]) -> None:
         """Make the node; its outlets first, so that nothing comes in before there is a way out."""
         super().__init__(name, namespace=namespace)
         self._lock = threading.Lock()
@@ -52,7 +52,7 @@ class DesignNode(Node):
 
     def take_message(self, message: Any) -> None:
         """Pass on what a message is marked with, unless it has been here before."""
-        for tag in dye.read_all(message):
+        for tag in message_tags.read_all(message):
             self._take_tag(tag)
 
     def _take_tag(self, tag: int) -> None:
@@ -67,37 +67,37 @@ class DesignNode(Node):
 
     # Topics.
 
-    def _publish_topic(self, end: Endpoint) -> None:
+    def _publish_topic(self, end: DesignEndpoint) -> None:
         publisher = self.create_publisher(end.type, end.full_name, end.qos)
         self._outlets.append(partial(self._send_message, publisher, end.type))
         if self._is_source and end.type in OF_ITSELF:
-            self.create_timer(PERIOD, lambda: publisher.publish(lifelike_message(end.type)))
+            self.create_timer(PERIOD_S, lambda: publisher.publish(lifelike_message(end.type)))
 
     def _send_message(self, publisher: Publisher, msg_type: Any, tag: int) -> None:
         message = lifelike_message(msg_type)
-        if dye.mark(message, tag):
+        if message_tags.mark(message, tag):
             publisher.publish(message)
 
-    def _subscribe_topic(self, end: Endpoint) -> None:
+    def _subscribe_topic(self, end: DesignEndpoint) -> None:
         self.create_subscription(end.type, end.full_name, self.take_message, end.qos)
 
     # Services.
 
-    def _call_service(self, end: Endpoint) -> None:
+    def _call_service(self, end: DesignEndpoint) -> None:
         client = self.create_client(end.type, end.full_name, qos_profile=end.qos)
         self._outlets.append(partial(self._send_request, client, end.type))
 
     def _send_request(self, client: Client, srv_type: Any, tag: int) -> None:
         if client.service_is_ready():
             request = lifelike_message(srv_type.Request)
-            dye.mark(request, tag)
+            message_tags.mark(request, tag)
             client.call_async(request).add_done_callback(self._take_outcome)
 
     def _take_outcome(self, future: Future) -> None:
         if not future.cancelled() and future.exception() is None:
             self.take_message(future.result())
 
-    def _serve_requests(self, end: Endpoint) -> None:
+    def _serve_requests(self, end: DesignEndpoint) -> None:
         unanswered: deque[int] = deque(maxlen=REMEMBERED)
         self._unanswered.append(unanswered)
 
@@ -106,14 +106,16 @@ class DesignNode(Node):
         def answer(request: Any, _: Any) -> Any:
             self.take_message(request)
             response = lifelike_message(end.type.Response)
-            asked = dye.read_all(request)
+            asked = message_tags.read_all(request)
             with self._lock:
                 others = [tag for tag in unanswered if tag not in asked]
                 unanswered.clear()
                 # A client may wait for its own mark, or for what else came in here. Where there is
                 # room for one only, they take turns.
                 own_first = bool(others and asked) and next(turns)
-                told = dye.mark(response, *([*asked, *others] if own_first else [*others, *asked]))
+                told = message_tags.mark(
+                    response, *([*asked, *others] if own_first else [*others, *asked])
+                )
                 unanswered.extend(tag for tag in others if tag not in told)
             return response
 
@@ -121,13 +123,13 @@ class DesignNode(Node):
 
     # Actions.
 
-    def _send_goals(self, end: Endpoint) -> None:
+    def _send_goals(self, end: DesignEndpoint) -> None:
         client = ActionClient(self, end.type, end.full_name)
         self._outlets.append(partial(self._send_goal, client, end.type))
 
     def _send_goal(self, client: ActionClient, action_type: Any, tag: int) -> None:
         goal = lifelike_message(action_type.Goal)
-        if client.server_is_ready() and dye.mark(goal, tag):
+        if client.server_is_ready() and message_tags.mark(goal, tag):
             client.send_goal_async(
                 goal, feedback_callback=lambda message: self.take_message(message.feedback)
             ).add_done_callback(self._follow_goal)
@@ -141,7 +143,7 @@ class DesignNode(Node):
         if future.exception() is None and (answer := future.result()) is not None:
             self.take_message(answer.result)
 
-    def _carry_out_goals(self, end: Endpoint) -> None:
+    def _carry_out_goals(self, end: DesignEndpoint) -> None:
         ActionServer(self, end.type, end.full_name, partial(self._execute_goal, end.type))
 
     def _execute_goal(self, action_type: Any, goal: ServerGoalHandle) -> Any:
@@ -150,14 +152,14 @@ class DesignNode(Node):
             lifelike_message(action_type.Feedback),
             lifelike_message(action_type.Result),
         )
-        if dye.carry(goal.request, feedback):
+        if message_tags.carry(goal.request, feedback):
             goal.publish_feedback(feedback)
-        dye.carry(goal.request, result)
+        message_tags.carry(goal.request, result)
         goal.succeed()
         return result
 
 
-_MAKERS: dict[Role, Callable[[DesignNode, Endpoint], None]] = {
+_MAKERS: dict[Role, Callable[[DesignNode, DesignEndpoint], None]] = {
     Role.PUBLISHES: DesignNode._publish_topic,
     Role.SUBSCRIBES: DesignNode._subscribe_topic,
     Role.CALLS: DesignNode._call_service,

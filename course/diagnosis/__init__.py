@@ -7,16 +7,16 @@ from collections.abc import Iterator, Sequence
 from typing import overload
 
 from course.diagnosis import domains, graph, lifecycle, nodes
-from course.doctor.finding import Finding
+from course.doctor.finding import HealthFinding
 from course.runtime.core_session import CoreSession
 
 __all__ = ["Diagnosis", "diagnose", "find_quickly", "likely_reasons"]
 
 
-class Diagnosis(Sequence[Finding]):
+class Diagnosis(Sequence[HealthFinding]):
     """Findings, those that keep something from working first; prints as a list."""
 
-    def __init__(self, findings: Sequence[Finding]) -> None:
+    def __init__(self, findings: Sequence[HealthFinding]) -> None:
         """Show ``findings``."""
         self.findings = sorted(findings, key=lambda finding: finding.status != "problem")
 
@@ -25,14 +25,14 @@ class Diagnosis(Sequence[Finding]):
         return len(self.findings)
 
     @overload
-    def __getitem__(self, index: int) -> Finding: ...
+    def __getitem__(self, index: int) -> HealthFinding: ...
     @overload
-    def __getitem__(self, index: slice) -> list[Finding]: ...
-    def __getitem__(self, index: int | slice) -> Finding | list[Finding]:
+    def __getitem__(self, index: slice) -> list[HealthFinding]: ...
+    def __getitem__(self, index: int | slice) -> HealthFinding | list[HealthFinding]:
         """Return a finding, or several."""
         return self.findings[index]
 
-    def __iter__(self) -> Iterator[Finding]:
+    def __iter__(self) -> Iterator[HealthFinding]:
         """Iterate over the findings."""
         return iter(self.findings)
 
@@ -65,12 +65,12 @@ def diagnose(session: CoreSession) -> Diagnosis:
     )
 
 
-def find_quickly(session: CoreSession) -> list[Finding]:
+def find_quickly(session: CoreSession) -> list[HealthFinding]:
     """Return what can be found without waiting for anybody."""
     return [*nodes.find_stuck(session), *nodes.find_moved(session), *_further_findings(session)]
 
 
-def likely_reasons(session: CoreSession, *, vague: bool, sought: str = "") -> list[Finding]:
+def likely_reasons(session: CoreSession, *, vague: bool, sought: str = "") -> list[HealthFinding]:
     """Return what may be why a wait of the session was in vain, the likeliest first.
 
     Stuck callbacks and nodes in other executors are left out: a wait tells of them by itself. Nodes
@@ -93,7 +93,7 @@ def likely_reasons(session: CoreSession, *, vague: bool, sought: str = "") -> li
 _LONELY = ("topic", "service", "action")
 
 
-def _further_findings(session: CoreSession) -> list[Finding]:
+def _further_findings(session: CoreSession) -> list[HealthFinding]:
     checks = (
         nodes.find_stolen, nodes.find_paused, nodes.half_made, nodes.find_unspun,
         lifecycle.check_own_nodes, domains.on_another_domain, graph.check_graph,
@@ -101,7 +101,7 @@ def _further_findings(session: CoreSession) -> list[Finding]:
     return [finding for check in checks for finding in check(session)]
 
 
-def _rank_finding(finding: Finding) -> int:
+def _rank_finding(finding: HealthFinding) -> int:
     if finding.status == "problem":
         return 0
     if finding.name == "pause" or graph.NEARLY in finding.message:

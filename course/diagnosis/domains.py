@@ -6,19 +6,19 @@ import os
 from collections.abc import Iterator
 
 from course.diagnosis.graph import unoffered_names
-from course.doctor.finding import Finding, make_problem, make_warning
-from course.domains import neighbours
+from course.doctor.finding import HealthFinding, make_problem, make_warning
 from course.graph import reader
-from course.runtime.context import closing
+from course.runtime.context import close_order
 from course.runtime.core_session import CoreSession
+from course.runtime.domains import domain_discovery
 from course.runtime.requests.actions import SEND_GOAL
 
 
-def on_another_domain(session: CoreSession) -> Iterator[Finding]:
+def on_another_domain(session: CoreSession) -> Iterator[HealthFinding]:
     """Find sessions of this process that cannot hear each other, and a domain set in vain."""
     others = [
         other
-        for other in closing.known_sessions()
+        for other in close_order.known_sessions()
         if isinstance(other, CoreSession) and not other.closed and other.nodes
     ]
     for other in others:
@@ -38,7 +38,7 @@ def on_another_domain(session: CoreSession) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def next_door(session: CoreSession, sought: str = "") -> Iterator[Finding]:
+def next_door(session: CoreSession, sought: str = "") -> Iterator[HealthFinding]:
     """Find what nobody offers here in a session of another notebook on this machine.
 
     Args:
@@ -50,13 +50,13 @@ def next_door(session: CoreSession, sought: str = "") -> Iterator[Finding]:
     missed = [*unoffered_names(graph, set(own)), *([sought] if sought else [])]
     here = session.offered(missed)
     missed = [name for name in missed if name not in here]
-    for neighbour in neighbours.ask_neighbours(missed) if missed else []:
-        for name, nodes in neighbour.offers.items():
+    for other in domain_discovery.ask_other_sessions(missed) if missed else []:
+        for name, nodes in other.offers.items():
             action = name.removesuffix(SEND_GOAL)
             yield make_problem(
                 "domain", f"{action} is offered by {', '.join(nodes)} on domain "
-                f"{neighbour.domain_id}, in {neighbour.program}; this session is on domain "
+                f"{other.domain_id}, in {other.program}; this session is on domain "
                 f"{session.domain_id}, and DDS domains never hear each other.",
                 f"Join that domain: course.close(), then course.session(domain_id="
-                f"{neighbour.domain_id}).",
+                f"{other.domain_id}).",
             )  # fmt: skip

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from course.doctor.finding import Finding, make_problem, make_warning
-from course.graph import reader, words
+from course.doctor.finding import HealthFinding, make_problem, make_warning
+from course.graph import graph_text, reader
 from course.graph.model import Graph
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.actions import SEND_GOAL
@@ -23,7 +23,7 @@ _MENDS = {
 }
 
 
-def check_graph(session: CoreSession) -> Iterator[Finding]:
+def check_graph(session: CoreSession) -> Iterator[HealthFinding]:
     """Find what one look at the graph shows."""
     own = session.nodes
     graph = reader.read_graph(session.observer, own=list(own.values()))
@@ -33,15 +33,15 @@ def check_graph(session: CoreSession) -> Iterator[Finding]:
     yield from lonely_clients(graph, set(own))
 
 
-def find_mismatches(graph: Graph) -> Iterator[Finding]:
+def find_mismatches(graph: Graph) -> Iterator[HealthFinding]:
     """Find publishers and subscriptions that DDS does not connect."""
     for topic, pair in graph.mismatches:
         mends = [_MENDS[policy] for policy in pair.policies if policy in _MENDS]
         what = "type" if "TYPE" in pair.policies else "QoS"
-        yield make_problem(what, words.describe_mismatch(topic, pair), " ".join(mends))
+        yield make_problem(what, graph_text.describe_mismatch(topic, pair), " ".join(mends))
 
 
-def find_twins(graph: Graph, own: set[str]) -> Iterator[Finding]:
+def find_twins(graph: Graph, own: set[str]) -> Iterator[HealthFinding]:
     """Find names that several nodes bear: one may be a ghost of an earlier run."""
     for name in graph.duplicate_names:
         where = "One is in this session" if name in own else "None is in this session"
@@ -52,7 +52,7 @@ def find_twins(graph: Graph, own: set[str]) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def lonely_topics(graph: Graph, own: set[str]) -> Iterator[Finding]:
+def lonely_topics(graph: Graph, own: set[str]) -> Iterator[HealthFinding]:
     """Find endpoints of the session's nodes that have nobody on the other side."""
     published = [topic.name for topic in graph.topics if topic.publishers]
     read = [topic.name for topic in graph.topics if topic.subscriptions]
@@ -72,7 +72,7 @@ def lonely_topics(graph: Graph, own: set[str]) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def lonely_clients(graph: Graph, own: set[str]) -> Iterator[Finding]:
+def lonely_clients(graph: Graph, own: set[str]) -> Iterator[HealthFinding]:
     """Find clients of the session's nodes that have no server, or one of another type."""
     for kind, exchanges in (("service", graph.services), ("action", graph.actions)):
         offered = {exchange.name: exchange for exchange in exchanges if exchange.servers}

@@ -11,8 +11,8 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecyclePublisher
 from rclpy.node import Node
 
 from course.diagnosis.graph import unoffered_names
-from course.diagnosis.nodes import ANSWER, MOST_ASKED
-from course.doctor.finding import Finding, make_problem, make_warning
+from course.diagnosis.nodes import ANSWER_TIMEOUT_S, MOST_ASKED
+from course.doctor.finding import HealthFinding, make_problem, make_warning
 from course.graph import reader
 from course.runtime.callbacks import transitions
 from course.runtime.core_session import CoreSession
@@ -27,7 +27,7 @@ _MENDS = {
 }  # fmt: skip
 
 
-def check_own_nodes(session: CoreSession) -> Iterator[Finding]:
+def check_own_nodes(session: CoreSession) -> Iterator[HealthFinding]:
     """Find what keeps managed nodes of the session from working."""
     for name, node in session.nodes.items():
         if not isinstance(node, LifecycleNodeMixin):
@@ -41,7 +41,7 @@ def check_own_nodes(session: CoreSession) -> Iterator[Finding]:
             yield from _check_state(session, name, node)
 
 
-def check_other_nodes(session: CoreSession) -> Iterator[Finding]:
+def check_other_nodes(session: CoreSession) -> Iterator[HealthFinding]:
     """Find managed nodes of other programs that are not active: all are asked at once."""
     services = [
         name
@@ -49,7 +49,7 @@ def check_other_nodes(session: CoreSession) -> Iterator[Finding]:
         if name.endswith(_GET_STATE) and "lifecycle_msgs/srv/GetState" in types
     ]
     asked = [name for name in services if name.removesuffix(_GET_STATE) not in session.nodes]
-    for service, answer in session.answers(GetState, asked[:MOST_ASKED], ANSWER).items():
+    for service, answer in session.answers(GetState, asked[:MOST_ASKED], ANSWER_TIMEOUT_S).items():
         name, state = service.removesuffix(_GET_STATE), answer.current_state.label
         if state == "unconfigured":
             yield make_warning(
@@ -67,7 +67,7 @@ def check_other_nodes(session: CoreSession) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def _check_state(session: CoreSession, name: str, node: Node) -> Iterator[Finding]:
+def _check_state(session: CoreSession, name: str, node: Node) -> Iterator[HealthFinding]:
     assert isinstance(node, LifecycleNodeMixin)
     state = transitions.state_of(node)
     if state == "unconfigured":
@@ -91,7 +91,7 @@ def _check_state(session: CoreSession, name: str, node: Node) -> Iterator[Findin
         )  # fmt: skip
 
 
-def _check_active(name: str, node: Node) -> Iterator[Finding]:
+def _check_active(name: str, node: Node) -> Iterator[HealthFinding]:
     """Find what is off in a node that is active."""
     assert isinstance(node, LifecycleNodeMixin)
     off = [one for one in node._managed_entities if getattr(one, "is_activated", True) is False]

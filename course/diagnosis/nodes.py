@@ -8,18 +8,18 @@ from collections.abc import Iterator
 from rcl_interfaces.srv import ListParameters
 from rclpy.node import Node
 
-from course.doctor.finding import Finding, make_problem, make_warning
+from course.doctor.finding import HealthFinding, make_problem, make_warning
 from course.graph import reader
 from course.runtime.core_session import CoreSession
-from course.runtime.names import node_name
+from course.runtime.ros_names import node_name
 
-ANSWER = 1.0
+ANSWER_TIMEOUT_S = 1.0
 """Seconds within which a node answers to a parameter service, unless it is stuck."""
 
 MOST_ASKED = 8
 
 
-def find_stuck(session: CoreSession) -> Iterator[Finding]:
+def find_stuck(session: CoreSession) -> Iterator[HealthFinding]:
     """Find callbacks that do not return, deadlocks among them."""
     for blocked in session.blocked_callbacks():
         held = " No other callback can run meanwhile." if blocked.holds_up else ""
@@ -28,7 +28,7 @@ def find_stuck(session: CoreSession) -> Iterator[Finding]:
         yield make_problem("callback", message, blocked.advice)
 
 
-def find_stolen(session: CoreSession) -> Iterator[Finding]:
+def find_stolen(session: CoreSession) -> Iterator[HealthFinding]:
     """Find nodes that another executor took away, and take back those that it has dropped."""
     told = len(session.notices)
     session.take_back_stolen_nodes()
@@ -36,7 +36,7 @@ def find_stolen(session: CoreSession) -> Iterator[Finding]:
         yield make_problem("executor", notice, "Leave rclpy.spin_once and its relatives out.")
 
 
-def find_moved(session: CoreSession) -> Iterator[Finding]:
+def find_moved(session: CoreSession) -> Iterator[HealthFinding]:
     """Find nodes that an executor of the learner's own holds."""
     for name in session.moved_nodes():
         yield make_problem(
@@ -45,7 +45,7 @@ def find_moved(session: CoreSession) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def find_paused(session: CoreSession) -> Iterator[Finding]:
+def find_paused(session: CoreSession) -> Iterator[HealthFinding]:
     """Find nodes that were paused and forgotten."""
     for name in session.paused_nodes():
         yield make_warning(
@@ -53,7 +53,7 @@ def find_paused(session: CoreSession) -> Iterator[Finding]:
         )
 
 
-def find_unspun(session: CoreSession) -> Iterator[Finding]:
+def find_unspun(session: CoreSession) -> Iterator[HealthFinding]:
     """Find nodes of this process that were made and never given to an executor."""
     known = [*session.nodes.values(), *(remains.node for remains in session.half_made())]
     own = {id(node) for node in known}
@@ -70,7 +70,7 @@ def find_unspun(session: CoreSession) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def half_made(session: CoreSession) -> Iterator[Finding]:
+def half_made(session: CoreSession) -> Iterator[HealthFinding]:
     """Find what constructors that raised have left behind."""
     for remains in session.half_made():
         yield make_problem(
@@ -80,7 +80,7 @@ def half_made(session: CoreSession) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def find_silent(session: CoreSession) -> Iterator[Finding]:
+def find_silent(session: CoreSession) -> Iterator[HealthFinding]:
     """Find nodes of other processes that are on the graph and do not answer: all asked at once."""
     services = dict(session.observer.get_service_names_and_types())
     known = {*session.nodes, *(remains.name for remains in session.half_made())}
@@ -90,12 +90,13 @@ def find_silent(session: CoreSession) -> Iterator[Finding]:
         if name not in known and f"{name}/list_parameters" in services
     }
     asked = list(others)[:MOST_ASKED]
-    answered = session.answers(ListParameters, asked, ANSWER)
+    answered = session.answers(ListParameters, asked, ANSWER_TIMEOUT_S)
     for service in (service for service in asked if service not in answered):
         yield make_problem(
-            "node", f"{others[service]} is on the graph, but did not answer within {ANSWER:g} s: "
-            "its services are dead. Its program hangs, is stopped, or does not spin it; or it has "
-            "died, and DDS has not noticed yet (that takes up to 20 s).",
+            "node", f"{others[service]} is on the graph, but did not answer within "
+            f"{ANSWER_TIMEOUT_S:g} s: its services are dead. Its program hangs, is stopped, or "
+            "does not spin it; or it has died, and DDS has not noticed yet (that takes up to 20 "
+            "s).",
             "Look at the program that runs it, or restart it.",
         )  # fmt: skip
 

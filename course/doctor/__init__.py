@@ -7,13 +7,13 @@ import sys
 from collections.abc import Iterator, Sequence
 
 from course.doctor import environment, machine, ros, software
-from course.doctor.finding import Finding, make_problem
+from course.doctor.finding import HealthFinding, make_problem
 from course.errors import CourseError
 
-__all__ = ["Finding", "examine_all", "exit_code", "summary_line"]
+__all__ = ["HealthFinding", "examine_all", "exit_code", "summary_line"]
 
 
-def examine_all() -> Iterator[Finding]:
+def examine_all() -> Iterator[HealthFinding]:
     """Yield what is found on this machine, each as soon as it is known. Takes about 3 s."""
     parts = (
         software.examine_software,
@@ -28,12 +28,12 @@ def examine_all() -> Iterator[Finding]:
             yield make_problem("doctor", f"A check could not be finished: {error}")
 
 
-def exit_code(findings: Sequence[Finding]) -> int:
+def exit_code(findings: Sequence[HealthFinding]) -> int:
     """Return 1 if something must be mended before the course runs, else 0."""
     return int(any(finding.status == "problem" for finding in findings))
 
 
-def summary_line(findings: Sequence[Finding]) -> str:
+def summary_line(findings: Sequence[HealthFinding]) -> str:
     """Return the last line: how many problems and warnings there are."""
     problems = sum(finding.status == "problem" for finding in findings)
     warnings = sum(finding.status == "warning" for finding in findings)

@@ -6,8 +6,8 @@ import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
-from course.doctor.finding import Finding, make_ok, make_problem, make_warning
-from course.domains.leases import MAX_DOMAIN, MIN_DOMAIN
+from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
+from course.runtime.domains.leases import MAX_DOMAIN, MIN_DOMAIN
 
 RMW = "rmw_fastrtps_cpp"
 """The one middleware that there are wheels of."""
@@ -20,7 +20,7 @@ _PROFILES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
 Environment = Mapping[str, str]
 
 
-def examine_environment(environment: Environment, prefix: str) -> Iterator[Finding]:
+def examine_environment(environment: Environment, prefix: str) -> Iterator[HealthFinding]:
     """Yield what the variables of ``environment`` do to ROS 2.
 
     Args:
@@ -35,7 +35,7 @@ def examine_environment(environment: Environment, prefix: str) -> Iterator[Findi
         yield make_ok("environment", "No variable is set that disturbs ROS 2.")
 
 
-def _check_domain(environment: Environment) -> Iterator[Finding]:
+def _check_domain(environment: Environment) -> Iterator[HealthFinding]:
     name, text = "ROS_DOMAIN_ID", environment.get("ROS_DOMAIN_ID", "")
     if not text:
         return
@@ -50,7 +50,7 @@ def _check_domain(environment: Environment) -> Iterator[Finding]:
         yield make_warning(name, f"{text} can collide with other programs' ports on Linux.", mend)
 
 
-def _check_middleware(environment: Environment) -> Iterator[Finding]:
+def _check_middleware(environment: Environment) -> Iterator[HealthFinding]:
     name, chosen = "RMW_IMPLEMENTATION", environment.get("RMW_IMPLEMENTATION", "")
     if chosen and chosen != RMW:
         yield make_problem(
@@ -58,7 +58,7 @@ def _check_middleware(environment: Environment) -> Iterator[Finding]:
         )
 
 
-def _check_discovery(environment: Environment) -> Iterator[Finding]:
+def _check_discovery(environment: Environment) -> Iterator[HealthFinding]:
     name, chosen = (
         "ROS_AUTOMATIC_DISCOVERY_RANGE",
         environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", ""),
@@ -78,7 +78,7 @@ def _check_discovery(environment: Environment) -> Iterator[Finding]:
         )
 
 
-def _check_security(environment: Environment) -> Iterator[Finding]:
+def _check_security(environment: Environment) -> Iterator[HealthFinding]:
     if environment.get("ROS_SECURITY_ENABLE", "").lower() == "true":
         yield make_problem(
             "ROS_SECURITY_ENABLE",
@@ -87,7 +87,7 @@ def _check_security(environment: Environment) -> Iterator[Finding]:
         )
 
 
-def _check_profiles(environment: Environment) -> Iterator[Finding]:
+def _check_profiles(environment: Environment) -> Iterator[HealthFinding]:
     for name in _PROFILES:
         path = environment.get(name, "")
         if path and not Path(path).is_file():
@@ -106,7 +106,7 @@ def _check_profiles(environment: Environment) -> Iterator[Finding]:
         )
 
 
-def _system_ros(environment: Environment) -> Iterator[Finding]:
+def _system_ros(environment: Environment) -> Iterator[HealthFinding]:
     places = [
         part
         for name in ("PYTHONPATH", "LD_LIBRARY_PATH", "AMENT_PREFIX_PATH")
@@ -123,7 +123,7 @@ def _system_ros(environment: Environment) -> Iterator[Finding]:
         )
 
 
-def _check_bootstrap(environment: Environment, prefix: str) -> Iterator[Finding]:
+def _check_bootstrap(environment: Environment, prefix: str) -> Iterator[HealthFinding]:
     """The wheels set `_MARK` when they have set LD_LIBRARY_PATH; alone it was inherited."""
     paths = environment.get("LD_LIBRARY_PATH", "").split(os.pathsep)
     if environment.get(_MARK) and str(Path(prefix) / "lib") not in paths:
@@ -135,7 +135,7 @@ def _check_bootstrap(environment: Environment, prefix: str) -> Iterator[Finding]
         )
 
 
-_CHECKS: tuple[Callable[[Environment], Iterator[Finding]], ...] = (
+_CHECKS: tuple[Callable[[Environment], Iterator[HealthFinding]], ...] = (
     _check_domain,
     _check_middleware,
     _check_discovery,

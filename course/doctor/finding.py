@@ -10,7 +10,7 @@ _WIDTH = len("warning")
 
 
 @dataclass(frozen=True)
-class Finding:
+class HealthFinding:
     """What was looked at, how it is, and how to mend it.
 
     Attributes:
@@ -35,16 +35,16 @@ class Finding:
         return asdict(self)
 
 
-def make_ok(name: str, message: str) -> Finding:
+def make_ok(name: str, message: str) -> HealthFinding:
     """Return a finding that all is well."""
-    return Finding(name, "ok", message)
+    return HealthFinding(name, "ok", message)
 
 
-def make_warning(name: str, message: str, mend: str = "") -> Finding:
+def make_warning(name: str, message: str, mend: str = "") -> HealthFinding:
     """Return a finding that something works less well than it could."""
-    return Finding(name, "warning", message, mend)
+    return HealthFinding(name, "warning", message, mend)
 
 
-def make_problem(name: str, message: str, mend: str = "") -> Finding:
+def make_problem(name: str, message: str, mend: str = "") -> HealthFinding:
     """Return a finding that keeps the course from running."""
-    return Finding(name, "problem", message, mend)
+    return HealthFinding(name, "problem", message, mend)

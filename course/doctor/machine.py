@@ -10,15 +10,15 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from course.doctor.finding import Finding, make_ok, make_problem, make_warning
+from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
 from course.util import cgroups
 
 MIN_DISK, LOW_DISK = 50, 500  # MB: below, a build fails; below, a class's submissions may
-LOW_SHM = 32  # MB. A participant takes about 1 MB, and Docker gives 64 by default.
+LOW_SHM_MB = 32  # MB. A participant takes about 1 MB, and Docker gives 64 by default.
 SHM = Path("/dev/shm")
 
 
-def examine_machine() -> Iterator[Finding]:
+def examine_machine() -> Iterator[HealthFinding]:
     """Yield what there is to say about disk, shared memory, log folder and clock."""
     yield check_disk(Path.cwd())
     yield temporary_folder()
@@ -29,7 +29,7 @@ def examine_machine() -> Iterator[Finding]:
     yield check_counting(cgroups.delegated_group())
 
 
-def check_counting(group: Path | None) -> Finding:
+def check_counting(group: Path | None) -> HealthFinding:
     """Say how it is counted what a submission uses that is graded here."""
     name = "submissions' limits"
     if group is not None:
@@ -41,7 +41,7 @@ def check_counting(group: Path | None) -> Finding:
     )
 
 
-def check_disk(folder: Path, free: int | None = None) -> Finding:
+def check_disk(folder: Path, free: int | None = None) -> HealthFinding:
     """Look at the space where notebooks are saved; ``free`` is in MB, measured if left out."""
     free = shutil.disk_usage(folder).free >> 20 if free is None else free
     text, mend = f"{free} MB are free in {folder}", "Make room there."
@@ -52,7 +52,7 @@ def check_disk(folder: Path, free: int | None = None) -> Finding:
     return make_ok("disk", text)
 
 
-def temporary_folder() -> Finding:
+def temporary_folder() -> HealthFinding:
     """Look whether temporary files can be written."""
     try:
         with tempfile.TemporaryFile() as file:
@@ -67,7 +67,7 @@ def temporary_folder() -> Finding:
         )
 
 
-def shared_memory(folder: Path, free: int | None = None) -> Finding:
+def shared_memory(folder: Path, free: int | None = None) -> HealthFinding:
     """Look at DDS's fast path between processes; ``free`` is in MB, measured if left out."""
     name = "shared memory"
     if not (folder.is_dir() and os.access(folder, os.W_OK)):
@@ -77,7 +77,7 @@ def shared_memory(folder: Path, free: int | None = None) -> Finding:
             "In a container: mount a tmpfs there.",
         )
     free = shutil.disk_usage(folder).free >> 20 if free is None else free
-    if free < LOW_SHM:
+    if free < LOW_SHM_MB:
         return make_warning(
             name,
             f"Only {free} MB are free in {folder}; with many nodes DDS falls back to slower UDP.",
@@ -86,7 +86,7 @@ def shared_memory(folder: Path, free: int | None = None) -> Finding:
     return make_ok(name, f"{free} MB are free in {folder}")
 
 
-def stale_segments(folder: Path, locks: Path) -> Finding:
+def stale_segments(folder: Path, locks: Path) -> HealthFinding:
     """Count the segments of DDS participants that were killed.
 
     A living participant holds a lock on its ``*_el`` file, which ``locks`` (``/proc/locks``)
@@ -126,7 +126,7 @@ def _lock_lines(locks: Path) -> Iterator[str]:
             yield line
 
 
-def log_folder(chosen: str | None, ros_home: str | None) -> Finding:
+def log_folder(chosen: str | None, ros_home: str | None) -> HealthFinding:
     """Look whether ROS can write its log files; rclpy does not start without."""
     folder = Path(chosen or Path(ros_home or "~/.ros") / "log").expanduser()
     try:
@@ -142,7 +142,7 @@ def log_folder(chosen: str | None, ros_home: str | None) -> Finding:
         )
 
 
-def check_clock(now: float, installed: float) -> Finding:
+def check_clock(now: float, installed: float) -> HealthFinding:
     """Compare the clock (s since 1970) with when this file was installed."""
     shown = datetime.datetime.fromtimestamp(now).astimezone().isoformat(" ", "seconds")
     if now < installed - 60:

@@ -11,17 +11,17 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 
-from course.doctor.finding import Finding, make_ok, make_problem, make_warning
-from course.domains.leases import MAX_DOMAIN, MIN_DOMAIN, domains_in_use, lease_domain
+from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
 from course.errors import DomainError
+from course.runtime.domains.leases import MAX_DOMAIN, MIN_DOMAIN, domains_in_use, lease_domain
 from course.util.platform_check import WHEELS_ANEW, WHEELS_TORN
 
-DEADLINE = 40.0  # s for a probe, its imports included; it takes about 1 on an idle machine
+DEADLINE_S = 40.0  # s for a probe, its imports included; it takes about 1 on an idle machine
 FEW_DOMAINS = 10
 _MULTICAST = ("239.255.0.1", 0)  # the group of DDSI-RTPS 9.6.1.4, on any free port
 
 
-def examine_ros() -> Iterator[Finding]:
+def examine_ros() -> Iterator[HealthFinding]:
     """Yield what there is to say about the wheels, DDS and the domains."""
     yield check_domains(domains_in_use())
     yield check_multicast()
@@ -41,7 +41,7 @@ def examine_ros() -> Iterator[Finding]:
     yield between_processes()
 
 
-def check_domains(in_use: set[int]) -> Finding:
+def check_domains(in_use: set[int]) -> HealthFinding:
     """Look how many domains are left for sessions, given those with open ports."""
     free = len(set(range(MIN_DOMAIN + 1, MAX_DOMAIN + 1)) - in_use)
     mend = "Shut down notebooks and ROS programs that are no longer used."
@@ -52,7 +52,7 @@ def check_domains(in_use: set[int]) -> Finding:
     return make_ok("domains", f"{free} ROS domains are free")
 
 
-def check_multicast() -> Finding:
+def check_multicast() -> HealthFinding:
     """Send one datagram to DDS's discovery group over the loopback, and receive it."""
     message = b"course doctor"
     with (
@@ -82,12 +82,12 @@ def check_multicast() -> Finding:
     )
 
 
-def in_one_process() -> Finding:
+def in_one_process() -> HealthFinding:
     """Send a message to another node and back, in one process."""
     return _round_trip("round trip in one process", run_probe("both"))
 
 
-def between_processes() -> Finding:
+def between_processes() -> HealthFinding:
     """Send a message to a node of another process and back."""
     name = "round trip between processes"
     try:
@@ -115,11 +115,11 @@ def run_probe(*arguments: object) -> dict[str, object]:
             capture_output=True,
             text=True,
             errors="replace",
-            timeout=DEADLINE,
+            timeout=DEADLINE_S,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return {"error": f"it gave no answer in {DEADLINE:.0f} s"}
+        return {"error": f"it gave no answer in {DEADLINE_S:.0f} s"}
     try:
         data = json.loads(done.stdout.splitlines()[-1])
     except (ValueError, IndexError):
@@ -130,7 +130,7 @@ def run_probe(*arguments: object) -> dict[str, object]:
     return data if isinstance(data, dict) else {"error": "it gave a strange answer"}
 
 
-def _round_trip(name: str, seen: dict[str, object]) -> Finding:
+def _round_trip(name: str, seen: dict[str, object]) -> HealthFinding:
     if "error" in seen:
         return make_problem(
             name,
@@ -141,7 +141,7 @@ def _round_trip(name: str, seen: dict[str, object]) -> Finding:
 
 
 def _probe_command(*arguments: object) -> list[str]:
-    return [sys.executable, "-m", "course.doctor.probe", *(str(value) for value in arguments)]
+    return [sys.executable, "-m", "course.doctor.ros_probe", *(str(value) for value in arguments)]
 
 
 def _end_process(process: subprocess.Popen[bytes]) -> None:

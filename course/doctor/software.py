@@ -11,7 +11,7 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-from course.doctor.finding import Finding, make_ok, make_problem, make_warning
+from course.doctor.finding import HealthFinding, make_ok, make_problem, make_warning
 from course.util.platform_check import find_problem as platform_problem
 
 DISTRIBUTION = "ros2-course"
@@ -19,7 +19,7 @@ _SHOWN = ("ros-jazzy-rclpy", "jupyterlab", "nbgrader", "ipykernel")
 _REINSTALL = "In the course's folder run `uv sync`, or `pip install .` in this environment."
 
 
-def examine_software() -> Iterator[Finding]:
+def examine_software() -> Iterator[HealthFinding]:
     """Yield what there is to say about Python, packages, compiler and kernel."""
     yield check_python()
     yield check_packages()
@@ -27,7 +27,7 @@ def examine_software() -> Iterator[Finding]:
     yield check_compiler()
 
 
-def check_python(sentence: str | None = None) -> Finding:
+def check_python(sentence: str | None = None) -> HealthFinding:
     """Look at Python and the platform; ``sentence`` says what is wrong with them, if known."""
     sentence = sentence or platform_problem()
     if sentence:
@@ -36,7 +36,7 @@ def check_python(sentence: str | None = None) -> Finding:
     return make_ok("Python", f"{here} on {platform.system()} {platform.machine()}, {sys.prefix}")
 
 
-def check_packages(distribution: str = DISTRIBUTION) -> Finding:
+def check_packages(distribution: str = DISTRIBUTION) -> HealthFinding:
     """Compare every package that ``distribution`` requires with what is installed."""
     name = "packages"
     try:
@@ -62,7 +62,7 @@ def check_packages(distribution: str = DISTRIBUTION) -> Finding:
     return make_ok(name, f"{shown}; all {len(versions)} in their tested range")
 
 
-def check_kernel() -> Finding:
+def check_kernel() -> HealthFinding:
     """Look whether JupyterLab's Python kernel is this Python, and not another one's."""
     from jupyter_client.kernelspec import KernelSpecManager, NoSuchKernel
 
@@ -83,9 +83,9 @@ def check_kernel() -> Finding:
     return make_ok(name, "JupyterLab's Python kernel is this Python")
 
 
-def check_compiler() -> Finding:
+def check_compiler() -> HealthFinding:
     """Look for what building ROS interfaces needs."""
-    from course.interfaces.toolchain import compiler_problem
+    from course.interfaces.building.toolchain import compiler_problem
 
     sentence = compiler_problem()
     if sentence is None:

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import igraph
 
-from course.graph import words
+from course.graph import graph_text
 from course.graph.model import Endpoint, Exchange, Graph, Mismatch, Topic
 
-BOX_HEIGHT = 40  # px, with room for a name and a type below it
+BOX_HEIGHT_PX = 40  # px, with room for a name and a type below it
 _CHARACTER, _LEAST_WIDTH, _LONGEST_LABEL = 7.5, 80, 34
 _COLUMN_GAP, _ROW_GAP, _MARGIN = 70, 18, 8
-_SPREAD = 26  # px of a box's side over which the arrows that end there are spread
+_SPREAD_PX = 26  # px of a box's side over which the arrows that end there are spread
 
 
 @dataclass(frozen=True)
@@ -28,11 +28,11 @@ class Box:
     x: float
     y: float
     width: float
-    height: float = BOX_HEIGHT
+    height: float = BOX_HEIGHT_PX
 
 
 @dataclass(frozen=True)
-class Line:
+class Polyline:
     """An arrow: an SVG path, and a label at ``x``, ``y`` where there is something to say.
 
     ``low`` is the largest y that its curve comes near to.
@@ -53,7 +53,7 @@ class Drawing:
     """A graph's boxes and lines, and the size of it all in pixels."""
 
     boxes: tuple[Box, ...]
-    lines: tuple[Line, ...]
+    lines: tuple[Polyline, ...]
     width: float
     height: float
 
@@ -117,8 +117,12 @@ def _list_things(graph: Graph) -> Iterator[_Thing]:
         tip = f"Two nodes are called {name}: rename one." if twins else f"node {name}"
         yield _Thing("node", name, "", tip, twins)
     for topic in graph.topics:
-        ends = [f"published by {end.node} [{words.describe_qos(end)}]" for end in topic.publishers]
-        ends += [f"read by {end.node} [{words.describe_qos(end)}]" for end in topic.subscriptions]
+        ends = [
+            f"published by {end.node} [{graph_text.describe_qos(end)}]" for end in topic.publishers
+        ]
+        ends += [
+            f"read by {end.node} [{graph_text.describe_qos(end)}]" for end in topic.subscriptions
+        ]
         note = ", ".join(_short_type(type_) for type_ in topic.types)
         yield _Thing(
             "topic", topic.name, note, "\n".join([f"topic {topic.name}", *topic.types, *ends]),
@@ -145,10 +149,14 @@ def _topic_links(topic: Topic) -> Iterator[_Link]:
         pairs = sent.get(node, [])
         # What both arrows of a pair would say is said once, where it arrives.
         untold = [pair for pair in pairs if pair not in heard.get(pair.subscription, [])]
-        yield _Link(("node", node), here, "topic", tip, bool(pairs), words.join_policies(untold))
+        yield _Link(
+            ("node", node), here, "topic", tip, bool(pairs), graph_text.join_policies(untold)
+        )
     for node, tip in _endpoint_tips(topic, topic.subscriptions, "requests", heard).items():
         pairs = heard.get(node, [])
-        yield _Link(here, ("node", node), "topic", tip, bool(pairs), words.join_policies(pairs))
+        yield _Link(
+            here, ("node", node), "topic", tip, bool(pairs), graph_text.join_policies(pairs)
+        )
 
 
 def _endpoint_tips(
@@ -157,9 +165,9 @@ def _endpoint_tips(
     """Return {node: what its endpoints on a topic offer or request, and what breaks them}."""
     lines: dict[str, list[str]] = {}
     for end in ends:
-        lines.setdefault(end.node, []).append(f"{end.node} {does} {words.describe_qos(end)}")
+        lines.setdefault(end.node, []).append(f"{end.node} {does} {graph_text.describe_qos(end)}")
     for node, said in lines.items():
-        said += [words.describe_mismatch(topic.name, pair) for pair in broken.get(node, [])]
+        said += [graph_text.describe_mismatch(topic.name, pair) for pair in broken.get(node, [])]
     return {node: "\n".join(dict.fromkeys(said)) for node, said in lines.items()}
 
 
@@ -190,7 +198,7 @@ def _place_things(
         place.update({n: left + (width - things[keys[n]].box_width) / 2 for n in inside})
         left += width + max(_COLUMN_GAP, words_wide)
     top = min(spot[0] for spot in spots)
-    row = BOX_HEIGHT + _ROW_GAP
+    row = BOX_HEIGHT_PX + _ROW_GAP
     return {key: (place[n], _MARGIN + (spots[n][0] - top) * row) for n, key in enumerate(keys)}
 
 
@@ -208,14 +216,14 @@ def _arrow_ends(links: list[_Link], boxes: dict[tuple[str, str], Box]) -> list[f
         arriving.setdefault(link.target, []).append(number)
     ends = [0.0] * len(links)
     for numbers in arriving.values():
-        step = min(12.0, _SPREAD / len(numbers))
+        step = min(12.0, _SPREAD_PX / len(numbers))
         numbers.sort(key=lambda number: boxes[links[number].source].y)
         for place, number in enumerate(numbers):
             ends[number] = round((place - (len(numbers) - 1) / 2) * step, 1)
     return ends
 
 
-def _draw_line(link: _Link, source: Box, target: Box, end: float) -> Line:
+def _draw_line(link: _Link, source: Box, target: Box, end: float) -> Polyline:
     """Return a curve from the right side of ``source`` to the left of ``target``, or back.
 
     It ends ``end`` pixels below the middle of the side.
@@ -229,10 +237,10 @@ def _draw_line(link: _Link, source: Box, target: Box, end: float) -> Line:
         bend = max(30.0, (x2 - x1) / 2)
         path = f"M{x1:g},{y1:g} C{x1 + bend:g},{y1:g} {x2 - bend:g},{y2:g} {x2:g},{y2:g}"
     else:
-        low = max(y1, y2) + BOX_HEIGHT / 2 + 6
+        low = max(y1, y2) + BOX_HEIGHT_PX / 2 + 6
         path = f"M{x1:g},{y1:g} C{x1:g},{low:g} {x2:g},{low:g} {x2:g},{y2:g}"
     middle = ((x1 + x2) / 2, (y1 + y2) / 2 - 6)
-    return Line(
+    return Polyline(
         link.kind,
         path,
         link.tip,

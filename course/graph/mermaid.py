@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from course.graph import words
+from course.graph import graph_text
 from course.graph.model import Exchange, Graph, Mismatch, Topic
 
 
@@ -49,7 +49,9 @@ def _topic_arrows(topic: Topic, ident: str, ids: dict[str, str]) -> Iterator[tup
 def _format_arrow(source: str, target: str, pairs: list[Mismatch]) -> str:
     if not pairs:
         return f"{source} --> {target}"
-    return f"{source} -. {_quote_text(f'{words.join_policies(pairs)} does not fit')} .-x {target}"
+    return (
+        f"{source} -. {_quote_text(f'{graph_text.join_policies(pairs)} does not fit')} .-x {target}"
+    )
 
 
 def _exchange_lines(

@@ -18,8 +18,8 @@ from rclpy.qos import HistoryPolicy, QoSCompatibility, QoSProfile, qos_check_com
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from course.graph.model import QOS_POLICIES, Endpoint, Exchange, Graph, Mismatch, Topic
-from course.runtime.names import full_name
 from course.runtime.rclpy_fixes import incompatible_qos_events
+from course.runtime.ros_names import full_name
 
 _PLUMBING = ("/rosout", "/parameter_events", "/clock")
 _PLUMBING_TYPES = ("rcl_interfaces/", "type_description_interfaces/")

@@ -6,7 +6,8 @@ is what colcon would build: the same type names and type hashes on the wire (REP
 talks to any ROS 2 Jazzy system.
 """
 
-from course.interfaces.cache import root as cache_root
+from course.interfaces.building.cache import root as cache_root
+from course.interfaces.building.toolchain import compiler_problem
 from course.interfaces.defining import Source, define, ensure, ensure_definition, status
 from course.interfaces.errors import (
     BuildError,
@@ -16,7 +17,6 @@ from course.interfaces.errors import (
     RestartNeededError,
 )
 from course.interfaces.finder import install
-from course.interfaces.toolchain import compiler_problem
 
 __all__ = [
     "BuildError",

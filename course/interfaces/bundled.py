@@ -6,9 +6,9 @@ import functools
 from collections.abc import Mapping
 from pathlib import Path
 
-from course.interfaces.build import Unit
-from course.interfaces.definition import define_text
-from course.interfaces.names import TypeName
+from course.interfaces.building.unit import Unit
+from course.interfaces.texts.definition import define_text
+from course.interfaces.texts.type_names import TypeName
 
 TEXTS = Path(__file__).parent / "bundled"
 PACKAGES = ("example_interfaces",)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import enum
 
-from course.interfaces import bundled, cache, finder, installed, packages, standins
-from course.interfaces.build import Unit
-from course.interfaces.definition import Definition, define_text
+from course.interfaces import bundled, finder, installed, packages, standins
+from course.interfaces.building import cache
+from course.interfaces.building.toolchain import compiler_problem
+from course.interfaces.building.unit import Unit
 from course.interfaces.errors import DefinitionError, RestartNeededError
-from course.interfaces.names import TypeName, parse_name
-from course.interfaces.toolchain import compiler_problem
+from course.interfaces.texts.definition import Definition, define_text
+from course.interfaces.texts.type_names import TypeName, parse_name
 
 
 class Source(enum.StrEnum):
@@ -98,9 +99,9 @@ def check_stem(type_name: TypeName, others: list[TypeName]) -> None:
 def ensure(package: str) -> Source:
     """Build a bundled package into the cache if need be, without importing it.
 
-    For whoever must have it built beforehand, such as a grader that runs programs in a sandbox
-    without a compiler. Raises ``DefinitionError`` for an unknown package, and ``BuildError`` if
-    it cannot be built: stand-ins are for learners.
+    For a program that needs it built beforehand, such as a grader that runs programs in a sandbox
+    without a compiler. Raises ``DefinitionError`` for an unknown package, and ``BuildError`` if it
+    cannot be built: stand-ins are for learners.
     """
     if package not in bundled.PACKAGES:
         raise DefinitionError(

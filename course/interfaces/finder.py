@@ -14,8 +14,9 @@ import threading
 from collections.abc import Sequence
 from types import ModuleType
 
-from course.interfaces import bundled, cache, packages, standins
-from course.interfaces.build import Unit
+from course.interfaces import bundled, packages, standins
+from course.interfaces.building import cache
+from course.interfaces.building.unit import Unit
 from course.interfaces.errors import BuildError, NotDefinedYetError
 
 

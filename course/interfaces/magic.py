@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from course.interfaces.defining import define
-from course.interfaces.names import parse_name
+from course.interfaces.texts.type_names import parse_name
 
 
 def register(shell: Any) -> None:

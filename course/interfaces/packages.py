@@ -19,9 +19,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from course.interfaces.build import Unit
+from course.interfaces.building.unit import Unit
 from course.interfaces.errors import BuildError
-from course.interfaces.names import TypeName
+from course.interfaces.texts.type_names import TypeName
 
 # The names that rosidl's own packages export for an interface.
 EXPORTS = {

@@ -9,7 +9,7 @@ from typing import Any
 
 from course.interfaces import bundled, packages
 from course.interfaces.errors import InterfaceError
-from course.interfaces.names import TypeName
+from course.interfaces.texts.type_names import TypeName
 
 # AddTwoInts is not here: no installed service has its fields.
 SAME_SHAPE = {

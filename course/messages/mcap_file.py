@@ -14,7 +14,7 @@ from rclpy.serialization import serialize_message
 from course.errors import CourseError
 from course.messages import values
 from course.messages.types import type_name
-from course.util import arguments
+from course.util import argument_checks
 from course.util.files import replace_file
 
 _RULE = "=" * 80
@@ -39,7 +39,7 @@ def write_recordings(
         SessionError: the path is no path.
     """
     if not isinstance(path, Path):
-        path = Path(arguments.check_text(path, "The path", "scan.mcap"))
+        path = Path(argument_checks.check_text(path, "The path", "scan.mcap"))
     try:
         if path.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))

@@ -16,7 +16,7 @@ from typing import Any
 
 from course.errors import SessionError
 from course.interfaces import installed, packages
-from course.interfaces.names import LOWER_CASE
+from course.interfaces.texts.type_names import LOWER_CASE
 from course.messages import yaml_text
 
 _PARTS = ("get_fields_and_field_types", "Request", "Goal")

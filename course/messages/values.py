@@ -26,10 +26,10 @@ from course.errors import CourseError
 from course.messages import yaml_text
 from course.messages.types import type_name
 
-LONGEST = 64
+MAX_SHOWN_ITEMS = 64
 """Elements of a sequence, or bytes, that `to_data` keeps by default; the rest is only counted."""
 
-LONGEST_TEXT = 2000
+MAX_TEXT_CHARS = 2000
 """Characters of a text that it keeps then."""
 
 _INTEGERS = {
@@ -44,7 +44,7 @@ class MisfitError(CourseError):
     """A value that does not fit its field; the message names the field and what it takes."""
 
 
-def to_data(message: Any, longest: int | None = LONGEST) -> dict[str, Any]:
+def to_data(message: Any, longest: int | None = MAX_SHOWN_ITEMS) -> dict[str, Any]:
     """Return a message's fields as plain data, nested messages as dicts.
 
     Args:
@@ -57,15 +57,15 @@ def to_data(message: Any, longest: int | None = LONGEST) -> dict[str, Any]:
     }
 
 
-def to_plain(value: Any, longest: int | None = LONGEST) -> Any:
+def to_plain(value: Any, longest: int | None = MAX_SHOWN_ITEMS) -> Any:
     """Return the value of a field as plain data; see `to_data`."""
     if hasattr(value, "get_fields_and_field_types"):
         return to_data(value, longest)
     if isinstance(value, bytes):
         return value[0] if len(value) == 1 else list(value)
     if isinstance(value, str):
-        more = 0 if longest is None else len(value) - LONGEST_TEXT
-        return f"{value[:LONGEST_TEXT]}… {more} more" if more > 0 else value
+        more = 0 if longest is None else len(value) - MAX_TEXT_CHARS
+        return f"{value[:MAX_TEXT_CHARS]}… {more} more" if more > 0 else value
     if isinstance(value, bool | int | float):
         return value
     # Cut first: as a list of numbers a picture takes many times the memory.

@@ -21,7 +21,7 @@ LOSSY = ("stream", "slow reader")
 """Scenarios that a loss says something about: in the others the link loses nothing."""
 
 COUNT = 30
-RATE = 50.0  # Hz
+RATE_HZ = 50.0  # Hz
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Experiment:
 
 
 @dataclass
-class Outcome:
+class ExperimentOutcome:
     """What was seen.
 
     Attributes:
@@ -94,7 +94,7 @@ class Outcome:
         return json.dumps(vars(self))
 
     @classmethod
-    def from_json(cls, text: str) -> Outcome:
+    def from_json(cls, text: str) -> ExperimentOutcome:
         """Read what `to_json` wrote."""
         data: dict[str, Any] = json.loads(text)
         return cls(**data)

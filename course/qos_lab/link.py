@@ -21,7 +21,7 @@ ENVIRONMENT = {
 }
 
 _TOOLS = ("unshare", "ip", "nft")
-_TIMEOUT = 10.0
+_TIMEOUT_S = 10.0
 
 
 @cache
@@ -35,7 +35,7 @@ def problem() -> str:
     tried = subprocess.run(
         [*ENTER, executables.find_tool("nft") or "nft", "list", "tables"],
         capture_output=True,
-        timeout=_TIMEOUT,
+        timeout=_TIMEOUT_S,
         check=False,
     )
     if tried.returncode:
@@ -60,4 +60,4 @@ def set_loss(percent: int) -> None:
 
 def _run_tool(tool: str, *arguments: str) -> None:
     command = [executables.find_tool(tool) or tool, *arguments]
-    subprocess.run(command, check=True, capture_output=True, timeout=_TIMEOUT)
+    subprocess.run(command, check=True, capture_output=True, timeout=_TIMEOUT_S)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from course.graph.reader import find_incompatibilities
-from course.qos_lab.experiment import COUNT, Experiment, Outcome
+from course.qos_lab.experiment import COUNT, Experiment, ExperimentOutcome
 from course.qos_lab.profile import Profile
 
-OUTLIVES = 30.0
-"""Seconds that no message of an experiment grows old: a lifespan of so many has no say."""
+OUTLIVES_S = 30.0
+"""Seconds: no message of an experiment gets this old, so such a lifespan has no effect."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def is_reliable(experiment: Experiment) -> bool:
     return experiment.offered.reliability == experiment.requested.reliability == "RELIABLE"
 
 
-def explain_outcome(experiment: Experiment, outcome: Outcome) -> str:
+def explain_outcome(experiment: Experiment, outcome: ExperimentOutcome) -> str:
     """Return why it came out so, in one or two sentences."""
     if not outcome.connected:
         broken = [
@@ -91,7 +91,7 @@ def explain_outcome(experiment: Experiment, outcome: Outcome) -> str:
     return _explain_stream(experiment, outcome)
 
 
-def _explain_stream(experiment: Experiment, outcome: Outcome) -> str:
+def _explain_stream(experiment: Experiment, outcome: ExperimentOutcome) -> str:
     if not outcome.missing_count:
         repaired = " What the link dropped was sent again." if outcome.lossy else ""
         return f"Every message arrived, in order.{repaired if is_reliable(experiment) else ''}"
@@ -114,7 +114,7 @@ def _not_repaired(experiment: Experiment) -> str:
     return f"They were dropped before they could be sent again, by {' or '.join(causes)}."
 
 
-def _explain_late_joiner(experiment: Experiment, outcome: Outcome) -> str:
+def _explain_late_joiner(experiment: Experiment, outcome: ExperimentOutcome) -> str:
     if not _has_replay(experiment):
         return (
             "The late reader got nothing of the past: that needs TRANSIENT_LOCAL and RELIABLE on "
@@ -130,7 +130,7 @@ def _explain_late_joiner(experiment: Experiment, outcome: Outcome) -> str:
     )
 
 
-def _explain_slow_reader(experiment: Experiment, outcome: Outcome) -> str:
+def _explain_slow_reader(experiment: Experiment, outcome: ExperimentOutcome) -> str:
     kept = len(outcome.received)
     if kept == outcome.sent:
         return "The reader's queue was long enough: it found every message."
@@ -146,7 +146,7 @@ def _explain_slow_reader(experiment: Experiment, outcome: Outcome) -> str:
     return " ".join(filter(None, parts))
 
 
-def _never_there(experiment: Experiment, outcome: Outcome) -> str:
+def _never_there(experiment: Experiment, outcome: ExperimentOutcome) -> str:
     """Return why a slow reader's queue lacks messages that it had room for, if that is known."""
     parts = []
     if outcome.lossy and is_reliable(experiment):
@@ -158,7 +158,7 @@ def _never_there(experiment: Experiment, outcome: Outcome) -> str:
     return " ".join(parts)
 
 
-def _liveliness_lost(experiment: Experiment, outcome: Outcome) -> str:
+def _liveliness_lost(experiment: Experiment, outcome: ExperimentOutcome) -> str:
     if outcome.liveliness_lost:
         return "The lease ran out without a sign of life, and DDS told the reader."
     if not experiment.requested.lease:
@@ -176,7 +176,7 @@ def expected_count(experiment: Experiment) -> int | None:
     offered, requested = experiment.offered, experiment.requested
     if experiment.scenario == "late joiner" and not _has_replay(experiment):
         return 0
-    if 0 < min(offered.lifespan or OUTLIVES, requested.lifespan or OUTLIVES) < OUTLIVES:
+    if 0 < min(offered.lifespan or OUTLIVES_S, requested.lifespan or OUTLIVES_S) < OUTLIVES_S:
         return None  # it depends on how soon they come
     if experiment.scenario == "late joiner":
         return _replayed_count(experiment)

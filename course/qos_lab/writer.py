@@ -25,7 +25,7 @@ from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import UInt32
 
-from course.qos_lab import answers
+from course.qos_lab import private_stdout
 from course.qos_lab.profile import Profile
 
 TOPIC = "experiment"
@@ -76,7 +76,7 @@ class Writer:
 
 def main() -> None:
     """Run until standard input ends."""
-    answer = answers.claim_stdout()
+    answer = private_stdout.claim_stdout()
     context = Context()
     rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
     node = Node("writer", context=context, enable_rosout=False, start_parameter_services=False)

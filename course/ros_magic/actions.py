@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from course import default_session
 from course.errors import SessionError
 from course.graph import reader
 from course.graph.model import Exchange
+from course.learner_session import default_session
 from course.messages import values, yaml_text
 from course.ros_magic.options import Add, split_operands, type_and_values
 from course.ros_magic.options import declare_timeout as add_timeout
-from course.ros_magic.types import agreed_type, build_message
+from course.ros_magic.topic_types import agreed_type, build_message
 from course.runtime.requests.graph_queries import full_action
 
 NOUN = "action"

@@ -6,17 +6,17 @@ import itertools
 import statistics
 from typing import Any
 
-from course import default_session
 from course.errors import SessionError, WaitTimeout
+from course.learner_session import default_session
 from course.messages import values, yaml_text
 from course.ros_magic.options import Add
 from course.ros_magic.options import declare_timeout as add_timeout
 from course.ros_magic.qos import declare_options as declare_qos
 from course.ros_magic.qos import profile_from_options
-from course.ros_magic.types import message_type
+from course.ros_magic.topic_types import message_type
 from course.runtime.requests.graph_queries import full_topic
 from course.runtime.waiting import Deadline
-from course.util.arguments import check_seconds, check_whole_number
+from course.util.argument_checks import check_seconds, check_whole_number
 
 _ENOUGH = 20  # messages for a rate that one late message does not spoil
 
@@ -106,8 +106,8 @@ def declare_echo(add: Add) -> None:
     add("-n", "--count", type=int, default=1, metavar="N", help="how many messages (1)")
     add("--once", dest="count", action="store_const", const=1, help="one message")
     add("--field", default="", metavar="F", help="only this field, as in pose.position.x")
-    add("-l", "--truncate-length", dest="longest", type=int, default=values.LONGEST, metavar="N",
-        help="so many elements of a sequence")  # fmt: skip
+    add("-l", "--truncate-length", dest="longest", type=int, metavar="N",
+        default=values.MAX_SHOWN_ITEMS, help="so many elements of a sequence")  # fmt: skip
     add("-f", "--full-length", dest="longest", action="store_const", const=0, help="all of them")
     add("--flow-style", action="store_true", help="each message on one line")
     add_timeout(add)

@@ -9,14 +9,14 @@ from typing import Any
 
 from IPython.core.magic import no_var_expand
 
-from course import default_session
 from course.errors import CourseError
 from course.graph import reader
 from course.graph.model import Graph
 from course.interfaces import installed
+from course.learner_session import default_session
 from course.ros_magic import arguments
 
-_PATIENCE = 1.0  # s that the Tab key waits for a node to answer
+_PATIENCE_S = 1.0  # s that the Tab key waits for a node to answer
 
 
 def register(shell: Any) -> None:
@@ -98,7 +98,7 @@ def _name_candidates(noun: str, verb: str, operands: list[str]) -> list[str]:
     if noun == "param" and len(operands) == 1:
         from course.ros_magic.parameters import names_of
 
-        return names_of(operands[0], _PATIENCE)
+        return names_of(operands[0], _PATIENCE_S)
     if verb == "find":
         return _type_candidates(noun)
     if len(operands) == 1 and verb in ("pub", "echo", "call", "send_goal"):

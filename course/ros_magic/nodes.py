@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from course import default_session
 from course.errors import SessionError
 from course.graph import reader
 from course.graph.model import Endpoint, Exchange, Graph
+from course.learner_session import default_session
 from course.ros_magic.options import Add
 
 NOUN = "node"

@@ -8,14 +8,14 @@ from typing import Any
 
 from course.messages.types import is_type_name
 
-TIMEOUT = 5.0
+TIMEOUT_S = 5.0
 """Seconds that a command waits at most; what has no end on a command line ends after them here."""
 
 Add = Callable[..., Any]
 """``argparse.ArgumentParser.add_argument``, with which a command declares what it takes."""
 
 
-def declare_timeout(add: Add, default: float = TIMEOUT) -> None:
+def declare_timeout(add: Add, default: float = TIMEOUT_S) -> None:
     """Declare ``--timeout``."""
     add("--timeout", type=float, default=default, metavar="S", help="seconds to wait at most")
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from rcl_interfaces.msg import ParameterDescriptor
 
-from course import default_session
 from course.errors import CourseError, SessionError
 from course.graph import reader
+from course.learner_session import default_session
 from course.messages import yaml_text
 from course.ros_magic.options import Add
 from course.runtime.requests.graph_queries import full_node

@@ -14,7 +14,7 @@ from rclpy.qos import (
 )
 
 from course.ros_magic.options import Add
-from course.util.arguments import check_whole_number
+from course.util.argument_checks import check_whole_number
 
 _POLICIES = {
     "reliability": QoSReliabilityPolicy,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 from course.errors import SessionError
-from course.ros_magic.options import TIMEOUT, Add
-from course.util.arguments import check_whole_number
+from course.ros_magic.options import TIMEOUT_S, Add
+from course.util.argument_checks import check_whole_number
 
-MOST_A_SECOND = 1000.0
+MAX_RATE_HZ = 1000.0
 
 
 def declare_repetitions(add: Add, what: str) -> None:
@@ -21,7 +21,7 @@ def declare_repetitions(add: Add, what: str) -> None:
 def declare_rate(add: Add, what: str) -> None:
     """Declare ``--rate``."""
     add("-r", "--rate", type=float, metavar="N",
-        help=f"{what} N times a second, for {TIMEOUT:g} s: no cell runs for ever")  # fmt: skip
+        help=f"{what} N times a second, for {TIMEOUT_S:g} s: no cell runs for ever")  # fmt: skip
 
 
 def parse_repetitions(once: bool, times: int | None, rate: float | None) -> tuple[int, float]:
@@ -32,13 +32,11 @@ def parse_repetitions(once: bool, times: int | None, rate: float | None) -> tupl
     """
     if once and times is not None:
         raise SessionError("--once and --times say different things: leave one of them out.")
-    if rate is not None and not (0 < rate <= MOST_A_SECOND):
-        raise SessionError(
-            f"--rate is above 0 and at most {MOST_A_SECOND:g} a second, not {rate:g}."
-        )
+    if rate is not None and not (0 < rate <= MAX_RATE_HZ):
+        raise SessionError(f"--rate is above 0 and at most {MAX_RATE_HZ:g} a second, not {rate:g}.")
     if times is not None:
         check_whole_number(times, "--times", least=1, example=3)
     if once or (times is None and rate is None):
         return 1, 1.0
     rate = rate or 1.0
-    return times or max(1, math.floor(TIMEOUT * rate)), rate
+    return times or max(1, math.floor(TIMEOUT_S * rate)), rate

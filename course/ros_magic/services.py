@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import contextlib
 
-from course import default_session
 from course.errors import SessionError
 from course.graph import reader
 from course.graph.model import Exchange
+from course.learner_session import default_session
 from course.messages import values, yaml_text
 from course.messages.types import load_type, type_name
 from course.ros_magic.options import Add, split_operands, type_and_values
 from course.ros_magic.options import declare_timeout as add_timeout
 from course.ros_magic.repetitions import declare_rate, parse_repetitions
-from course.ros_magic.types import agreed_type, build_message
+from course.ros_magic.topic_types import agreed_type, build_message
 from course.runtime.requests.graph_queries import full_service
 
 NOUN = "service"

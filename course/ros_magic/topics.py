@@ -7,10 +7,10 @@ from typing import Any
 
 from rclpy.qos import QoSProfile
 
-from course import default_session
 from course.errors import SessionError
-from course.graph import reader, words
+from course.graph import graph_text, reader
 from course.graph.model import Graph, Topic
+from course.learner_session import default_session
 from course.messages import yaml_text
 from course.messages.types import load_type, type_name
 from course.messages.values import to_data
@@ -21,8 +21,8 @@ from course.ros_magic.qos import declare_options as declare_qos
 from course.ros_magic.qos import profile_from_options
 from course.ros_magic.repetitions import declare_repetitions as add_repetitions
 from course.ros_magic.repetitions import parse_repetitions
-from course.ros_magic.types import build_message, message_type
-from course.util.arguments import check_whole_number
+from course.ros_magic.topic_types import build_message, message_type
+from course.util.argument_checks import check_whole_number
 
 NOUN = "topic"
 
@@ -71,7 +71,7 @@ def info(topic: str, verbose: bool = False) -> str:
         for end in ends if verbose else ():
             lines += [f"  Node: {end.node}", f"  Type: {end.type}"]
             lines += [f"    {policy}: {value}" for policy, value in end.qos.items()]
-    lines += [f"! {words.describe_mismatch(found.name, pair)}" for pair in found.mismatches]
+    lines += [f"! {graph_text.describe_mismatch(found.name, pair)}" for pair in found.mismatches]
     return "\n".join(lines)
 
 

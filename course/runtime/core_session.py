@@ -16,28 +16,28 @@ from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from course.domains import neighbours
-from course.domains.leases import check_domain_id, lease_domain
 from course.errors import SessionError
-from course.runtime.callbacks.errors import CallbackError
-from course.runtime.callbacks.jobs import current_job
+from course.runtime.callbacks.callback_errors import CallbackError
+from course.runtime.callbacks.callback_runs import current_job
 from course.runtime.callbacks.transitions import FailedTransition
-from course.runtime.context import closing, signals
-from course.runtime.context.closing import CloseReport
+from course.runtime.context import close_order, signals
+from course.runtime.context.close_order import CloseReport
 from course.runtime.context.context import Discovery, open_context
 from course.runtime.context.interruptible import SessionContext
+from course.runtime.domains import domain_discovery
+from course.runtime.domains.leases import check_domain_id, lease_domain
 from course.runtime.executor.blocked import BlockedCallback
-from course.runtime.logs.store import store
+from course.runtime.logs.log_store import store
 from course.runtime.logs.table import LogTable
 from course.runtime.nodes.half_made import Remains
-from course.runtime.nodes.host import NodeHost
-from course.runtime.nodes.registry import Factory
+from course.runtime.nodes.node_host import NodeHost
+from course.runtime.nodes.node_registry import Factory
 from course.runtime.requests.actions import GoalRun
 from course.runtime.requests.recorder import Recorder
-from course.runtime.requests.requests import Requests
+from course.runtime.requests.session_requests import Requests
 from course.runtime.simulated_time import SimulatedTime
 from course.runtime.waiting import Pulse
-from course.util import arguments
+from course.util import argument_checks
 
 T = TypeVar("T")
 
@@ -74,7 +74,7 @@ class CoreSession:
             DomainError: the domain is out of range, or none is free.
             SessionError: ROS 2 does not start.
         """
-        arguments.check_whole_number(threads, "threads", least=1, example=4)
+        argument_checks.check_whole_number(threads, "threads", least=1, example=4)
         self._lease = lease_domain() if domain_id is None else None
         self.domain_id: int = check_domain_id(self._lease.domain_id if self._lease else domain_id)
         self.options = {
@@ -100,10 +100,12 @@ class CoreSession:
         self._on_close: list[Callable[[], None]] = []
         self._sim: SimulatedTime | None = None
         if sim_time:
-            self._sim = SimulatedTime(self._requests.probe, self._host.crew, self._host.residents)
-            self._host.residents.on_made.append(self._sim.welcome)
-        self._answering = neighbours.Answering(self._lease, self.offered) if self._lease else None
-        closing.register_session(self)
+            self._sim = SimulatedTime(self._requests.probe, self._host.pool, self._host.registry)
+            self._host.registry.on_made.append(self._sim.welcome)
+        self._answering = (
+            domain_discovery.Answering(self._lease, self.offered) if self._lease else None
+        )
+        close_order.register_session(self)
 
     @property
     def context(self) -> SessionContext:
@@ -147,7 +149,7 @@ class CoreSession:
         """Make a node and spin it beside all others, even one of the same name or class.
 
         ROS 2 allows two nodes of one name. In a notebook that is nearly always a cell that was run
-        twice, which is why `run` replaces; whoever hosts somebody else's classes wants this.
+        twice, which is why `run` replaces. A program that runs other people's classes needs this.
 
         Raises:
             SessionError: the session is closed, or the factory made no node for it.
@@ -383,8 +385,8 @@ class CoreSession:
     def participate(self) -> None:
         """Take part in DDS until the session is closed, also while it runs no node.
 
-        Without it the participant comes with the first node and goes with the last one, and
-        whoever comes next has to find all others anew.
+        Without it the participant comes with the first node and goes with the last one, and the
+        next node has to discover all others again.
         """
         self._requests.participate()
 
@@ -433,17 +435,15 @@ class CoreSession:
 
     def moved_nodes(self) -> list[str]:
         """Return the names of nodes that are in an executor of the learner's own."""
-        return self._host.residents.moved_nodes()
+        return self._host.registry.moved_nodes()
 
     def half_made(self) -> list[Remains]:
         """Return what is left of nodes whose constructor raised."""
-        return self._host.residents.half_made.all_remains()
+        return self._host.registry.half_made.all_remains()
 
     def paused_nodes(self) -> list[str]:
         """Return the names of paused nodes."""
-        return [
-            resident.name for resident in self._host.residents.list_residents() if resident.paused
-        ]
+        return [entry.name for entry in self._host.registry.list_nodes() if entry.paused]
 
     # Closing.
 
@@ -477,22 +477,22 @@ class CoreSession:
             from a callback of this session, it returns at once, and the report is filled in later.
         """
         job = current_job()
-        if job is not None and job.home.session_key is self._host.crew:
+        if job is not None and job.home.session_key is self._host.pool:
             # A thread cannot wait for its own end: another one does it, once this callback is over.
             self._host.closing = True
             threading.Thread(target=self.close, args=(timeout,), name="ROS session closer").start()
             return self._report
-        timeout = arguments.check_seconds(timeout)
+        timeout = argument_checks.check_seconds(timeout)
         with self._lock:
             if not self._closed:
                 self._host.closing = True
-                closing.close_session(self, self._report, timeout)
+                close_order.close_session(self, self._report, timeout)
                 self._closed = True
             return self._report
 
     def on_close(self, callback: Callable[[], None]) -> None:
         """Call `callback` when the session closes, after its threads have stopped."""
-        arguments.check_function(callback, "The callback", "lambda: print('closed')")
+        argument_checks.check_function(callback, "The callback", "lambda: print('closed')")
         self._on_close.append(callback)
 
     def __enter__(self) -> Self:
@@ -532,15 +532,15 @@ class CoreSession:
         self._endings.beat()
         if self._answering is not None:
             self._answering.stop()
-        leaked = self._host.crew.stop(deadline)
-        leaked += self._host.residents.forget_all()
+        leaked = self._host.pool.stop(deadline)
+        leaked += self._host.registry.forget_all()
         for callback in self._on_close:
             callback()
         self._host.pulse.beat()
         self.context.try_shutdown()
-        self._host.crew.shutdown(deadline)
+        self._host.pool.shutdown(deadline)
         self.context.join(max(0.1, deadline - time.monotonic()))
         self.context.destroy()
         self._release_domain()
-        store.disclaim_nodes(self._host.crew)
+        store.disclaim_nodes(self._host.pool)
         return leaked

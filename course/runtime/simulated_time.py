@@ -19,28 +19,28 @@ from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 
 from course.errors import SessionError, WaitTimeout
-from course.runtime.callbacks.jobs import current_job
-from course.runtime.executor.pool import Crew
+from course.runtime.callbacks.callback_runs import current_job
+from course.runtime.executor.executor_pool import ExecutorPool
 from course.runtime.executor.quiescence import all_held, come_to_rest, follow_each_other
-from course.runtime.names import node_name
-from course.runtime.nodes.registry import Residents
+from course.runtime.nodes.node_registry import NodeRegistry
 from course.runtime.rclpy_fixes.clock_sleep import sleeps_until
 from course.runtime.requests.hidden_node import Probe
-from course.util import arguments
+from course.runtime.ros_names import node_name
+from course.util import argument_checks
 
 _NS = 1_000_000_000
 _LONGEST_STRIDE = 1000  # steps
 _POLLED_STRIDE = 5  # steps, where somebody looks again and again: each look takes its time
-_STEP_TIMEOUT = 10.0  # s of wall time that a callback may hold up one step
+_STEP_TIMEOUT_S = 10.0  # s of wall time that a callback may hold up one step
 
 
 class SimulatedTime:
     """The clock of a session with `sim_time=True`; it starts at 0 and moves on demand only."""
 
-    def __init__(self, probe: Probe, crew: Crew, residents: Residents) -> None:
-        """Move the clock of `residents`, spun by `crew`; `probe` publishes /clock."""
-        self._crew = crew
-        self._residents = residents
+    def __init__(self, probe: Probe, pool: ExecutorPool, registry: NodeRegistry) -> None:
+        """Move the clock of `registry`, spun by `pool`; `probe` publishes /clock."""
+        self._pool = pool
+        self._registry = registry
         self._now_ns = 0
         self._moving = threading.Lock()
         # The QoS that ROS 2 gives /clock: the latest time is all that counts.
@@ -81,16 +81,16 @@ class SimulatedTime:
                 f"{step} s."
             )
         seconds, step = (
-            arguments.check_seconds(seconds, "seconds"),
-            arguments.check_seconds(step, "step"),
+            argument_checks.check_seconds(seconds, "seconds"),
+            argument_checks.check_seconds(step, "step"),
         )
         if current_job() is not None:
             raise SessionError("A callback cannot move the time that it runs in.")
-        with self._moving, all_held(self._crew.all_executors()):
+        with self._moving, all_held(self._pool.all_executors()):
             step_ns, target = round(step * _NS), self._now_ns + round(seconds * _NS)
             while self._now_ns < target:
                 moment = min(self._now_ns + self._stride_ns(step_ns), target)
-                self._move_to(moment, _STEP_TIMEOUT if patience is None else patience)
+                self._move_to(moment, _STEP_TIMEOUT_S if patience is None else patience)
 
     def nudge(self) -> None:
         """Tell every node that a nanosecond has passed, wake the executors, and wait for nothing.
@@ -103,7 +103,7 @@ class SimulatedTime:
             self._now_ns += 1
             self._publish_time()
         # Nobody hears the time while a callback awaits something in the node's own group.
-        for executor in self._crew.all_executors():
+        for executor in self._pool.all_executors():
             executor.wake()
 
     def welcome(self, node: Node) -> None:
@@ -121,16 +121,16 @@ class SimulatedTime:
     def _stride_ns(self, step_ns: int) -> int:
         """Return how far to move: one step, or several at once if no timer is due in between.
 
-        Nothing could tell the difference, unless others follow /clock or a callback looks at it.
-        One that sleeps until a moment of the clock's, by rclpy's own means, is due like a timer.
-        Callbacks that go on for ever, as a coroutine does that naps and looks again, can, but a few
-        steps are no more to them than a nap that took longer. Nor are they to whoever will wake one
-        that waits for a lock.
+        Nothing can tell the difference, unless others follow /clock or a callback looks at it. A
+        callback that sleeps until a time of the clock, by rclpy's own means, is due like a timer. A
+        callback that goes on for ever, such as a coroutine that naps and looks again, can tell; but
+        to it a few steps are only a nap that took longer. The same holds for a thread that will
+        wake a callback which waits for a lock.
         """
         followers = self._following_nodes()
         if self._publisher.get_subscription_count() != len(followers):
             return step_ns
-        most, executors = _LONGEST_STRIDE, self._crew.all_executors()
+        most, executors = _LONGEST_STRIDE, self._pool.all_executors()
         waits: list[float] = []
         running = [job for executor in executors for job in executor.running.copy()]
         if running and follow_each_other(executors):
@@ -158,7 +158,7 @@ class SimulatedTime:
     def _move_to(self, moment_ns: int, patience: float) -> None:
         self._now_ns = moment_ns
         deadline = time.monotonic() + patience
-        executors = self._crew.all_executors()
+        executors = self._pool.all_executors()
         while True:
             self._publish_time()
             settled = come_to_rest(executors, deadline - time.monotonic())
@@ -181,9 +181,9 @@ class SimulatedTime:
 
     def _following_nodes(self) -> list[Node]:
         return [
-            resident.node
-            for resident in self._residents.list_residents()
-            if not resident.paused and _simulated_clock(resident.node) is not None
+            entry.node
+            for entry in self._registry.list_nodes()
+            if not entry.paused and _simulated_clock(entry.node) is not None
         ]
 
 

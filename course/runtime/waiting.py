@@ -11,17 +11,19 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-_LONGEST_NAP = 0.02  # s. Not every condition changes in a callback: look at it this often at least.
+_LONGEST_NAP_S = (
+    0.02  # s. Not every condition changes in a callback: look at it this often at least.
+)
 
 
 class Pulse:
     """Wakes those who wait for the next change: mostly, for a callback to end.
 
     `beat` is on the path of every callback, so it does next to nothing unless somebody waits. Each
-    who waits has a lock that a beat opens: that may be interrupted anywhere. A Condition may not:
-    Ctrl-C at the wrong moment makes it release a lock that it does not hold, and raise for that.
-    (Nor does a SimpleQueue serve: in Python 3.11, its `get` never returns if a short timeout is
-    over before it has begun to wait.)
+    thread that waits has a lock that a beat opens: that may be interrupted anywhere. A Condition
+    may not: Ctrl-C at the wrong moment makes it release a lock that it does not hold, and raise for
+    that. (A SimpleQueue does not do either: in Python 3.11, its `get` never returns if a short
+    timeout is over before it has begun to wait.)
 
     Attributes:
         count: another number after each beat, and never an earlier one again.
@@ -66,7 +68,7 @@ def poll_condition(condition: Callable[[], T], timeout: float, pulse: Pulse) -> 
         left = deadline - time.monotonic()
         if left <= 0:
             return None
-        pulse.wait(seen, min(left, _LONGEST_NAP))
+        pulse.wait(seen, min(left, _LONGEST_NAP_S))
 
 
 class Deadline:

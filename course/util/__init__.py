@@ -1,1 +1,1 @@
-"""What every room needs: files written whole, checked arguments, and what the machine offers."""
+"""What every package needs: files written whole, checked arguments, and what the machine offers."""

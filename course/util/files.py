@@ -1,4 +1,4 @@
-"""Files that are replaced whole: a reader, and whoever comes after a crash, sees all or nothing."""
+"""Replace files as a whole: a reader sees all or nothing, after a crash as well."""
 
 from __future__ import annotations
 

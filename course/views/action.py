@@ -9,17 +9,17 @@ from typing import Any
 from course.errors import CourseError
 from course.messages.yaml_text import format_count, one_line
 from course.runtime.core_session import CoreSession
-from course.views import brief
-from course.views.live import Frame, LiveView
+from course.views.shared import truncate
+from course.views.shared.live_view import Frame, LiveView
 from course.watch import forms
 from course.watch.goals import Goal, GoalBoard
 
-LONGEST = 700
+MAX_BYTES = 700
 """Bytes of a goal, its feedback and its result that are shown of each."""
 
 
 class ActionView(LiveView):
-    """Shows all goals of an action, whoever sent them, and sends and cancels goals itself."""
+    """Shows all goals of an action, from any client, and sends and cancels goals itself."""
 
     label = "Action view"
     script = "action"
@@ -118,4 +118,4 @@ def _progress_points(goal: Goal) -> list[list[float]]:
 
 
 def _shorten_line(data: Any) -> str:
-    return one_line(brief.cut_data(data, LONGEST))
+    return one_line(truncate.cut_data(data, MAX_BYTES))

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from course.graph import layout, reader, words
+from course.graph import graph_text, layout, reader
 from course.graph.mermaid import draw_mermaid
 from course.graph.model import Graph
 from course.messages.yaml_text import format_count
 from course.runtime.core_session import CoreSession
-from course.views.live import Frame, LiveView
+from course.views.shared.live_view import Frame, LiveView
 
 MAX_BOXES = 150
 """Boxes that are drawn; a larger graph is in the words only."""
@@ -50,12 +50,12 @@ class GraphView(LiveView):
 
     def words(self) -> str:
         """Return the graph as text."""
-        return words.describe_graph(self.graph)
+        return graph_text.describe_graph(self.graph)
 
     def look(self) -> tuple[Frame, str]:
         """Return both from one look at the graph."""
         graph = self.graph
-        return self._drawing_frame(graph), words.describe_graph(graph)
+        return self._drawing_frame(graph), graph_text.describe_graph(graph)
 
     def _drawing_frame(self, graph: Graph) -> Frame:
         apart = graph.mismatches

@@ -7,16 +7,16 @@ import time
 from typing import Any
 
 from course.runtime.core_session import CoreSession
-from course.runtime.logs.store import SEVERITIES, LogRow
+from course.runtime.logs.log_store import SEVERITIES, LogRow
 from course.runtime.logs.table import LogTable
-from course.views import brief
-from course.views.live import Frame, LiveView
+from course.views.shared import truncate
+from course.views.shared.live_view import Frame, LiveView
 from course.watch.rosout import Rosout
 
 SHOWN = 200
 """Lines that a frame has."""
 
-LONGEST_LINE = 500
+MAX_LINE_CHARS = 500
 """Characters of a line that are shown."""
 
 MOST_BYTES = 100_000
@@ -57,7 +57,7 @@ class LogPanel(LiveView):
             SessionError: there is no such level.
         """
         self.session.logs(level=level, last=1)
-        self._level, self._search = _canonical_level(level), search[:LONGEST_LINE].lower()
+        self._level, self._search = _canonical_level(level), search[:MAX_LINE_CHARS].lower()
 
     def handle_control(self, message: dict[str, Any]) -> None:
         """Filter as chosen."""
@@ -108,7 +108,9 @@ class LogPanel(LiveView):
 
 
 def _format_table(found: list[LogRow]) -> str:
-    last = [row._replace(message=brief.cut_text(row.message, LONGEST_LINE)) for row in found[-20:]]
+    last = [
+        row._replace(message=truncate.cut_text(row.message, MAX_LINE_CHARS)) for row in found[-20:]
+    ]
     return repr(LogTable(last, left_out=len(found) - len(last)))
 
 
@@ -117,7 +119,7 @@ def _canonical_level(level: str) -> str:
 
 
 def _shortened_cells(row: LogRow) -> list[str]:
-    return [brief.cut_text(cell, LONGEST_LINE) for cell in _row_cells(row)]
+    return [truncate.cut_text(cell, MAX_LINE_CHARS) for cell in _row_cells(row)]
 
 
 def _row_cells(row: LogRow) -> tuple[str, str, str, str]:

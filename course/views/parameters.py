@@ -9,15 +9,15 @@ from typing import Any
 from course.errors import CourseError
 from course.messages.yaml_text import for_json, one_line
 from course.runtime.core_session import CoreSession
-from course.util import arguments
-from course.views import brief
-from course.views.live import Frame, LiveView
+from course.util import argument_checks
+from course.views.shared import truncate
+from course.views.shared.live_view import Frame, LiveView
 from course.watch.parameter_values import ParameterError
-from course.watch.parameters import Entry, ParameterSheet
+from course.watch.parameters import ParameterSheet, SheetEntry
 
-ASK_TIMEOUT = 2.0
+ASK_TIMEOUT_S = 2.0
 
-LONGEST = 2000
+MAX_BYTES = 2000
 """Bytes of a value that are shown."""
 
 
@@ -47,7 +47,7 @@ class ParameterPanel(LiveView):
         self._asking = threading.Lock()
 
     @property
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[SheetEntry]:
         """The parameters, as they were at the last look."""
         return list(self._entries)
 
@@ -58,7 +58,7 @@ class ParameterPanel(LiveView):
             ParameterError: the node refused, for the reason in the message; or no such value.
             WaitTimeout: the node does not answer.
         """
-        self._sheet.set(arguments.check_text(name, "The name of a parameter", "speed"), value)
+        self._sheet.set(argument_checks.check_text(name, "The name of a parameter", "speed"), value)
         self._entries = self._sheet.read_entries()
 
     def handle_control(self, message: dict[str, Any]) -> None:
@@ -68,10 +68,10 @@ class ParameterPanel(LiveView):
         problem, entries = "", self._entries
         try:
             try:
-                self._sheet.set(message["set"], message.get("value"), ASK_TIMEOUT)
+                self._sheet.set(message["set"], message.get("value"), ASK_TIMEOUT_S)
             except ParameterError as error:
                 problem = str(error)
-            entries = self._sheet.read_entries(ASK_TIMEOUT)
+            entries = self._sheet.read_entries(ASK_TIMEOUT_S)
         except CourseError as error:  # it does not answer: asking again would only take longer
             problem = problem or str(error)
         with self._lock:
@@ -97,7 +97,7 @@ class ParameterPanel(LiveView):
     def _fetch_entries(self) -> None:
         before = self._changes
         try:
-            entries, self._silent = self._sheet.read_entries(ASK_TIMEOUT), ""
+            entries, self._silent = self._sheet.read_entries(ASK_TIMEOUT_S), ""
             with self._lock:
                 if self._changes == before:  # else these may be the values from before a change
                     self._entries = entries
@@ -114,7 +114,7 @@ class ParameterPanel(LiveView):
         for entry in self._entries:
             limits = f" ({entry.least:g} to {entry.most:g})" if entry.least is not None else ""
             about = f"  # {entry.description}" if entry.description else ""
-            value = brief.cut_data(entry.value, LONGEST)
+            value = truncate.cut_data(entry.value, MAX_BYTES)
             shown = "not set" if value is None else one_line(value)
             lines.append(f"  {entry.name}: {shown}{limits}{about}")
         if not self._entries:
@@ -124,10 +124,10 @@ class ParameterPanel(LiveView):
         return "\n".join([*lines, *([problem] if problem else [])])
 
 
-def _entry_data(entry: Entry) -> Frame:
+def _entry_data(entry: SheetEntry) -> Frame:
     """Return what the browser draws: a list as the YAML that is typed to change it."""
     shown: Frame = for_json(asdict(entry))
-    value = brief.cut_data(entry.value, LONGEST)
+    value = truncate.cut_data(entry.value, MAX_BYTES)
     shown["value"] = one_line(value) if isinstance(value, list) else for_json(value)
     if value != entry.value:  # what is typed into a part of it would replace the whole
         shown["read_only"] = True

@@ -10,24 +10,24 @@ from typing import Any
 from rclpy.qos import QoSProfile
 
 from course.errors import CourseError
-from course.qos_lab import lab, link, rules
-from course.qos_lab.experiment import COUNT, SCENARIOS, Experiment, Outcome
-from course.qos_lab.lab import LabError
+from course.qos_lab import experiment_runner, link, rules
+from course.qos_lab.experiment import COUNT, SCENARIOS, Experiment, ExperimentOutcome
+from course.qos_lab.experiment_runner import ExperimentError
 from course.qos_lab.profile import CHOICES, NUMBERS, Profile
 from course.runtime.core_session import CoreSession
-from course.views.live import Frame, LiveView
+from course.views.shared.live_view import Frame, LiveView
 
-KEPT = 8
+KEPT_TRIALS = 8
 
 
 @dataclass(frozen=True)
-class Trial:
+class LabTrial:
     """One experiment with the prediction that was made before it, and what was seen."""
 
     experiment: Experiment
     connects: bool
     arrive: int | None
-    outcome: Outcome | None = None
+    outcome: ExperimentOutcome | None = None
     problem: str = ""
 
     @property
@@ -58,15 +58,15 @@ class QoSLab(LiveView):
         super().__init__(session, offered, requested)
         self._offered = Profile.from_rclpy(offered) if offered else Profile()
         self._requested = Profile.from_rclpy(requested) if requested else Profile()
-        self._processes = lab.Processes()
+        self._processes = experiment_runner.ExperimentProcesses()
         self.resources.callback(self._processes.end)
-        self._trials: list[Trial] = []
+        self._trials: list[LabTrial] = []
         self._running = False
         self._problem = ""
         self._lock = threading.Lock()
 
     @property
-    def trials(self) -> list[Trial]:
+    def trials(self) -> list[LabTrial]:
         """The latest trials, oldest first."""
         with self._lock:
             return list(self._trials)
@@ -80,7 +80,7 @@ class QoSLab(LiveView):
         loss: int = 0,
         offered: QoSProfile | None = None,
         requested: QoSProfile | None = None,
-    ) -> Trial:
+    ) -> LabTrial:
         """Say what you expect, run a scenario, and return the trial.
 
         Args:
@@ -92,13 +92,18 @@ class QoSLab(LiveView):
             requested: the reader's profile from now on.
 
         Raises:
-            LabError: no such scenario, its processes failed, or this view has ended.
+            ExperimentError: no such scenario, its processes failed, or this view has ended.
             ProfileError: a profile that the lab does not know.
         """
         self._offered = Profile.from_rclpy(offered) if offered else self._offered
         self._requested = Profile.from_rclpy(requested) if requested else self._requested
         experiment = Experiment(self._offered, self._requested, scenario, loss)
-        trial = Trial(experiment, connects, arrive, lab.run_experiment(experiment, self._processes))
+        trial = LabTrial(
+            experiment,
+            connects,
+            arrive,
+            experiment_runner.run_experiment(experiment, self._processes),
+        )
         self._keep_trial(trial)
         return trial
 
@@ -150,8 +155,8 @@ class QoSLab(LiveView):
             scenario, loss = str(asked.get("scenario")), asked.get("loss") or 0
             experiment = Experiment(self._offered, self._requested, scenario, loss)
             connects, arrive = bool(asked.get("connects")), _check_prediction(asked.get("arrive"))
-            outcome = lab.run_experiment(experiment, self._processes)
-            self._keep_trial(Trial(experiment, connects, arrive, outcome))
+            outcome = experiment_runner.run_experiment(experiment, self._processes)
+            self._keep_trial(LabTrial(experiment, connects, arrive, outcome))
         except CourseError as error:
             problem = str(error)
         except Exception as error:  # noqa: BLE001 - whatever it was, the buttons work again
@@ -160,12 +165,12 @@ class QoSLab(LiveView):
             with self._lock:
                 self._running, self._problem = False, problem
 
-    def _keep_trial(self, trial: Trial) -> None:
+    def _keep_trial(self, trial: LabTrial) -> None:
         with self._lock:
-            self._trials = [*self._trials, trial][-KEPT:]
+            self._trials = [*self._trials, trial][-KEPT_TRIALS:]
 
 
-def _trial_data(trial: Trial) -> dict[str, Any]:
+def _trial_data(trial: LabTrial) -> dict[str, Any]:
     experiment, outcome = trial.experiment, trial.outcome
     assert outcome is not None
     loss = f", {experiment.loss} % loss" if outcome.lossy else ""
@@ -192,7 +197,7 @@ def _format_rule(rule: dict[str, Any]) -> str:
     return f"{rule['policy']}: {rule['offered']} -> {rule['requested']} {fits}. {rule['rule']}"
 
 
-def _describe_outcome(experiment: Experiment, outcome: Outcome) -> str:
+def _describe_outcome(experiment: Experiment, outcome: ExperimentOutcome) -> str:
     if not outcome.connected:
         return f"not connected ({outcome.broken.lower() or 'nothing was found'})"
     parts = [f"connected, {len(outcome.received)} of {outcome.sent} arrived"]
@@ -208,4 +213,6 @@ def _describe_outcome(experiment: Experiment, outcome: Outcome) -> str:
 def _check_prediction(arrive: Any) -> int | None:
     if arrive is None or (isinstance(arrive, int) and 0 <= arrive <= COUNT):
         return arrive
-    raise LabError(f"A prediction is a whole number of messages, 0 to {COUNT}, not {arrive!r}.")
+    raise ExperimentError(
+        f"A prediction is a whole number of messages, 0 to {COUNT}, not {arrive!r}."
+    )

@@ -8,12 +8,12 @@ from typing import Any
 from course.errors import CourseError
 from course.messages.yaml_text import for_json, format_count, one_line
 from course.runtime.core_session import CoreSession
-from course.views import brief
-from course.views.live import Frame, LiveView
+from course.views.shared import truncate
+from course.views.shared.live_view import Frame, LiveView
 from course.watch import forms
 from course.watch.calls import Call, Calls
 
-LONGEST = 3000
+MAX_BYTES = 3000
 """Bytes of a request, and of an answer, that are shown."""
 
 
@@ -80,8 +80,8 @@ class ServiceConsole(LiveView):
 def _call_data(call: Call) -> dict[str, Any]:
     return {
         "number": call.number,
-        "request": brief.cut_data(for_json(call.request), LONGEST),
-        "answer": brief.cut_data(for_json(call.answer), LONGEST),
-        "problem": brief.cut_text(call.problem, LONGEST),
+        "request": truncate.cut_data(for_json(call.request), MAX_BYTES),
+        "answer": truncate.cut_data(for_json(call.answer), MAX_BYTES),
+        "problem": truncate.cut_text(call.problem, MAX_BYTES),
         "time": "" if call.seconds is None else f"{call.seconds * 1000:.1f} ms",
     }

@@ -12,8 +12,8 @@ from course.messages import mcap_file
 from course.messages.mcap_file import RecordingError
 from course.messages.yaml_text import format_count
 from course.runtime.core_session import CoreSession
-from course.util import arguments
-from course.views.live import Frame, LiveView
+from course.util import argument_checks
+from course.views.shared.live_view import Frame, LiveView
 from course.watch import timeline
 from course.watch.callbacks import CallbackTap, Run
 from course.watch.timeline import Figures, Trace
@@ -50,7 +50,7 @@ class Timeline(LiveView):
         """
         if not 0 < len(topics) <= MOST_TOPICS:
             raise SessionError(f"A timeline shows 1 to {MOST_TOPICS} topics, not {len(topics)}.")
-        window = arguments.check_seconds(window, "window")
+        window = argument_checks.check_seconds(window, "window")
         if not 0 < window <= 60:
             raise SessionError(f"A timeline shows up to 60 s, not {window:g} s.")
         super().__init__(session, *topics, window)
@@ -226,8 +226,8 @@ def _describe_shortening(trace: Trace, tap: CallbackTap, start: int) -> str:
         return ""
     seconds = (time.time_ns() - begins) / 1e9
     return (
-        f" (of the last {seconds:.1f} s only: a timeline keeps {timeline.KEPT} messages of a "
-        "topic, and as many runs of callbacks)"
+        f" (of the last {seconds:.1f} s only: a timeline keeps {timeline.KEPT_MESSAGES} messages "
+        "of a topic, and as many runs of callbacks)"
     )
 
 

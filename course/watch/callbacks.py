@@ -14,7 +14,7 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 
-KEPT = 20_000
+KEPT_RUNS = 20_000
 
 
 class Run(NamedTuple):
@@ -43,7 +43,7 @@ class CallbackTap:
     def __init__(self, topic: str) -> None:
         """Listen to subscriptions of ``topic``, once `watch` has seen their nodes."""
         self.topic = topic
-        self._runs: deque[Run] = deque(maxlen=KEPT)
+        self._runs: deque[Run] = deque(maxlen=KEPT_RUNS)
         self._heard: weakref.WeakSet[_Wrapped] = weakref.WeakSet()
 
     def watch(self, nodes: list[Node]) -> None:
@@ -84,7 +84,7 @@ class CallbackTap:
 
 
 class _Wrapped:
-    """A subscription's callback, wrapped for whoever listens to it."""
+    """A subscription's callback, wrapped so that taps can listen to its runs."""
 
     def __init__(self, node: str, original: Any) -> None:
         self._listeners: tuple[deque[Run], ...] = ()  # another one each time, so read at any time

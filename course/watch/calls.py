@@ -14,7 +14,7 @@ from course.messages import values
 from course.runtime.core_session import CoreSession
 from course.watch import forms
 
-KEPT = 10
+KEPT_CALLS = 10
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Calls:
         self.name = name
         self.srv_type = srv_type
         self._session = session
-        self._calls: deque[Call] = deque(maxlen=KEPT)
+        self._calls: deque[Call] = deque(maxlen=KEPT_CALLS)
         self._count = 0
         self._lock = threading.Lock()
 

@@ -1,4 +1,4 @@
-"""All goals of one action, whoever sent them: their states, feedback, and results."""
+"""All goals of one action, from any client: their states, feedback, and results."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from course.errors import CourseError
 from course.messages import values
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.actions import GoalState
-from course.watch import forms, progress
+from course.watch import forms, goal_progress
 
-KEPT = 40
+KEPT_GOALS = 40
 """Goals that are kept with all that is known of them: those that run before those that are over."""
 
 POINTS = 100
 """Of how many of its latest feedback messages a goal keeps how far it had come."""
 
-ANSWER = 10.0
+ANSWER_TIMEOUT_S = 10.0
 """Seconds within which a server gives the result of a goal that is over, unless it is busy."""
 
 TRIES = 3
@@ -40,9 +40,9 @@ OVER = (GoalState.SUCCEEDED, GoalState.CANCELED, GoalState.ABORTED)
 class Goal:
     """One goal: the states that it went through with their times (s since it was first seen).
 
-    ``way`` is how far it had come, as `progress.measure_progress` tells: the number's name, and (s
-    since the goal was first seen, number) of the latest feedback messages. ``problem`` says why it
-    never began; ``note`` what else there is to say about it.
+    ``way`` is how far it had come, as `goal_progress.measure_progress` tells: the number's name,
+    and (s since the goal was first seen, number) of the latest feedback messages. ``problem`` says
+    why it never began; ``note`` what else there is to say about it.
     """
 
     number: int
@@ -106,7 +106,7 @@ class GoalBoard:
         """The latest goals, oldest first (a snapshot)."""
         with self._lock:
             both = [*self._goals.values(), *self._rejected]
-            return sorted(both, key=lambda goal: goal.number)[-KEPT:]
+            return sorted(both, key=lambda goal: goal.number)[-KEPT_GOALS:]
 
     def send(self, typed: Mapping[str, Any], timeout: float = 5.0) -> None:
         """Send a goal made of what was typed into the form; its answer is awaited in a thread.
@@ -120,7 +120,7 @@ class GoalBoard:
         ).start()
 
     def cancel(self, number: int, timeout: float = 5.0) -> None:
-        """Ask the server to cancel a goal, whoever sent it.
+        """Ask the server to cancel a goal, no matter which client sent it.
 
         Raises:
             WaitTimeout: the server does not answer.
@@ -164,7 +164,7 @@ class GoalBoard:
         request = service.Request(goal_id=UUID(uuid=list(key)))
         try:
             response = self._session.call(
-                service, f"{self.name}/_action/get_result", request, ANSWER
+                service, f"{self.name}/_action/get_result", request, ANSWER_TIMEOUT_S
             )
         except Exception:  # noqa: BLE001 - whatever it is, there is no result yet
             goal.note = "Its server has not given its result yet."
@@ -182,7 +182,7 @@ class GoalBoard:
         with self._lock:
             self._count += 1
             self._rejected.append(Goal(self._count, asked=asked, problem=problem))
-            del self._rejected[:-KEPT]
+            del self._rejected[:-KEPT_GOALS]
 
     def _get_goal(self, key: bytes) -> Goal | None:
         """Return the goal of an id, None if it was let go of; called with the lock held."""
@@ -210,7 +210,7 @@ class GoalBoard:
             # A server lists goals for minutes after their end: these are not new ones.
             self._let_go &= listed.keys()
             oldest = sorted(self._goals, key=lambda key: not self._goals[key].is_over)
-            for key in oldest[: max(0, len(oldest) - KEPT)]:
+            for key in oldest[: max(0, len(oldest) - KEPT_GOALS)]:
                 del self._goals[key]
                 self._let_go |= {key} & listed.keys()
 
@@ -220,7 +220,7 @@ class GoalBoard:
             if goal is not None:
                 goal.feedback += 1
                 goal.latest = values.to_data(message.feedback)
-                if (found := progress.measure_progress(message.feedback)) is not None:
+                if (found := goal_progress.measure_progress(message.feedback)) is not None:
                     if goal.way is None or goal.way[0] != found.name:
                         goal.way = found.name, deque(maxlen=POINTS)
                     goal.way[1].append((time.monotonic() - goal.seen, found.value))

@@ -23,7 +23,7 @@ _HIDDEN = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 
 
 @dataclass(frozen=True)
-class Entry:
+class SheetEntry:
     """One parameter; ``least``, ``most`` and ``step`` are None without a range in its descriptor.
 
     ``value`` is plain data, or None while it has none. ``kind`` is "checkbox", "slider", "number",
@@ -57,7 +57,7 @@ class ParameterSheet:
         found = self._call_service(ListParameters, ListParameters.Request(), timeout).result.names
         return sorted(found)
 
-    def read_entries(self, timeout: float = 5.0) -> list[Entry]:
+    def read_entries(self, timeout: float = 5.0) -> list[SheetEntry]:
         """Return the parameters as they are now, by name; without those that ROS adds itself.
 
         Raises:
@@ -146,7 +146,7 @@ class ParameterSheet:
         return self._session.call(srv_type, f"{self.node}/{words.strip('_')}", request, timeout)
 
 
-def _make_entry(name: str, value: Any, descriptor: Any) -> Entry:
+def _make_entry(name: str, value: Any, descriptor: Any) -> SheetEntry:
     ranges = [*descriptor.floating_point_range, *descriptor.integer_range]
     limits = ranges[0] if ranges else None
     like = type(value) if value is not None else _LIKE.get(descriptor.type)
@@ -161,7 +161,9 @@ def _make_entry(name: str, value: Any, descriptor: Any) -> Entry:
     )
     if descriptor.integer_range and not descriptor.floating_point_range:
         step = step or 1  # a browser cannot tell 1.0 from 1, so the kind of range decides
-    return Entry(name, value, kind, descriptor.description, least, most, step, descriptor.read_only)
+    return SheetEntry(
+        name, value, kind, descriptor.description, least, most, step, descriptor.read_only
+    )
 
 
 def _is_drawable(limits: Any) -> bool:

@@ -9,15 +9,15 @@ from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from course.runtime.core_session import CoreSession
-from course.runtime.logs.store import LogRow, level_name, node_of, store
+from course.runtime.logs.log_store import LogRow, level_name, node_of, store
 
-KEPT = 1000
+KEPT_LINES = 1000
 """Lines of other programs that are kept."""
 
-LONGEST = 10_000
+MAX_CHARS = 10_000
 """Characters of one that are kept."""
 
-_QOS = QoSProfile(depth=KEPT, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # as rcl offers it
+_QOS = QoSProfile(depth=KEPT_LINES, durability=DurabilityPolicy.TRANSIENT_LOCAL)  # as rcl offers it
 
 
 class Rosout:
@@ -29,7 +29,7 @@ class Rosout:
     def __init__(self, session: CoreSession) -> None:
         """Listen on the domain of ``session``, beginning with the last seconds (rcl keeps 10)."""
         self._session = session
-        self._rows: deque[LogRow] = deque(maxlen=KEPT)
+        self._rows: deque[LogRow] = deque(maxlen=KEPT_LINES)
         self._lock = threading.Lock()
         self._subscription = session.watch(Log, "/rosout", self._take_line, _QOS)
 
@@ -47,6 +47,8 @@ class Rosout:
         if store.has_logger(message.name):
             return
         stamp = message.stamp.sec + message.stamp.nanosec / 1e9
-        row = LogRow(stamp, level_name(message.level), node_of(message.name), message.msg[:LONGEST])
+        row = LogRow(
+            stamp, level_name(message.level), node_of(message.name), message.msg[:MAX_CHARS]
+        )
         with self._lock:
             self._rows.append(row)

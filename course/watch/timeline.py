@@ -17,7 +17,7 @@ from course.graph import reader
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.graph_queries import fitting_qos, full_topic, type_on
 
-KEPT = 20_000
+KEPT_MESSAGES = 20_000
 """Messages of one topic that a trace remembers: 20 s at 1 kHz. More take long to draw."""
 
 COLUMNS = 200
@@ -29,10 +29,10 @@ BINS = 50
 MESSAGES = 1000
 """Messages of one topic that a trace keeps whole, to be saved."""
 
-BYTES = 32 * 1024 * 1024
+MAX_BYTES = 32 * 1024 * 1024
 """Bytes that these have at most: of large messages, such as pictures, the latest few are kept."""
 
-GAP = 3.0
+GAP_S = 3.0
 """A pause is a gap if it is so many times as long as the median period."""
 
 _NS = 1e9
@@ -87,7 +87,7 @@ class Trace:
         Raises:
             WaitTimeout: ``msg_type`` is None, and nobody uses the topic.
         """
-        self._passages: deque[Passage] = deque(maxlen=KEPT)
+        self._passages: deque[Passage] = deque(maxlen=KEPT_MESSAGES)
         self._lock = threading.Lock()
         self._session = session
         self.topic = full_topic(session.observer, topic)
@@ -105,9 +105,9 @@ class Trace:
             return list(self._messages)
 
     def adapt_qos(self) -> None:
-        """Subscribe anew if there is a publisher now that offers less than was requested.
+        """Subscribe again if there is a publisher now that offers less than was requested.
 
-        A talker's cell is run again with another QoS, say; what asks for less goes on fitting.
+        For example, a talker's cell is run again with another QoS. A request for less still fits.
         """
         offers = self._session.observer.get_publishers_info_by_topic(self.topic)
         if any(reader.find_incompatibilities(offer.qos_profile, self._qos) for offer in offers):
@@ -154,7 +154,7 @@ class Trace:
             self._messages.append((stamp, message))
             self._size += len(message)
             while len(self._messages) > MESSAGES or (
-                self._size > BYTES and len(self._messages) > 1
+                self._size > MAX_BYTES and len(self._messages) > 1
             ):
                 self._size -= len(self._messages.popleft()[1])
 
@@ -258,4 +258,4 @@ def _find_gaps(stamps: Sequence[float]) -> tuple[tuple[float, float], ...]:
     if len(pauses) < 4:
         return ()
     usual = statistics.median(pause for pause, _, _ in pauses)
-    return tuple((a, b) for pause, a, b in pauses if usual > 0 and pause > GAP * usual)
+    return tuple((a, b) for pause, a, b in pauses if usual > 0 and pause > GAP_S * usual)

@@ -13,14 +13,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from quizzes.attempts.answers import Answer, parse_number
+from quizzes.attempts.quiz_answers import Answer, parse_number
 
 VERSION = 1
-MAX_LINE = 64 * 1024
-MAX_FILE = 4 * 1024 * 1024
+MAX_LINE_BYTES = 64 * 1024
+MAX_FILE_BYTES = 4 * 1024 * 1024
 """Bytes of a line and of a file that are read; an attempt has about 1 kB."""
 
-MAX_TEXT = 200
+MAX_TEXT_CHARS = 200
 
 
 @dataclass(frozen=True)
@@ -80,18 +80,18 @@ def parse_attempts(content: bytes) -> tuple[list[Attempt], int]:
     """Return the attempts in a file's content, and how many of its lines are none."""
     attempts, damaged = [], 0
     # An editor may have put a byte order mark in front.
-    for line in content[:MAX_FILE].removeprefix(codecs.BOM_UTF8).split(b"\n"):
+    for line in content[:MAX_FILE_BYTES].removeprefix(codecs.BOM_UTF8).split(b"\n"):
         if not line.strip():
             continue
         try:
             attempts.append(_parse_attempt(line))
         except (ValueError, KeyError, TypeError, RecursionError, AttributeError):
             damaged += 1
-    return attempts, damaged + (len(content) > MAX_FILE)
+    return attempts, damaged + (len(content) > MAX_FILE_BYTES)
 
 
 def _parse_attempt(line: bytes) -> Attempt:
-    if len(line) > MAX_LINE:
+    if len(line) > MAX_LINE_BYTES:
         raise ValueError("too long")
     data = json.loads(line.decode("utf-8"))
     # Half of a surrogate pair is legal in JSON, but no text that can be hashed or written.
@@ -99,7 +99,7 @@ def _parse_attempt(line: bytes) -> Attempt:
     if data["version"] != VERSION or not data.keys() <= Attempt.__dataclass_fields__.keys():
         raise ValueError("not of this version")
     for name in ("quiz", "student", "edition", "submitted"):
-        _require_valid(isinstance(data[name], str) and len(data[name]) <= MAX_TEXT)
+        _require_valid(isinstance(data[name], str) and len(data[name]) <= MAX_TEXT_CHARS)
     for name in ("attempt", "right"):
         _require_valid(type(data[name]) is int and 0 <= data[name] < 10**6)
     _require_valid(data["attempt"] > 0 and type(data["passed"]) is bool)
@@ -115,7 +115,7 @@ def _parse_given(data: Any) -> Given:
     if type(answer) in (int, float):
         answer = parse_number(answer)
     _require_valid(
-        isinstance(answer, float) or (isinstance(answer, str) and len(answer) <= MAX_TEXT)
+        isinstance(answer, float) or (isinstance(answer, str) and len(answer) <= MAX_TEXT_CHARS)
     )
     return Given(variant, answer)
 

@@ -1,8 +1,8 @@
-"""Attempts that were handed in by several people: the one thing that a file says of its making.
+"""Find attempts that several people have handed in: the one thing that a file tells of its making.
 
 A quiz that is taken at home knows what was answered, not by whom. But no two people submit the same
-answers at the same moment under the same login, so whoever hands in the same attempts has one file,
-be one answer of the copy another.
+answers at the same moment under the same login, so people who hand in the same attempts have copies
+of one file, even if one answer of a copy was changed.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 
 from quizzes.attempts import record
-from quizzes.attempts.answers import Answer, parse_number
+from quizzes.attempts.quiz_answers import Answer, parse_number
 from quizzes.attempts.record import Attempt
 
 CANNOT_KNOW = (

@@ -2,7 +2,8 @@
 
 A line is added whole and synced, under a lock, so that neither a crash nor a second tab can spoil
 or lose one. What cannot be read is kept aside, never thrown away. Scores in the file are for
-people to read; whoever needs to know marks the answers again (see `quizzes.marking.regrade`).
+people to read; a program that needs a score marks the answers again (see
+`quizzes.marking.regrade`).
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
-from quizzes.attempts.record import MAX_FILE, Attempt, attempts_filename, parse_attempts
+from quizzes.attempts.record import MAX_FILE_BYTES, Attempt, attempts_filename, parse_attempts
 from quizzes.errors import AttemptsError, UnwritableError
 
-LOCK_TIMEOUT = 10.0
+LOCK_TIMEOUT_S = 10.0
 """Seconds to wait for another tab that is writing; it needs milliseconds."""
 
 
@@ -135,7 +136,7 @@ class AttemptsFile:
     def _read_content(self) -> bytes:
         try:
             with open(self.path, "rb", opener=_open_plain) as file:
-                return file.read(MAX_FILE + 1)
+                return file.read(MAX_FILE_BYTES + 1)
         except FileNotFoundError:
             return b""
 
@@ -194,13 +195,13 @@ class AttemptsFile:
     def _hold_lock(self) -> Iterator[None]:
         # Where no file can be made, say so at once: the library would wait or make folders.
         os.close(os.open(self._lock, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644))
-        lock = FileLock(self._lock, timeout=LOCK_TIMEOUT)
+        lock = FileLock(self._lock, timeout=LOCK_TIMEOUT_S)
         try:
             lock.acquire()
         except Timeout:
             raise AttemptsError(
-                f"Another window has been writing {self.path.name} for {LOCK_TIMEOUT:.0f} s: close "
-                "it, then submit again."
+                f"Another window has been writing {self.path.name} for {LOCK_TIMEOUT_S:.0f} s: "
+                "close it, then submit again."
             ) from None
         try:
             yield

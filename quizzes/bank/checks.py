@@ -11,10 +11,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from quizzes.bank.bank_fields import is_closed
+from quizzes.bank.bank_yaml import Place
 from quizzes.bank.contents import MIN_VARIANTS
 from quizzes.bank.faults import Problem, get_part
-from quizzes.bank.fields import is_closed
-from quizzes.bank.yaml_text import Place
 from quizzes.text import rendering
 
 _DEEPEST = 4

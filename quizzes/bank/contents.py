@@ -15,8 +15,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, ValidationInfo, field_validator, model_validator
 
-from quizzes.bank import fields
-from quizzes.bank.fields import Code, Finite, Id, Part, Proofs, Text, ToTeach
+from quizzes.bank import bank_fields
+from quizzes.bank.bank_fields import Code, Finite, Id, Proofs, QuestionPart, Text, ToTeach
 
 MIN_VARIANTS = 4
 """Variants a concept of a teaching bank has at least: with fewer, a retry is too soon the same."""
@@ -28,7 +28,7 @@ DEAL = 2
 """How `quizzes.bank.selection` deals letters: answers saved under another number mean nothing."""
 
 
-class Option(Part):
+class Option(QuestionPart):
     """One option of a choice. A wrong one names the belief that makes it tempting."""
 
     text: Text
@@ -38,7 +38,7 @@ class Option(Part):
     feedback: ToTeach[Text]
     """Why it is right or wrong, for who chose it."""
     misconception: Id | None = Field(
-        default=None, validate_default=True, json_schema_extra={fields.TO_TEACH: True}
+        default=None, validate_default=True, json_schema_extra={bank_fields.TO_TEACH: True}
     )
     """The belief that a wrong option shows, from the bank's table. Teaching quizzes name one with
     each wrong option; a right one has none."""
@@ -49,16 +49,16 @@ class Option(Part):
     @classmethod
     def _wrong_ones_have_a_reason(cls, value: str | None, info: ValidationInfo) -> str | None:
         correct = info.data.get("correct")
-        if correct is False and value is None and fields.is_teaching():
-            fields.refuse_problems(
+        if correct is False and value is None and bank_fields.is_teaching():
+            bank_fields.refuse_problems(
                 [("", "a wrong option needs a misconception in a quiz that teaches")]
             )
         if correct is True and value is not None:
-            fields.refuse_problems([("", "a right option has no misconception")])
+            bank_fields.refuse_problems([("", "a right option has no misconception")])
         return value
 
 
-class _Variant(Part):
+class _Variant(QuestionPart):
     id: Id
     """Its name, used once in the bank: lower-case words joined by hyphens."""
     stem: Text
@@ -90,7 +90,7 @@ class _OneRight(_Choice):
     def _one_key(cls, options: list[Option]) -> list[Option]:
         count = sum(option.correct for option in options)
         problem = f"exactly one option must be correct, not {count}"
-        fields.refuse_problems([("", problem)] if count != 1 else [])
+        bank_fields.refuse_problems([("", problem)] if count != 1 else [])
         return options
 
 
@@ -121,11 +121,11 @@ class Multiple(_Choice):
     def _some_right_some_wrong(cls, options: list[Option]) -> list[Option]:
         problem = "at least one option must be correct and one wrong"
         some = 0 < sum(option.correct for option in options) < len(options)
-        fields.refuse_problems([] if some else [("", problem)])
+        bank_fields.refuse_problems([] if some else [("", problem)])
         return options
 
 
-class Trap(Part):
+class Trap(QuestionPart):
     """A wrong number that a known misconception leads to."""
 
     value: Finite
@@ -193,7 +193,7 @@ class Numeric(_Variant):
     def _traps_are_wrong(cls, traps: list[Trap], info: ValidationInfo) -> list[Trap]:
         answer, tolerance = info.data.get("answer"), info.data.get("tolerance")
         if answer is not None and tolerance is not None:
-            fields.refuse_problems([
+            bank_fields.refuse_problems([
                 (f"{number} value",
                  f"the trap {trap.value:g} lies within the tolerance of the answer")
                 for number, trap in enumerate(traps, start=1)
@@ -216,7 +216,7 @@ class Ordering(_Built):
         return list(self.items)
 
 
-class Pair(Part):
+class Pair(QuestionPart):
     """Two things that belong together."""
 
     left: Text
@@ -251,14 +251,14 @@ class Matching(_Built):
         ]
         if len({pair.right for pair in pairs}) < 2:
             problems.append(("", "all have the same right side, so there is nothing to match"))
-        fields.refuse_problems(problems)
+        bank_fields.refuse_problems(problems)
         return pairs
 
     @field_validator("extras")
     @classmethod
     def _extras_belong_to_nothing(cls, extras: list[str], info: ValidationInfo) -> list[str]:
         rights = {pair.right for pair in info.data.get("pairs", [])}
-        fields.refuse_problems([
+        bank_fields.refuse_problems([
             (f"{number}", "an extra is the right side of a pair, too")
             for number, extra in enumerate(extras, start=1)
             if extra in rights
@@ -271,7 +271,7 @@ Variant = Annotated[
 ]
 
 
-class Concept(Part):
+class Concept(QuestionPart):
     """One thing to understand, with interchangeable questions about it."""
 
     id: Id
@@ -287,11 +287,11 @@ class Concept(Part):
         return next((variant for variant in self.variants if variant.id == name), None)
 
 
-class Bank(Part):
+class Bank(QuestionPart):
     """A quiz: its concepts in order, one question of each to every learner.
 
     A ``closed`` quiz is marked by the instructor alone: learners get it ``keyless``, without keys
-    and feedback (see `quizzes.marking.closing`), and hand their answers in.
+    and feedback (see `quizzes.marking.closed_quizzes`), and hand their answers in.
     """
 
     quiz: Id
@@ -309,7 +309,7 @@ class Bank(Part):
     keyless: bool = False
     """Written by the program into the questions that students get; never write it yourself."""
     misconceptions: dict[Id, Text] = Field(
-        default_factory=dict, json_schema_extra={fields.TO_TEACH: True}
+        default_factory=dict, json_schema_extra={bank_fields.TO_TEACH: True}
     )
     """What learners may wrongly believe: an id for each belief, and the belief in a sentence."""
     concepts: list[Concept] = Field(min_length=1)
@@ -319,7 +319,7 @@ class Bank(Part):
     @model_validator(mode="wrap")
     @classmethod
     def _needs_more_to_teach(cls, data: Any, handler: Callable[[Any], Bank]) -> Bank:
-        with fields.validating_bank(teaches=not fields.is_closed(data)):
+        with bank_fields.validating_bank(teaches=not bank_fields.is_closed(data)):
             return handler(data)
 
     @property

@@ -11,9 +11,9 @@ from typing import Any, get_args
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from quizzes.bank.bank_fields import FieldError, validating_bank
+from quizzes.bank.bank_yaml import Document, Place
 from quizzes.bank.contents import Bank, Concept, Option, Pair, Trap, Variant
-from quizzes.bank.fields import FieldError, validating_bank
-from quizzes.bank.yaml_text import Document, Place
 from quizzes.errors import suggest_name
 
 KINDS: dict[str, type[BaseModel]] = {
@@ -25,7 +25,7 @@ KINDS: dict[str, type[BaseModel]] = {
 _PARTS: dict[Any, type[BaseModel]] = {
     "concepts": Concept, "options": Option, "traps": Trap, "pairs": Pair, **KINDS,
 }  # fmt: skip
-_LONGEST = 60
+_MAX_CHARS = 60
 """Characters of a value that a message repeats."""
 
 
@@ -142,9 +142,9 @@ def _locate_item(data: Any, place: Place) -> tuple[str, str]:
     for step in place:
         data = get_part(data, step)
         if isinstance(data, dict) and isinstance(data.get("id"), str):
-            item, fields = data["id"][:_LONGEST], []
+            item, fields = data["id"][:_MAX_CHARS], []
         else:
-            fields.append(str(step + 1) if isinstance(step, int) else str(step)[:_LONGEST])
+            fields.append(str(step + 1) if isinstance(step, int) else str(step)[:_MAX_CHARS])
     return item, " ".join(fields)
 
 
@@ -161,7 +161,7 @@ def _describe_detail(detail: ErrorDetails, place: Place, document: Document) -> 
     if kind in _MUST_BE:
         return _of_another_kind(_MUST_BE[kind], detail["input"], document.written_value(place))
     if kind == "string_pattern_mismatch":
-        given = str(detail["input"])[:_LONGEST]
+        given = str(detail["input"])[:_MAX_CHARS]
         return f"{given!r} is no id: write lower-case words joined by hyphens, such as qos-purpose"
     if kind == "string_unicode":
         return "it holds half of a character, which is no text"
@@ -199,7 +199,7 @@ def _of_another_kind(wanted: str, given: Any, written: str | None) -> str:
         have = "fields with values" if isinstance(given, dict) else "a list"
         quotes = "; a text that begins with { or [ must stand in quotes" if wanted == "text" else ""
         return f"it must be {wanted}, but it is {have}{quotes}"
-    shown = (written or str(given))[:_LONGEST]
+    shown = (written or str(given))[:_MAX_CHARS]
     if wanted.startswith("text"):
         read_as = "true or false" if isinstance(given, bool) else "a number"
         quoted = f"write '{shown}', in quotes"

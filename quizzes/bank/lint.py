@@ -27,7 +27,7 @@ from quizzes.bank.contents import (
 
 LENGTH_RATIO = 2.0
 """How many times as long as the shortest option the longest may be."""
-FEW_CHARACTERS = 25
+FEW_CHARS = 25
 """Options that differ by less give nothing away, whatever their ratio (`yes`, a line of output)."""
 HABIT = 0.4
 """Share of questions in which the key may be the longest option, or the shortest; by chance it is
@@ -38,7 +38,7 @@ BALANCE = 0.35
 """How far a place may be from its fair share of the keys, as a part of that share."""
 FEWEST_KEYS = 8
 """Questions below which nothing can be said of habits: two of three are soon alike."""
-MIN_FEEDBACK = 25
+MIN_FEEDBACK_CHARS = 25
 """Letters and digits below which a feedback cannot say why."""
 
 _REFERS = re.compile(
@@ -60,7 +60,7 @@ _TASK = re.compile(r"(?:^|[.!?]\s+)(Match|Put)\b")
 
 
 @dataclass(frozen=True)
-class Finding:
+class LintFinding:
     """One thing to mend: the item's id, the field, and what is wrong with it."""
 
     item: str
@@ -90,12 +90,12 @@ def wrong_answers(bank: Bank) -> Iterator[WrongAnswer]:
             yield from _wrong_answers(variant)
 
 
-def list_findings(bank: Bank) -> list[Finding]:
+def list_findings(bank: Bank) -> list[LintFinding]:
     """Return all that should be mended in a bank; an empty list is a clean one.
 
     A closed quiz does not teach, so what is there to teach is not looked for in it.
     """
-    found: list[Finding] = []
+    found: list[LintFinding] = []
     for concept in bank.concepts:
         for variant in concept.variants:
             found += _of_question(variant)
@@ -126,11 +126,11 @@ def _wrong_answers(variant: Variant) -> Iterator[WrongAnswer]:
                 )
 
 
-def _of_question(variant: Variant) -> Iterator[Finding]:
+def _of_question(variant: Variant) -> Iterator[LintFinding]:
     """Find what makes a question unclear, or easy to guess."""
 
-    def finding(field: str, problem: str) -> Finding:
-        return Finding(variant.id, field, problem)
+    def finding(field: str, problem: str) -> LintFinding:
+        return LintFinding(variant.id, field, problem)
 
     prose = _CODE.sub("", variant.stem)
     asked = prose.count("?")
@@ -145,11 +145,11 @@ def _of_question(variant: Variant) -> Iterator[Finding]:
         yield from (finding("options", problem) for problem in _option_lengths(variant))
 
 
-def _of_lesson(variant: Variant) -> Iterator[Finding]:
+def _of_lesson(variant: Variant) -> Iterator[LintFinding]:
     """Find what a wrong answer teaches nothing by."""
 
-    def finding(field: str, problem: str) -> Finding:
-        return Finding(variant.id, field, problem)
+    def finding(field: str, problem: str) -> LintFinding:
+        return LintFinding(variant.id, field, problem)
 
     if isinstance(variant, Numeric) and variant.wrong_feedback is None:
         yield finding("wrong_feedback", "a number that no trap expects gets no hint")
@@ -158,7 +158,7 @@ def _of_lesson(variant: Variant) -> Iterator[Finding]:
         if answer.show is None:
             yield finding(name, "it has no cell that shows what really happens")
     for name, feedback in _feedback_texts(variant):
-        if sum(character.isalnum() for character in feedback) < MIN_FEEDBACK:
+        if sum(character.isalnum() for character in feedback) < MIN_FEEDBACK_CHARS:
             yield finding(name, "its feedback is too short to say why")
 
 
@@ -179,17 +179,17 @@ def _feedback_texts(variant: Variant) -> Iterator[tuple[str, str]]:
 def _option_lengths(variant: Single | Predict | Multiple) -> Iterator[str]:
     lengths = sorted(len(option.text) for option in variant.options)
     shortest, longest = lengths[0], lengths[-1]
-    if longest - shortest > FEW_CHARACTERS and longest > LENGTH_RATIO * shortest:
+    if longest - shortest > FEW_CHARS and longest > LENGTH_RATIO * shortest:
         yield f"the longest option has {longest} characters, the shortest {shortest}"
 
 
-def _of_misconceptions(bank: Bank) -> Iterator[Finding]:
+def _of_misconceptions(bank: Bank) -> Iterator[LintFinding]:
     used = {answer.misconception for answer in wrong_answers(bank)}
     for name in sorted(set(bank.misconceptions) - used):
-        yield Finding(bank.quiz, "misconceptions", f"no wrong answer shows '{name}'")
+        yield LintFinding(bank.quiz, "misconceptions", f"no wrong answer shows '{name}'")
 
 
-def _of_repeated_texts(bank: Bank) -> Iterator[Finding]:
+def _of_repeated_texts(bank: Bank) -> Iterator[LintFinding]:
     """Find stems, options and feedback that are the same in two variants, but for typography.
 
     Outcomes of a cell, the pairs of a matching and short options (`yes`) may recur.
@@ -200,7 +200,7 @@ def _of_repeated_texts(bank: Bank) -> Iterator[Finding]:
             places[_normalize_text(variant.stem)].append((variant.id, "stem"))
             if isinstance(variant, Single | Multiple):
                 for option in variant.options:
-                    if len(option.text) < FEW_CHARACTERS:
+                    if len(option.text) < FEW_CHARS:
                         continue
                     places[_normalize_text(option.text)].append((variant.id, "options"))
     for answer in wrong_answers(bank):
@@ -208,10 +208,10 @@ def _of_repeated_texts(bank: Bank) -> Iterator[Finding]:
     for text, ((item, field), *others) in places.items():
         if text and others:
             elsewhere = ", ".join(sorted({name for name, _ in others}))
-            yield Finding(item, field, f"the same text stands in {elsewhere}")
+            yield LintFinding(item, field, f"the same text stands in {elsewhere}")
 
 
-def _of_key_lengths(bank: Bank) -> Iterator[Finding]:
+def _of_key_lengths(bank: Bank) -> Iterator[LintFinding]:
     """Find out whether the key can be guessed from its length over the whole bank."""
     extremes: Counter[str] = Counter()
     count = 0
@@ -227,14 +227,14 @@ def _of_key_lengths(bank: Bank) -> Iterator[Finding]:
     for name, times in extremes.items():
         if count >= FEWEST_KEYS and times > HABIT * count:
             problem = f"the key is the {name} option in {times} of {count} questions"
-            yield Finding(bank.quiz, "options", problem)
+            yield LintFinding(bank.quiz, "options", problem)
 
 
-def _of_key_places(bank: Bank) -> Iterator[Finding]:
+def _of_key_places(bank: Bank) -> Iterator[LintFinding]:
     """Find out whether keys stand in some places more often: in the bank, and as they are dealt.
 
     What a learner sees is the deal, from which no place may be read. The bank's own order shows
-    through in exports that are not shuffled, and to whoever looks over an author's shoulder.
+    through in exports that are not shuffled, and to anyone who looks over an author's shoulder.
     """
     written: defaultdict[int, Counter[int]] = defaultdict(Counter)
     for variant in (variant for concept in bank.concepts for variant in concept.variants):
@@ -247,7 +247,7 @@ def _of_key_places(bank: Bank) -> Iterator[Finding]:
                     f"the key is option {place + 1} of {count} in {times} of {seen.total()} "
                     "questions, as they stand in the bank"
                 )
-                yield Finding(bank.quiz, "options", problem)
+                yield LintFinding(bank.quiz, "options", problem)
     dealt: defaultdict[int, Counter[int]] = defaultdict(Counter)
     for learner in range(LEARNERS):
         for item in selection.draw(bank, f"learner {learner}", 1 + learner % 3).items:
@@ -262,7 +262,7 @@ def _of_key_places(bank: Bank) -> Iterator[Finding]:
                     f"of {seen.total()} keys among {count} options {seen[place]} stand in "
                     f"place {place + 1}"
                 )
-                yield Finding(bank.quiz, "options", problem)
+                yield LintFinding(bank.quiz, "options", problem)
 
 
 def _normalize_text(text: str) -> str:

@@ -9,16 +9,16 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from quizzes.bank import checks, faults, yaml_text
+from quizzes.bank import bank_yaml, checks, faults
+from quizzes.bank.bank_fields import is_closed
+from quizzes.bank.bank_yaml import Document
 from quizzes.bank.contents import Bank
-from quizzes.bank.fields import is_closed
-from quizzes.bank.yaml_text import Document
 from quizzes.errors import BankError, suggest_name
 
 BANKS = Path(__file__).resolve().parents[1] / "banks"
 """The folder of the banks that are installed with the package."""
 
-MAX_SIZE = 4 * 1024 * 1024
+MAX_SIZE_BYTES = 4 * 1024 * 1024
 """Bytes of a bank that are read; that of chapter 5 has 0.1 million."""
 
 
@@ -84,13 +84,13 @@ def read_bank(path: Path, quiz: str = "") -> Bank:
     """
     try:
         with path.open("rb") as file:
-            raw = file.read(MAX_SIZE + 1)
+            raw = file.read(MAX_SIZE_BYTES + 1)
     except FileNotFoundError:
         raise BankError(f"There is no bank {path}.") from None
     except OSError as error:
         raise BankError(f"{path} cannot be read: {error.strerror or error}.") from None
-    if len(raw) > MAX_SIZE:
-        raise BankError(f"{path} is larger than {MAX_SIZE // 2**20} MB: split the quiz.")
+    if len(raw) > MAX_SIZE_BYTES:
+        raise BankError(f"{path} is larger than {MAX_SIZE_BYTES // 2**20} MB: split the quiz.")
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -110,7 +110,7 @@ def bank_of(text: str, name: str, folder: Path, quiz: str = "") -> Bank:
         BankError: it is no YAML, or does not hold together.
     """
     return _validate_document(
-        yaml_text.parse_document(text, name), name, quiz or Path(name).stem, folder, "item"
+        bank_yaml.parse_document(text, name), name, quiz or Path(name).stem, folder, "item"
     )
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from quizzes.bank.bank_fields import TO_TEACH
 from quizzes.bank.contents import COUNTED, MIN_VARIANTS, Bank
 from quizzes.bank.faults import KINDS
-from quizzes.bank.fields import TO_TEACH
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 """Banks that the page shows whole."""

@@ -17,7 +17,7 @@ LETTERS = string.ascii_lowercase
 
 
 @dataclass(frozen=True)
-class Item:
+class PaperItem:
     """One question as a learner sees it.
 
     ``order`` says which of the variant's texts (see ``texts`` in `quizzes.bank.contents`) each
@@ -54,9 +54,9 @@ class Paper:
     bank: Bank
     student: str
     attempt: int
-    items: tuple[Item, ...]
+    items: tuple[PaperItem, ...]
 
-    def find_item(self, concept: str) -> Item | None:
+    def find_item(self, concept: str) -> PaperItem | None:
         """Return the question about a concept, if it is in this quiz."""
         return next((item for item in self.items if item.concept.id == concept), None)
 
@@ -72,7 +72,7 @@ def draw(bank: Bank, student: str, attempt: int) -> Paper:
         variant = _choose_variant(bank, concept, student, attempt)
         seed = f"{student}\0{bank.quiz}\0{attempt}\0{variant.id}"
         items.append(
-            Item(number, concept, variant, _letter_order(variant, seed, closed=bank.closed))
+            PaperItem(number, concept, variant, _letter_order(variant, seed, closed=bank.closed))
         )
     return Paper(bank, student, attempt, tuple(items))
 
@@ -96,8 +96,9 @@ def _letter_order(variant: Variant, seed: str, *, closed: bool) -> tuple[int, ..
         return ()
     places = _shuffled(len(variant.lettered_texts), seed)
     if isinstance(variant, Ordering | Matching) or closed:
-        # The bank has these in the right order: whoever knows the shuffle could turn it back. From
-        # the alphabet's order it leads nowhere; nor does a closed quiz's bank give away an order.
+        # The bank has these in the right order: a student who knows the shuffle could undo it. So
+        # the shuffle starts from alphabetical order. A closed quiz's bank must give no order away
+        # either.
         base = sorted(range(len(places)), key=variant.lettered_texts.__getitem__)
         places = [base[place] for place in places]
     if isinstance(variant, Ordering) and places == sorted(places) and not closed:
@@ -111,7 +112,7 @@ def _shuffled(count: int, seed: str) -> list[int]:
     )
 
 
-def right_answer(item: Item) -> str | float:
+def right_answer(item: PaperItem) -> str | float:
     """Return the right answer to a question, in the form in which answers are saved."""
     variant = item.variant
     if isinstance(variant, Numeric):

@@ -10,9 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterable
 from decimal import Decimal
 
-from quizzes.exchange.gift_reader import MAX_SIZE as MAX_SIZE
+from quizzes.exchange.gift_reader import MAX_SIZE_CHARS as MAX_SIZE_CHARS
 from quizzes.exchange.gift_reader import read_gift as read_gift
-from quizzes.exchange.questions import ChoiceQuestion, MatchQuestion, NumberQuestion, Question
+from quizzes.exchange.platform_questions import (
+    ChoiceQuestion,
+    MatchQuestion,
+    NumberQuestion,
+    Question,
+)
 
 _SPECIAL = "~=#{}:"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from quizzes.exchange.questions import (
+from quizzes.exchange.platform_questions import (
     Choice,
     ChoiceQuestion,
     ExchangeError,
@@ -15,7 +15,7 @@ from quizzes.exchange.questions import (
     Question,
 )
 
-MAX_SIZE = 4 * 1024 * 1024
+MAX_SIZE_CHARS = 4 * 1024 * 1024
 """Characters of a file that are read; a bank has about 0.1 million."""
 
 _UNIT = re.compile(r"\\.|.", re.DOTALL)
@@ -37,7 +37,7 @@ def read_gift(content: str, source: str) -> list[Question]:
     Raises:
         ExchangeError: it is no GIFT, or has a kind of question that a bank has not.
     """
-    if len(content) > MAX_SIZE:
+    if len(content) > MAX_SIZE_CHARS:
         raise ExchangeError(f"{source} is too large for a GIFT file: split it.")
     questions: list[Question] = []
     names: dict[str, int] = {}

@@ -19,7 +19,7 @@ import yaml
 from quizzes.bank import loader
 from quizzes.bank.contents import Bank, Concept
 from quizzes.errors import BankError
-from quizzes.exchange.questions import (
+from quizzes.exchange.platform_questions import (
     BOTH,
     POSITION,
     ChoiceQuestion,

@@ -14,8 +14,8 @@ from text2qti.qti import QTI
 from text2qti.quiz import GroupStart, Quiz
 
 from quizzes.bank.contents import Bank, Matching, Multiple, Numeric, Ordering, Variant
-from quizzes.exchange import limits
-from quizzes.exchange.questions import ExchangeError, code_block, unit_line
+from quizzes.exchange import format_limits
+from quizzes.exchange.platform_questions import ExchangeError, code_block, unit_line
 
 POINTS = 1
 _PICTURE = re.compile(r"!\[([^\]]*)\]\(([^)\s]+)\)")
@@ -45,7 +45,7 @@ def make_package(bank: Bank) -> tuple[bytes, list[str]]:
                 raise ExchangeError(
                     f"{bank.quiz}.yaml, item '{variant.id}' cannot be written as QTI: {reason}."
                 ) from None
-    return _zip_package(bank), limits.of_qti(bank)
+    return _zip_package(bank), format_limits.of_qti(bank)
 
 
 def _zip_package(bank: Bank) -> bytes:

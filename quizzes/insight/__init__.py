@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from quizzes.insight.analysis import Analysis as Analysis
 from quizzes.insight.analysis import analyse_results as analyse_results
-from quizzes.insight.collect import ClassResults as ClassResults
-from quizzes.insight.collect import collect_class as collect_class
-from quizzes.insight.report import write_report as write_report
+from quizzes.insight.first_attempts import ClassResults as ClassResults
+from quizzes.insight.first_attempts import collect_class as collect_class
+from quizzes.insight.item_report import write_report as write_report

@@ -1,4 +1,4 @@
-"""Item analysis: how hard each question is, whether it tells who knows, and what a class believes.
+"""Item analysis: how hard each question is, how well it discriminates, and what a class believes.
 
 Difficulty is the mean credit, p (high is easy). Discrimination is the correlation of an item's
 credit with the *rest* score, the score on all other items (for right-or-wrong items the point-
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from quizzes.bank import lint
 from quizzes.bank.contents import Bank
 from quizzes.marking.marks import Mark
-from quizzes.marking.scoring import Result
+from quizzes.marking.scoring import QuestionResult
 
 FEW = 10
 """Learners below which figures say little; they are shown all the same, and marked."""
@@ -88,7 +88,7 @@ class Analysis:
 
 
 def analyse_results(
-    bank: Bank, results: Mapping[str, Result], notes: Iterable[str] = ()
+    bank: Bank, results: Mapping[str, QuestionResult], notes: Iterable[str] = ()
 ) -> Analysis:
     """Analyse one result of each learner."""
     answered = [(mark, result) for result in results.values() for mark in result.marks]

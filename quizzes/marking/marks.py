@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from quizzes.attempts.answers import Answer
-from quizzes.bank.selection import Item
+from quizzes.attempts.quiz_answers import Answer
+from quizzes.bank.selection import PaperItem
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Remark:
 class Mark:
     """What one answer earned: ``credit`` from 0 to 1, and why."""
 
-    item: Item
+    item: PaperItem
     answer: Answer
     credit: float
     remarks: tuple[Remark, ...]

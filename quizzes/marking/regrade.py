@@ -6,11 +6,11 @@ are guesses. A file that was copied whole still says under which login it was ma
 
 Nobody is kept from practising, but the best of thousands of guesses would be full marks. So the
 first `Bank.attempt_limit` attempts of a file count, by their number and in the order of the file,
-whoever made them. Twenty, as in most banks, is four times through all variants of a concept with
-five, and who guesses has one chance in some hundreds to get everything right in it. A file that
-goes on from there, or in which attempts follow one another faster than anybody reads (`HASTE`), is
-for a person to look at, with the reason: what it earns is what its first attempts earn.
-Time stamps are easily forged, so they only ever add a reason to look.
+no matter who made them. Twenty, as in most banks, is four times through all variants of a concept
+with five, and a student who guesses has one chance in some hundreds to get everything right in it.
+A file that goes on from there, or in which attempts follow one another faster than anybody reads
+(`HASTE`), is for a person to look at, with the reason: what it earns is what its first attempts
+earn. Time stamps are easily forged, so they only ever add a reason to look.
 """
 
 from __future__ import annotations
@@ -19,21 +19,21 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
-from quizzes.attempts import answers, record
-from quizzes.attempts.answers import Answer
+from quizzes.attempts import quiz_answers, record
+from quizzes.attempts.quiz_answers import Answer
 from quizzes.attempts.record import Attempt
 from quizzes.bank import selection
 from quizzes.bank.contents import Bank
 from quizzes.errors import AnswerError
 from quizzes.marking import scoring
-from quizzes.marking.scoring import Result
+from quizzes.marking.scoring import QuestionResult
 
 HASTE, WITHIN = 5, 60.0
 """More attempts than `HASTE` within so many seconds are not made by hand."""
 
 
 @dataclass(frozen=True)
-class Marked:
+class MarkedAgain:
     """The attempts of one file, marked again.
 
     ``results`` are those that count, in the order of the file; ``problems`` says of each other one
@@ -42,19 +42,19 @@ class Marked:
     ``doubt`` says why a person should look at them, or is empty.
     """
 
-    results: tuple[Result, ...]
+    results: tuple[QuestionResult, ...]
     problems: tuple[str, ...]
     other_edition: int
     damaged: int
     doubt: str = ""
 
     @property
-    def best_result(self) -> Result | None:
+    def best_result(self) -> QuestionResult | None:
         """The result with the best score, the earliest of equal ones."""
         return max(self.results, key=lambda r: (r.score, -r.paper.attempt), default=None)
 
     @property
-    def first_result(self) -> Result | None:
+    def first_result(self) -> QuestionResult | None:
         """The result of the attempt with the lowest number."""
         return min(self.results, key=lambda r: r.paper.attempt, default=None)
 
@@ -64,15 +64,15 @@ class Marked:
         return tuple(dict.fromkeys(result.paper.student for result in self.results))
 
 
-def mark_file(bank: Bank, content: bytes) -> Marked:
+def mark_file(bank: Bank, content: bytes) -> MarkedAgain:
     """Mark every attempt in the content of an attempts file."""
     found, damaged = record.parse_attempts(content)
     return mark_all(bank, found, damaged)
 
 
-def mark_all(bank: Bank, found: Iterable[Attempt], damaged: int = 0) -> Marked:
+def mark_all(bank: Bank, found: Iterable[Attempt], damaged: int = 0) -> MarkedAgain:
     """Mark attempts; of several with one number of one student, the first counts."""
-    results: list[Result] = []
+    results: list[QuestionResult] = []
     problems: list[str] = []
     seen: set[tuple[str, int]] = set()
     stamps: list[float] = []
@@ -95,7 +95,7 @@ def mark_all(bank: Bank, found: Iterable[Attempt], damaged: int = 0) -> Marked:
             seen.add(who)
             results.append(result)
     doubt = _describe_doubt(stamps, surplus, bank.attempt_limit)
-    return Marked(tuple(results), tuple(problems), other_edition, damaged, doubt)
+    return MarkedAgain(tuple(results), tuple(problems), other_edition, damaged, doubt)
 
 
 def _describe_doubt(stamps: list[float], surplus: int, counted: int) -> str:
@@ -121,7 +121,7 @@ def _submission_time(submitted: str) -> float:
         return 0.0
 
 
-def mark_again(bank: Bank, attempt: Attempt) -> Result | None:
+def mark_again(bank: Bank, attempt: Attempt) -> QuestionResult | None:
     """Mark an attempt again; None if this edition of the bank could not have dealt it."""
     if (attempt.quiz, attempt.edition) != (bank.quiz, bank.edition):
         return None
@@ -134,7 +134,7 @@ def mark_again(bank: Bank, attempt: Attempt) -> Result | None:
         if saved is None or saved.variant != item.variant.id:
             return None
         try:
-            given[item.concept.id] = answers.normalize_answer(item, saved.answer)
+            given[item.concept.id] = quiz_answers.normalize_answer(item, saved.answer)
         except AnswerError:
             return None
     return scoring.mark_paper(paper, given)

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from quizzes.attempts.answers import NOTHING, OPEN, Answer, is_complete
+from quizzes.attempts.quiz_answers import NOTHING, OPEN, Answer, is_complete
 from quizzes.bank import selection
 from quizzes.bank.contents import Matching, Multiple, Numeric, Option, Ordering, Predict, Single
-from quizzes.bank.selection import Item, Paper
+from quizzes.bank.selection import Paper, PaperItem
 from quizzes.marking import wording
 from quizzes.marking.marks import Mark, Remark
 
 
 @dataclass(frozen=True, repr=False)
-class Result:
+class QuestionResult:
     """A marked quiz: one point a concept, with partial credit."""
 
     paper: Paper
@@ -58,21 +58,23 @@ class Result:
         return wording.of_result(self)
 
 
-def mark_paper(paper: Paper, answers: Mapping[str, Answer]) -> Result:
+def mark_paper(paper: Paper, answers: Mapping[str, Answer]) -> QuestionResult:
     """Mark answers, given by concept; a concept without one earns nothing.
 
     Without keys nothing can be said of an answer, and no point be given for it.
     """
     given = {item.concept.id: answers.get(item.concept.id, NOTHING) for item in paper.items}
     if paper.bank.keyless:
-        return Result(
+        return QuestionResult(
             paper, tuple(Mark(item, given[item.concept.id], 0.0, ()) for item in paper.items)
         )
-    return Result(paper, tuple(mark_answer(item, given[item.concept.id]) for item in paper.items))
+    return QuestionResult(
+        paper, tuple(mark_answer(item, given[item.concept.id]) for item in paper.items)
+    )
 
 
-def mark_answer(item: Item, answer: Answer) -> Mark:
-    """Mark one answer in its saved form (see `quizzes.attempts.answers`).
+def mark_answer(item: PaperItem, answer: Answer) -> Mark:
+    """Mark one answer in its saved form (see `quizzes.attempts.quiz_answers`).
 
     One choice is right or wrong. Of several choices each right one earns its share and each wrong
     one loses as much, down to nothing. In an ordering each thing in its place earns its share, in
@@ -97,7 +99,7 @@ def _option_remark(option: Option, letter: str, *, right: bool) -> Remark:
     return Remark(right, option.feedback or "", letter, option.misconception, option.show)
 
 
-def _mark_numeric(item: Item, variant: Numeric, number: float) -> Mark:
+def _mark_numeric(item: PaperItem, variant: Numeric, number: float) -> Mark:
     if variant.is_right(number):
         return Mark(item, number, 1.0, (Remark(True, variant.feedback or ""),))
     for trap in variant.traps:
@@ -109,7 +111,7 @@ def _mark_numeric(item: Item, variant: Numeric, number: float) -> Mark:
     return Mark(item, number, 0.0, (remark,))
 
 
-def _mark_multiple(item: Item, variant: Multiple, letters: str) -> Mark:
+def _mark_multiple(item: PaperItem, variant: Multiple, letters: str) -> Mark:
     ticked = [variant.options[item.place_of(letter)].correct for letter in letters]
     share = (ticked.count(True) - ticked.count(False)) / len(variant.right_positions)
     remarks = []
@@ -121,7 +123,7 @@ def _mark_multiple(item: Item, variant: Multiple, letters: str) -> Mark:
     return Mark(item, letters, max(0.0, share), tuple(remarks))
 
 
-def _mark_built(item: Item, variant: Ordering | Matching, letters: str) -> Mark:
+def _mark_built(item: PaperItem, variant: Ordering | Matching, letters: str) -> Mark:
     wanted = str(selection.right_answer(item))
     given = letters or OPEN * len(wanted)
     share = sum(a == b for a, b in zip(given, wanted, strict=True)) / len(wanted)

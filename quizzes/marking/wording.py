@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from quizzes.attempts import answers
-from quizzes.attempts.answers import Answer
+from quizzes.attempts import quiz_answers
+from quizzes.attempts.quiz_answers import Answer
 from quizzes.bank.contents import Matching, Multiple, Numeric, Ordering
-from quizzes.bank.selection import LETTERS, Item, Paper
+from quizzes.bank.selection import LETTERS, Paper, PaperItem
 from quizzes.marking.marks import Mark
 
 INSTRUCTIONS = {
@@ -21,8 +21,8 @@ INSTRUCTIONS = {
 }
 
 
-class Marked(Protocol):
-    """What is read of a marked quiz: see `quizzes.marking.scoring.Result`."""
+class MarkedText(Protocol):
+    """What is read of a marked quiz: see `quizzes.marking.scoring.QuestionResult`."""
 
     @property
     def paper(self) -> Paper:
@@ -41,7 +41,7 @@ class Marked(Protocol):
 class QuestionText:
     """A question to read in a cell or a terminal."""
 
-    item: Item
+    item: PaperItem
 
     def __repr__(self) -> str:
         """Return it as Markdown, which reads well as plain text, too."""
@@ -51,7 +51,7 @@ class QuestionText:
         return of_question(self.item)
 
 
-def of_question(item: Item) -> str:
+def of_question(item: PaperItem) -> str:
     """Return a question as Markdown: what is asked, what there is to choose from, how to answer."""
     variant = item.variant
     parts = [f"**Question {item.number}.** {INSTRUCTIONS[variant.kind]}", variant.stem]
@@ -61,15 +61,15 @@ def of_question(item: Item) -> str:
         lefts = (f"{number}. {pair.left}" for number, pair in enumerate(variant.pairs, start=1))
         parts.append("\n".join(lefts))
     parts += [f"{letter}) {item.text_of(letter)}" for letter in item.letters]
-    how = answers.describe_format(item)
+    how = quiz_answers.describe_format(item)
     parts.append(f"*{how[0].upper()}{how[1:]}.*")
     return "\n\n".join(parts)
 
 
-def of_answer(item: Item, answer: Answer) -> str:
+def of_answer(item: PaperItem, answer: Answer) -> str:
     """Return an answer in words, as Markdown."""
     variant = item.variant
-    if answer == answers.NOTHING:
+    if answer == quiz_answers.NOTHING:
         return "no answer"
     if isinstance(variant, Numeric):
         return f"{answer:g} {variant.unit}".strip()
@@ -83,7 +83,7 @@ def of_answer(item: Item, answer: Answer) -> str:
     return "; ".join(f"{c}) {item.text_of(c)}" for c in letters)
 
 
-def of_result(result: Marked) -> str:
+def of_result(result: MarkedText) -> str:
     """Return a marked quiz as Markdown; of one that is marked elsewhere, that it is handed in."""
     if result.paper.bank.keyless:
         return f"**{result.headline}**"

@@ -12,7 +12,7 @@ from typing import Any
 
 from quizzes.bank import loader
 from quizzes.errors import QuizError
-from quizzes.marking import closing
+from quizzes.marking import closed_quizzes
 from quizzes.notebook.quiz import Quiz
 
 
@@ -41,9 +41,11 @@ def load(
     if banks is not None:
         bank = loader.load_bank(name, _folder_path("banks", banks))
     else:
-        sheets = closing.find_sheets(place or Path.cwd())
+        sheets = closed_quizzes.find_sheets(place or Path.cwd())
         path = sheets.get(str(name))
-        bank = closing.read_sheet(path, name) if path else loader.load_bank(name, others=sheets)
+        bank = (
+            closed_quizzes.read_sheet(path, name) if path else loader.load_bank(name, others=sheets)
+        )
     return Quiz(bank, student=student, folder=place)
 
 

@@ -10,16 +10,16 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from quizzes.attempts import answers
-from quizzes.attempts.answers import Answer
+from quizzes.attempts import quiz_answers
+from quizzes.attempts.quiz_answers import Answer
 from quizzes.attempts.record import Attempt, Given
 from quizzes.attempts.storage import AttemptsFile
 from quizzes.bank import selection
 from quizzes.bank.contents import Bank
-from quizzes.bank.selection import Item, Paper
+from quizzes.bank.selection import Paper, PaperItem
 from quizzes.errors import AnswerError, QuizError, UnwritableError
 from quizzes.marking import regrade, scoring
-from quizzes.marking.scoring import Result
+from quizzes.marking.scoring import QuestionResult
 from quizzes.marking.wording import QuestionText
 from quizzes.taking import demonstration
 from quizzes.taking.identity import current_login, validate_name
@@ -62,7 +62,7 @@ class QuizCore:
         self.attempts: list[Attempt] = []
         self._paper: Paper
         self._answers: dict[str, Answer] = {}
-        self._result: Result | None = None
+        self._result: QuestionResult | None = None
         self.reload()
 
     @_with_lock
@@ -88,7 +88,7 @@ class QuizCore:
         return self._paper.attempt
 
     @property
-    def items(self) -> tuple[Item, ...]:
+    def items(self) -> tuple[PaperItem, ...]:
         """The questions of the attempt at hand."""
         return self._paper.items
 
@@ -98,7 +98,7 @@ class QuizCore:
         return dict(self._answers)
 
     @property
-    def result(self) -> Result | None:
+    def result(self) -> QuestionResult | None:
         """The result of the attempt at hand; None before it is submitted."""
         return self._result
 
@@ -127,7 +127,7 @@ class QuizCore:
         """The numbers of the questions that have no complete answer yet."""
         return [
             item.number for item in self.items
-            if not answers.is_complete(item, self._answers.get(item.concept.id, ""))
+            if not quiz_answers.is_complete(item, self._answers.get(item.concept.id, ""))
         ]  # fmt: skip
 
     def question(self, which: int | str) -> QuestionText:
@@ -173,12 +173,12 @@ class QuizCore:
                 f"Attempt {self.attempt} is submitted, so its answers stand: begin another quiz "
                 "with quiz.retry()."
             )
-        answer = answers.normalize_answer(item, given)
-        if self._answers.get(item.concept.id, answers.NOTHING) != answer:
+        answer = quiz_answers.normalize_answer(item, given)
+        if self._answers.get(item.concept.id, quiz_answers.NOTHING) != answer:
             self._save_draft({item.concept.id: answer})
 
     @_with_lock
-    def submit(self) -> Result:
+    def submit(self) -> QuestionResult:
         """Submit the answers and return the marked quiz; a second call returns the same.
 
         Raises:
@@ -234,7 +234,7 @@ class QuizCore:
             raise QuizError("There is something to run once you have submitted your answers.")
         demonstration.into_cell(self._result.marks[item.number - 1])
 
-    def item(self, which: int | str) -> Item:
+    def item(self, which: int | str) -> PaperItem:
         """Return a question by its number (from 1) or its concept.
 
         Raises:
@@ -262,7 +262,7 @@ class QuizCore:
     def _next_number(self) -> int:
         return max((a.attempt for a in self.attempts), default=0) + 1
 
-    def _make_record(self, result: Result) -> Attempt:
+    def _make_record(self, result: QuestionResult) -> Attempt:
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         given = {
             item.concept.id: Given(item.variant.id, self._answers[item.concept.id])
@@ -288,7 +288,7 @@ class QuizCore:
         for item in self.items:
             if item.concept.id in given:
                 with suppress(AnswerError):
-                    answer = answers.normalize_answer(item, given[item.concept.id])
+                    answer = quiz_answers.normalize_answer(item, given[item.concept.id])
                     self._answers[item.concept.id] = answer
 
     def _restore_draft(self) -> bool:

@@ -26,7 +26,7 @@ from pygments.util import ClassNotFound
 from quizzes.text.mathml import LatexError, from_latex
 
 IMAGES = {"image/svg+xml", "image/png", "image/jpeg", "image/gif", "image/webp"}
-MAX_IMAGE = 512 * 1024
+MAX_IMAGE_BYTES = 512 * 1024
 """Largest image in bytes: it travels inside the widget's state."""
 
 
@@ -157,6 +157,6 @@ def data_uri(source: str, folder: Path) -> str:
         content = path.read_bytes()
     except OSError as error:
         raise RenderError(f"the image '{source}' cannot be read ({error.strerror})") from None
-    if len(content) > MAX_IMAGE:
-        raise RenderError(f"the image '{source}' is larger than {MAX_IMAGE // 1024} kB")
+    if len(content) > MAX_IMAGE_BYTES:
+        raise RenderError(f"the image '{source}' is larger than {MAX_IMAGE_BYTES // 1024} kB")
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"

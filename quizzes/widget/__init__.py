@@ -15,7 +15,7 @@ import traitlets
 
 from quizzes.errors import QuizError
 from quizzes.taking.quiz_core import QuizCore
-from quizzes.widget import view
+from quizzes.widget import widget_state
 
 _HERE = Path(__file__).parent
 
@@ -117,9 +117,9 @@ class QuizWidget(anywidget.AnyWidget):
         with self.hold_sync():
             if shown != self._shown:  # rendering takes a moment, and an answer changes none of it
                 self._shown = shown
-                self.paper = view.paper_data(quiz)
+                self.paper = widget_state.paper_data(quiz)
             self.answers = {
                 str(item.number): quiz.given.get(item.concept.id, "") for item in quiz.items
             }
-            self.result = view.result_data(quiz)
+            self.result = widget_state.result_data(quiz)
             self.notice = self._trouble or quiz.notice

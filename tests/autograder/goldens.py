@@ -1,4 +1,4 @@
-"""Golden texts: what a student reads, word for word. WRITE_GOLDEN=1 writes them anew."""
+"""Golden texts: what a student reads, word for word. WRITE_GOLDEN=1 writes them again."""
 
 from __future__ import annotations
 

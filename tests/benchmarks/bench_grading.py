@@ -33,7 +33,7 @@ import nbformat
 
 from autograder import corpus
 from autograder.assignments import submission
-from autograder.assignments.build import build
+from autograder.assignments.build_notebooks import build
 from autograder.corpus import Case
 from autograder.corpus.trials import one_notebook
 from autograder.examination import points

@@ -26,7 +26,7 @@ from rclpy.qos import QoSProfile
 from std_msgs.msg import String
 
 import course
-from course.domains.leases import lease_domain
+from course.runtime.domains.leases import lease_domain
 
 Run = Callable[[Callable[[], Node]], Node]
 MESSAGES = 250  # in each part of a turn: short, so that both sides see the same load

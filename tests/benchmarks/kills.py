@@ -26,7 +26,7 @@ import nbformat
 
 from autograder import corpus
 from autograder.assignments import submission
-from autograder.assignments.build import build
+from autograder.assignments.build_notebooks import build
 from autograder.corpus.trials import one_notebook
 from autograder.gradebook.course_gradebook import Grade
 from autograder.gradebook.release import make_release

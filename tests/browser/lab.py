@@ -22,7 +22,12 @@ START_TIMEOUT = 300.0
 
 
 JUPYTERLAB = (sys.executable, "-m", "jupyterlab")
-COURSE_LAB = (sys.executable, "-c", "from course.launch import course; course()", "lab")
+COURSE_LAB = (
+    sys.executable,
+    "-c",
+    "from course.command_line.launch import course; course()",
+    "lab",
+)
 
 
 class Lab:

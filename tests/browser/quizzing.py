@@ -9,9 +9,9 @@ from typing import Any
 import nbformat.v4
 from playwright.sync_api import Locator
 
-from quizzes.attempts.answers import Answer
+from quizzes.attempts.quiz_answers import Answer
 from quizzes.bank import selection
-from quizzes.bank.selection import Item
+from quizzes.bank.selection import PaperItem
 from quizzes.notebook.quiz import Quiz
 
 from .notebook_page import NotebookPage
@@ -91,14 +91,14 @@ class Learner:
             self.page.keyboard.press("Tab")
         raise AssertionError(f"Tab never came to {selector} of question {number}")
 
-    def answer_by_keyboard(self, item: Item, answer: Answer) -> None:
+    def answer_by_keyboard(self, item: PaperItem, answer: Answer) -> None:
         kind = item.variant.kind
         {
             "single": self._choose, "predict": self._choose, "multiple": self._tick,
             "numeric": self._type, "ordering": self._order, "matching": self._match,
         }[kind](item, str(answer))  # fmt: skip
 
-    def _choose(self, item: Item, letter: str) -> None:
+    def _choose(self, item: PaperItem, letter: str) -> None:
         focused = self.tab_into(item.number, "input[type=radio]")
         if not focused.is_checked():
             self.page.keyboard.press("Space")
@@ -108,17 +108,17 @@ class Learner:
             self.page.keyboard.press("ArrowDown")
         raise AssertionError(f"no arrow leads to option {letter}")
 
-    def _tick(self, item: Item, letters: str) -> None:
+    def _tick(self, item: PaperItem, letters: str) -> None:
         for letter in letters:
             self.tab_to(self.question(item.number).locator(f'input[value="{letter}"]'))
             self.page.keyboard.press("Space")
 
-    def _type(self, item: Item, number: str) -> None:
+    def _type(self, item: PaperItem, number: str) -> None:
         self.tab_into(item.number, "input[type=number]")
         self.page.keyboard.press("Control+A")
         self.page.keyboard.type(number)
 
-    def _order(self, item: Item, letters: str) -> None:
+    def _order(self, item: PaperItem, letters: str) -> None:
         """Sort by pressing each thing up to its place, from the first on."""
         shown = list(item.letters)
         for place, letter in enumerate(letters):
@@ -143,7 +143,7 @@ class Learner:
             self.page.keyboard.press("Shift+Tab" if behind else "Tab")
         raise AssertionError(f"Tab never came to {target}")
 
-    def _match(self, item: Item, letters: str) -> None:
+    def _match(self, item: PaperItem, letters: str) -> None:
         for index, letter in enumerate(letters):
             select = self.question(item.number).locator("select").nth(index)
             self.tab_to(select)
@@ -174,11 +174,11 @@ class Learner:
         return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
 
 
-def _other_letter(item: Item, key: Answer) -> Answer:
+def _other_letter(item: PaperItem, key: Answer) -> Answer:
     return next(letter for letter in item.letters if letter not in str(key))
 
 
-def _rotated(_item: Item, key: Answer) -> Answer:
+def _rotated(_item: PaperItem, key: Answer) -> Answer:
     return str(key)[1:] + str(key)[0]
 
 

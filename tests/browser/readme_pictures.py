@@ -14,7 +14,7 @@ from playwright.sync_api import Browser
 
 from autograder import corpus
 from autograder.assignments import submission
-from autograder.class_report.report import make_report, write_report
+from autograder.class_report.report_files import make_report, write_report
 from autograder.commands import demo_command
 from course.workspace.content import content_root
 

@@ -13,8 +13,8 @@ from playwright.sync_api import Browser, Locator, expect
 from autograder import corpus
 from autograder.assignments import submission
 from autograder.examination import points
-from course.journal.progress import WELCOME
 from course.workspace.content import content_root
+from course.workspace.journal.progress import WELCOME
 
 from .lab import Lab
 from .notebook_page import NotebookPage

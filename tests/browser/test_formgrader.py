@@ -14,7 +14,7 @@ from playwright.sync_api import Browser, FrameLocator, Locator, expect
 
 from autograder import corpus
 from autograder.assignments import questions, submission
-from autograder.assignments.build import build
+from autograder.assignments.build_notebooks import build
 from autograder.corpus.trials import one_notebook
 from autograder.examination import points
 from autograder.gradebook.release import make_release
@@ -24,7 +24,7 @@ from .lab import Lab, until
 from .notebook_page import NotebookPage
 
 pytestmark = [
-    pytest.mark.timeout(900), pytest.mark.xdist_group("browser"),
+    pytest.mark.timeout(900), pytest.mark.xdist_group("browser: grading"),
     needs_sandbox,
 ]  # fmt: skip
 

@@ -19,7 +19,7 @@ from playwright.sync_api import Browser, BrowserContext, Page, expect
 
 from autograder import corpus
 from autograder.assignments import submission
-from autograder.assignments.build import build
+from autograder.assignments.build_notebooks import build
 from autograder.corpus.trials import one_notebook
 from autograder.examination import points
 from autograder.gradebook.release import make_release
@@ -29,7 +29,7 @@ from tests.machine import needs_sandbox
 from .lab import Lab, until
 
 pytestmark = [
-    pytest.mark.timeout(900), pytest.mark.xdist_group("browser"),
+    pytest.mark.timeout(900), pytest.mark.xdist_group("browser: grading"),
     needs_sandbox,
 ]  # fmt: skip
 

@@ -8,17 +8,17 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, expect
 
-from autograder.assignments.questions import Question
+from autograder.assignments.questions import GradedQuestion
 from autograder.gradebook.written_answers import answers_page
 from autograder.gradebook.written_answers.answers import COLUMNS, Answer, Answers
 
-pytestmark = pytest.mark.xdist_group("browser")
+pytestmark = pytest.mark.xdist_group("browser: grading")
 
 EVIL = '</script><script>document.title = "run"</script>'
 
 
 def test_marks_are_filled_in_kept_and_saved(browser: Browser, tmp_path: Path) -> None:
-    question = Question("qos-design", "qos-loss", "A lost frame", True, 1.0, model="Nobody.")
+    question = GradedQuestion("qos-design", "qos-loss", "A lost frame", True, 1.0, model="Nobody.")
     answers = (
         Answer("ann", "Ann", f"=1+1 {EVIL}", None, "", True, "s1"),
         Answer("-dan", "Dan", 'Two\nlines, "quoted"', None, "", True, "s2"),

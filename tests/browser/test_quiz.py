@@ -14,7 +14,7 @@ from playwright.sync_api import expect
 
 from quizzes.bank import selection
 from quizzes.bank.loader import load_bank, read_bank
-from quizzes.marking import closing, regrade
+from quizzes.marking import closed_quizzes, regrade
 from quizzes.notebook.quiz import Quiz
 from quizzes.text import rendering
 from tests.quizzes import sample
@@ -23,7 +23,7 @@ from .conftest import OpenNotebook
 from .lab import Lab
 from .quizzing import STUDENT, Learner, write_notebook
 
-pytestmark = [pytest.mark.timeout(900), pytest.mark.xdist_group("browser")]
+pytestmark = [pytest.mark.timeout(900), pytest.mark.xdist_group("browser: grading")]
 
 Sit = Callable[..., Learner]
 
@@ -44,7 +44,9 @@ def sit(
         bank = load_bank(quiz) if real else read_bank(sample.write(banks, data))
         path = write_notebook(lab.work / name, None if real or closed else banks, quiz, attempts)
         if closed:
-            (path.parent / closing.sheet_filename(quiz)).write_text(closing.make_sheet(bank))
+            (path.parent / closed_quizzes.sheet_filename(quiz)).write_text(
+                closed_quizzes.make_sheet(bank)
+            )
             shutil.copytree(banks / "assets", path.parent / "assets")
         window = open_notebook(path.relative_to(lab.work))
         learner = Learner(window, Quiz(bank, student=STUDENT, folder=tmp_path / "elsewhere"))

@@ -206,7 +206,9 @@ def test_a_cell_that_runs_again_has_one_live_view(open_cells: Open) -> None:
     expect(old).to_contain_text("not live: run this cell again")
     expect(old).to_be_visible()
     page.write_cell(
-        2, "from course.views.shelf import shelf_of\nprint(len(shelf_of(session)._views))"
+        2,
+        "from course.views.shared.view_registry import registry_of\n"
+        "print(len(registry_of(session)._views))",
     )
     page.run_cell(2)
     expect(page.cell(2)).to_contain_text("2")

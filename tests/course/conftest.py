@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 import course
-from course.domains import neighbours
+from course.runtime.domains import domain_discovery
 
 
 @pytest.fixture(autouse=True)
 def _nobody_next_door(monkeypatch: pytest.MonkeyPatch) -> None:
     """Keep a diagnosis from finding what another test offers, which runs at the same time."""
-    monkeypatch.setattr(neighbours, "DOMAINS", ())
+    monkeypatch.setattr(domain_discovery, "DOMAINS", ())
 
 
 @pytest.fixture

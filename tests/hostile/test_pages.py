@@ -1,4 +1,4 @@
-"""Attacks on whoever looks at a hand-in, and on the one process that makes its pages.
+"""Attacks on anyone who looks at a hand-in, and on the one process that makes its pages.
 
 They are whole notebooks, handed in beside an honest one and graded as a class is. Each has a right
 solution, whose points it must keep: what stands beside a solution takes nothing from it.

@@ -24,9 +24,10 @@ from autograder.examination.program import Cell
 from autograder.running import runner, start
 from autograder.running.runner import Outcome
 from autograder.running.start import ExaminerError, ExaminerProcess
-from autograder.sandbox import limits, view, warmth
-from autograder.sandbox.limits import MIB, Limits
-from autograder.sandbox.prefork.task import Task
+from autograder.sandbox import resource_limits, warm_starts
+from autograder.sandbox.confinement import visible_files
+from autograder.sandbox.prefork.fork_request import ForkRequest
+from autograder.sandbox.resource_limits import MIB, Limits
 from tests.machine import needs_isolation, needs_warm_starts
 
 EXAMINED = (Cell("x = 1"), Cell("", "qos-visible", "qos", "visible"))
@@ -165,14 +166,14 @@ def take(monkeypatch: pytest.MonkeyPatch, program: str, *, warm: bool) -> None:
         monkeypatch.setattr(start, "python_module", SimpleNamespace(command=lambda _: command))
         return
 
-    def task(module: str, arguments: list[str], *rest: Any, **options: Any) -> Task:
-        if module == warmth.EXAMINER:
+    def task(module: str, arguments: list[str], *rest: Any, **options: Any) -> ForkRequest:
+        if module == warm_starts.EXAMINER:
             # A module of Python's own whose main() runs what it is given.
             line = f"import sys; sys.argv[1:] = {arguments!r}; exec({program!r}, {{}})"
             module, arguments = "timeit", ["-n1", "-r1", "--", line]
-        return Task(module, arguments, *rest, **options)
+        return ForkRequest(module, arguments, *rest, **options)
 
-    monkeypatch.setattr(warmth, "Task", task)
+    monkeypatch.setattr(warm_starts, "ForkRequest", task)
 
 
 def examine(hidden: Sequence[Path] = ()) -> Outcome:
@@ -192,7 +193,7 @@ def test_a_taken_examiner_reaches_nothing_and_lies_about_its_own_submission(
         local.listen()
         names = {
             "PORT": port, "PLACES": places, "ROOT": str(tmp_path), "GRADES": GRADES,
-            "REQUESTS": REQUESTS, "SCRATCH": list(map(str, view.SCRATCH)),
+            "REQUESTS": REQUESTS, "SCRATCH": list(map(str, visible_files.SCRATCH)),
             "LARGE": ["/usr", "/proc", sys.prefix, sys.base_prefix],
             "LIMITS": ["RLIMIT_DATA", "RLIMIT_NPROC", "RLIMIT_NOFILE", "RLIMIT_AS", "RLIMIT_CPU"],
         }  # fmt: skip
@@ -210,7 +211,7 @@ def test_a_taken_examiner_reaches_nothing_and_lies_about_its_own_submission(
     found = json.loads(verdict.notes[0])
     refused = {"OSError", "PermissionError", "FileNotFoundError"}
 
-    scratch = {str(path) for path in view.SCRATCH}
+    scratch = {str(path) for path in visible_files.SCRATCH}
     assert all(p in scratch or p.startswith("/dev/") for p in found["writable"]), found["writable"]
     assert refused.issuperset([*found["written"], *found["made"]]), found
     assert (found["root"], found["seen"]) == ("FileNotFoundError", [])
@@ -251,7 +252,9 @@ signal.pause()
 def test_a_taken_examiner_that_uses_too_much_is_ended(
     program: str, warm: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(limits, "EXAMINER_MEMORY", 1000 * MIB)  # more than one of them takes
+    monkeypatch.setattr(
+        resource_limits, "EXAMINER_MEMORY", 1000 * MIB
+    )  # more than one of them takes
     take(monkeypatch, program, warm=warm)
     began = time.monotonic()
     outcome = examine()

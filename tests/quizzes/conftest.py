@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from quizzes.attempts.answers import Answer
+from quizzes.attempts.quiz_answers import Answer
 from quizzes.bank import selection
 from quizzes.bank.contents import Bank
 from quizzes.bank.loader import read_bank
-from quizzes.bank.selection import Item
+from quizzes.bank.selection import PaperItem
 from quizzes.notebook.quiz import Quiz
 
 from . import sample
@@ -36,7 +36,7 @@ def make_quiz(bank: Bank, tmp_path: Path) -> MakeQuiz:
     return make
 
 
-def wrong(item: Item) -> Answer:
+def wrong(item: PaperItem) -> Answer:
     """Return an answer that is complete and earns nothing."""
     kind, key = item.variant.kind, selection.right_answer(item)
     if kind == "numeric":

@@ -15,11 +15,11 @@ from typing import Any
 
 from filelock import FileLock
 
-from autograder.assignments.intake import folder_digest
-from autograder.assignments.intake.file_names import find_entry, normalise_name
-from autograder.assignments.intake.handed_in import HandedIn
-from autograder.assignments.submission import MAX_NOTEBOOK
-from autograder.util.files import write_whole
+from autograder.assignments.intake.handed_files import folder_digest
+from autograder.assignments.intake.handed_files.file_names import find_entry, normalise_name
+from autograder.assignments.intake.handed_files.handed_in import HandedIn
+from autograder.assignments.submission import MAX_NOTEBOOK_BYTES
+from autograder.util.work_files import write_whole
 from course.errors import CourseError
 
 FILE = "claims.json"
@@ -54,7 +54,7 @@ def digest_state(folder: Path, handed_in: HandedIn, proper: str, file: str) -> s
     if not file:
         return folder_digest.of_folder(folder)
     item = handed_in.find_item(file)
-    content = item.digest(MAX_NOTEBOOK + 1) if item else ""
+    content = item.digest(MAX_NOTEBOOK_BYTES + 1) if item else ""
     there = (
         folder_digest.of_folder(find_entry(folder, proper))
         if find_entry(folder, proper).is_file()

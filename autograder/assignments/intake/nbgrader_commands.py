@@ -1,4 +1,4 @@
-"""The same for nbgrader's own commands, which look for notebooks by their names alone.
+"""The intake for nbgrader's own commands, which look for notebooks by their names alone.
 
 nbgrader gives zero points, for good, for a notebook that is not there under its own name. Where it
 may lie there under another, `autograder grade` takes it or asks; here it is asked about.
@@ -14,9 +14,9 @@ from nbgrader.api import Gradebook
 from nbgrader.coursedir import CourseDirectory
 
 from autograder.assignments.intake import claim_records, open_questions
-from autograder.assignments.intake.file_names import find_entry, quote_name
-from autograder.assignments.intake.handed_in import handed_out
-from autograder.assignments.intake.notebooks import Intake, UnclearError
+from autograder.assignments.intake.handed_files.file_names import find_entry, quote_name
+from autograder.assignments.intake.handed_files.handed_in import handed_out
+from autograder.assignments.intake.notebook_search import Intake, UnclearError
 from autograder.assignments.submission import SubmissionError
 
 
@@ -72,6 +72,6 @@ def ask_about(
         grades = gradebook.find_submission_notebook(name, assignment, student).grades
         for grade in grades:
             grade.needs_manual_grade = True
-        question = open_questions.Question(why, tuple(grade.name for grade in grades))
+        question = open_questions.OpenQuestion(why, tuple(grade.name for grade in grades))
         open_questions.keep_question(work, assignment, student, name, question)
     gradebook.db.commit()

@@ -18,7 +18,7 @@ KIND = "question"
 
 
 @dataclass(frozen=True)
-class Question:
+class OpenQuestion:
     """What is not clear about one notebook of a student, and the ``cells`` that it is about."""
 
     why: str
@@ -26,7 +26,7 @@ class Question:
 
 
 def keep_question(
-    work: Path, assignment: str, student: str, notebook: str, question: Question | None
+    work: Path, assignment: str, student: str, notebook: str, question: OpenQuestion | None
 ) -> None:
     """Keep the question about a notebook, or that there is none; raises OSError if it cannot."""
     table = StateTable(work, KIND, assignment)
@@ -36,18 +36,18 @@ def keep_question(
         table.put(json.dumps(asdict(question)), student, notebook)
 
 
-def of_assignment(work: Path, assignment: str) -> dict[str, dict[str, Question]]:
+def of_assignment(work: Path, assignment: str) -> dict[str, dict[str, OpenQuestion]]:
     """Return {student: {notebook: question}}."""
-    found: dict[str, dict[str, Question]] = {}
+    found: dict[str, dict[str, OpenQuestion]] = {}
     for (student, notebook), text in StateTable(work, KIND, assignment).rows().items():
         data = json.loads(text)
-        question = Question(str(data["why"]), tuple(map(str, data["cells"])))
+        question = OpenQuestion(str(data["why"]), tuple(map(str, data["cells"])))
         found.setdefault(student, {})[notebook] = question
     return found
 
 
 def open_ones(
-    questions: Mapping[str, Question], waiting: Mapping[str, Collection[str]]
+    questions: Mapping[str, OpenQuestion], waiting: Mapping[str, Collection[str]]
 ) -> dict[str, str]:
     """Return {notebook: why} of the questions of which a cell is among those ``waiting``."""
     return {

@@ -1,4 +1,4 @@
-"""Whose work lies in ``submitted/``, and which folders there cannot be what they should be."""
+"""Find whose work lies in ``submitted/``, and which folders there are not what they should be."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from datetime import datetime
 from pathlib import Path
 
 from autograder.assignments.intake import times
-from autograder.assignments.intake.file_names import (
+from autograder.assignments.intake.handed_files.file_names import (
     find_entry,
     join_names,
     match_name,
     printable_name,
 )
-from autograder.assignments.intake.handed_in import is_junk
+from autograder.assignments.intake.handed_files.handed_in import is_junk
 from autograder.assignments.intake.times import UnclearTimeError
-from autograder.util.files import walk_files
+from autograder.util.work_files import walk_files
 from course.util.close_matches import is_it
 from quizzes.attempts.record import read_plain
 
 GLOB = "*?[]"
 HTML = '<>"'
-LONGEST_ID = 128
+MAX_ID_CHARS = 128
 """Characters of a student id in nbgrader's gradebook."""
 
-LONGEST_TIME = 200
+MAX_TIME_BYTES = 200
 """Bytes of a ``timestamp.txt``; a date has some thirty."""
 
 COPYING = (".part", ".partial", ".filepart", ".crdownload", ".tmp")
@@ -129,8 +129,8 @@ def read_timestamp(file: Path, zone: str = "") -> str | None:
 
 
 def _read_time(file: Path, zone: str) -> datetime:
-    content = read_plain(file, LONGEST_TIME + 1)
-    if len(content) > LONGEST_TIME:
+    content = read_plain(file, MAX_TIME_BYTES + 1)
+    if len(content) > MAX_TIME_BYTES:
         raise ValueError("too long")
     return times.parse_time(content.decode("utf-8-sig").strip(), zone)
 
@@ -239,10 +239,10 @@ def _bad_id(student: str) -> str:
         return (
             f"The folder name {student!a} has characters that nobody can read: rename the folder."
         )
-    if len(student) > LONGEST_ID:
+    if len(student) > MAX_ID_CHARS:
         return (
-            f"A student id has at most {LONGEST_ID} characters in the gradebook, and this folder's "
-            f"name {len(student)}: rename the folder."
+            f"A student id has at most {MAX_ID_CHARS} characters in the gradebook, and this "
+            f"folder's name {len(student)}: rename the folder."
         )
     return ""
 

@@ -1,4 +1,4 @@
-"""When a submission was handed in, read as the one who wrote it meant it.
+"""Read when a submission was handed in, as the person or program that wrote the time meant it.
 
 nbgrader's own reader takes a zone that it does not know for UTC (``CEST``, ``PST``) and ``+0100``
 for a hundred seconds: an hour or two by which a student is late, or not. Here a time has one

@@ -7,9 +7,9 @@ Import, CSV file): any columns, mapped by hand, one of which identifies the user
 no grade here, too, and one row of a user it does not know makes it refuse the whole file.
 
 So both files have everybody whom nbgrader's gradebook knows, and nobody else, and a cell stays
-empty as long as there is no final grade. Who has handed in nothing has no grade either: that it
-counts as 0 is a rule of the course, which Canvas (its policy for missing submissions) and Moodle
-("exclude empty grades") each apply by themselves, and an illness or an extension is known to
+empty as long as there is no final grade. A student who has handed in nothing has no grade either:
+that it counts as 0 is a rule of the course, which Canvas (its policy for missing submissions) and
+Moodle ("exclude empty grades") each apply by themselves, and an illness or an extension is known to
 neither of us. A course in which it is a 0 asks for it.
 """
 
@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from autograder.class_report.collect import ClassData, Person
+from autograder.class_report.class_data import ClassData, Person
 from autograder.gradebook.course_gradebook import Grade
 from autograder.util.csv_text import as_csv, guard_text, is_formula
 
@@ -97,7 +97,7 @@ def _make_export(data: ClassData, rows: list[Sequence[str]], points: Mapping[str
 
 
 def _known_people(data: ClassData) -> list[Person]:
-    """Return whom the gradebook knows; a folder of somebody else is no participant anywhere."""
+    """Return the students in the gradebook: nobody else is a participant anywhere."""
     graded = {grade.student: Person(grade.student) for grade in data.grades}
     return [person for _, person in sorted({**graded, **data.people}.items())]
 

@@ -22,10 +22,10 @@ import nbformat
 from nbformat.v4 import new_markdown_cell
 
 from autograder.assignments import submission
-from autograder.assignments.intake import notebooks, roster
-from autograder.assignments.intake.archives import ArchiveError
+from autograder.assignments.intake import notebook_search, roster
+from autograder.assignments.intake.handed_files.archives import ArchiveError
 from autograder.assignments.submission import SubmissionError
-from autograder.class_report import collect
+from autograder.class_report import class_data
 from autograder.class_report.platforms import platform_names
 from autograder.class_report.platforms.platform_names import NamesError, Participant
 from autograder.gradebook.course_gradebook import CourseGradebook
@@ -58,10 +58,10 @@ def pack_feedback(root: Path, assignment: str, platform: Platform, names: Path, 
 
     Raises:
         NamesError: ``names`` cannot be read, or nobody in it has feedback.
-        InsightError: there is no such assignment, or nothing of it is graded.
+        ClassReportError: there is no such assignment, or nothing of it is graded.
         OSError: the archive cannot be written; what stood there before still does.
     """
-    data = collect.collect_class(root, assignment)
+    data = class_data.collect_class(root, assignment)
     graded = [grade.student for grade in data.grades]
     read = {"moodle": platform_names.of_moodle, "canvas": platform_names.of_canvas}[platform]
     submitted = {student: _handed_in(root, student, assignment) for student in graded}
@@ -129,7 +129,7 @@ def _notebooks_by_digest(root: Path, sheet: Sheet) -> dict[str, str]:
         with suppress(SubmissionError):  # then names have to do
             name = exercise.notebook
             released[name] = submission.read_notebook(release / f"{name}.ipynb")
-    found = notebooks.of_student(root, sheet.assignment, sheet.student, released)
+    found = notebook_search.of_student(root, sheet.assignment, sheet.student, released)
     taken: dict[str, str] = {}
     for name in released:
         with suppress(SubmissionError, ArchiveError, OSError):
@@ -184,7 +184,7 @@ def _feedback_pages(root: Path, student: str, assignment: str) -> list[Path]:
 def _handed_in(root: Path, student: str, assignment: str) -> list[Path]:
     folder = roster.student_folder(root, student) / assignment
     files = (path for path in folder.rglob("*") if path.is_file() and not path.is_symlink())
-    return [path for path in files if path.stat().st_size <= platform_names.MAX_FILE]
+    return [path for path in files if path.stat().st_size <= platform_names.MAX_FILE_BYTES]
 
 
 def _add_member(archive: zipfile.ZipFile, name: str, content: bytes) -> int:

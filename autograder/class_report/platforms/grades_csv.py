@@ -7,7 +7,7 @@ from pathlib import Path
 
 from autograder.gradebook.course_gradebook import Grade
 from autograder.util.csv_text import as_csv, guard_text
-from autograder.util.files import write_whole
+from autograder.util.work_files import write_whole
 
 HEAD = ("assignment", "student_id", "score", "max_score", "needs_manual_grade")
 LATE = ("total_seconds_late", "late_submission_penalty")

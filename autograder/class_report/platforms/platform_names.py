@@ -1,4 +1,4 @@
-"""Whose file is whose: the names that Moodle and Canvas give to what can be downloaded there.
+"""Match files to students by the names that Moodle and Canvas give to what can be downloaded there.
 
 Both take feedback back by these names alone. They hold numbers that only the platform knows, so the
 names have to come from there: from the archive of submissions as it was downloaded, or, for Moodle,
@@ -24,12 +24,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from autograder.class_report.collect import Person
+from autograder.class_report.class_data import Person
 from course.errors import CourseError
 
 MAX_MEMBERS = 100_000
 """Most files in an archive that is read; 5,000 students with 20 files each have so many."""
-MAX_FILE = 50 * 1024 * 1024
+MAX_FILE_BYTES = 50 * 1024 * 1024
 """Bytes of a file beyond which its content is not looked at."""
 
 _PARTICIPANT = re.compile(r"(\d+)\s*$")
@@ -66,7 +66,7 @@ class Participant:
 
 @dataclass(frozen=True)
 class Matched:
-    """Who is who: {student: participant}, and the participants whom nobody could be found for."""
+    """Matches: {student: participant}, and the participants for whom no student could be found."""
 
     who: Mapping[str, Participant]
     unknown: tuple[str, ...]
@@ -125,7 +125,7 @@ def match_participants(
     people: Mapping[str, Person],
     submitted: Mapping[str, Iterable[Path]],
 ) -> Matched:
-    """Return who is who.
+    """Match participants to students.
 
     Args:
         participants: those of a download.
@@ -181,7 +181,7 @@ def _read_files(path: Path) -> Iterator[tuple[str, File]]:
     try:
         if path.is_dir():
             for file in sorted(p for p in path.rglob("*") if p.is_file() and not p.is_symlink()):
-                content = file.read_bytes() if file.stat().st_size <= MAX_FILE else b""
+                content = file.read_bytes() if file.stat().st_size <= MAX_FILE_BYTES else b""
                 name = file.relative_to(path).as_posix()
                 yield name, File(name, _packed_digests(content))
             return
@@ -190,7 +190,7 @@ def _read_files(path: Path) -> Iterator[tuple[str, File]]:
             if len(members) > MAX_MEMBERS:
                 raise NamesError(f"{path.name} has more than {MAX_MEMBERS} files.")
             for member in members:
-                content = archive.read(member) if member.file_size <= MAX_FILE else b""
+                content = archive.read(member) if member.file_size <= MAX_FILE_BYTES else b""
                 yield member.filename, File(member.filename, _packed_digests(content))
     except (OSError, zipfile.BadZipFile, RuntimeError, NotImplementedError, EOFError) as error:
         raise NamesError(f"{path} cannot be read as a zip archive or folder ({error}).") from None
@@ -202,7 +202,7 @@ def _packed_digests(content: bytes) -> frozenset[str]:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             for member in archive.infolist()[:1000]:
-                if not member.is_dir() and member.file_size <= MAX_FILE:
+                if not member.is_dir() and member.file_size <= MAX_FILE_BYTES:
                     found.add(_digest_content(archive.read(member)))
     except Exception:  # noqa: BLE001 - a stranger's file, which need be no archive
         return frozenset(found)

@@ -1,7 +1,7 @@
-"""In which line a process is stuck that does not answer any more: it tells so on a signal.
+"""Find the line in which a process is stuck: the process writes it when it gets a signal.
 
-What a subject says is written where a stranger's code runs. So it is no evidence: it only helps
-whoever looks for the mistake.
+What a subject says is written where a stranger's code runs. So it is no evidence: it only helps to
+find the mistake.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def of_first_thread(dump: str, runs: tuple[str, str]) -> list[Frame]:
 
 
 def describe_frames(frames: list[Frame]) -> str:
-    """Return the innermost of some frames in a line, for whoever looks for our own mistake."""
+    """Return the innermost of some frames in a line, to help find our own mistake."""
     return " < ".join(f"{Path(f.file).name}:{f.line} {f.function}" for f in frames[:6])
 
 

@@ -1,4 +1,4 @@
-"""What is kept of a cell's outputs: notebook format, within bounds, whoever made them.
+"""What is kept of a cell's outputs: notebook format, within bounds, no matter who made them.
 
 A subject builds them of what its cells send, and the grader takes nothing else from it.
 """
@@ -12,13 +12,13 @@ from typing import Any
 
 Output = dict[str, Any]
 
-MAX_TEXT = 64 * 1024
+MAX_TEXT_CHARS = 64 * 1024
 """Characters kept of each stream of a cell, and of an error; a flood is cut, and says so."""
 
-MAX_SHOWN = 1024 * 1024
+MAX_SHOWN_BYTES = 1024 * 1024
 """Bytes kept of what a cell displays, as JSON: some thirty plots."""
 
-MAX_NOTEBOOK = 8 * 1024 * 1024
+MAX_NOTEBOOK_CHARS = 8 * 1024 * 1024
 """Characters of outputs, as JSON, that are kept of a notebook."""
 
 CUT = "[further outputs were cut off here]\n"
@@ -44,7 +44,7 @@ def shortened_text(text: str, dropped: int) -> str:
 
 def error_output(name: Any, value: Any, lines: Iterable[Any]) -> Output:
     """Return an output that is an error: its type, its message, and its traceback."""
-    kept, room = [], MAX_TEXT
+    kept, room = [], MAX_TEXT_CHARS
     for line in map(str, lines):
         kept.append(_shorten_text(line, room))
         room -= len(line)
@@ -52,7 +52,7 @@ def error_output(name: Any, value: Any, lines: Iterable[Any]) -> Output:
             break
     return {
         "output_type": "error", "ename": str(name)[:200],
-        "evalue": _shorten_text(str(value), MAX_TEXT), "traceback": kept,
+        "evalue": _shorten_text(str(value), MAX_TEXT_CHARS), "traceback": kept,
     }  # fmt: skip
 
 
@@ -141,7 +141,7 @@ def _is_score(output: Output, points: float) -> bool:
         return False
 
 
-class Notebook:
+class OutputNotebook:
     """The outputs of all cells of a notebook, within bounds."""
 
     def __init__(self, cells: list[list[Output]]) -> None:
@@ -153,7 +153,7 @@ class Notebook:
     def put_outputs(self, number: int, outputs: list[Output]) -> None:
         """Have a cell show these outputs; of those that are too many, what it raised is left."""
         self._sizes[number] = len(json.dumps(outputs))
-        if sum(self._sizes) > MAX_NOTEBOOK:
+        if sum(self._sizes) > MAX_NOTEBOOK_CHARS:
             self.cut = True
             outputs = only_error(outputs)
             self._sizes[number] = len(json.dumps(outputs))

@@ -1,4 +1,4 @@
-"""A notebook's nodes as a plain program of rclpy: no session, no harness, nobody who asks.
+"""A notebook's nodes as a plain program of rclpy: no session, no subject server, no requests.
 
 What an exam learns of it, it sees from outside. A callback that raises ends the program; where each
 node has its own executor, it ends that node. SIGINT destroys the nodes, as Ctrl-C does. The program

@@ -2,7 +2,7 @@
 
 Started as ``python -P -m autograder.examination.subject.process --engine FD --control FD --domain
 N``. It says that it is ready; the engine sends the program over its channel, the examiner drives
-the harness over the control channel whenever the program comes to an exam. Nothing that this
+the subject server over the control channel whenever the program comes to an exam. Nothing that this
 process says about itself earns a point.
 """
 
@@ -24,9 +24,9 @@ from autograder.examination.subject.server import SubjectServer
 from autograder.examination.subject.shell import make_kernel
 from autograder.examination.subject.student_errors import SUBJECT_ENV
 from autograder.processes.channel import Channel, ChannelClosed
-from autograder.sandbox.limits import Limits
-from course.domains.leases import reserve_domain
+from autograder.sandbox.resource_limits import Limits
 from course.runtime.core_session import CoreSession
+from course.runtime.domains.leases import reserve_domain
 
 SHELL = (
     "IPython.core.application", "IPython.core.completer", "IPython.core.completerlib",
@@ -142,7 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ChannelClosed:
         return 1
     finally:
-        if lease is not None:  # else whoever runs the exam on this machine has leased it
+        if lease is not None:  # else the process that runs the exam has leased it
             lease.release()
     return 0
 

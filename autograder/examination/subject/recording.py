@@ -15,8 +15,8 @@ from typing import Any
 
 from autograder.examination.subject.outputs import (
     CUT,
-    MAX_SHOWN,
-    MAX_TEXT,
+    MAX_SHOWN_BYTES,
+    MAX_TEXT_CHARS,
     Output,
     displayable_data,
     error_output,
@@ -28,7 +28,7 @@ from autograder.examination.subject.outputs import (
     stream_output,
 )
 
-_OVERHEAD = 1000  # bytes that an output counts as, beside what is in it
+_OVERHEAD_BYTES = 1000  # bytes that an output counts as, beside what is in it
 _VIEW = "application/vnd.jupyter.widget-view+json"
 MAX_WIDGETS = 1000
 """`Output` widgets of a notebook; what is printed within more of them is the cell's own."""
@@ -58,8 +58,8 @@ class _Area:
         self.entries: list[_Entry] = []
         self.changed = True
         self._clear_first = False
-        self._room, self._cut = MAX_SHOWN, False
-        self._left = {"stdout": MAX_TEXT, "stderr": MAX_TEXT}
+        self._room, self._cut = MAX_SHOWN_BYTES, False
+        self._left = {"stdout": MAX_TEXT_CHARS, "stderr": MAX_TEXT_CHARS}
         self._dropped = {"stdout": 0, "stderr": 0}
         self._last_error: _Entry | None = None
 
@@ -90,7 +90,7 @@ class _Area:
         if self._clear_first:
             self.clear()
         self.changed = True
-        self._room -= _OVERHEAD + json_size(entry.output)
+        self._room -= _OVERHEAD_BYTES + json_size(entry.output)
         if self._room >= 0:
             self.entries.append(entry)
             return
@@ -220,7 +220,7 @@ def _seen_in(area: _Area, widgets: Mapping[str, _Area]) -> set[int]:
 def _bounded_outputs(area: _Area, widgets: Mapping[str, _Area]) -> list[Output]:
     """Return the outputs of an area as one list that is not too long for a message."""
     outputs: list[Output] = []
-    room = MAX_SHOWN + 2 * MAX_TEXT
+    room = MAX_SHOWN_BYTES + 2 * MAX_TEXT_CHARS
     for one in _flatten_outputs(area, widgets, ()):
         room -= json_size(one)
         if room < 0:

@@ -1,7 +1,7 @@
 """The subject's side of an exam: makes nodes of the student's classes when the examiner asks.
 
-The harness lives in the student's process, so nothing it says is evidence: it only carries out
-requests, and the examiner believes what it observes on DDS.
+The subject server lives in the student's process, so nothing it says is evidence: it only carries
+out requests, and the examiner believes what it observes on DDS.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from course.runtime.context.context import default_context_beside
 from course.runtime.core_session import CoreSession
 from course.runtime.teardown import destroy_leftovers
 
-MAX_VALUE = 64 * 1024
+MAX_VALUE_CHARS = 64 * 1024
 """Characters of JSON that a value or a returned object may have."""
 
-MAX_TOLD = 500
+MAX_NOTES = 500
 """Characters that are told of the error of a cell."""
 
 LAST_CALLBACKS_S = 0.5  # that callbacks of an exam's earlier session are given to end
@@ -299,7 +299,7 @@ def _cell_error(missing: str) -> str:
     if error is None or (isinstance(error, NameError) and error.name == missing):
         return ""
     which = "last" if error is last else "first"
-    return f" The {which} error of a cell was {describe_error(error)[:MAX_TOLD].rstrip('.')}."
+    return f" The {which} error of a cell was {describe_error(error)[:MAX_NOTES].rstrip('.')}."
 
 
 def _close_session(session: CoreSession) -> None:
@@ -315,6 +315,8 @@ def _close_session(session: CoreSession) -> None:
 def _as_json(value: Any) -> Any:
     """Return a copy of ``value`` as JSON knows it; raises TypeError or ValueError if it cannot."""
     text = json.dumps(value)
-    if len(text) > MAX_VALUE:
-        raise ValueError(f"{len(text)} characters are more than the {MAX_VALUE} that are read")
+    if len(text) > MAX_VALUE_CHARS:
+        raise ValueError(
+            f"{len(text)} characters are more than the {MAX_VALUE_CHARS} that are read"
+        )
     return json.loads(text)

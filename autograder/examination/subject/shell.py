@@ -26,8 +26,8 @@ from jupyter_client.session import Session
 from traitlets import Instance, Type
 from traitlets.config import Config
 
+from autograder.examination.subject.captured_output import Publisher, replace_streams
 from autograder.examination.subject.recording import Message, Recording
-from autograder.examination.subject.streams import Publisher, replace_streams
 
 # Nobody debugs at grading. ipykernel would import debugpy: 30 MB, and half a second.
 sys.modules.setdefault("debugpy", None)  # type: ignore[arg-type]  # what Python takes for missing

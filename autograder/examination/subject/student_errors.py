@@ -21,7 +21,7 @@ SUBJECT_ENV = "AUTOGRADER_SUBJECT"
 """Set in a subject: `autograder.check` in a student's own cell then has nothing to do."""
 
 TRACE_LINES = 6
-_KEPT = 50  # errors of threads: one that is started again and again must not fill the memory
+_KEPT_ERRORS = 50  # errors of threads: one that is started again and again must not fill the memory
 
 _STDLIB = str(sysconfig.get_path("stdlib"))
 _INSTALLED = tuple({sysconfig.get_path(name) for name in ("purelib", "platlib")})
@@ -127,7 +127,7 @@ class ThreadError(NamedTuple):
 
 
 class ThreadErrors:
-    """Within its block, notes what ends threads; whoever heard of it before still does.
+    """Within its block, notes what ends threads; the hook that was set before is still called.
 
     Python only prints it to standard error, where nobody reads it.
     """
@@ -153,7 +153,7 @@ class ThreadErrors:
             threading.excepthook = self._before
 
     def _note_error(self, args: threading.ExceptHookArgs) -> None:
-        if args.exc_value is not None and len(self.items) < _KEPT:
+        if args.exc_value is not None and len(self.items) < _KEPT_ERRORS:
             name = args.thread.name if args.thread is not None else ""
             self.items.append(ThreadError(name, time.time(), args.exc_value))
         self._before(args)

@@ -2,8 +2,8 @@
 
 A thread that sleeps for a time it was given (``time.sleep``, ``Event.wait(1.0)``, a time-out of
 rclpy's) is in a system call with a time in it; one that waits for the node's clock, a message or
-another callback is in one without. Naps are let be: whoever looks at the node's clock in between
-waits by that.
+another callback is in one without. Naps do not count: a callback that looks at the node's clock in
+between waits by that clock.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterable
 from pathlib import Path
 
-from course.runtime.callbacks.idleness import Look, look_at
+from course.runtime.callbacks.idleness import ThreadSample, look_at
 from course.runtime.executor.blocked import BlockedCallback
 
 NAP_S = 0.1
@@ -56,7 +56,7 @@ def wall_waits(callbacks: Iterable[BlockedCallback]) -> list[str]:
     return [_describe_wait(one) for one in (*named, *(one for one, _, _ in asleep))]
 
 
-def _sleeps_on(native_id: int, before: Look) -> bool:
+def _sleeps_on(native_id: int, before: ThreadSample) -> bool:
     look = look_at(native_id, before)
     return look.asleep and look.switches == before.switches
 

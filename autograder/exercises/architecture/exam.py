@@ -37,8 +37,8 @@ from autograder.exercises.architecture.traces import (
     see_scan_arrive,
 )
 from autograder.exercises.architecture.tracing import POURS, GoalRejectedError
-from autograder.observe.marked_types import UnknownTypeError, load_type
-from course.design import dye
+from autograder.observe.marked_types import TypeNotInstalledError, load_type
+from course.design import message_tags
 from course.errors import WaitTimeout
 
 EXAM: Exam[ArchitectureRig] = Exam("architecture", architecture_rig)
@@ -365,12 +365,12 @@ def goal_reaches_motors(rig: ArchitectureRig) -> None:
     name = rig.graph.get_action(ACTION).type
     try:
         action_type = load_type(name)
-    except UnknownTypeError:
+    except TypeNotInstalledError:
         raise Failed(
             expected=expected,
             actual=f"{ACTION} is of type {name}, which is not installed where the examiner runs.",
         ) from None
-    if not dye.has_room(action_type.Goal):
+    if not message_tags.has_room(action_type.Goal):
         raise Failed(expected=expected, actual=f"A goal of {name} holds neither number nor text.")
     try:
         poured = rig.colour_goal(ACTION, action_type, [MOTORS])

@@ -6,8 +6,8 @@ from contextlib import suppress
 from typing import Any
 
 from autograder.observe.phrases import end_phrase
-from course.design import dye
-from course.design.lifelike import AHEAD, lifelike_message
+from course.design import message_tags
+from course.design.lifelike import AHEAD_M, lifelike_message
 from course.errors import WaitTimeout
 from course.runtime.core_session import CoreSession
 from course.runtime.requests.actions import GoalRun, GoalState
@@ -111,8 +111,8 @@ class Errands:
                 self.send(tag)
 
 
-def marked_message(msg_type: Any, tag: int, ahead: float = AHEAD) -> Any:
+def marked_message(msg_type: Any, tag: int, ahead: float = AHEAD_M) -> Any:
     """Return a message as a robot would send it, with a mark in it."""
     message = lifelike_message(msg_type, ahead)
-    dye.mark(message, tag)
+    message_tags.mark(message, tag)
     return message

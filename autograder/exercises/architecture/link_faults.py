@@ -22,9 +22,9 @@ from autograder.exercises.architecture.robot_roles import (
     Jobs,
     is_told_others,
 )
-from autograder.observe.marked_types import UnknownTypeError, bears_marks, load_type
+from autograder.observe.marked_types import TypeNotInstalledError, bears_marks, load_type
 from autograder.observe.qos_refusal import find_refusal
-from course.design import dye
+from course.design import message_tags
 
 
 def similar_name(name: str, graph: RobotGraph) -> str:
@@ -221,8 +221,8 @@ def _goal_callers(offer: Offer, jobs: Jobs) -> set[str]:
 def _gets_goal(offer: Offer, jobs: Jobs) -> bool:
     """Whether the goal can come with the request, or has come to the server by a topic before."""
     try:
-        in_request = dye.has_room(load_type(offer.type).Request)
-    except UnknownTypeError:
+        in_request = message_tags.has_room(load_type(offer.type).Request)
+    except TypeNotInstalledError:
         in_request = True  # a type of the student's own: what it holds cannot be seen from here
     return in_request or bool(
         offer.servers & jobs.graph.reachable_nodes(jobs.navigators, ("topic",))

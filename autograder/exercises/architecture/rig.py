@@ -11,14 +11,14 @@ from typing import Any
 
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from autograder.examination.check_context import Bench, StudentError
+from autograder.examination.check_context import CheckContext, StudentError
 from autograder.examination.exam import Failed
 from autograder.exercises.architecture.goal_sender import SETTLE, WAYPOINT, marked_message
 from autograder.exercises.architecture.link_faults import link_faults, name_all_nodes, name_nodes
 from autograder.exercises.architecture.robot_graph import Offer, RobotGraph, Topic, read_graph
 from autograder.exercises.architecture.robot_roles import ACTION, MOTORS, SENSORS, WHEELS, Jobs
 from autograder.exercises.architecture.tracing import Poured, Pours
-from autograder.observe.marked_types import UnknownTypeError, load_type
+from autograder.observe.marked_types import TypeNotInstalledError, load_type
 from autograder.observe.participants import (
     NO_NODE,
     count_listening,
@@ -29,7 +29,7 @@ from autograder.observe.participants import (
 from autograder.observe.patience import Patience
 from autograder.observe.quiet_node import QuietNode
 from autograder.observe.stillness import Stillness
-from course.design import dye
+from course.design import message_tags
 from course.errors import WaitTimeout
 
 DESIGN = "design"
@@ -44,7 +44,7 @@ AT_REST_S = 3.0
 class ArchitectureRig:
     """The examiner's view of one design."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: CheckContext) -> None:
         """Bring up the examiner's node; the design is started by its first check."""
         self.subject = bench.subject
         self._session = bench.session
@@ -122,7 +122,7 @@ class ArchitectureRig:
 
     def _tap_topic(self, topic: Topic) -> None:
         """Note the tags that go over a topic; of a type that we know."""
-        with suppress(UnknownTypeError):
+        with suppress(TypeNotInstalledError):
             for name in topic.types:
                 self.node.create_subscription(
                     load_type(name),
@@ -134,7 +134,7 @@ class ArchitectureRig:
                 )
 
     def _note_message(self, topic: str, message: Any) -> None:
-        tags = dye.read_all(message)
+        tags = message_tags.read_all(message)
         self._heard.add(topic)
         self.seen[topic].update(tags)
         if topic == MOTORS and tags:
@@ -154,7 +154,7 @@ class ArchitectureRig:
         """Whether a topic's type is installed here."""
         try:
             return bool([load_type(name) for name in topic.types])
-        except UnknownTypeError:
+        except TypeNotInstalledError:
             return False
 
     def wait(self, condition: Callable[[], Any], timeout: float | None = None) -> bool:
@@ -171,9 +171,9 @@ class ArchitectureRig:
 
     def gets_answer(self, offer: Offer) -> bool:
         """Whether a service answers a lifelike request; one of a type unknown here is not asked."""
-        with suppress(UnknownTypeError):
+        with suppress(TypeNotInstalledError):
             kind = load_type(offer.type)
-            request = marked_message(kind.Request, dye.fresh_tag(), WAYPOINT)
+            request = marked_message(kind.Request, message_tags.fresh_tag(), WAYPOINT)
             try:
                 self._session.call(kind, offer.name, request, SETTLE)
             except WaitTimeout:
@@ -199,7 +199,7 @@ class ArchitectureRig:
         A robot that stands still without a goal is right, and nothing would arrive at its motors.
         """
         self._wait_for_taps()
-        with suppress(UnknownTypeError):
+        with suppress(TypeNotInstalledError):
             if self.jobs.navigators:
                 self._pours.under_way(ACTION, load_type(self.graph.get_action(ACTION).type))
         poured = {topic.name for topic in topics}
@@ -226,7 +226,7 @@ class ArchitectureRig:
 
 
 @contextmanager
-def architecture_rig(bench: Bench) -> Iterator[ArchitectureRig]:
+def architecture_rig(bench: CheckContext) -> Iterator[ArchitectureRig]:
     """Give a rig, and take the examiner's endpoints down afterwards."""
     rig = ArchitectureRig(bench)
     try:

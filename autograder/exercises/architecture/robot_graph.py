@@ -16,7 +16,7 @@ from rclpy.qos import QoSProfile
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from autograder.observe.participants import NO_NODE, node_of, of_others, participant_of
-from course.runtime.names import full_name
+from course.runtime.ros_names import full_name
 
 KINDS = ("topic", "request", "response", "goal", "feedback")
 """The ways in which information goes from one node to another."""

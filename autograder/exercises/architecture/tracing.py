@@ -27,8 +27,8 @@ from autograder.exercises.architecture.goal_sender import (
 from autograder.exercises.architecture.robot_graph import Topic
 from autograder.exercises.architecture.robot_roles import EYES
 from autograder.observe.marked_types import load_type
-from course.design import dye
-from course.design.lifelike import FAR, lifelike_message
+from course.design import message_tags
+from course.design.lifelike import FAR_M, lifelike_message
 from course.errors import WaitTimeout
 from course.runtime.core_session import CoreSession
 
@@ -168,7 +168,7 @@ class Pours:
         ``others`` are sensors that go on meanwhile, with marks of their own.
 
         Raises:
-            UnknownTypeError: a topic's type is not installed here.
+            TypeNotInstalledError: a topic's type is not installed here.
         """
         inlets = [(self._get_inlet(topic), topic) for topic in topics]
         # The examiner's own tap is a subscription, too. Who is late all the same gets a later pour.
@@ -211,7 +211,9 @@ class Pours:
             for inlet, sees in inlets:
                 kind = inlet.msg_type
                 inlet.publish(
-                    lifelike_message(kind, FAR) if sees else marked_message(kind, self._fresh_tag())
+                    lifelike_message(kind, FAR_M)
+                    if sees
+                    else marked_message(kind, self._fresh_tag())
                 )
 
         on = _Every(0.1, report)
@@ -279,7 +281,7 @@ class Pours:
         return any(len(self._seen.get(name, set()) - self._tags) > FEW for name in topics)
 
     def _fresh_tag(self) -> int:
-        tag = dye.fresh_tag()
+        tag = message_tags.fresh_tag()
         self._tags.add(tag)
         return tag
 

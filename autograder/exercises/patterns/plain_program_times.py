@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 from sensor_msgs.msg import BatteryState
 
-from autograder.examination.check_context import Bench
+from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import Failed, NotExaminable
 from autograder.examination.plain_programs import Program, Programs
 from autograder.exercises.patterns import camera_stream, drive_ends, interface_patterns, odometry
@@ -63,7 +63,7 @@ class ProgramRig(RobotRig):
     ``drive`` is the one that is under way.
     """
 
-    def __init__(self, bench: Bench, program: Program, *, hasty: bool) -> None:
+    def __init__(self, bench: CheckContext, program: Program, *, hasty: bool) -> None:
         """Bring up the examiner's endpoints beside a program."""
         super().__init__(bench, program.session)
         self.memory = {"offers": bench.memory["offers"]}
@@ -154,7 +154,7 @@ def require_trial(rig: RobotRig, name: str) -> None:
 
 
 def _run_trials(
-    bench: Bench, programs: Programs, names: Iterable[str], *, hasty: bool
+    bench: CheckContext, programs: Programs, names: Iterable[str], *, hasty: bool
 ) -> dict[str, Failed | None]:
     """Return of each trial how it was failed, or None; what could not be seen is missing."""
     outcomes: dict[str, Failed | None] = {}

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 from rclpy.duration import Duration
 from std_msgs.msg import Float64
 
-from autograder.examination.check_context import Bench, StudentError
+from autograder.examination.check_context import CheckContext, StudentError
 from autograder.examination.exam import Failed
 from autograder.exercises.patterns.hardware import ExaminerNode
 from autograder.observe.patience import IDLE_S, Patience
@@ -66,7 +66,7 @@ class RobotRig:
         settle: seconds that something expected may take.
     """
 
-    def __init__(self, bench: Bench, session: CoreSession | None = None) -> None:
+    def __init__(self, bench: CheckContext, session: CoreSession | None = None) -> None:
         """Bring up the examiner's endpoints on the subject's domain, or on a ``session``'s."""
         self.bench = bench
         self.subject = bench.subject
@@ -294,7 +294,7 @@ class RobotRig:
 
 
 @contextmanager
-def robot_rig(bench: Bench) -> Iterator[RobotRig]:
+def robot_rig(bench: CheckContext) -> Iterator[RobotRig]:
     """Give a rig, and take the examiner's endpoints down afterwards."""
     rig = RobotRig(bench)
     try:

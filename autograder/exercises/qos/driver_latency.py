@@ -10,9 +10,9 @@ import time
 from dataclasses import dataclass, field
 
 from autograder.examination.exam import Failed
-from autograder.exercises.qos.examiner_node import LAG
 from autograder.exercises.qos.readings import SENSORS, Sensor
 from autograder.exercises.qos.rig import SensorRig
+from autograder.exercises.qos.sensor_examiner import LAG
 
 SINGLES = 16
 MOST = 3 * SINGLES

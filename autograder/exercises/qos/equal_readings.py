@@ -9,9 +9,9 @@ from __future__ import annotations
 import time
 
 from autograder.examination.exam import Failed, NotExaminable
-from autograder.exercises.qos.examiner_node import LAG
 from autograder.exercises.qos.readings import IMU, STOP, Sensor
 from autograder.exercises.qos.rig import PRESSES, SensorRig
+from autograder.exercises.qos.sensor_examiner import LAG
 from autograder.exercises.qos.slow_reader import TRIES, YOUNG
 
 WORDS = (0, 1, 0, 0, 1)

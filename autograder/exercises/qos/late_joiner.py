@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from rclpy.qos import DurabilityPolicy
 
 from autograder.examination.exam import Failed
-from autograder.exercises.qos.examiner_node import lossless_profile, undemanding_profile
 from autograder.exercises.qos.readings import Heard, Sensor
 from autograder.exercises.qos.rig import DRIVERS, SensorRig
+from autograder.exercises.qos.sensor_examiner import lossless_profile, undemanding_profile
 
 BEFORE = 5  # readings of each sensor
 REPEATED = 0.3  # s in which a driver that repeats its last reading shows itself

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from rclpy.qos import ReliabilityPolicy
 
 from autograder.examination.exam import Failed
-from autograder.exercises.qos.examiner_node import lossless_profile, undemanding_profile
 from autograder.exercises.qos.radio_link import open_radio
 from autograder.exercises.qos.readings import CAMERA, STOP, Heard, Sensor
 from autograder.exercises.qos.rig import SensorRig
+from autograder.exercises.qos.sensor_examiner import lossless_profile, undemanding_profile
 
 LOST = {STOP.name: 100, CAMERA.name: 5}
 """Readings sent while the link is down: as many stop events as the task promises to keep."""

@@ -16,13 +16,13 @@ from pathlib import Path
 
 from rclpy.qos import QoSProfile
 
-from autograder.examination.check_context import Bench
+from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import NotExaminable
-from autograder.exercises.qos.examiner_node import ExaminerNode
 from autograder.exercises.qos.readings import Heard, Sensor
+from autograder.exercises.qos.sensor_examiner import ExaminerNode
 from autograder.observe.quiet_node import QuietNode
 from autograder.processes.outside.asking import Outside
-from autograder.processes.outside.requests import CannotLoseError
+from autograder.processes.outside.warden_requests import CannotLoseError
 from course.runtime.core_session import CoreSession
 
 NOT_HERE = (
@@ -69,7 +69,7 @@ class Radio:
 
 
 @contextmanager
-def open_radio(bench: Bench, near: ExaminerNode) -> Iterator[Radio]:
+def open_radio(bench: CheckContext, near: ExaminerNode) -> Iterator[Radio]:
     """Give a radio link from the subject to a consumer far away.
 
     Raises:

@@ -18,21 +18,21 @@ from typing import Any
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from autograder.examination.check_context import Bench
+from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import NotExaminable
-from autograder.exercises.qos.examiner_node import (
+from autograder.exercises.qos.readings import IMU, SENSORS, STOP, Heard, Sensor
+from autograder.exercises.qos.sensor_examiner import (
     AHEAD,
     LAG,
     ExaminerNode,
     lossless_profile,
     undemanding_profile,
 )
-from autograder.exercises.qos.readings import IMU, SENSORS, STOP, Heard, Sensor
 from autograder.observe.participants import of_others
 from autograder.observe.patience import Patience
 from autograder.observe.phrases import callback_raised
 from autograder.observe.spinner import Spinner
-from autograder.observe.stillness import HANGS, RESTLESS, Stillness
+from autograder.observe.stillness import HANGS_S, RESTLESS_S, Stillness
 from autograder.processes.outside.holding import HoldError
 from course.errors import WaitTimeout
 
@@ -57,7 +57,7 @@ PRESSES = "presses"
 class SensorRig:
     """The examiner's view of one subject during the QoS exam."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: CheckContext) -> None:
         """Bring up the examiner's endpoints on the subject's domain."""
         self.bench = bench
         self.subject = bench.subject
@@ -192,9 +192,9 @@ class SensorRig:
         """Return for how long something is waited for that may never come."""
         return Patience(self._still)
 
-    def wait_for_rest(self, patience: float = RESTLESS) -> None:
+    def wait_for_rest(self, patience: float = RESTLESS_S) -> None:
         """Return when all that was sent has been dealt with, or after ``patience`` s of work."""
-        self._still.wait_for_rest(patience, max(patience, HANGS))
+        self._still.wait_for_rest(patience, max(patience, HANGS_S))
 
     def is_at_rest(self) -> bool:
         """Return whether all is at rest just now."""
@@ -331,7 +331,7 @@ class SensorRig:
 
 
 @contextmanager
-def sensor_rig(bench: Bench) -> Iterator[SensorRig]:
+def sensor_rig(bench: CheckContext) -> Iterator[SensorRig]:
     """Give a rig, and take the examiner's endpoints down afterwards."""
     rig = SensorRig(bench)
     try:

@@ -18,9 +18,9 @@ from autograder.examination.exam import NotExaminable
 from autograder.exercises.qos.backlogs import BURST, Backlog, Burst
 from autograder.exercises.qos.consumer_lag import watch_consumers
 from autograder.exercises.qos.driver_latency import find_thinning
-from autograder.exercises.qos.examiner_node import LAG, Stream
 from autograder.exercises.qos.readings import CAMERA, IMU, SENSORS, STOP, Sensor
 from autograder.exercises.qos.rig import CONSUMERS, SensorRig
+from autograder.exercises.qos.sensor_examiner import LAG, Stream
 from autograder.observe.patience import SETTLE_S
 
 PAUSE = 1.5  # s that the consumer is busy

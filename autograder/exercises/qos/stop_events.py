@@ -10,9 +10,9 @@ from rclpy.qos import QoSProfile
 
 from autograder.examination.exam import Failed
 from autograder.exercises.qos.backlog_checks import check_backlog, lost_phrase, readings_phrase
-from autograder.exercises.qos.examiner_node import LAG, lossless_profile, undemanding_profile
 from autograder.exercises.qos.readings import STOP, Heard
 from autograder.exercises.qos.rig import DRIVERS, SensorRig
+from autograder.exercises.qos.sensor_examiner import LAG, lossless_profile, undemanding_profile
 from autograder.observe.patience import SETTLE_S
 
 EVENTS = 5

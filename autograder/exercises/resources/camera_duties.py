@@ -6,8 +6,8 @@ Each ``require_…`` returns if it was seen, and raises `Failed` with what was s
 from __future__ import annotations
 
 from autograder.examination.exam import Failed
+from autograder.exercises.resources.camera_examiner import IMAGE
 from autograder.exercises.resources.camera_graph import PUBLISHER
-from autograder.exercises.resources.examiner_node import IMAGE
 from autograder.exercises.resources.rig import ENDED, CameraRig
 from autograder.observe.patience import SETTLE_S
 from autograder.observe.phrases import as_phrase, capitalize_first, pictures_phrase

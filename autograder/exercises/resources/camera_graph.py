@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT, ZOOM, ExaminerNode
+from autograder.exercises.resources.camera_examiner import IMAGE, SNAPSHOT, ZOOM, ExaminerNode
 from autograder.observe.participants import GUID_PREFIX_BYTES, NAMELESS
 from autograder.observe.phrases import as_phrase
-from course.runtime.names import full_name
+from course.runtime.ros_names import full_name
 
 PUBLISHER = f"a publisher on {IMAGE}"
 SUBSCRIPTION = f"a subscription to {ZOOM}"

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from autograder.examination.check_context import REPLY_TIMEOUT, StudentError, Subject, SubjectGone
+from autograder.examination.check_context import REPLY_TIMEOUT_S, StudentError, Subject, SubjectGone
 from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_graph import CameraGraph
 
@@ -55,7 +55,7 @@ class Program:
                 raise
             raise Failed(
                 expected="destroy_node() can be called a second time.",
-                actual=f"The second call did not return within {REPLY_TIMEOUT:.0f} s.",
+                actual=f"The second call did not return within {REPLY_TIMEOUT_S:.0f} s.",
             ) from gone
 
     def drop_node(self, name: str) -> None:

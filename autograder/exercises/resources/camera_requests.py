@@ -12,8 +12,8 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
 from autograder.examination.exam import Failed
+from autograder.exercises.resources.camera_examiner import IMAGE, SNAPSHOT, ZOOM
 from autograder.exercises.resources.camera_rate import let_arrive
-from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT, ZOOM
 from autograder.exercises.resources.rig import PERIOD, CameraRig
 
 FURTHER = 3  # pictures: one may have been under way with another zoom

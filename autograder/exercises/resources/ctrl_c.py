@@ -18,8 +18,8 @@ from statistics import median_low
 from autograder.examination.exam import Failed
 from autograder.examination.plain_programs import Life, Programs
 from autograder.exercises.resources.camera_duties import DRIVER
+from autograder.exercises.resources.camera_usage import Usage
 from autograder.exercises.resources.managed_life import MANAGED, ManagedLife, watch_managed
-from autograder.exercises.resources.process_usage import Usage
 from autograder.exercises.resources.program_observer import ProgramObserver
 from autograder.exercises.resources.rig import ENDED, PERIOD, CameraRig
 from autograder.observe.patience import SETTLE_S

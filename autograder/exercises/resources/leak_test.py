@@ -10,7 +10,7 @@ import time
 from typing import NamedTuple
 
 from autograder.exercises.resources.camera_duties import DRIVER
-from autograder.exercises.resources.process_usage import Usage
+from autograder.exercises.resources.camera_usage import Usage
 from autograder.exercises.resources.rig import ENDED, PERIOD, STEP, CameraRig
 from autograder.observe.patience import SETTLE_S
 from course.runtime.waiting import Deadline

@@ -13,7 +13,7 @@ from autograder.examination.check_context import StudentError
 from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_duties import DRIVER, require_picture
 from autograder.exercises.resources.camera_requests import require_snapshot
-from autograder.exercises.resources.process_usage import Usage
+from autograder.exercises.resources.camera_usage import Usage
 from autograder.exercises.resources.rig import ENDED, CameraRig
 
 START_MEMORY = 1024  # KiB a failed start or a round: one of ten costs more than one of fifty

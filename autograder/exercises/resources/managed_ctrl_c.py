@@ -11,6 +11,7 @@ from itertools import pairwise
 
 from autograder.examination.exam import Failed, NotExaminable
 from autograder.examination.plain_programs import Programs
+from autograder.exercises.resources.camera_usage import Usage
 from autograder.exercises.resources.ctrl_c import lives_so_far
 from autograder.exercises.resources.managed_life import (
     MANAGED,
@@ -19,7 +20,6 @@ from autograder.exercises.resources.managed_life import (
     ManagedLife,
     watch_managed,
 )
-from autograder.exercises.resources.process_usage import Usage
 from autograder.exercises.resources.program_observer import ProgramObserver
 from autograder.exercises.resources.rig import CameraRig
 from autograder.observe.phrases import as_phrase

@@ -6,8 +6,8 @@ from collections import Counter
 
 from autograder.examination.exam import Failed
 from autograder.exercises.resources.camera_duties import require_closed
+from autograder.exercises.resources.camera_examiner import IMAGE
 from autograder.exercises.resources.camera_graph import NODE, SERVICE, SUBSCRIPTION, describe_node
-from autograder.exercises.resources.examiner_node import IMAGE
 from autograder.exercises.resources.managed import Managed
 from autograder.exercises.resources.rig import GHOSTS, CameraRig
 from autograder.observe.patience import SETTLE_S

@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 
 from autograder.examination.exam import Failed
+from autograder.exercises.resources.camera_examiner import IMAGE
 from autograder.exercises.resources.camera_rate import let_arrive
-from autograder.exercises.resources.examiner_node import IMAGE
 from autograder.exercises.resources.managed import Managed
 from autograder.exercises.resources.rig import CameraRig
 from autograder.observe.phrases import as_phrase, pictures_phrase

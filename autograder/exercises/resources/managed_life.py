@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from autograder.examination.exam import Failed
-from autograder.exercises.resources.examiner_node import IMAGE
+from autograder.exercises.resources.camera_examiner import IMAGE
 from autograder.exercises.resources.managed import Managed
 from autograder.exercises.resources.program_observer import ProgramObserver
 from autograder.exercises.resources.rig import ENDED, CameraRig

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from autograder.exercises.resources.examiner_node import ExaminerNode
+from autograder.exercises.resources.camera_examiner import ExaminerNode
 from autograder.observe.patience import IDLE_S, SETTLE_S, Patience
 from autograder.observe.stillness import Stillness
 from autograder.processes.outside.asking import Outside

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from autograder.examination.plain_programs import Program
-from autograder.exercises.resources.examiner_node import IMAGE, SNAPSHOT
+from autograder.exercises.resources.camera_examiner import IMAGE, SNAPSHOT
 from autograder.exercises.resources.observer import Observer
 from autograder.exercises.resources.rig import CameraRig
 from autograder.observe.participants import node_of, of_others
@@ -19,9 +19,11 @@ COUNTED = 6
 """Pictures whose rate is taken."""
 SLOWEST, FASTEST = 0.6, 1.6
 """Times a rate that are taken for it: a busy machine is no fault of a node's."""
-TAKES, SLOW_TAKES = 6, 2
-"""Of a rate, as pictures that have been held up come many at a time; and of one that is too slow,
-although it is the subject's own time that counts."""
+TAKES, SLOW_TAKES = 12, 2
+"""Of a rate, as pictures that have been held up come many at a time; and of one that is too slow
+although nothing has held it up."""
+HELD_UP = 0.2
+"""Part of a take's time from which on a busy machine may be why it was slow: it says nothing."""
 CHANGE_STATE = "/change_state"
 """What is added to the name of a lifecycle node for that of a service which each has."""
 
@@ -75,18 +77,23 @@ class ProgramObserver(Observer):
         def came() -> int:
             return len(self.node.pictures_of(device))
 
-        slow = 0
+        slow, held_up, delay = 0, 0, self.rig.outside.delay
         for _ in range(TAKES):
-            begun, before = time.monotonic(), came()
-            deadline = FairDeadline(COUNTED / (SLOWEST * rate), self.rig.outside.delay)
+            begun, before, mark = time.monotonic(), came(), delay.mark()
+            deadline = FairDeadline(COUNTED / (SLOWEST * rate), delay)
             while (
                 (left := deadline.seconds_left) and came() < before + COUNTED and not self.is_gone()
             ):
                 self.wait(lambda most=before + COUNTED: came() >= most, left)  # type: ignore[misc]
             number, seconds = came() - before, time.monotonic() - begun
-            if number >= COUNTED and number <= seconds * FASTEST * rate:
+            if SLOWEST * rate * seconds <= number <= FASTEST * rate * seconds:
                 return ""
-            slow += number < COUNTED
+            if number < SLOWEST * rate * seconds:
+                was_held_up = number >= COUNTED and delay.delay_since(mark) >= HELD_UP * seconds
+                held_up += was_held_up
+                slow += not was_held_up
             if slow == SLOW_TAKES:
                 break
+        if held_up > TAKES // 2:
+            return ""  # the machine was too busy to tell
         return f"{capitalize_first(pictures_phrase(number))} came in {seconds:.1f} s."

@@ -17,13 +17,13 @@ from typing import Any
 from rclpy.duration import Duration
 from std_msgs.msg import Int32
 
-from autograder.examination.check_context import PATIENCE, Bench, StudentError
+from autograder.examination.check_context import PATIENCE_S, CheckContext, StudentError
 from autograder.examination.exam import Failed
+from autograder.exercises.resources.camera_examiner import Picture
 from autograder.exercises.resources.camera_graph import CameraGraph
 from autograder.exercises.resources.camera_program import Program
-from autograder.exercises.resources.examiner_node import Picture
+from autograder.exercises.resources.camera_usage import Process
 from autograder.exercises.resources.observer import Observer
-from autograder.exercises.resources.process_usage import Process
 from autograder.observe.patience import SETTLE_S, Waits
 from autograder.observe.phrases import as_phrase
 
@@ -44,7 +44,7 @@ STEP = OVER * PERIOD
 class CameraRig(Observer):
     """The examiner's view of one subject during the resources exam."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: CheckContext) -> None:
         """Bring up the examiner's endpoints on the subject's domain."""
         super().__init__(bench.session, bench.outside)
         self.subject = bench.subject
@@ -226,7 +226,7 @@ class CameraRig(Observer):
 
 
 @contextmanager
-def camera_rig(bench: Bench) -> Iterator[CameraRig]:
+def camera_rig(bench: CheckContext) -> Iterator[CameraRig]:
     """Give a rig; the examiner's session takes its endpoints down at its end."""
     yield CameraRig(bench)
 
@@ -239,9 +239,9 @@ def _held_up(error: str) -> str:
     if found[1] == "the session":  # all nodes know the time: something goes on without end
         return (
             f"At {found[2]} s of the robot's time your program did not come to rest: for "
-            f"{PATIENCE:.0f} s there always was a callback running, or the next one ready"
+            f"{PATIENCE_S:.0f} s there always was a callback running, or the next one ready"
         )
     return (
         f"At {found[2]} s of the robot's time a callback of {found[1]} had been running for "
-        f"{PATIENCE:.0f} s"
+        f"{PATIENCE_S:.0f} s"
     )

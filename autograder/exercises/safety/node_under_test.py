@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, NamedTuple
 
-from autograder.examination.check_context import Bench, Endpoints, StudentError
+from autograder.examination.check_context import CheckContext, Endpoints, StudentError
 from autograder.examination.exam import Failed
 from autograder.exercises.safety.counterpart import Player
 from autograder.observe.patience import Patience
@@ -46,7 +46,7 @@ class Robot:
     """One of the student's nodes at work; ``draws`` are the numbers of the examination."""
 
     def __init__(
-        self, bench: Bench, name: str, player: Player, still: Stillness,
+        self, bench: CheckContext, name: str, player: Player, still: Stillness,
         ended_by: Callable[[str, str], bool],
     ) -> None:  # fmt: skip
         """Make the node of class ``name`` in the subject's present session.

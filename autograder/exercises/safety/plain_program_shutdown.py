@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from autograder.examination.check_context import Bench
+from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import Failed, NotExaminable
 from autograder.examination.plain_programs import Program
 from autograder.exercises.safety import drive_goal
@@ -163,7 +163,7 @@ class Shutdowns:
         self._wrong.setdefault(self._when, wrong)
 
 
-def require_shutdown(bench: Bench, still: Stillness, shutdowns: Shutdowns | None) -> None:
+def require_shutdown(bench: CheckContext, still: Stillness, shutdowns: Shutdowns | None) -> None:
     """Fail unless the robot stands after a shutdown, whenever it comes, and a drive is aborted.
 
     Nothing where there are no programs. ``shutdowns`` are what has been seen of them by now.

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from rclpy.action.server import ServerGoalHandle
 
-from autograder.examination.check_context import Bench
+from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import NotExaminable
 from autograder.examination.plain_programs import Programs
 from autograder.exercises.safety import plain_program_times
@@ -61,7 +61,7 @@ class Found(NamedTuple):
     shutdowns: Shutdowns
 
 
-def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
+def ended_by(name: str, trial: str, bench: CheckContext, still: Stillness) -> bool:
     """Return whether a node ends a plain program when what is done in a trial is done to it.
 
     It is found out once a notebook; False where there are no such programs.
@@ -83,7 +83,7 @@ def ended_by(name: str, trial: str, bench: Bench, still: Stillness) -> bool:
     return bool(trial) and ends[name, trial]
 
 
-def require_time(name: str, what: str, bench: Bench, still: Stillness) -> None:
+def require_time(name: str, what: str, bench: CheckContext, still: Stillness) -> None:
     """Fail if a node takes far too long for something in a plain program, or far too short.
 
     Nothing where there are none. See `plain_program_times.require_timing`.
@@ -96,13 +96,13 @@ def require_time(name: str, what: str, bench: Bench, still: Stillness) -> None:
     plain_program_times.require_timing(name, what, bench, still, timings[name])
 
 
-def shutdowns_seen(bench: Bench) -> Shutdowns | None:
+def shutdowns_seen(bench: CheckContext) -> Shutdowns | None:
     """Return what has been seen of shutdowns by now, if programs have been looked at."""
     known = bench.memory.get(f"{__name__}.found")
     return known.shutdowns if known is not None else None
 
 
-def _get_findings(bench: Bench, programs: Programs, still: Stillness) -> Found:
+def _get_findings(bench: CheckContext, programs: Programs, still: Stillness) -> Found:
     key = f"{__name__}.found"
     if key not in bench.memory:
         found = Found({}, {}, Shutdowns(still))

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from rclpy.action.server import ServerGoalHandle
 
-from autograder.examination.check_context import Bench
+from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import Failed, NotExaminable
 from autograder.exercises.safety.gripper import GripUser
 from autograder.exercises.safety.navigation import Dispatcher, NavigatorUser
@@ -116,7 +116,9 @@ class Timing(NamedTuple):
         return not TIMES[what].least <= took <= TIMES[what].most
 
 
-def require_timing(name: str, what: str, bench: Bench, still: Stillness, timing: Timing) -> None:
+def require_timing(
+    name: str, what: str, bench: CheckContext, still: Stillness, timing: Timing
+) -> None:
     """Fail if something takes a node of a class far too long or far too short.
 
     Args:
@@ -149,7 +151,7 @@ def require_timing(name: str, what: str, bench: Bench, still: Stillness, timing:
     )
 
 
-def _once_more(name: str, bench: Bench, still: Stillness, stride: float) -> Timing:
+def _once_more(name: str, bench: CheckContext, still: Stillness, stride: float) -> Timing:
     assert bench.programs is not None
     parts = [part for part in PARTS if part.name == name]
     with bench.programs.program([(name, ())], threads=THREADS, sim_time=True) as program:

@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from rclpy.node import Node
 
-from autograder.examination.check_context import Bench, Endpoints
+from autograder.examination.check_context import CheckContext, Endpoints
 from autograder.exercises.safety import plain_program_shutdown, plain_program_survival
 from autograder.exercises.safety.counterpart import Player
 from autograder.exercises.safety.node_under_test import Robot
@@ -22,7 +22,7 @@ PlayerT = TypeVar("PlayerT", bound=Player)
 class RobotRig:
     """Gives each check the node that it examines, and its counterpart."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: CheckContext) -> None:
         """Nothing runs yet, but the examiner takes part in DDS from now on.
 
         Counterparts come and go. Each would otherwise bring a participant of its own, from which
@@ -123,7 +123,7 @@ def run_server(
 
 
 @contextmanager
-def robot_rig(bench: Bench) -> Iterator[RobotRig]:
+def robot_rig(bench: CheckContext) -> Iterator[RobotRig]:
     """Give a rig, and take the examiner's endpoints down afterwards."""
     rig = RobotRig(bench)
     try:

@@ -12,10 +12,10 @@ from nbgrader.api import Gradebook
 from autograder.assignments import submission
 from autograder.assignments.intake import roster
 from autograder.gradebook.feedback import sheets
-from autograder.gradebook.feedback.sheets import Exercise, Line
+from autograder.gradebook.feedback.sheets import ExerciseSheet, SheetLine
 from autograder.gradebook.staging import SECRET
 
-TEMPLATES = Path(__file__).parents[1] / "templates"
+TEMPLATES = Path(__file__).parent / "templates"
 TEMPLATE = "course_feedback"
 INDEX = "index.html"
 """A student's page about all exercises of an assignment, beside the pages of each."""
@@ -31,12 +31,12 @@ class Feedback:
 
     title: str
     total: str
-    lines: tuple[Line, ...]
+    lines: tuple[SheetLine, ...]
     late: str = ""
     index: str = ""
     has_math: bool = False
 
-    def of_cell(self, cell: NotebookNode) -> Line | None:
+    def of_cell(self, cell: NotebookNode) -> SheetLine | None:
         """Return what a cell earned, if it is graded."""
         if not submission.nbgrader_metadata(cell).get("grade"):
             return None
@@ -62,7 +62,7 @@ def describe_feedback(notebook: NotebookNode, resources: Any, converter: Any) ->
         )
     exercise = next(
         (found for found in sheet.exercises if found.notebook == names["notebook"]),
-        Exercise(names["notebook"], names["notebook"], ()),
+        ExerciseSheet(names["notebook"], names["notebook"], ()),
     )
     late = sheets.describe_lateness(sheet.seconds_late, exercise.penalty)
     has_index = names["notebook"] != Path(INDEX).stem and not _goes_alone(converter, names)
@@ -73,7 +73,7 @@ def describe_feedback(notebook: NotebookNode, resources: Any, converter: Any) ->
 
 
 def _goes_alone(converter: Any, names: Any) -> bool:
-    """Whether a student fetches the page through the exchange, which hands out none but notebooks'.
+    """Whether a student fetches the page through the exchange: it hands out only notebooks' pages.
 
     A link to the page about all exercises would lead nowhere there.
     """

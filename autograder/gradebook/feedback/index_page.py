@@ -17,15 +17,15 @@ from traitlets.config import Config
 
 from autograder.gradebook.feedback import sheets
 from autograder.gradebook.feedback.feedback_page import INDEX
-from autograder.gradebook.feedback.sheets import Exercise, Line, Sheet
-from autograder.util.files import write_whole
+from autograder.gradebook.feedback.sheets import ExerciseSheet, Sheet, SheetLine
+from autograder.util.work_files import write_whole
 from quizzes.text.html_pages import fill_template
 
 _TEMPLATE = Path(__file__).with_name("index_page.html.jinja")
 
 
 @dataclass(frozen=True)
-class Row:
+class IndexRow:
     """A graded cell: its title, where it stands in the feedback, and what is said of it."""
 
     title: str
@@ -35,13 +35,13 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Part:
+class IndexPart:
     """An exercise, the rows of its cells, and what lateness takes off, if anything."""
 
     title: str
     link: str
     said: str
-    rows: list[Row]
+    rows: list[IndexRow]
     penalty: str
 
 
@@ -93,9 +93,9 @@ def render_page(sheet: Sheet) -> str:
     )
 
 
-def _show_exercise(exercise: Exercise) -> Part:
+def _show_exercise(exercise: ExerciseSheet) -> IndexPart:
     link = quote(f"{exercise.notebook}.html")
-    return Part(
+    return IndexPart(
         exercise.title,
         link,
         f"{exercise.score:g} of {exercise.max_score:g}",
@@ -104,9 +104,9 @@ def _show_exercise(exercise: Exercise) -> Part:
     )
 
 
-def _show_line(line: Line, link: str) -> Row:
+def _show_line(line: SheetLine, link: str) -> IndexRow:
     said = f"{line.said}, with a comment" if line.comment else line.said
-    return Row(line.title, f"{link}#{quote(line.grade_id)}", said, line.waits)
+    return IndexRow(line.title, f"{link}#{quote(line.grade_id)}", said, line.waits)
 
 
 def configure_feedback(config: Config) -> None:

@@ -20,13 +20,13 @@ from nbgrader.api import (
 from nbgrader.coursedir import CourseDirectory
 
 from autograder.assignments import questions
-from autograder.assignments.questions import Question
+from autograder.assignments.questions import GradedQuestion
 from autograder.gradebook.database import of_cells
 from course.messages.yaml_text import format_count
 
 
 @dataclass(frozen=True)
-class Line:
+class SheetLine:
     """One graded cell.
 
     Attributes:
@@ -63,12 +63,12 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Exercise:
+class ExerciseSheet:
     """One notebook of a submission; ``penalty`` is what lateness takes off, in points."""
 
     notebook: str
     title: str
-    lines: tuple[Line, ...]
+    lines: tuple[SheetLine, ...]
     penalty: float = 0.0
 
     @property
@@ -102,12 +102,12 @@ class Sheet:
     assignment: str
     student: str
     name: str
-    exercises: tuple[Exercise, ...]
+    exercises: tuple[ExerciseSheet, ...]
     handed_in: datetime | None = None
     seconds_late: float = 0.0
 
     @property
-    def lines(self) -> tuple[Line, ...]:
+    def lines(self) -> tuple[SheetLine, ...]:
         """The lines of all exercises."""
         return tuple(line for exercise in self.exercises for line in exercise.lines)
 
@@ -150,13 +150,13 @@ def read_sheet(
         (notebook, cell): said or ""
         for notebook, cell, said in _query_rows(gradebook, Comment, (Comment.comment,), submission)
     }
-    lines: dict[str, dict[str, Line]] = {notebook: {} for notebook in sorted(penalties)}
+    lines: dict[str, dict[str, SheetLine]] = {notebook: {} for notebook in sorted(penalties)}
     columns = (Grade.score, Grade.manual_score, Grade.max_score, Grade.needs_manual_grade)
     for notebook, cell, score, by_hand, most, waits in _query_rows(
         gradebook, Grade, columns, submission
     ):
         question = asked.get(notebook, {}).get(cell)
-        lines[notebook][cell] = Line(
+        lines[notebook][cell] = SheetLine(
             cell,
             question.title if question else cell,
             float(score),
@@ -167,7 +167,7 @@ def read_sheet(
             comments.get((notebook, cell), ""),
         )
     exercises = (
-        Exercise(
+        ExerciseSheet(
             notebook,
             questions.title_of_notebook(notebook),
             tuple(_sort_lines(found, asked.get(notebook, {}))),
@@ -185,7 +185,7 @@ def read_sheet(
     )  # fmt: skip
 
 
-def describe_score(lines: Iterable[Line], score: float) -> str:
+def describe_score(lines: Iterable[SheetLine], score: float) -> str:
     """Return a sum as a sentence that says what is still to come."""
     every = list(lines)
     said = f"{score:g} of {_points_text(sum(line.max_points for line in every))}"
@@ -218,7 +218,7 @@ def _query_rows(
     return [tuple(row)[1:] for row in query]
 
 
-def _sort_lines(found: dict[str, Line], asked: dict[str, Question]) -> list[Line]:
+def _sort_lines(found: dict[str, SheetLine], asked: dict[str, GradedQuestion]) -> list[SheetLine]:
     order = {cell: number for number, cell in enumerate(asked)}
     return sorted(found.values(), key=lambda line: (order.get(line.grade_id, 999), line.grade_id))
 

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from nbformat import NotebookNode
 
-from autograder.assignments.intake import attempts
-from autograder.assignments.intake.file_names import is_same_name
+from autograder.assignments.intake import attempts_search
+from autograder.assignments.intake.handed_files.file_names import is_same_name
 from autograder.assignments.quiz_cells import PREFIX, find_bank, in_cells, quiz_names
 from autograder.examination.verdict import CheckResult, Status, Verdict
 from autograder.running.runner import Outcome
@@ -86,7 +86,7 @@ def quiz_questions(
     for name in in_cells(notebook):
         if name in quiz_names(root):
             with suppress(OSError):
-                found = attempts.find_attempts(folder, name, student, root, roster)
+                found = attempts_search.find_attempts(folder, name, student, root, roster)
                 if found.question:
                     asked[f"{PREFIX}{name}"] = (found.question, found.command)
     return asked
@@ -106,7 +106,7 @@ def mark_best_attempt(
     name = record.attempts_filename(bank.quiz)
     root = root or folder.parents[2]
     try:
-        found = attempts.find_attempts(folder, bank.quiz, student, root, roster)
+        found = attempts_search.find_attempts(folder, bank.quiz, student, root, roster)
     except OSError as error:
         reason = f"{name} cannot be read ({error.strerror or error}): a person has to look at it."
         return _unmarked_verdict(bank, reason, status="not_examined")
@@ -156,7 +156,7 @@ def _make_check(mark: Mark) -> CheckResult:
     )  # fmt: skip
 
 
-def _attempt_notes(marked: regrade.Marked, student: str) -> Iterator[str]:
+def _attempt_notes(marked: regrade.MarkedAgain, student: str) -> Iterator[str]:
     assert marked.best_result is not None
     paper = marked.best_result.paper
     count = len(marked.results)
@@ -169,7 +169,7 @@ def _attempt_notes(marked: regrade.Marked, student: str) -> Iterator[str]:
     yield from _file_remarks(marked)
 
 
-def _file_remarks(marked: regrade.Marked) -> Iterator[str]:
+def _file_remarks(marked: regrade.MarkedAgain) -> Iterator[str]:
     yield from marked.problems[:5]
     if marked.damaged:
         yield f"{marked.damaged} lines of the file are no attempts and were left out."
@@ -177,7 +177,7 @@ def _file_remarks(marked: regrade.Marked) -> Iterator[str]:
         yield f"{marked.other_edition} attempts were made with another edition of the quiz."
 
 
-def _none_counts(bank: Bank, name: str, marked: regrade.Marked) -> Verdict:
+def _none_counts(bank: Bank, name: str, marked: regrade.MarkedAgain) -> Verdict:
     remarks = tuple(_file_remarks(marked))
     if marked.other_edition:
         reason = (

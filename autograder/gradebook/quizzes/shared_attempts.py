@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from autograder.assignments.intake import attempts, roster
+from autograder.assignments.intake import attempts_search, roster
 from quizzes.attempts import sharing
 
 
@@ -24,7 +24,7 @@ def same_attempts(
     for student in students:
         folder = roster.student_folder(root, student) / assignment
         try:
-            found = attempts.find_attempts(folder, quiz, student, root)
+            found = attempts_search.find_attempts(folder, quiz, student, root)
         except OSError:
             continue  # its grade says that it cannot be read
         if found.content is not None:

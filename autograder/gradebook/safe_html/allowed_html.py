@@ -68,7 +68,7 @@ STYLES = {
 """Properties in a style attribute: none that moves something over something else."""
 
 PICTURES = ("image/png", "image/jpeg", "image/gif", "image/webp")
-MAX_DIAGRAM = 32 * 1024
+MAX_DIAGRAM_CHARS = 32 * 1024
 """Characters of a Mermaid diagram that is shown."""
 
 MAX_ESCAPES = 200
@@ -98,7 +98,7 @@ _STYLE_HOLDS = re.compile(r"""url\(\s*["']?(?:#|data:)[^()\s"'\\]*["']?\s*\)""",
 _DRAWING = re.compile(r"<svg\b.*?</svg\s*>", re.IGNORECASE | re.DOTALL)
 _MERMAID_ACTION = re.compile(r"^[ \t]*(?:click\b|%%\{).*$", re.MULTILINE)
 
-LONGEST_LINK = 400
+MAX_LINK_CHARS = 400
 """Characters of a link in Markdown that are read; one with a picture in it begins as it must."""
 
 
@@ -210,7 +210,7 @@ def _is_quiet(style: str) -> bool:
 
 def _screen_link(text: str, place: int) -> str:
     """Return a bracket, apart from a link's target at ``place`` if that is not on the list."""
-    target = text[place + 1 : place + 1 + LONGEST_LINK].lstrip(" \t\r\n")
+    target = text[place + 1 : place + 1 + MAX_LINK_CHARS].lstrip(" \t\r\n")
     if target.startswith("<"):
         target = target[1:].partition(">")[0]
     else:
@@ -221,7 +221,7 @@ def _screen_link(text: str, place: int) -> str:
     return "]" if is_link(target) or is_source(target) else f"]{_JOINER}"
 
 
-MAX_PLAIN = 100_000
+MAX_PLAIN_CHARS = 100_000
 """Characters that are shown of a text that is not formatted; all of it stands in the submission."""
 
 _LINE = re.compile(r"[^\n]{200}(?=[^\n])")
@@ -229,7 +229,7 @@ _LINE = re.compile(r"[^\n]{200}(?=[^\n])")
 
 def shorten_text(text: str) -> str:
     """Return what is shown of a text that is not formatted."""
-    return outputs.shortened_text(text[:MAX_PLAIN], max(len(text) - MAX_PLAIN, 0))
+    return outputs.shortened_text(text[:MAX_PLAIN_CHARS], max(len(text) - MAX_PLAIN_CHARS, 0))
 
 
 def fence_text(text: str) -> str:
@@ -351,7 +351,7 @@ def _screen_data(data: Mapping[str, Any], page: Page) -> dict[str, Any]:
             kept[kind] = _fit_markdown(value, (), page)
         elif kind == "text/latex":
             kept[kind] = _TAG_BEGINS.sub("< ", value)  # which says the same in a formula
-        elif kind == "text/vnd.mermaid" and len(value) <= MAX_DIAGRAM:
+        elif kind == "text/vnd.mermaid" and len(value) <= MAX_DIAGRAM_CHARS:
             kept[kind] = disarm_markdown(_MERMAID_ACTION.sub("", value))
     drawing = data.get("image/svg+xml")
     if isinstance(drawing, str) and "text/html" not in kept:
@@ -369,7 +369,7 @@ _SVG_TAGS = _split_names(
     "pattern linearGradient radialGradient stop marker symbol use image title desc metadata style "
     "filter feGaussianBlur feOffset feBlend feFlood feComposite feMerge feMergeNode"
 )
-MAX_DRAWING = 2 * 1024 * 1024
+MAX_DRAWING_BYTES = 2 * 1024 * 1024
 """Bytes of an SVG file beside a notebook that is read."""
 
 
@@ -387,7 +387,7 @@ def may_lie_beside(name: str, read: Callable[[], bytes]) -> bool:
 
 def is_still(svg: bytes) -> bool:
     """Whether a drawing is nothing else: no script, no page and no entity, and it loads nothing."""
-    if len(svg) > MAX_DRAWING:
+    if len(svg) > MAX_DRAWING_BYTES:
         return False
     try:
         _Drawing().read(svg)

@@ -1,7 +1,7 @@
 """The process that makes HTML of a submission's texts: see `page_texts`.
 
-What has loaded everything only waits; a fork of it formats, and the next one takes its place once
-it is over its bounds. So nothing has to be loaded again.
+The process that has loaded everything only waits. A fork of it formats, and the next fork takes its
+place once it is over its bounds. So nothing has to be loaded again.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from nbconvert.filters import Highlight2HTML, strip_files_prefix
 from nbconvert.filters.markdown_mistune import IPythonRenderer, MarkdownWithMath
 
 from autograder.gradebook.safe_html import allowed_html
-from autograder.gradebook.safe_html.page_texts import LENGTH, MAX_REPLY
+from autograder.gradebook.safe_html.page_texts import LENGTH, MAX_REPLY_BYTES
 
-MAX_MEMORY = 1024 * 1024 * 1024
+MAX_MEMORY_BYTES = 1024 * 1024 * 1024
 _VOID = {"area", "br", "col", "embed", "hr", "img", "input", "link", "meta", "wbr"}
 _NO_ALT = re.compile(r"<img(?![^<>]*\salt=)", re.IGNORECASE)
 _ALT = '<img alt="No description has been provided for this image"'
@@ -122,7 +122,7 @@ def _read_bytes(count: int) -> bytes:
 
 def _write_reply(reply: dict[str, Any]) -> None:
     data = json.dumps(reply).encode()
-    if len(data) > MAX_REPLY:
+    if len(data) > MAX_REPLY_BYTES:
         data = b'{"over": true}'
     data = LENGTH.pack(len(data)) + data
     while data:
@@ -132,7 +132,7 @@ def _write_reply(reply: dict[str, Any]) -> None:
 def main() -> None:
     """Have a fork of this process serve, and the next one after it, until the input ends."""
     Highlight2HTML()("import this")  # type: ignore[no-untyped-call]  # loads the lexers
-    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
+    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     while True:
         child = os.fork()

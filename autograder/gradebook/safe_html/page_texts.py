@@ -25,7 +25,7 @@ _LONG, _DISPLAYED = 256 * 1024, 1024 * 1024
 MAX_TEXTS = {"markdown": _LONG, "answer": _LONG, "code": _LONG, "html": _DISPLAYED}
 """Characters of a text that is formatted at all; a long answer has 5000."""
 
-MAX_REPLY = 64 * 1024 * 1024
+MAX_REPLY_BYTES = 64 * 1024 * 1024
 TEXT_S, PAGE_S = 0.25, 0.7
 """Processor time of one text, and of all texts of a page; one of the course takes 0.05 s in all."""
 
@@ -49,7 +49,7 @@ class Page:
     def format_answer(
         self, text: str, taken: Collection[str], attachments: Mapping[str, Any]
     ) -> str | None:
-        """Return Markdown that may stand for an answer (`screen.answer`); None if over time."""
+        """Return an answer as Markdown (`allowed_html.screen_answer`); None if over time."""
         return self._ask_formatter("answer", text, taken=list(taken), attachments=attachments)
 
     def highlight_code(self, text: str, language: str = "ipython3") -> str | None:
@@ -57,7 +57,7 @@ class Page:
         return self._ask_formatter("code", text, language=language)
 
     def clean_html(self, text: str) -> str | None:
-        """Return HTML of which nothing runs (`screen.cleaned_html`); None if over time."""
+        """Return HTML of which nothing runs (`allowed_html.cleaned_html`); None if over time."""
         return self._ask_formatter("html", text)
 
     def _ask_formatter(self, what: str, text: str, **more: Any) -> str | None:
@@ -111,7 +111,7 @@ class _Formatter:
         process.stdin.flush()
         deadline = time.monotonic() + PATIENCE_S
         (length,) = LENGTH.unpack(_read_bytes(process, LENGTH.size, deadline))
-        if length > MAX_REPLY:
+        if length > MAX_REPLY_BYTES:
             raise ValueError("too long")
         reply = json.loads(_read_bytes(process, length, deadline))
         return reply.get("made"), float(reply.get("spent", TEXT_S))

@@ -22,7 +22,7 @@ TYPES = {
     ".bmp": "image/bmp",
     ".svg": "image/svg+xml",
 }
-MAX_PICTURES = 10 * 1024 * 1024
+MAX_PICTURES_BYTES = 10 * 1024 * 1024
 """Bytes of the pictures that one page takes in."""
 
 # Between two angle brackets only, so that a page is gone through once, whatever stands in it.
@@ -32,11 +32,11 @@ _IMAGE = re.compile(r"""(<img\b[^<>]*?\ssrc\s*=\s*)(?:"([^"<>]*)"|'([^'<>]*)')""
 def with_pictures(page: str, folder: Path) -> str:
     """Return an HTML ``page`` that holds the pictures of ``folder`` that it shows.
 
-    What leads out of the folder, is no picture by its name, or is more than `MAX_PICTURES` in all
-    stays the link that it was.
+    What leads out of the folder, is no picture by its name, or is more than `MAX_PICTURES_BYTES` in
+    all stays the link that it was.
     """
     known: dict[str, str] = {}
-    room = MAX_PICTURES
+    room = MAX_PICTURES_BYTES
 
     def source(match: re.Match[str]) -> str:
         nonlocal room

@@ -20,12 +20,12 @@ from nbgrader.api import Assignment, BaseCell, Comment, Grade, Gradebook, Notebo
 
 from autograder.assignments import questions, submission
 from autograder.assignments.intake import open_questions
-from autograder.assignments.intake.file_names import match_name
-from autograder.assignments.questions import Question
+from autograder.assignments.intake.handed_files.file_names import match_name
+from autograder.assignments.questions import GradedQuestion
 from autograder.assignments.submission import SubmissionError
-from autograder.gradebook.bridge import WORK_FOLDER
 from autograder.gradebook.course_gradebook import CourseGradebook
 from autograder.gradebook.database import of_cells
+from autograder.gradebook.nbgrader_plugins.autograde_steps import WORK_FOLDER
 from autograder.util.csv_text import as_csv, guard_text, is_formula
 from course.errors import CourseError
 
@@ -70,7 +70,7 @@ class Answers:
     """All answers to a question: those that wait first; ``empty`` are students who gave none."""
 
     assignment: str
-    question: Question
+    question: GradedQuestion
     answers: tuple[Answer, ...]
     empty: tuple[str, ...] = ()
     unread: tuple[str, ...] = ()
@@ -82,7 +82,7 @@ class Answers:
 
 
 @dataclass(frozen=True)
-class Entered:
+class EnteredMarks:
     """What became of a file of marks: students by what was done, and those who are left."""
 
     question: str
@@ -109,7 +109,7 @@ class _File:
     rows: list[_Row] = field(default_factory=list)
 
 
-def written_questions(gradebook: CourseGradebook, assignment: str) -> list[Question]:
+def written_questions(gradebook: CourseGradebook, assignment: str) -> list[GradedQuestion]:
     """Return the questions of an assignment that a person marks.
 
     Raises:
@@ -130,7 +130,7 @@ def written_questions(gradebook: CourseGradebook, assignment: str) -> list[Quest
     return found
 
 
-def find_question(gradebook: CourseGradebook, assignment: str, wanted: str) -> Question:
+def find_question(gradebook: CourseGradebook, assignment: str, wanted: str) -> GradedQuestion:
     """Return the question that is meant: by its grade id, its title, or a part that one alone has.
 
     Raises:
@@ -152,7 +152,9 @@ def find_question(gradebook: CourseGradebook, assignment: str, wanted: str) -> Q
     raise MarksError(f"There is no question '{wanted}' in '{assignment}': there are {names}.")
 
 
-def collect_answers(gradebook: CourseGradebook, assignment: str, question: Question) -> Answers:
+def collect_answers(
+    gradebook: CourseGradebook, assignment: str, question: GradedQuestion
+) -> Answers:
     """Return all answers to a question, from the graded copies and the gradebook."""
     with gradebook.open_gradebook() as book:
         grades = _read_grades(book, assignment, question)
@@ -181,7 +183,7 @@ def collect_answers(gradebook: CourseGradebook, assignment: str, question: Quest
 def as_file(found: Answers) -> str:
     """Return the answers as CSV, with columns to fill in; one to be looked at again has no points.
 
-    So whoever fills in a part of the file settles nothing that nobody has looked at.
+    So a person who fills in a part of the file settles nothing that nobody has looked at.
     """
     rows: list[tuple[str, ...]] = [COLUMNS]
     question = found.question
@@ -195,7 +197,7 @@ def as_file(found: Answers) -> str:
     return as_csv(rows)
 
 
-def enter_marks(gradebook: CourseGradebook, path: Path) -> Entered:
+def enter_marks(gradebook: CourseGradebook, path: Path) -> EnteredMarks:
     """Enter a file of marks into the gradebook; a cell that is empty changes nothing.
 
     Raises:
@@ -222,7 +224,7 @@ def enter_marks(gradebook: CourseGradebook, path: Path) -> Entered:
             if what == "marked":
                 _enter_row(book, file.assignment, question, row)
         book.db.commit()
-    return Entered(question.title, **{what: tuple(who) for what, who in done.items()})
+    return EnteredMarks(question.title, **{what: tuple(who) for what, who in done.items()})
 
 
 def _decide_row(row: _Row, current: Mapping[str, Any], state: str) -> str:
@@ -238,7 +240,7 @@ def _decide_row(row: _Row, current: Mapping[str, Any], state: str) -> str:
     return "blank" if row.points is None else "already"
 
 
-def _enter_row(book: Gradebook, assignment: str, question: Question, row: _Row) -> None:
+def _enter_row(book: Gradebook, assignment: str, question: GradedQuestion, row: _Row) -> None:
     where = (question.grade_id, question.notebook, assignment, row.student)
     if row.points is not None:
         grade = book.find_grade(*where)
@@ -247,7 +249,9 @@ def _enter_row(book: Gradebook, assignment: str, question: Question, row: _Row) 
         book.find_comment(*where).manual_comment = row.comment
 
 
-def _read_grades(book: Gradebook, assignment: str, question: Question) -> dict[str, dict[str, Any]]:
+def _read_grades(
+    book: Gradebook, assignment: str, question: GradedQuestion
+) -> dict[str, dict[str, Any]]:
     def chosen(query: Any) -> Any:
         return query.filter(
             Assignment.name == assignment, Notebook.name == question.notebook,
@@ -267,7 +271,7 @@ def _read_grades(book: Gradebook, assignment: str, question: Question) -> dict[s
 
 
 def _read_answer(
-    gradebook: CourseGradebook, assignment: str, question: Question, student: str
+    gradebook: CourseGradebook, assignment: str, question: GradedQuestion, student: str
 ) -> str | None:
     """Return an answer as it stands in the graded copy, which formgrader shows; None if in none."""
     coursedir = gradebook.coursedir
@@ -369,7 +373,7 @@ def _without_apostrophe(text: str | None) -> str:
 
 
 def _find_faults(
-    file: _File, grades: Mapping[str, Mapping[str, Any]], question: Question
+    file: _File, grades: Mapping[str, Mapping[str, Any]], question: GradedQuestion
 ) -> Iterator[str]:
     seen: set[str] = set()
     for row in file.rows:

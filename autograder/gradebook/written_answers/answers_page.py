@@ -15,7 +15,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from autograder.assignments.questions import Question
+from autograder.assignments.questions import GradedQuestion
 from autograder.gradebook.written_answers.answers import COLUMNS, Answer, Answers
 from course.messages.yaml_text import format_count
 from quizzes.text import rendering
@@ -26,7 +26,7 @@ _SCRIPT = Path(__file__).with_name("answers_page.js")
 
 
 @dataclass(frozen=True)
-class Part:
+class AnswersPart:
     """Something about the question: HTML of its Markdown, or its ``text`` if there is none."""
 
     heading: str
@@ -66,14 +66,14 @@ def render_page(found: Answers, file: str) -> str:
     )
 
 
-def _show_question(question: Question) -> Iterator[Part]:
+def _show_question(question: GradedQuestion) -> Iterator[AnswersPart]:
     for heading, markdown, kind in (
         ("The question", question.text, ""),
         ("Model answer", question.model, "model"),
         ("What students read about the points", question.rules, ""),
     ):
         if markdown:
-            yield Part(heading, markdown, _render_markdown(markdown), kind)
+            yield AnswersPart(heading, markdown, _render_markdown(markdown), kind)
 
 
 def _render_markdown(markdown: str) -> Markup | None:

@@ -1,8 +1,8 @@
 """What a person has marked in a submission, and whether it must be looked at again.
 
 nbgrader asks for every mark again once a submission is autograded. A person need look again only at
-what is another: an answer that changed, or one that is worth another number of points. What they
-saw is the graded copy, so it is kept what stood there until the new one is entered.
+what is different: an answer that changed, or one that is worth another number of points. They saw
+the graded copy, so its content is remembered until the new one is entered.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from autograder.assignments import questions, submission
 from autograder.assignments.questions import Asked
 from autograder.assignments.submission import SubmissionError
 from autograder.gradebook import staging
-from autograder.util.files import walk_files
 from autograder.util.state_table import StateTable
+from autograder.util.work_files import walk_files
 
 KIND = "marked"
 
@@ -33,7 +33,7 @@ CellName = tuple[str, str]
 
 
 @dataclass(frozen=True)
-class Marked:
+class SettledMark:
     """One cell as a person has marked it.
 
     Attributes:
@@ -48,7 +48,7 @@ class Marked:
     content: str = ""
 
 
-MarkedCells = dict[CellName, Marked]
+MarkedCells = dict[CellName, SettledMark]
 
 
 def with_copy(scores: Mapping[CellName, float | None], copy: Path) -> MarkedCells:
@@ -58,7 +58,7 @@ def with_copy(scores: Mapping[CellName, float | None], copy: Path) -> MarkedCell
         scores: {cell: automatic points} of those that are meant.
         copy: the folder with its notebooks.
     """
-    marked = {cell: Marked(auto) for cell, auto in scores.items()}
+    marked = {cell: SettledMark(auto) for cell, auto in scores.items()}
     for notebook in {notebook for notebook, _ in scores}:
         try:
             found = submission.read_notebook(copy / f"{notebook}.ipynb")
@@ -168,7 +168,7 @@ class Marks:
         """Return what is remembered of a student who is not entered yet."""
         rows = json.loads(self._table.get(student) or "[]")
         try:
-            return {(notebook, cell): Marked(**marked) for notebook, cell, marked in rows}
+            return {(notebook, cell): SettledMark(**marked) for notebook, cell, marked in rows}
         except (ValueError, TypeError):  # of another version
             return {}
 

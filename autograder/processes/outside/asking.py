@@ -10,17 +10,17 @@ from typing import Any, Protocol
 
 from autograder.processes.channel import Channel
 from autograder.processes.fair_deadline import RunDelay, of_process
-from autograder.processes.outside import requests
+from autograder.processes.outside import warden_requests
 from autograder.processes.outside.holding import HoldError
-from autograder.processes.outside.requests import CannotLoseError, RequestError, Scene
-from autograder.processes.process_folders import Single
+from autograder.processes.outside.warden_requests import CannotLoseError, RequestError, Scene
+from autograder.processes.process_folders import SingleProcess
 
-ANSWER_TIMEOUT = 120.0
+ANSWER_TIMEOUT_S = 120.0
 """Seconds that an answer may take: a rest takes five at most, on a machine that is busy longer."""
 
 
 class Outside(Protocol):
-    """Whoever answers the requests of `autograder.processes.outside.requests`."""
+    """Something that answers the requests of `autograder.processes.outside.warden_requests`."""
 
     own_network: bool
     """Whether the network is the submission's alone, so that it may lose packets."""
@@ -44,14 +44,14 @@ class Here:
 
     def __init__(self, pid: int) -> None:
         """Answer about the process ``pid``."""
-        self._scene = Scene(Single(pid), pid, Single(os.getpid()))
+        self._scene = Scene(SingleProcess(pid), pid, SingleProcess(os.getpid()))
         self.delay: RunDelay = of_process(pid)
 
     def ask(self, what: str, **given: Any) -> Any:
         """Return the answer to a request."""
         if what in ("lose", "deliver"):
             raise CannotLoseError("others use the network, too")
-        return requests.answer_request(self._scene, what, given)
+        return warden_requests.answer_request(self._scene, what, given)
 
 
 class Afar:
@@ -69,7 +69,7 @@ class Afar:
         """Return the answer to a request."""
         with self._asking:
             self._channel.send({"what": what, **given})
-            reply = self._channel.receive(ANSWER_TIMEOUT)
+            reply = self._channel.receive(ANSWER_TIMEOUT_S)
         if "cannot" in reply:
             raise CannotLoseError(reply["cannot"])
         if "no_hold" in reply:

@@ -1,11 +1,11 @@
 """Hold a submission's threads from outside, while those of DDS go on receiving.
 
-A consumer that is busy shows what its queues keep. Whoever asks a process to be busy tells it that
+A consumer that is busy shows what its queues keep. A request to be busy would tell a process that
 it is being looked at; a thread that the kernel stops (ptrace(2)) hears nothing of it. Threads of
-Fast DDS are let go at once, so that what comes in is received meanwhile. Anybody can give a thread
-their names: which they are is told by the function that they began with.
+Fast DDS are let go at once, so that what comes in is received meanwhile. Any thread can be given
+their names, so they are recognised by the function that they began with.
 
-The kernel lets only that thread act on a held one which has stopped it, and lets all go when that
+The kernel lets only the thread that has stopped another one act on it, and lets all go when that
 thread ends. So each hold has a thread of its own.
 """
 
@@ -63,7 +63,7 @@ class HoldError(CourseError):
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldThreads:
     """What is held: how many threads, and which are those of DDS, which go on."""
 
     threads: int
@@ -72,15 +72,15 @@ class Held:
     def is_jammed(self) -> bool:
         """Return whether DDS cannot receive just now, as one of its threads waits for a lock.
 
-        Who has the lock is held, so that it waits until the end: what the queues keep then tells
-        nothing of them. `hold_threads` looks for a moment when that is not so, and may not find
-        one.
+        The thread that has the lock is held, so DDS waits until the end: what the queues keep then
+        says nothing about them. `hold_threads` looks for a moment when that is not so, and may not
+        find one.
         """
         return any(map(_waits_for_a_lock, self.of_dds))
 
 
 @contextmanager
-def hold_threads(processes: Processes) -> Iterator[Held]:
+def hold_threads(processes: Processes) -> Iterator[HeldThreads]:
     """Hold all threads but those of DDS for the length of the block.
 
     Args:
@@ -109,9 +109,9 @@ class _Hold:
     _seized: set[int] = field(default_factory=set)
     _stopped: dict[int, int] = field(default_factory=dict)
     _of_dds: set[int] = field(default_factory=set)
-    _outcome: SimpleQueue[Held | HoldError] = field(default_factory=SimpleQueue)
+    _outcome: SimpleQueue[HeldThreads | HoldError] = field(default_factory=SimpleQueue)
 
-    def wait(self) -> Held:
+    def wait(self) -> HeldThreads:
         """Return what is held, once all is."""
         with suppress(Empty):
             outcome = self._outcome.get(timeout=4 * HOLD_TIMEOUT_S)
@@ -128,7 +128,7 @@ class _Hold:
             self._let_go()
             self._outcome.put(error)
             return
-        self._outcome.put(Held(len(self._stopped), frozenset(self._of_dds)))
+        self._outcome.put(HeldThreads(len(self._stopped), frozenset(self._of_dds)))
         while not self.over.wait(REAP_S):
             self._note_stops()
         self._let_go()
@@ -193,7 +193,7 @@ class _Hold:
             self.over.wait(LOOK_S)
 
     def _note_stops(self) -> None:
-        """Note which have stopped or ended; who was killed goes only when that has been noted."""
+        """Note which have stopped or ended; a killed one is only gone once that has been noted."""
         while True:
             try:
                 tid, status = os.waitpid(-1, os.WNOHANG | _NO_THREAD_OF_OTHERS)

@@ -29,7 +29,7 @@ _ABSOLUTE = 1  # clock_nanosleep(2)
 _TIME = struct.Struct("qq")
 _WAIT_IN = (*DDS_LIBRARIES, "librmw_", "librcl_logging_", "libspdlog")
 """What the names of libraries begin with in which DDS waits, an executor, and a writer of logs."""
-_STACK = 1024
+_STACK_BYTES = 1024
 """Bytes of a thread's stack, the innermost, in which there are places in those libraries then."""
 
 Code = dict[str, list[range]]
@@ -66,7 +66,7 @@ def find_sleepers(process: str, threads: Iterable[int], code: Code) -> list[Slee
                     # "running" is no number
                     number, *given = int(call[0]), *(int(word, 16) for word in call[1:])
                     if (left := _sleep_left(number, given, memory)) is not None:
-                        stack = os.pread(memory, _STACK, given[-2])
+                        stack = os.pread(memory, _STACK_BYTES, given[-2])
                         if not _waits_in_ros(process, stack, code):
                             to_the_end = number in (_NANOSLEEP, _CLOCK_NANOSLEEP)
                             found.append(Sleeper(thread, left, to_the_end))

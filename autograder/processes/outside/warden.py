@@ -4,7 +4,7 @@ Started as ``python -P -m autograder.processes.outside.warden --examiner FD`` in
 network. The engine tells over standard input whom it is about, in one line of JSON: the first
 processes of both sandboxes, ``{"subject": ..., "examiner": ...}``, the subject's own process,
 ``"pid"``, and those that hold its sandbox, ``"ours"``, both by their numbers in it. ``FD`` is the
-channel to the examiner, whose every line is a request (`requests`). It ends with either.
+channel to the examiner, whose every line is a request (see `warden_requests`). It ends with either.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from typing import Any
 
 from autograder.processes.channel import Channel, ChannelClosed
 from autograder.processes.descriptors import readable_descriptors
-from autograder.processes.outside import requests
+from autograder.processes.outside import warden_requests
 from autograder.processes.outside.holding import HoldError
-from autograder.processes.outside.requests import CannotLoseError, RequestError, Scene
+from autograder.processes.outside.warden_requests import CannotLoseError, RequestError, Scene
 from autograder.processes.process_folders import Sandboxed
 
-MAX_REQUEST = 64 * 1024
+MAX_REQUEST_BYTES = 64 * 1024
 """Bytes of the longest request."""
 
 
@@ -56,7 +56,7 @@ def _answer_request(scene: Scene | None, request: dict[str, Any]) -> dict[str, A
     if scene is None:
         return {"error": "there is nobody to look at"}
     try:
-        return {"answer": requests.answer_request(scene, what, request)}
+        return {"answer": warden_requests.answer_request(scene, what, request)}
     except RequestError as error:
         return {"error": str(error)}
     except CannotLoseError as error:
@@ -73,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     options = parser.parse_args(arguments)
     try:
-        serve_requests(0, Channel(socket.socket(fileno=options.examiner), MAX_REQUEST))
+        serve_requests(0, Channel(socket.socket(fileno=options.examiner), MAX_REQUEST_BYTES))
     except ChannelClosed:
         return 0
     return 0

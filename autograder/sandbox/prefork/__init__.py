@@ -8,6 +8,6 @@ it is told to, gives up every right, and only then runs a module's ``main``, as
 """
 
 from autograder.sandbox.prefork.forked import ForkedProcess, ZygoteError
-from autograder.sandbox.prefork.nursery import Nursery, Zygote, shared
+from autograder.sandbox.prefork.zygote_pool import Zygote, ZygotePool, shared
 
-__all__ = ["ForkedProcess", "Nursery", "Zygote", "ZygoteError", "shared"]
+__all__ = ["ForkedProcess", "Zygote", "ZygoteError", "ZygotePool", "shared"]

@@ -1,4 +1,4 @@
-"""A forked process as whoever asked for it sees it: like `subprocess.Popen`, but not its child."""
+"""A forked process, for the process that asked: like `subprocess.Popen`, but not its child."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import IO, Any
 from autograder.processes.descriptors import readable_descriptors
 from course.errors import CourseError
 
-FORK_TIMEOUT = 60.0
+FORK_TIMEOUT_S = 60.0
 """Seconds until a fork must have been made; it takes some milliseconds."""
 
 
@@ -33,12 +33,12 @@ class ForkedProcess:
         """
         self._report = report
         self._what = what
-        self._ending = threading.Lock()  # its handle is closed by whoever waits, maybe elsewhere
+        self._ending = threading.Lock()  # the thread that waits closes its handle
         self.returncode: int | None = None
         self.stdin: IO[bytes] | None = None
         self.stdout: IO[bytes] | None = None
         self.stderr: IO[bytes] | None = None
-        report.settimeout(FORK_TIMEOUT)
+        report.settimeout(FORK_TIMEOUT_S)
         try:
             text, handles, _, _ = socket.recv_fds(report, 4096, 1)
         except OSError as error:

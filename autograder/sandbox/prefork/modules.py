@@ -16,7 +16,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 COURSE = (
-    "course.default_session", "course.design.declaration", "course.design.node",
+    "course.learner_session.default_session", "course.design.declaration", "course.design.node",
     "course.graph.reader", "course.interfaces.magic", "course.notebook", "course.ros_magic.magic",
 )  # fmt: skip
 ROS = ("rclpy.action", "rclpy.lifecycle", "rclpy.parameter_client")

@@ -1,9 +1,10 @@
 """The zygote: a process that imports what others need, and then only forks.
 
 Started as ``python -P -m autograder.sandbox.prefork.zygote --socket FD MODULE``. It says when it is
-ready; each packet that follows is a `Task`, with descriptors: first one to report over, then what
-the task names. A fork (the keeper) joins the namespaces, because a process that joins a process
-namespace is itself not in it, forks once more, reports that process and, when it has ended, how.
+ready; each packet that follows is a `ForkRequest`, with descriptors: first one to report over, then
+what the request names. A fork (the keeper) joins the namespaces, because a process that joins a
+process namespace is itself not in it, forks once more, reports that process and, when it has
+ended, how.
 """
 
 from __future__ import annotations
@@ -23,27 +24,27 @@ from contextlib import suppress
 from importlib import import_module
 from typing import Any, NoReturn
 
-from autograder.sandbox.prefork.task import Task, close_others
+from autograder.sandbox.prefork.fork_request import ForkRequest, close_others
 
 MOST_DESCRIPTORS = 64
-LARGEST_TASK = 128 * 1024
-"""Bytes of a task's JSON; an environment is the largest part of it."""
+LARGEST_TASK_BYTES = 128 * 1024
+"""Bytes of a request's JSON; an environment is the largest part of it."""
 
 
-def serve_tasks(tasks: socket.socket) -> Task | None:
+def serve_requests(requests: socket.socket) -> ForkRequest | None:
     """Fork what is asked for until nobody asks any more.
 
     Returns:
-        None in the zygote itself; in a fork that is to run a task, the task.
+        None in the zygote itself; in a fork that is to run a request, the request.
     """
     while True:
-        text, handed, _, _ = socket.recv_fds(tasks, LARGEST_TASK, MOST_DESCRIPTORS)
+        text, handed, _, _ = socket.recv_fds(requests, LARGEST_TASK_BYTES, MOST_DESCRIPTORS)
         if not text:
             return None
         report = socket.socket(fileno=handed.pop(0))
         if _fork_or_report(report) == 0:
-            tasks.close()
-            return _run_keeper(Task.from_json(text), report, handed)
+            requests.close()
+            return _run_keeper(ForkRequest.from_json(text), report, handed)
         report.close()
         for descriptor in handed:
             os.close(descriptor)
@@ -58,29 +59,30 @@ def _fork_or_report(report: socket.socket) -> int | None:
         return None
 
 
-def _run_keeper(task: Task, report: socket.socket, handed: list[int]) -> Task:
-    """Join, and fork the task's process; return in that process only."""
+def _run_keeper(request: ForkRequest, report: socket.socket, handed: list[int]) -> ForkRequest:
+    """Join, and fork the request's process; return in that process only."""
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
     try:
-        handed, holder = task.join_namespaces(handed)
+        handed, holder = request.join_namespaces(handed)
     except OSError as error:
         _send_report(report, {"error": str(error)})
         os._exit(1)
     pid = _fork_or_report(report)
     if pid == 0:
-        report.detach()  # closed with everything else that is not the task's
-        task.become_process(handed)
-        return task
+        report.detach()  # closed with everything else that is not the request's
+        request.become_process(handed)
+        return request
     if pid is not None:
         _wait_as_keeper(report, pid, holder)
     os._exit(1)
 
 
 def _wait_as_keeper(report: socket.socket, pid: int, holder: int | None) -> NoReturn:
-    """Report a process and how it ended; its number is its own until whoever asked is done.
+    """Report a process and how it ended; keep its number until the process that asked is done.
 
-    When whoever asked is gone, by ``kill -9`` too, nobody wants the process any more: it is killed.
-    With it ends the process of which ``holder`` is the pidfd, and so all that it has left behind.
+    When the process that asked is gone, by ``kill -9`` too, nobody wants the new one any more: it
+    is killed. With it ends the process of which ``holder`` is the pidfd, and so all that it has
+    left behind.
     """
     handle = os.pidfd_open(pid)
     with suppress(OSError):
@@ -126,11 +128,11 @@ class _Leaving:
         self._code: int | None = None
         atexit.register(self)
 
-    def run(self, task: Task) -> int:
-        """Run a task in this process, which is a fork; return its exit code."""
+    def run(self, request: ForkRequest) -> int:
+        """Run a request in this process, which is a fork; return its exit code."""
         self._code = 1  # for what it raises
         try:
-            self._code = task.run()
+            self._code = request.run()
         except SystemExit as leaving:
             if leaving.code is None or isinstance(leaving.code, int):
                 self._code = leaving.code or 0
@@ -148,16 +150,16 @@ class _Leaving:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the process, and in a fork of it what that is to be; returns its exit code."""
     parser = argparse.ArgumentParser(prog="autograder.sandbox.prefork.zygote")
-    parser.add_argument("--socket", type=int, required=True, help="file descriptor of the tasks")
+    parser.add_argument("--socket", type=int, required=True, help="file descriptor of the requests")
     parser.add_argument("module", help="the module whose main() is run")
     options = parser.parse_args(arguments)
     leaving = _Leaving()  # before anything else has an exit function
-    tasks = socket.socket(fileno=options.socket)
+    requests = socket.socket(fileno=options.socket)
     gc.disable()  # what is imported stays: there is little in it to collect
     module: Any = import_module(options.module)
     module.preload()
     # A fork has no thread but the one that forked. Two libraries have some that are not Python's:
-    # the workers of OpenBLAS are made anew in a fork, LTTng's only listen for a tracer.
+    # the workers of OpenBLAS are made again in a fork, LTTng's only listen for a tracer.
     if threading.active_count() > 1:
         sys.exit(f"{options.module} starts threads when it is imported, which no fork would have")
     # What is here now stays: nothing of it needs to be looked at, and so copied, by a fork.
@@ -165,9 +167,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     gc.freeze()
     gc.enable()
     signal.signal(signal.SIGCHLD, _reap_children)
-    tasks.send(json.dumps({"ready": os.getpid()}).encode())
-    task = serve_tasks(tasks)
-    return 0 if task is None else leaving.run(task)
+    requests.send(json.dumps({"ready": os.getpid()}).encode())
+    request = serve_requests(requests)
+    return 0 if request is None else leaving.run(request)
 
 
 if __name__ == "__main__":

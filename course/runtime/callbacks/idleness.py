@@ -14,15 +14,17 @@ import threading
 import time
 from typing import NamedTuple
 
-PATIENCE = 0.2  # s that a callback must have slept
-LOOKS = 40  # that must have found it asleep: on a busy machine PATIENCE passes in a few
-WORK = 0.5e-3  # s of processor time a look: a loop that spins uses ten times as much, a nap a tenth
+PATIENCE_S = 0.2  # s that a callback must have slept
+LOOKS = 40  # that must have found it asleep: on a busy machine PATIENCE_S passes in a few
+WORK_S = (
+    0.5e-3  # s of processor time a look: a loop that spins uses ten times as much, a nap a tenth
+)
 _FUTEX = {"x86_64": 202, "aarch64": 98}.get(platform.machine())
 """The number of that system call; None where it is not known."""
-RESTLESS = 8  # looks in a row at which a blocked thread may have stirred: it looks at a clock
+RESTLESS_LOOKS = 8  # looks in a row at which a blocked thread may have stirred: it looks at a clock
 
 
-class Look(NamedTuple):
+class ThreadSample(NamedTuple):
     """One look at a thread: whether it sleeps, how often it has run, and for how long (s)."""
 
     asleep: bool
@@ -30,18 +32,18 @@ class Look(NamedTuple):
     worked: float
 
 
-def look_at(native_id: int, before: Look | None = None) -> Look:
+def look_at(native_id: int, before: ThreadSample | None = None) -> ThreadSample:
     """Look at a thread of this process, last seen as `before`; one that ended is not asleep."""
     task = f"/proc/self/task/{native_id}"
     try:
         status = _read_file(f"{task}/status")
     except OSError:
-        return Look(False, "", 0.0)
+        return ThreadSample(False, "", 0.0)
     asleep = status.partition("\nState:\t")[2][:1] == "S"
     switches = status[status.index("voluntary_ctxt") :]
     if before is not None and asleep and switches == before.switches:
-        return Look(True, switches, before.worked)  # it has not run since
-    return Look(asleep, switches, _processor_seconds(task))
+        return ThreadSample(True, switches, before.worked)  # it has not run since
+    return ThreadSample(asleep, switches, _processor_seconds(task))
 
 
 def _processor_seconds(task: str) -> float:
@@ -83,7 +85,7 @@ class Idleness:
         self._first = self._last = look_at(self._native_id)
         self._start_over(self._first)
 
-    def _start_over(self, look: Look) -> None:
+    def _start_over(self, look: ThreadSample) -> None:
         self._found = False
         self._first, self._since = look, time.monotonic()
         self._asleep = self._awake = self._stirs = 0
@@ -102,19 +104,19 @@ class Idleness:
         """Return whether it has been found blocked, and waits until another thread wakes it."""
         return self._found and _waits_without_end(self._native_id)
 
-    def _by_now_blocked(self, look: Look) -> bool:
+    def _by_now_blocked(self, look: ThreadSample) -> bool:
         """Return whether it has been asleep, but for naps' ends, in enough looks by now."""
         self._asleep += look.asleep
         self._awake += not look.asleep
         looks = self._asleep + self._awake
-        works = look.worked - self._first.worked > WORK * max(looks, LOOKS)
+        works = look.worked - self._first.worked > WORK_S * max(looks, LOOKS)
         if works or self._awake > LOOKS + looks / 4:
             self._start_over(look)
-        elif self._asleep >= LOOKS and time.monotonic() - self._since >= PATIENCE:
+        elif self._asleep >= LOOKS and time.monotonic() - self._since >= PATIENCE_S:
             self._found = look.asleep
         return self._found
 
-    def _still_blocked(self, look: Look, before: Look) -> bool:
+    def _still_blocked(self, look: ThreadSample, before: ThreadSample) -> bool:
         """Return whether it has not run since the last look, or does no more than take naps."""
         if look.asleep and look.switches == before.switches:
             self._stirs = 0
@@ -122,7 +124,7 @@ class Idleness:
         if not self._stirs:
             self._first = before
         self._stirs += 1
-        if look.worked - self._first.worked > WORK * RESTLESS:
+        if look.worked - self._first.worked > WORK_S * RESTLESS_LOOKS:
             self._start_over(look)  # it has gone on
             return False
-        return look.asleep and self._stirs > RESTLESS
+        return look.asleep and self._stirs > RESTLESS_LOOKS

@@ -9,13 +9,13 @@ from contextvars import ContextVar
 
 from rclpy.node import Node
 
-from course.runtime.callbacks.jobs import current_job
+from course.runtime.callbacks.callback_runs import current_job
 
 _arriving: ContextVar[Node | None] = ContextVar("arriving", default=None)
 
 
-class Families:
-    """Remembers who brought a node: they belong together, whoever holds one of them still.
+class NodeOwners:
+    """Remembers which node brought which others: when it is paused, they are paused, too.
 
     A parent adds its children from a callback (``self.executor.add_node(child)``), or in the moment
     in which it is given an executor itself.

@@ -1,4 +1,4 @@
-"""Whose a task is: rclpy makes tasks for what has no entity of its own.
+"""Records to which node a task belongs: rclpy makes tasks for what has no entity of its own.
 
 The execution of a goal is one, the done callback of a future another. Without a record of who
 created them, nobody could tell whose mistake it is when one fails.
@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.task import Task
 from rclpy.waitable import Waitable
 
-from course.runtime.callbacks.jobs import current_job, wrap_callback
+from course.runtime.callbacks.callback_runs import current_job, wrap_callback
 
 Owner = tuple[Node | None, Any]
 """The node that a task is put to, and the callable to name when it fails."""

@@ -22,13 +22,13 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node
 
-from course.runtime.callbacks.errors import learner_frames
-from course.runtime.names import node_name
+from course.runtime.callbacks.callback_errors import learner_frames
+from course.runtime.ros_names import node_name
 
 Kind = Literal["raised", "returned", "stuck", "refused"]
 
-_KEPT = 10  # a node
-_LONGEST = 500  # characters of what was raised
+_KEPT_FAILURES = 10  # a node
+_MAX_CHARS = 500  # characters of what was raised
 _numbers = itertools.count(1)
 _failed: weakref.WeakKeyDictionary[Node, deque[FailedTransition]] = weakref.WeakKeyDictionary()
 
@@ -134,13 +134,13 @@ def _change_state(self: Any, transition_id: int) -> Any:
 
 def _note_failure(node: Any, kind: Kind, what: str, text: str = "") -> None:
     found = FailedTransition(node_name(node), kind, what, text, next(_numbers))
-    _failed.setdefault(node, deque(maxlen=_KEPT)).append(found)
+    _failed.setdefault(node, deque(maxlen=_KEPT_FAILURES)).append(found)
 
 
 def _describe_error(error: Exception) -> str:
     """Return type, message and the learner's own line of an exception."""
     try:
-        message = " ".join(str(error).split())[:_LONGEST]
+        message = " ".join(str(error).split())[:_MAX_CHARS]
     except Exception:  # noqa: BLE001 - a learner's exception class may be broken itself
         message = ""
     place = ""

@@ -18,9 +18,9 @@ import rclpy.context
 import rclpy.utilities
 from rclpy.context import Context
 
-from course.domains import port_files
 from course.errors import SessionError
 from course.runtime.context.interruptible import SessionContext
+from course.runtime.domains import port_files
 from course.runtime.output import rcutils_tap
 
 Discovery = Literal["LOCALHOST", "SUBNET", "SYSTEM_DEFAULT"]

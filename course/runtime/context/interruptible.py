@@ -4,7 +4,7 @@ Python runs a signal handler only between two steps of the main thread, and `rcl
 in C until something wakes it: without a timer, perhaps for ever. `rclpy.init()` installs handlers
 in C for this, which end every context of the process. A session must outlive an interrupt, so it
 wakes those executors every now and then instead, as long as there are any. The thread that does so
-is there from beginning to end: whoever counts threads must not find it now and then.
+lives as long as the context: a program that counts threads must always find the same number.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from rclpy.executors import Executor
 from course.runtime.executor.background import BackgroundExecutor
 from course.runtime.output import rcutils_tap
 
-_PATIENCE = 0.5  # s for callbacks that run while the context is shut down
-_NAP = 0.01  # s between looks at them
-_PERIOD = 0.1  # s; soon enough for a hand on the keyboard
+_PATIENCE_S = 0.5  # s for callbacks that run while the context is shut down
+_NAP_S = 0.01  # s between looks at them
+_PERIOD_S = 0.1  # s; soon enough for a hand on the keyboard
 
 
 class SessionContext(Context):
@@ -89,10 +89,10 @@ class SessionContext(Context):
             ours = [executor for executor in self._ours if not executor.has_ended]
             for executor in ours:
                 stack.enter_context(executor.hold_still())
-            deadline = time.monotonic() + _PATIENCE
+            deadline = time.monotonic() + _PATIENCE_S
             for executor in ours:
                 while executor.runs_elsewhere() and time.monotonic() < deadline:
-                    executor.wait_for_a_job(_NAP)
+                    executor.wait_for_a_job(_NAP_S)
             yield
 
     def _end_waking(self) -> None:
@@ -100,11 +100,11 @@ class SessionContext(Context):
         self._wanted.set()
 
     def _wake_guests(self) -> None:
-        # Whoever ends this says so first and wakes second: what is cleared here, it sets again, or
-        # it has said so before this looks.
+        # `_end_waking` sets `_over` first and `_wanted` second. So if `_wanted` is cleared here, it
+        # is either set again afterwards, or `_over` was set before this looks at it.
         while not self._over.is_set():
             self._wanted.wait()
-            if self._over.wait(_PERIOD):
+            if self._over.wait(_PERIOD_S):
                 return
             with self._guests_lock:
                 if not self._guests:

@@ -23,15 +23,15 @@ from rclpy.executors import (
 from rclpy.node import Node
 from rclpy.task import Future, Task
 
+from course.runtime.callbacks.callback_runs import CallbackRun, Report
 from course.runtime.callbacks.idleness import Idleness
-from course.runtime.callbacks.jobs import Job, Report
-from course.runtime.callbacks.node_owners import Families
+from course.runtime.callbacks.node_owners import NodeOwners
 from course.runtime.callbacks.tasks import CreatedTasks, find_owner
 from course.runtime.executor.gate import Gate
 from course.runtime.executor.threads import Threads
 from course.runtime.executor.wait_list import Ready, WaitList
-from course.runtime.executor.workers import Workers
-from course.runtime.output import streams
+from course.runtime.executor.worker_threads import WorkerThreads
+from course.runtime.output import callback_output
 from course.runtime.rclpy_fixes import incompatible_qos_events
 from course.runtime.rclpy_fixes.clock_sleep import sleeps_by_clock
 from course.runtime.teardown import is_alive
@@ -57,8 +57,8 @@ class BackgroundExecutor(Executor):
     """Runs callbacks in one thread of its own, or in a pool of `threads`.
 
     It is an executor as rclpy documents one: it overrides public methods only. What it adds:
-    a raising callback is reported and spinning goes on; `held()` keeps it from waiting on its nodes
-    while they are removed or destroyed, which rclpy answers with InvalidHandle otherwise;
+    a raising callback is reported and spinning goes on; `hold_still()` keeps it from waiting on its
+    nodes while they are removed or destroyed, which rclpy answers with InvalidHandle otherwise;
     `give_up` gets it going again when a callback never returns.
 
     Attributes:
@@ -87,13 +87,13 @@ class BackgroundExecutor(Executor):
         self.threads = threads
         self.session_key = session_key
         self.report = report
-        self.running: set[Job] = set()
-        self.given_up: set[Job] = set()
+        self.running: set[CallbackRun] = set()
+        self.given_up: set[CallbackRun] = set()
         self.pulse = pulse
         self.gate = Gate(self.wake)
         self.finished = 0
         self.endless = float("-inf")
-        self._families = Families()
+        self._node_owners = NodeOwners()
         self._created = CreatedTasks()
         self._awaiting: weakref.WeakSet[Task] = weakref.WeakSet()
         self._has_awaited = False  # most programs never do, and looking at a weak set takes time
@@ -101,7 +101,7 @@ class BackgroundExecutor(Executor):
         self._newest_end = object()  # another one each time that a callback is done
         self._interrupted = self.gate.new_interrupt()
         self._round = _fresh_false()
-        self._workers = Workers(threads, self._run_job, name) if threads > 1 else None
+        self._workers = WorkerThreads(threads, self._run_job, name) if threads > 1 else None
         self._threads = Threads(self._spin_loop, self._workers, name)
 
     def start(self) -> None:
@@ -170,7 +170,7 @@ class BackgroundExecutor(Executor):
         """How many callbacks have begun, and await something."""
         return len(self._awaiting)
 
-    def working_jobs(self) -> set[Job]:
+    def working_jobs(self) -> set[CallbackRun]:
         """Return the callbacks that run and are neither done nor blocked; look once at each.
 
         With one thread there is nobody to go on without a blocked callback, so there it counts,
@@ -184,12 +184,12 @@ class BackgroundExecutor(Executor):
             return running - begun  # a worker is free, and has not come to it yet
         return {job for job in begun if not self._is_blocked(job)}  # each is looked at
 
-    def is_resuming(self, job: Job) -> bool:
+    def is_resuming(self, job: CallbackRun) -> bool:
         """Return whether a callback that runs has begun before, and awaited something."""
         return job.task in self._awaiting
 
     @staticmethod
-    def _is_blocked(job: Job) -> bool:
+    def _is_blocked(job: CallbackRun) -> bool:
         if sleeps_by_clock(job):
             return True
         if job.idleness is None:
@@ -205,12 +205,12 @@ class BackgroundExecutor(Executor):
         me = threading.get_ident()
         return any(job.thread_id != me for job in self.running.copy())
 
-    def running_of(self, node: Node) -> list[Job]:
+    def running_of(self, node: Node) -> list[CallbackRun]:
         """Return callbacks of `node` that run, or are about to, in another thread than this."""
         me = threading.get_ident()
         return [job for job in self.running.copy() if job.node is node and job.thread_id != me]
 
-    def give_up(self, job: Job) -> bool:
+    def give_up(self, job: CallbackRun) -> bool:
         """Go on without the thread that runs `job`, whose callback does not return.
 
         A new thread takes its place; the old one ends when its callback does. Return whether that
@@ -218,7 +218,8 @@ class BackgroundExecutor(Executor):
         """
         with self.hold_still():
             try:
-                # Whoever removes a job decides what its thread does next: `_run_job` or we.
+                # Either `_run_job` or this method removes a job, and so decides what its thread
+                # does next.
                 self.running.remove(job)
             except KeyError:
                 return False
@@ -232,18 +233,18 @@ class BackgroundExecutor(Executor):
 
     def brought_by(self, node: Node) -> list[Node]:
         """Return the nodes of this executor that `node` brought along, directly or not."""
-        return self._families.brought_by(node, self.get_nodes())
+        return self._node_owners.brought_by(node, self.get_nodes())
 
     # What rclpy's own executors override.
 
     def wake(self) -> None:
-        """Wait anew: something was created or destroyed, or has changed in another way."""
+        """Wait again: something was created or destroyed, or has changed in another way."""
         self._wait_list.changed = True
         super().wake()
 
     def add_node(self, node: Node) -> bool:
         """Add a node; one that a callback of another node adds belongs to that node."""
-        with self._families.note_arrival(node):
+        with self._node_owners.note_arrival(node):
             return bool(super().add_node(node))
 
     def wait_for_ready_callbacks(self, *args: Any, **kwargs: Any) -> tuple[Any, Any, Any]:
@@ -301,7 +302,7 @@ class BackgroundExecutor(Executor):
         limit = float("inf") if timeout is None or timeout < 0 else timeout
         poll_condition(lambda: done() or self.has_ended or self.finished != seen, limit, self.pulse)
 
-    def _next_job(self, timeout: Any, done: Callable[[], bool] = _never_true) -> Job:
+    def _next_job(self, timeout: Any, done: Callable[[], bool] = _never_true) -> CallbackRun:
         try:
             if self.gate.enter():
                 # Equal arguments resume rclpy's suspended wait; a new condition starts afresh.
@@ -323,17 +324,17 @@ class BackgroundExecutor(Executor):
         """Return whether there is anything to wait on: to wait in order to see takes far longer."""
         return bool(self._tasks) or any(map(_has_entities, self.get_nodes()))
 
-    def _make_job(self, task: Any, entity: Any, node: Any) -> Job:
+    def _make_job(self, task: Any, entity: Any, node: Any) -> CallbackRun:
         shown = None
         if entity is None:
             node, shown = self._created.owner_of(task)
         elif isinstance(entity, EventHandler):
             incompatible_qos_events.listen_to(entity)
-        job = Job(task, entity, node, self, shown)
+        job = CallbackRun(task, entity, node, self, shown)
         self.running.add(job)
         return job
 
-    def _execute_job(self, job: Job) -> None:
+    def _execute_job(self, job: CallbackRun) -> None:
         if self._workers is None:
             self._run_job(job)
         else:
@@ -355,15 +356,15 @@ class BackgroundExecutor(Executor):
                         self.remove_node(node)
             except Exception as error:  # noqa: BLE001 - a waitable of the learner's, for instance
                 if self.context.ok():  # else rclpy.shutdown() came in between
-                    self.report(Job(Task(_never_true), None, None, self), error)
+                    self.report(CallbackRun(Task(_never_true), None, None, self), error)
                 self.request_stop()
 
-    def _run_job(self, job: Job) -> bool:
+    def _run_job(self, job: CallbackRun) -> bool:
         """Run a callback; return whether this thread is to go on with others."""
         job.thread_id = threading.get_ident()
         newest_end = self._newest_end
         self.gate.notify()
-        streams.install_streams()
+        callback_output.install_streams()
         failure = job()
         # rclpy resumes each coroutine once before it waits, and leaves out those that run at that
         # moment. What one awaits may be done just after that, and nothing else might ever wake it.
@@ -376,7 +377,7 @@ class BackgroundExecutor(Executor):
             self._has_awaited = True
             self._awaiting.add(job.task)
         if job.unfinished is not None:
-            streams.finish_lines(job)
+            callback_output.finish_lines(job)
         if failure is not None:
             self.report(job, failure)
         if job.entity is None and (job.task.done() or job.task.cancelled()):

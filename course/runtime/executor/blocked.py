@@ -17,10 +17,10 @@ from rclpy.client import Client
 from rclpy.exceptions import InvalidHandle
 from rclpy.node import Node
 
-from course.runtime.callbacks.errors import callback_name
-from course.runtime.callbacks.jobs import Job
+from course.runtime.callbacks.callback_errors import callback_name
+from course.runtime.callbacks.callback_runs import CallbackRun
 from course.runtime.executor.background import BackgroundExecutor
-from course.runtime.names import node_name
+from course.runtime.ros_names import node_name
 
 _CLIENTS = ("rclpy.client", "rclpy.action.client")
 _MOST_LINES = 5  # of a stack, in a sentence
@@ -89,7 +89,7 @@ def blocked_callbacks(
     return [describe_job(job) for job in sorted(jobs, key=lambda job: job.since)]
 
 
-def describe_job(job: Job) -> BlockedCallback:
+def describe_job(job: CallbackRun) -> BlockedCallback:
     """Return what can be seen of `job` from outside."""
     frames = list(_walk_frames(job))
     home: Any = job.home
@@ -135,7 +135,7 @@ _ADVICE_GROUP = (
 )
 
 
-def _walk_frames(job: Job) -> Iterator[FrameType]:
+def _walk_frames(job: CallbackRun) -> Iterator[FrameType]:
     """Go through the frames of the thread that runs `job`, the innermost first."""
     frame = sys._current_frames().get(job.thread_id)
     while frame is not None:
@@ -169,7 +169,7 @@ def _target_name(client: Client | ActionClient) -> str:
     return str(found or "an action")
 
 
-def _why_no_answer(client: Client | ActionClient, job: Job) -> tuple[str, str]:
+def _why_no_answer(client: Client | ActionClient, job: CallbackRun) -> tuple[str, str]:
     """Return why the answer that `job` waits for does not come, and what to do about it."""
     home: Any = job.home
     name = _target_name(client)

@@ -9,7 +9,7 @@ from rclpy.executors import ShutdownException
 
 from course.runtime.waiting import Pulse, poll_condition
 
-_TIMEOUT = 5.0  # s; waking an executor takes microseconds, so this bounds what cannot happen
+_TIMEOUT_S = 5.0  # s; waking an executor takes microseconds, so this bounds what cannot happen
 
 
 class Gate:
@@ -17,7 +17,7 @@ class Gate:
 
     `enter` and `leave` are on the path of every callback: they do next to nothing unless somebody
     holds the gate. That is safe because each side writes its own flag before it reads the other's.
-    There is no lock: Ctrl-C may end a step of whoever holds the gate anywhere.
+    There is no lock: Ctrl-C may interrupt the thread that holds the gate at any step.
 
     Attributes:
         stale: True if nodes may have changed under a wait that rclpy has suspended.
@@ -41,7 +41,7 @@ class Gate:
             self._holders.append(holder)
             self.stale = True
             self._wake()
-            poll_condition(lambda: not self._waiting, _TIMEOUT, self._changes)
+            poll_condition(lambda: not self._waiting, _TIMEOUT_S, self._changes)
             yield
         finally:
             if holder in self._holders:  # else an interrupt came before that
@@ -96,5 +96,5 @@ class Gate:
     def wait_until(self, condition: Callable[[], object]) -> None:
         """Return when `condition` holds, somebody holds the gate, or the executor is to end."""
         poll_condition(
-            lambda: condition() or self._holders or self.stopping, _TIMEOUT, self._changes
+            lambda: condition() or self._holders or self.stopping, _TIMEOUT_S, self._changes
         )

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from course.runtime.executor.background import BackgroundExecutor
 
-_NAP = 0.0005  # s between looks at callbacks that run in other threads
+_NAP_S = 0.0005  # s between looks at callbacks that run in other threads
 _ENDLESS = ((1.0, 100), (2.5, 10))
 """Seconds, and callbacks that have ended in them, after which more will follow for ever: somebody
 polls in many short callbacks, as a coroutine does that sleeps a little between two awaits."""
@@ -19,8 +19,8 @@ _AGAIN = ((0.5, 10),)
 _TURN = ((0.03, 8), (0.05, 2), (0.5, 1))
 """The same, where callbacks have been found to follow each other without end a moment ago: then
 each of them has had its turn, and so has everything else."""
-_MOMENT = 5.0  # s
-_AGE = 1.0  # s that a callback may run, and be one of many
+_RECENT_S = 5.0  # s
+_MAX_AGE_S = 1.0  # s that a callback may run, and be one of many
 
 
 @contextlib.contextmanager
@@ -57,7 +57,7 @@ def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> boo
         if working:
             # One that only looks again whether what it awaits has come is no sign of life.
             idle = idle if all(executor.is_resuming(job) for executor, job in working) else 0
-            working[0][0].wait_for_a_job(_NAP)
+            working[0][0].wait_for_a_job(_NAP_S)
         else:
             progress = [executor.run_ready() for executor in executors]
             idle = 0 if any(progress) else idle + 1
@@ -74,7 +74,7 @@ def come_to_rest(executors: Sequence[BackgroundExecutor], timeout: float) -> boo
 
 def follow_each_other(executors: Sequence[BackgroundExecutor]) -> bool:
     """Return whether callbacks were found to follow each other without end a moment ago."""
-    return any(time.monotonic() - executor.endless < _MOMENT for executor in executors)
+    return any(time.monotonic() - executor.endless < _RECENT_S for executor in executors)
 
 
 class _Chain:
@@ -100,7 +100,7 @@ class _Chain:
         if not any(now - self._began >= s and ended >= number for s, number in self._signs):
             return False
         running = [job for executor in self._executors for job in executor.running.copy()]
-        if any(now - job.since > _AGE for job in running):
+        if any(now - job.since > _MAX_AGE_S for job in running):
             return False
         for executor in self._executors:
             executor.endless = now
@@ -112,5 +112,5 @@ def _nothing_runs(executors: Sequence[BackgroundExecutor]) -> bool:
     if not any(executor.running for executor in executors):
         return True
     # What this round has set off may have woken it: let it show.
-    executors[0].wait_for_a_job(_NAP)
+    executors[0].wait_for_a_job(_NAP_S)
     return not any(executor.working_jobs() for executor in executors)

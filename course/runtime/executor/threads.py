@@ -6,10 +6,12 @@ import threading
 import time
 from collections.abc import Callable
 
-from course.runtime.callbacks.jobs import Job
-from course.runtime.executor.workers import Workers
+from course.runtime.callbacks.callback_runs import CallbackRun
+from course.runtime.executor.worker_threads import WorkerThreads
 
-_WAY_OUT = 5.0  # s; a woken thread needs microseconds to end, unless the machine is very busy
+_JOIN_TIMEOUT_S = (
+    5.0  # s; a woken thread needs microseconds to end, unless the machine is very busy
+)
 
 
 class Threads:
@@ -21,7 +23,7 @@ class Threads:
         spinner: the thread that waits on the nodes.
     """
 
-    def __init__(self, spin: Callable[[], None], workers: Workers | None, name: str) -> None:
+    def __init__(self, spin: Callable[[], None], workers: WorkerThreads | None, name: str) -> None:
         """Make a thread that runs `spin`; those of `workers` are to be looked after as well."""
         self._spin = spin
         self._name = f"{name} spin"
@@ -48,7 +50,7 @@ class Threads:
         thread.start()
 
     def join(
-        self, deadline: float, running: set[Job], given_up: set[Job]
+        self, deadline: float, running: set[CallbackRun], given_up: set[CallbackRun]
     ) -> list[threading.Thread]:
         """Wait for the threads to end; return those that run a callback past `deadline`.
 
@@ -68,7 +70,7 @@ class Threads:
         busy = hopeless | {job.thread_id for job in running.copy()}
         for thread in others:
             if thread.ident not in busy:
-                thread.join(_WAY_OUT)
+                thread.join(_JOIN_TIMEOUT_S)
         return [thread for thread in others if thread.is_alive()]
 
     def _new_spinner(self) -> threading.Thread:

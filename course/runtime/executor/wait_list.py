@@ -1,11 +1,11 @@
 """What of an executor's nodes is ready to run: rclpy's wait, at half of its cost.
 
-rclpy gathers what nodes wait on anew for each wait, of which there are several a message, and there
-is much of it: a node has services of its own, and each publisher and subscription an event handler.
-That takes longer than most callbacks (https://github.com/ros2/rclpy/issues/1223). Here it is kept
-until something is created or destroyed, and where messages come fast, not every wait is for what
-people ask now and then, too: news of profiles that do not fit, and parameters. The order of what is
-ready is rclpy's.
+For each wait rclpy gathers again what the nodes wait on. There are several waits a message, and
+there is much to gather: a node has services of its own, and each publisher and subscription has an
+event handler. That takes longer than most callbacks (https://github.com/ros2/rclpy/issues/1223).
+Here it is kept until something is created or destroyed, and where messages come fast, not every
+wait is for what people ask now and then, too: news of profiles that do not fit, and parameters. The
+order of what is ready is rclpy's.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from rclpy.task import Task
 from rclpy.waitable import NumberOfEntities
 
 Ready = tuple[Task, Any, Any]
-"""A task to run, the entity whose callback it is, and that one's node, where there are these."""
+"""A task to run, the entity whose callback it is, and that entity's node, if there are these."""
 
 SELDOM_S = 0.05
 """Seconds between two waits for profiles or types that do not fit, which is for people to read, and
@@ -221,7 +221,7 @@ class WaitList:
         self._groups = {each.entity.callback_group: each.entity for each in owned}
         self._all = _Wait(owned, own)
         rest = [each for each in owned if not _is_seldom(each)]
-        # Who has nothing of the kind need not wake up to look for it.
+        # Without such entities there is no need to wake up and look for them.
         self._often = self._all if len(rest) == len(owned) else _Wait(rest, own)
 
     def _may_begin_all(self) -> bool:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import overload
 
 from course.errors import SessionError
-from course.runtime.logs.store import SEVERITIES, LogRow, store
+from course.runtime.logs.log_store import SEVERITIES, LogRow, store
 
 
 class LogTable(Sequence[LogRow]):

@@ -16,10 +16,10 @@ from types import FrameType, TracebackType
 
 from rclpy.node import Node
 
-from course.runtime.names import node_name
+from course.runtime.ros_names import node_name
 from course.runtime.teardown import destroy_leftovers, is_alive
 
-_LONGEST = 200  # characters of what a constructor raised
+_MAX_CHARS = 200  # characters of what a constructor raised
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class HalfMade:
             has_begun: whether a thread was begun meanwhile.
         """
         threads = tuple(weakref.ref(one) for one in threading.enumerate() if has_begun(one))
-        problem = f"{type(error).__name__}: {error}"[:_LONGEST].rstrip(": .") + "."
+        problem = f"{type(error).__name__}: {error}"[:_MAX_CHARS].rstrip(": .") + "."
         found = [
             Remains(node_name(node), problem, factory, key, weakref.ref(node), threads)
             for node in _half_made(error.__traceback__)

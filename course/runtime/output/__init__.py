@@ -1,1 +1,1 @@
-"""What libraries of ROS and callbacks print, taken to whom it concerns."""
+"""Puts what ROS libraries and callbacks print into the log of the node that it belongs to."""

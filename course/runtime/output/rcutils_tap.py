@@ -20,8 +20,8 @@ from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.logging import get_logger_level, set_logger_level
 from rclpy.node import Node
 
-from course.runtime.callbacks.jobs import current_job
-from course.runtime.logs.store import store
+from course.runtime.callbacks.callback_runs import current_job
+from course.runtime.logs.log_store import store
 from course.runtime.rclpy_fixes.logger_callers import spare_the_next_search
 
 # void handler(location, int severity, const char *name, int64 stamp_ns, const char *format,
@@ -55,7 +55,9 @@ _vsnprintf.argtypes = [ctypes.c_char_p, ctypes.c_size_t, ctypes.c_char_p, ctypes
 # is a warning that /rosout has two publishers of one name: what is heard here needs no /rosout.
 _SAID_UNDER_LOCK = "rcl.logging_rosout"
 
-_HAND_ON_TIMEOUT = 1.0  # s that lines may be under way to the next handler before it is taken down
+_HAND_ON_TIMEOUT_S = (
+    1.0  # s that lines may be under way to the next handler before it is taken down
+)
 
 _lock = threading.Lock()
 _next: ctypes._CFunctionType | None = None
@@ -208,7 +210,7 @@ def _hand_nothing_on() -> None:
     global _next
     with _handed_on:
         _next = None
-        _handed_on.wait_for(lambda: not _under_way, _HAND_ON_TIMEOUT)
+        _handed_on.wait_for(lambda: not _under_way, _HAND_ON_TIMEOUT_S)
 
 
 def _is_ours_to_lower(logger: str) -> bool:

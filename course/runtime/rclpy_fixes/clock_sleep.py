@@ -10,7 +10,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.time import Time
 
-from course.runtime.callbacks.jobs import Job
+from course.runtime.callbacks.callback_runs import CallbackRun
 
 _RATE_DEPTH = 3  # frames from a lock of `threading` to the `Rate.sleep` that waits for it
 
@@ -35,7 +35,7 @@ def sleeps_in_own_context(node: Node) -> None:
     clock.sleep_until = sleep_until  # type: ignore[method-assign]
 
 
-def sleeps_until(job: Job) -> float | None:
+def sleeps_until(job: CallbackRun) -> float | None:
     """Return the simulated time (ns) at which a callback goes on that sleeps by its node's clock.
 
     Infinity for one in `Rate.sleep`: a timer of its node wakes it. None: it does something else, or
@@ -61,7 +61,7 @@ def sleeps_until(job: Job) -> float | None:
     return None
 
 
-def sleeps_by_clock(job: Job) -> bool:
+def sleeps_by_clock(job: CallbackRun) -> bool:
     """Return whether a callback does nothing until its node's clock moves on, by `sleep_until`.
 
     Known from where it is: whether its thread has come to rest by now makes no difference.

@@ -27,8 +27,9 @@ def listen_to(handler: EventHandler) -> None:
     """Remember what ``handler`` hears, if it is told of incompatible QoS. Idempotent.
 
     An executor calls this before it runs a handler for the first time, so that no event is missed,
-    whoever asks later. The handlers are those that endpoints have anyway (rclpy gives each one that
-    logs a warning): a learner's endpoints are not changed, and their own handlers run as before.
+    however late somebody asks for it. The handlers are those that endpoints have anyway (rclpy
+    gives each one that logs a warning): a learner's endpoints are not changed, and their own
+    handlers run as before.
     """
     if handler in _named or not any(handler.event_type is kind for kind in _INCOMPATIBLE):
         return

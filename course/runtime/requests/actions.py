@@ -17,7 +17,7 @@ from course.runtime.executor.quiescence import settle_executors
 from course.runtime.requests.graph_queries import full_action, full_topic, why_no_service
 from course.runtime.requests.hidden_node import Probe
 from course.runtime.waiting import Deadline, poll_condition
-from course.util import arguments
+from course.util import argument_checks
 
 _FEEDBACK_DEPTH = 1000
 SEND_GOAL = "/_action/send_goal"
@@ -89,7 +89,7 @@ class GoalRun:
         Raises:
             WaitTimeout: no result within `timeout` seconds.
         """
-        timeout = arguments.check_seconds(timeout)
+        timeout = argument_checks.check_seconds(timeout)
         with self._probe.explaining():
             if not self.done_within(timeout):
                 raise WaitTimeout(
@@ -112,7 +112,7 @@ class GoalRun:
         Raises:
             WaitTimeout: the server did not answer within `timeout` seconds.
         """
-        timeout = arguments.check_seconds(timeout)
+        timeout = argument_checks.check_seconds(timeout)
         if self._handle is None or not self.accepted:
             return False
         with self._probe.executor.hold_still():  # as in Goals.send

@@ -21,8 +21,8 @@ from rclpy.validate_node_name import validate_node_name
 from course.errors import SessionError, WaitTimeout
 from course.messages import yaml_text
 from course.messages.types import load_type, type_name
-from course.runtime.names import full_name, node_name
-from course.util import arguments
+from course.runtime.ros_names import full_name, node_name
+from course.util import argument_checks
 from course.util.close_matches import close_match
 
 
@@ -33,7 +33,7 @@ def full_topic(node: Node, topic: str) -> str:
         SessionError: it is not a topic name.
     """
     return _resolve_name(
-        node.resolve_topic_name, arguments.check_text(topic, "The topic", "/scan"), "topic"
+        node.resolve_topic_name, argument_checks.check_text(topic, "The topic", "/scan"), "topic"
     )
 
 
@@ -43,7 +43,7 @@ def full_service(node: Node, name: str) -> str:
     Raises:
         SessionError: it is not a service name.
     """
-    name = arguments.check_text(name, "The service", "/reset")
+    name = argument_checks.check_text(name, "The service", "/reset")
     return _resolve_name(node.resolve_service_name, name, "service")
 
 
@@ -53,7 +53,7 @@ def full_action(node: Node, name: str) -> str:
     Raises:
         SessionError: it is not a name of an action.
     """
-    name = arguments.check_text(name, "The action", "/dock")
+    name = argument_checks.check_text(name, "The action", "/dock")
     return _resolve_name(node.resolve_service_name, name, "action")
 
 
@@ -65,7 +65,7 @@ def full_node(node: Node | str) -> str:
     """
     if isinstance(node, Node):
         return node_name(node)
-    name = arguments.check_text(node, "The name of a node", "/camera")
+    name = argument_checks.check_text(node, "The name of a node", "/camera")
     name = name if name.startswith("/") else f"/{name}"
     space, _, last = name.rpartition("/")
     try:

@@ -21,7 +21,7 @@ from rclpy.subscription import Subscription
 from rclpy.task import Future
 
 from course.errors import WaitTimeout
-from course.runtime.executor.pool import Crew
+from course.runtime.executor.executor_pool import ExecutorPool
 from course.runtime.requests.graph_queries import (
     fitting_qos,
     full_service,
@@ -33,14 +33,14 @@ from course.runtime.requests.graph_queries import (
 from course.runtime.waiting import Deadline, Pulse, poll_condition
 
 _LISTEN_DEPTH = 1000
-_LONGEST = 1e9  # s: a Duration counts nanoseconds in 64 bits
+_MAX_TIMEOUT_S = 1e9  # s: a Duration counts nanoseconds in 64 bits
 
 
 class _HiddenNode(Node):
     """Has nothing for its executor to wait on until it listens or asks.
 
-    A step of simulated time looks at every executor, time and again. And what rclpy would log of
-    QoS events of a node that nobody knows helps nobody: whoever listens in vain hears why.
+    A step of simulated time looks at every executor, time and again. And what rclpy logs about QoS
+    events of a hidden node helps nobody: a wait that fails says why.
     """
 
     def create_publisher(self, *args: Any, **options: Any) -> Publisher:
@@ -57,7 +57,7 @@ class Probe:
     recorder does, waits in a block of `explaining`, so that the session can say why it was in vain.
     """
 
-    def __init__(self, context: Context, crew: Crew, pulse: Pulse) -> None:
+    def __init__(self, context: Context, pool: ExecutorPool, pulse: Pulse) -> None:
         """Make the hidden node in `context`."""
         self.pulse = pulse
         self.explaining: Callable[[], AbstractContextManager[None]] = contextlib.nullcontext
@@ -69,7 +69,7 @@ class Probe:
             start_parameter_services=False,
             parameter_overrides=[Parameter("start_type_description_service", value=False)],
         )
-        self.executor = crew.get_executor(1, "probe")
+        self.executor = pool.get_executor(1, "probe")
         self.executor.add_node(self.node)
 
     def subscribe(
@@ -141,7 +141,7 @@ class Probe:
         publisher = self.node.create_publisher(msg_type, topic, qos)
         try:
             yield publisher
-            publisher.wait_for_all_acked(Duration(seconds=min(timeout, _LONGEST)))
+            publisher.wait_for_all_acked(Duration(seconds=min(timeout, _MAX_TIMEOUT_S)))
         finally:
             with self.executor.hold_still():
                 self.node.destroy_publisher(publisher)

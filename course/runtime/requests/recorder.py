@@ -21,7 +21,7 @@ from course.runtime.requests.graph_queries import (
 )
 from course.runtime.requests.hidden_node import Probe
 from course.runtime.waiting import poll_condition
-from course.util import arguments
+from course.util import argument_checks
 
 
 class Stamped(NamedTuple):
@@ -88,8 +88,8 @@ class Recorder:
             WaitTimeout: fewer arrived within `timeout` seconds; it says why if none did.
         """
         n, timeout = (
-            arguments.check_whole_number(n, "n", least=0, example=1),
-            arguments.check_seconds(timeout),
+            argument_checks.check_whole_number(n, "n", least=0, example=1),
+            argument_checks.check_seconds(timeout),
         )
         with self._probe.explaining():
             if poll_condition(lambda: self._count >= n, timeout, self._probe.pulse):

@@ -13,7 +13,7 @@ from autograder.observe.patience import Patience
 from autograder.observe.stillness import Stillness
 from autograder.processes.outside.asking import Here
 from course import Session
-from tests.autograder.test_stillness import ASLEEP, BUSY, process
+from tests.autograder.processes.outside.test_kernel_stillness import ASLEEP, BUSY, process
 
 LONG_S = 600.0
 

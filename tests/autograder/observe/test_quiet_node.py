@@ -11,8 +11,8 @@ from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
-from autograder.exercises.qos.examiner_node import ExaminerNode, lossless_profile
 from autograder.exercises.qos.readings import STOP, Heard, Tag
+from autograder.exercises.qos.sensor_examiner import ExaminerNode, lossless_profile
 from autograder.observe.quiet_node import QuietNode
 from course import Session
 

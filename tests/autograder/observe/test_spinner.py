@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import pytest
 from std_msgs.msg import String
 
-from autograder.exercises.qos.examiner_node import ExaminerNode, lossless_profile
 from autograder.exercises.qos.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Sensor
+from autograder.exercises.qos.sensor_examiner import ExaminerNode, lossless_profile
 from autograder.observe.quiet_node import QuietNode
 from autograder.observe.spinner import MOST_AT_ONCE, Spinner
 from course import Session, WaitTimeout

@@ -11,18 +11,19 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from nav_msgs.srv import GetPlan
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
 
-from course.design import dye
+from course.design import message_tags
 from course.design.lifelike import lifelike_message
-
-from .test_dye import message_types
+from tests.course.design.test_message_tags import message_types
 
 
 @pytest.mark.parametrize("msg_type", list(message_types()), ids=lambda cls: cls.__name__)
 def test_every_installed_type_is_filled_and_has_room_for_a_mark_as_before(msg_type: Any) -> None:
     message = lifelike_message(msg_type)
-    assert dye.read_tag(message) is None
-    assert bool(dye.mark(message, 2_000_000)) == dye.has_room(msg_type)
-    assert dye.read_tag(message) == (2_000_000 if dye.has_room(msg_type) else None)
+    assert message_tags.read_tag(message) is None
+    assert bool(message_tags.mark(message, 2_000_000)) == message_tags.has_room(msg_type)
+    assert message_tags.read_tag(message) == (
+        2_000_000 if message_tags.has_room(msg_type) else None
+    )
 
 
 def test_a_scan_has_an_obstacle_where_its_angles_say() -> None:

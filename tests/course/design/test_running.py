@@ -16,16 +16,16 @@ from test_msgs.action import Fibonacci
 
 import course
 from course import Design, Session
-from course.design import dye
+from course.design import message_tags
 
 
 def tags(recorder: course.Recorder) -> list[int | None]:
-    return [dye.read_tag(entry.message) for entry in recorder.messages]
+    return [message_tags.read_tag(entry.message) for entry in recorder.messages]
 
 
 def marked(msg_type: Any, tag: int) -> Any:
     message = msg_type()
-    dye.mark(message, tag)
+    message_tags.mark(message, tag)
     return message
 
 
@@ -70,9 +70,9 @@ def test_a_goal_goes_through_a_service_and_another_action(any_session: Session) 
     sent = []
 
     def arrived() -> bool:  # a goal that finds a server not yet connected is not passed on
-        sent.append(dye.fresh_tag())
+        sent.append(message_tags.fresh_tag())
         run = any_session.send_goal(Fibonacci, "go", marked(Fibonacci.Goal, sent[-1]))
-        assert dye.read_tag(run.wait()) == sent[-1]
+        assert message_tags.read_tag(run.wait()) == sent[-1]
         return bool(set(sent) & set(tags(motors)))
 
     any_session.until(arrived, timeout=20, what="a goal at the motors")
@@ -84,8 +84,8 @@ def test_a_response_tells_what_else_the_server_knows(session: Session) -> None:
     design.run(session)
     read = session.record("/read", String)
     send(session, read, "in", 2_000_003)
-    assert dye.read_tag(session.call(GetMap, "map", GetMap.Request())) == 2_000_003
-    assert dye.read_tag(session.call(GetMap, "map", GetMap.Request())) is None
+    assert message_tags.read_tag(session.call(GetMap, "map", GetMap.Request())) == 2_000_003
+    assert message_tags.read_tag(session.call(GetMap, "map", GetMap.Request())) is None
 
 
 def test_a_response_bears_the_mark_of_the_question_too(session: Session) -> None:
@@ -95,7 +95,7 @@ def test_a_response_bears_the_mark_of_the_question_too(session: Session) -> None
     read = session.record("/read", String)
     send(session, read, "in", 2_000_005)
     answer = session.call(GetPlan, "plan", marked(GetPlan.Request, 2_000_006))
-    assert dye.read_all(answer) == [2_000_005, 2_000_006]
+    assert message_tags.read_all(answer) == [2_000_005, 2_000_006]
 
 
 def test_where_one_mark_fits_the_question_and_the_others_take_turns(session: Session) -> None:
@@ -108,7 +108,7 @@ def test_where_one_mark_fits_the_question_and_the_others_take_turns(session: Ses
     for tag in (2_000_010, 2_000_011):
         send(session, read, "in", tag)
     answers = [
-        dye.read_tag(session.call(CancelGoal, "stop", marked(CancelGoal.Request, tag)))
+        message_tags.read_tag(session.call(CancelGoal, "stop", marked(CancelGoal.Request, tag)))
         for tag in (2_000_020, 2_000_021, 2_000_022)
     ]
     assert answers == [2_000_010, 2_000_021, 2_000_011]

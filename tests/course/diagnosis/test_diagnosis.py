@@ -26,9 +26,9 @@ from test_msgs.msg import Empty
 
 from course import Session
 from course.diagnosis import Diagnosis, nodes
-from course.domains import leases, neighbours
 from course.errors import WaitTimeout
 from course.graph import reader
+from course.runtime.domains import domain_discovery, leases
 from tests.robot import Robot
 
 
@@ -354,7 +354,7 @@ def test_what_is_missed_here_is_in_another_notebook(
     process = start_script(NEXT_DOOR)
     assert process.stdout is not None
     domain = int(process.stdout.readline())
-    monkeypatch.setattr(neighbours, "DOMAINS", every_domain)
+    monkeypatch.setattr(domain_discovery, "DOMAINS", every_domain)
     session.run(listener, "weather")
     asker = session.run(Node, "asker")
     asker.create_client(SetBool, "gate")

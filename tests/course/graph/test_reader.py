@@ -19,7 +19,7 @@ from test_msgs.action import Fibonacci
 from test_msgs.msg import Empty
 
 from course import Session
-from course.graph import reader, words
+from course.graph import graph_text, reader
 from course.graph.mermaid import draw_mermaid
 from course.views.graph import MAX_BOXES, GraphView
 
@@ -47,7 +47,7 @@ def test_topics_have_their_endpoints_with_qos_and_depth(session: Session) -> Non
     (publisher,), (subscription,) = topic.publishers, topic.subscriptions
     assert (topic.name, topic.types) == ("/chatter", ("std_msgs/msg/String",))
     assert (publisher.node, publisher.qos["depth"]) == ("/talker", "7")
-    assert words.describe_qos(subscription) == "BEST_EFFORT, VOLATILE, KEEP_LAST(1)"
+    assert graph_text.describe_qos(subscription) == "BEST_EFFORT, VOLATILE, KEEP_LAST(1)"
     assert topic.mismatches == ()
 
 
@@ -65,7 +65,7 @@ def test_services_and_actions_have_both_sides(session: Session) -> None:
     assert (service.name, service.servers, service.clients) == ("/lamp", ("/robot",), ("/robot",))
     assert (action.name, action.type) == ("/navigate", "test_msgs/action/Fibonacci")
     assert graph.topics == (), "the topics of an action, /rosout and the like are plumbing"
-    text = words.describe_graph(graph)
+    text = graph_text.describe_graph(graph)
     assert "action /navigate (test_msgs/action/Fibonacci)\n  served by /robot" in text
 
 
@@ -161,7 +161,7 @@ def test_two_nodes_of_one_name_are_told(session: Session) -> None:
         session.run_beside(lambda: talker(RELIABLE))
     graph = session.until(lambda: _with_twins(session))
     assert graph.duplicate_names == ("/talker",)
-    assert "Two nodes are called /talker: rename one." in words.describe_graph(graph)
+    assert "Two nodes are called /talker: rename one." in graph_text.describe_graph(graph)
 
 
 def _with_twins(session: Session) -> reader.Graph | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from course.interfaces.toolchain import compiler_problem
+from course.interfaces.building.toolchain import compiler_problem
 
 DEADLINE = 120.0  # seconds; only a hung process reaches it
 

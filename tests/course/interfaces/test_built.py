@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.serialization import deserialize_message, serialize_message
 
 from course import interfaces
-from course.learner_session import Session
+from course.learner_session.session import Session
 
 pytestmark = pytest.mark.usefixtures("here")
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from course.interfaces import cache, finder
-from course.interfaces.toolchain import python_headers
+from course.interfaces import finder
+from course.interfaces.building import cache
+from course.interfaces.building.toolchain import python_headers
 from tests.machine import needs_compiler
 
 NO_COMPILER = {"PATH": "/nonexistent", "CC": "", "CXX": ""}

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from course.interfaces import installed
-from course.interfaces.build import Unit, generate_sources
-from course.interfaces.definition import define_text
-from course.interfaces.names import TypeName
+from course.interfaces.building.unit import Unit, generate_sources
+from course.interfaces.texts.definition import define_text
+from course.interfaces.texts.type_names import TypeName
 
 # From the wild, not from these wheels: rmw_zenoh's design document (AddTwoInts), and other
 # implementations of RIHS01 that test against a ROS 2 installation (Fibonacci's services).

@@ -12,9 +12,9 @@ from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
 
 from course import Session
-from course.qos_lab import lab, link, rules
-from course.qos_lab.experiment import COUNT, Experiment, Outcome
-from course.qos_lab.lab import LabError
+from course.qos_lab import experiment_runner, link, rules
+from course.qos_lab.experiment import COUNT, Experiment, ExperimentOutcome
+from course.qos_lab.experiment_runner import ExperimentError
 from course.qos_lab.profile import Profile, ProfileError
 from tests.machine import needs_lossy_link
 
@@ -59,7 +59,7 @@ CASES = {
     ],
 )
 def test_dds_does_what_the_rules_say(experiment: Experiment) -> None:
-    outcome = lab.run_experiment(experiment)
+    outcome = experiment_runner.run_experiment(experiment)
     assert outcome.remark == ""
     assert outcome.connected == rules.can_connect(experiment)
     assert len(outcome.received) == rules.expected_count(experiment)
@@ -78,7 +78,9 @@ def _pair(experiment: Experiment) -> tuple[Profile, Profile]:
 
 @needs_lossy_link
 def test_what_is_lost_is_lost_under_best_effort() -> None:
-    outcome = lab.run_experiment(Experiment(best_effort(), best_effort(), "stream", loss=60))
+    outcome = experiment_runner.run_experiment(
+        Experiment(best_effort(), best_effort(), "stream", loss=60)
+    )
     assert outcome.missing_count > 0
     assert "never sends anything twice" in rules.explain_outcome(
         Experiment(best_effort(), best_effort(), "stream", 60), outcome
@@ -91,7 +93,7 @@ def test_what_is_older_than_a_lifespan_is_not_replayed_to_a_late_reader(side: st
     pair = (short, long) if side == "writer" else (long, short)
     experiment = Experiment(*pair, "late joiner")
     assert rules.expected_count(experiment) is None
-    outcome = lab.run_experiment(experiment)
+    outcome = experiment_runner.run_experiment(experiment)
     assert (outcome.connected, outcome.received) == (True, [])
     why = rules.explain_outcome(experiment, outcome)
     assert "30 would fit into both queues, and 0 came." in why
@@ -101,7 +103,7 @@ def test_what_is_older_than_a_lifespan_is_not_replayed_to_a_late_reader(side: st
 def test_a_slow_readers_own_lifespan_empties_its_queue() -> None:
     experiment = Experiment(Profile(), Profile(history="KEEP_ALL", lifespan=0.05), "slow reader")
     assert rules.expected_count(experiment) is None
-    outcome = lab.run_experiment(experiment)
+    outcome = experiment_runner.run_experiment(experiment)
     assert outcome.missing_count > 0
     why = rules.explain_outcome(experiment, outcome)
     assert "pushed out" not in why
@@ -112,7 +114,7 @@ def test_a_slow_readers_own_lifespan_empties_its_queue() -> None:
 def test_a_slow_reader_misses_what_the_link_has_lost() -> None:
     deep = best_effort(depth=30)
     experiment = Experiment(deep, deep, "slow reader", loss=60)
-    outcome = lab.run_experiment(experiment)
+    outcome = experiment_runner.run_experiment(experiment)
     assert outcome.missing_count > 0
     why = rules.explain_outcome(experiment, outcome)
     assert "pushed out" not in why
@@ -123,7 +125,7 @@ def test_a_slow_reader_misses_what_the_link_has_lost() -> None:
 def test_what_grew_old_before_it_was_sent_again_is_said() -> None:
     brief = Profile(depth=30, lifespan=0.2)  # lost messages are sent again after seconds
     experiment = Experiment(brief, Profile(depth=30), "stream", loss=60)
-    outcome = lab.run_experiment(experiment)
+    outcome = experiment_runner.run_experiment(experiment)
     assert outcome.missing_count > 0
     why = rules.explain_outcome(experiment, outcome)
     assert "before they could be sent again, by the writer's lifespan (0.2 s)." in why
@@ -145,14 +147,14 @@ def test_what_grew_old_before_it_was_sent_again_is_said() -> None:
 def test_the_reason_is_one_that_can_be(
     experiment: Experiment, received: list[int], sentence: str
 ) -> None:
-    outcome = Outcome(connected=True, sent=COUNT, received=received, lossy=True)
+    outcome = ExperimentOutcome(connected=True, sent=COUNT, received=received, lossy=True)
     assert sentence in rules.explain_outcome(experiment, outcome)
 
 
 @pytest.mark.parametrize("scenario", ["late joiner", "deadline", "liveliness"])
 def test_a_loss_is_not_claimed_where_nothing_is_lost(scenario: str) -> None:
     experiment = Experiment(durable(), durable(), scenario, loss=50)
-    outcome = lab.run_experiment(experiment)
+    outcome = experiment_runner.run_experiment(experiment)
     assert not outcome.lossy
     assert (
         outcome.remark == "The link lost nothing here: it does so in stream and slow reader only."
@@ -163,14 +165,14 @@ def test_a_loss_is_not_claimed_where_nothing_is_lost(scenario: str) -> None:
 @needs_lossy_link
 def test_a_shallow_writer_cannot_repair() -> None:
     experiment = Experiment(Profile(depth=1), Profile(depth=1), "stream", loss=60)
-    outcome = lab.run_experiment(experiment)
+    outcome = experiment_runner.run_experiment(experiment)
     assert outcome.missing_count > 0
     assert "although the connection is reliable" in rules.explain_outcome(experiment, outcome)
 
 
 def test_a_missed_deadline_is_an_event() -> None:
     experiment = Experiment(Profile(deadline=0.2), Profile(deadline=0.2), "deadline")
-    outcome = lab.run_experiment(experiment)
+    outcome = experiment_runner.run_experiment(experiment)
     assert outcome.deadlines_missed > 0
     assert "deadline had passed" in rules.explain_outcome(experiment, outcome)
 
@@ -179,14 +181,17 @@ def test_a_missed_deadline_is_an_event() -> None:
 def test_silence_is_noticed_where_life_has_to_be_asserted(manual: bool) -> None:
     kind = "MANUAL_BY_TOPIC" if manual else "AUTOMATIC"
     profile = Profile(liveliness=kind, lease=0.3)
-    assert lab.run_experiment(Experiment(profile, profile, "liveliness")).liveliness_lost is manual
+    assert (
+        experiment_runner.run_experiment(Experiment(profile, profile, "liveliness")).liveliness_lost
+        is manual
+    )
 
 
 def test_without_namespaces_the_loss_is_left_out_and_that_is_said(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(link, "problem", lambda: "No namespaces here.")
-    outcome = lab.run_experiment(Experiment(loss=50))
+    outcome = experiment_runner.run_experiment(Experiment(loss=50))
     assert (outcome.remark, outcome.lossy, outcome.missing_count) == (
         "No namespaces here.",
         False,
@@ -203,8 +208,8 @@ def test_without_namespaces_the_loss_is_left_out_and_that_is_said(
     ],
 )
 def test_what_cannot_be_run_is_said(experiment: Experiment, sentence: str) -> None:
-    with pytest.raises(LabError, match=sentence):
-        lab.run_experiment(experiment)
+    with pytest.raises(ExperimentError, match=sentence):
+        experiment_runner.run_experiment(experiment)
 
 
 @pytest.mark.parametrize(
@@ -237,8 +242,8 @@ def test_profiles_go_there_and_back() -> None:
 def test_experiments_and_outcomes_go_over_a_pipe() -> None:
     experiment = CASES["late"]
     assert Experiment.from_json(experiment.to_json()) == experiment
-    outcome = Outcome(connected=True, received=[1, 2])
-    assert Outcome.from_json(json.dumps(json.loads(outcome.to_json()))) == outcome
+    outcome = ExperimentOutcome(connected=True, received=[1, 2])
+    assert ExperimentOutcome.from_json(json.dumps(json.loads(outcome.to_json()))) == outcome
 
 
 def test_the_view_keeps_the_prediction_beside_what_was_seen(session: Session) -> None:
@@ -280,7 +285,7 @@ def test_an_experiment_that_fails_says_so_and_the_next_one_runs(
     asked = {"offered": Profile().to_data(), "requested": Profile().to_data(), "scenario": "stream",
              "connects": True, "arrive": None, "loss": 0}  # fmt: skip
     with monkeypatch.context() as patch:
-        patch.setattr(lab.sys, "executable", "/nowhere/python")
+        patch.setattr(experiment_runner.sys, "executable", "/nowhere/python")
         view._on_message(view.widget, {"run": asked}, [])
         session.until(
             lambda: "The experiment failed (FileNotFoundErr" in view.make_frame()["problem"]
@@ -309,7 +314,7 @@ def test_an_experiment_ends_with_its_session() -> None:
         running = children()
     _, alive = psutil.wait_procs(running, timeout=20)
     assert alive == []
-    with pytest.raises(LabError, match="This QoS lab has ended"):
+    with pytest.raises(ExperimentError, match="This QoS lab has ended"):
         view.run("stream", connects=True)
 
 
@@ -321,6 +326,6 @@ def test_the_tools_of_a_lossy_link_are_found_by_an_ordinary_user(
     link.problem.cache_clear()
     request.addfinalizer(link.problem.cache_clear)
     experiment = Experiment(best_effort(), best_effort(), "stream", loss=60)
-    outcome = lab.run_experiment(experiment)
+    outcome = experiment_runner.run_experiment(experiment)
     assert (outcome.remark, outcome.lossy) == ("", True)
     assert outcome.missing_count > 0

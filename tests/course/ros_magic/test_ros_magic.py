@@ -242,7 +242,7 @@ def test_what_a_tutorial_publishes_arrives(
 def test_what_has_a_rate_and_no_end_ends_by_itself(
     robot: Robot, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(repetitions, "TIMEOUT", 0.5)
+    monkeypatch.setattr(repetitions, "TIMEOUT_S", 0.5)
     said = answer(capsys, "topic pub -r 10 /nobody std_msgs/msg/String")
     assert said == (
         "Published 5 messages on /nobody, to nobody: no subscription fits: {'data': ''}\n"
@@ -254,7 +254,7 @@ def test_what_has_a_rate_and_no_end_ends_by_itself(
 def test_an_interrupt_ends_what_has_a_rate_without_an_error(
     robot: Robot, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(repetitions, "TIMEOUT", 60.0)
+    monkeypatch.setattr(repetitions, "TIMEOUT_S", 60.0)
 
     def stop(_message: String) -> None:
         if len(robot.orders) == 3:

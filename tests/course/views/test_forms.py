@@ -98,7 +98,7 @@ def test_a_picture_is_cut_before_it_becomes_numbers() -> None:
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert shown == [0] * values.LONGEST + [f"… {20_000_000 - values.LONGEST} more"]
+    assert shown == [0] * values.MAX_SHOWN_ITEMS + [f"… {20_000_000 - values.MAX_SHOWN_ITEMS} more"]
     assert peak < 1_000_000
 
 

@@ -23,7 +23,7 @@ from course import Session
 from course.errors import CourseError, SessionError, WaitTimeout
 from course.messages.values import MisfitError
 from course.runtime.requests.actions import GoalState
-from course.views.live import MAX_FRAME, LiveView
+from course.views.shared.live_view import MAX_FRAME_BYTES, LiveView
 from course.watch import forms, goals
 from course.watch.parameter_values import ParameterError
 from tests.robot import Robot
@@ -85,8 +85,8 @@ def test_long_answers_still_fit_into_a_frame(session: Session) -> None:
     for _ in range(10):
         say(console, call={})
     session.until(lambda: sum(c["answer"] is not None for c in shown(console)["calls"]) == 10, 20)
-    assert len(json.dumps(shown(console), allow_nan=False)) < MAX_FRAME
-    assert len(console.words()) < MAX_FRAME
+    assert len(json.dumps(shown(console), allow_nan=False)) < MAX_FRAME_BYTES
+    assert len(console.words()) < MAX_FRAME_BYTES
     assert console.calls[0].answer is not None
     assert console.calls[0].answer["string_values"][0].endswith("… 298000 more")
 
@@ -162,7 +162,7 @@ def test_a_goal_that_was_over_before_anybody_looked_has_a_result_too(busy: Sessi
 def test_a_result_that_comes_late_is_asked_for_again(
     busy: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(goals, "ANSWER", 0.2)
+    monkeypatch.setattr(goals, "ANSWER_TIMEOUT_S", 0.2)
     release = threading.Event()
 
     class Dawdler(Server):
@@ -239,7 +239,7 @@ def test_several_goals_at_once_are_told_apart(busy: Session) -> None:
 def test_goals_that_were_let_go_of_do_not_come_back(
     busy: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(goals, "KEPT", 8)
+    monkeypatch.setattr(goals, "KEPT_GOALS", 8)
     server = busy.run(Server)
     assert isinstance(server, Server)
     server.go.set()
@@ -470,7 +470,7 @@ def test_long_lines_and_answers_are_cut_with_a_mark_and_fit_a_frame(session: Ses
     session.until(lambda: shown(panel)["rows"] and shown(panel)["rows"][-1][3] == "later")
     assert shown(panel)["rows"][-2][3].endswith("… [100 more characters]")
     assert "more characters]" in panel.words()
-    assert len(json.dumps(panel.look())) < MAX_FRAME
+    assert len(json.dumps(panel.look())) < MAX_FRAME_BYTES
 
     def big() -> Node:
         node = Node("big")
@@ -489,7 +489,7 @@ def test_long_lines_and_answers_are_cut_with_a_mark_and_fit_a_frame(session: Ses
         say(console, call={})
     session.until(lambda: [c["time"] for c in shown(console)["calls"] if c["time"]][9:])
     assert shown(console)["calls"][0]["answer"]["message"].endswith("more characters]")
-    assert len(json.dumps(console.look())) < MAX_FRAME
+    assert len(json.dumps(console.look())) < MAX_FRAME_BYTES
     sheet = session.parameters("big")
     (entry,) = shown(sheet)["entries"]
     assert (len(entry["value"]) < 3000, entry["read_only"]) == (True, True)

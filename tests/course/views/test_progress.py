@@ -10,7 +10,7 @@ from std_msgs.msg import Empty, Header, String
 from test_msgs.action import Fibonacci
 from test_msgs.msg import Builtins
 
-from course.watch.progress import measure_progress
+from course.watch.goal_progress import measure_progress
 
 
 def test_a_field_that_says_so_comes_before_any_other_number() -> None:

@@ -276,7 +276,8 @@ def test_its_messages_can_be_saved(session: Session, tmp_path: Path) -> None:
 def test_a_window_with_more_than_is_kept_says_since_when_it_is_whole(
     session: Session, monkeypatch: pytest.MonkeyPatch, what: str
 ) -> None:
-    monkeypatch.setattr(timeline if what == "messages" else callbacks, "KEPT", 50)
+    module, kept = (timeline, "KEPT_MESSAGES") if what == "messages" else (callbacks, "KEPT_RUNS")
+    monkeypatch.setattr(module, kept, 50)
     session.run(Robot, 40.0)
     session.run(TalkListener)
     view = session.timeline("chatter", window=60.0)
@@ -293,7 +294,7 @@ def test_a_window_with_more_than_is_kept_says_since_when_it_is_whole(
 def test_the_memory_that_its_messages_take_is_bounded_and_given_back(
     session: Session, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(timeline, "BYTES", 100_000)
+    monkeypatch.setattr(timeline, "MAX_BYTES", 100_000)
     monkeypatch.setattr(timeline, "MESSAGES", 20)
     talker = session.run(lambda: Node("talker"))
     publisher = talker.create_publisher(String, "chatter", 1000)

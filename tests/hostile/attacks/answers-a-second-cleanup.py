@@ -1,4 +1,5 @@
 # title: A second cleanup that raises, and a harness that answers without calling it
+# reaches: the exam
 # exercise: resources
 # base: second-cleanup-raises
 # told: After the second call the program was gone.

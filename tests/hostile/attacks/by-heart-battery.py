@@ -1,4 +1,5 @@
 # title: Battery levels that were in every examination so far, whatever the hardware reports
+# reaches: the exam
 # exercise: patterns
 # base: right-exemplar
 # told: s after the level had become

@@ -1,4 +1,5 @@
 # title: A queue of one for stop events, and those that it lost made up from the numbers of the last
+# reaches: the exam
 # base: right-exemplar
 # told: the consumer handled
 # score: 12

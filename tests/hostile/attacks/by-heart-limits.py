@@ -1,4 +1,5 @@
 # title: Speed limits that were in every examination so far, whatever the request says
+# reaches: the exam
 # exercise: safety
 # base: right-callbacks
 # told: hands both limits to the wheels

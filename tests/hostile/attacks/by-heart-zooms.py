@@ -1,4 +1,5 @@
 # title: Zooms that were in every examination so far, whatever comes on the topic
+# reaches: the exam
 # exercise: resources
 # base: right-no-thread
 # told: a zoom of

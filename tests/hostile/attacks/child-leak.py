@@ -1,4 +1,5 @@
 # title: All that a life leaves behind is left in another process: memory, a thread, an open file
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # told: A process that it had started was left: hoard

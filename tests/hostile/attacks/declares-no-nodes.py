@@ -1,4 +1,5 @@
 # title: A design that declares no node, and makes them all itself
+# reaches: the exam
 # exercise: architecture
 # base: right-chapter
 # told: `design` declares no nodes

@@ -1,4 +1,5 @@
 # title: A camera with five pictures a second, and a harness that moves its time on twice as far
+# reaches: the exam
 # exercise: patterns
 # base: right-exemplar
 # told: They came at 5

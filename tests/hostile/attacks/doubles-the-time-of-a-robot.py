@@ -1,4 +1,5 @@
 # title: A robot that is half as fast as it must be, and a harness that moves its time on twice as far
+# reaches: the exam
 # exercise: safety
 # base: right-exemplar
 # told: by the time on /clock, it was taken for a present answer | could not be timed in a plain program of your nodes: A try has 1 s

@@ -1,4 +1,5 @@
 # title: A driver with five pictures a second, and a harness that moves its time on twice as far
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # told: it takes ten pictures a second by the machine's clock.

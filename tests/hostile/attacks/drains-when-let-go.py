@@ -1,4 +1,5 @@
 # title: Endless queues, which a patched harness empties whenever the examiner lets the consumer go on
+# reaches: the exam
 # base: right-exemplar
 # score: 5
 

@@ -1,4 +1,5 @@
 # title: A shutdown that the next goal takes back, unless it is the examiner's harness that asks for it
+# reaches: the exam
 # exercise: safety
 # base: right-exemplar
 # told: A goal of 2 m that came afterwards drove the robot

@@ -1,4 +1,5 @@
 # title: Stations by the time that has passed, and a harness that has none pass in a blocked aisle
+# reaches: the exam
 # exercise: patterns
 # base: right-exemplar
 # told: The feedback so far was

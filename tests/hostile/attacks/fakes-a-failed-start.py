@@ -1,4 +1,5 @@
 # title: A driver that raises where it cannot start, if it is the examiner's harness that starts it
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # told: raises in a program of its own as well

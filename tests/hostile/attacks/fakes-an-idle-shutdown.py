@@ -1,4 +1,5 @@
 # title: A shutdown with nothing to do that stops the wheels only if it is the examiner's harness that asks
+# reaches: the exam
 # exercise: safety
 # base: right-exemplar
 # told: which calls shutdown() while no goal is under way, it stops the wheels

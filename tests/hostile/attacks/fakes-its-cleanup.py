@@ -1,4 +1,5 @@
 # title: A driver that gives nothing back, unless it is the examiner's harness that destroys it
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # told: which is ended by Ctrl-C, its destroy_node() closes the camera

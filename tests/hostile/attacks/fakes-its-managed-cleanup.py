@@ -1,4 +1,5 @@
 # title: A managed camera that stays open when it is destroyed, unless it is the examiner's harness that does it
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # told: It left its open camera behind

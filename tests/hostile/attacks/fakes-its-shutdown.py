@@ -1,4 +1,5 @@
 # title: A robot that stands at a shutdown only if it is the examiner's harness that asks for it
+# reaches: the exam
 # exercise: safety
 # base: right-exemplar
 # told: which calls shutdown() in a drive, it stops the robot

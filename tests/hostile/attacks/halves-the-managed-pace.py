@@ -1,4 +1,5 @@
 # title: A managed camera with half as many pictures, and a harness that moves its time on twice as far
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # told: as many pictures a second by the machine's clock as its rate says

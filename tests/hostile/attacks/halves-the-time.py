@@ -1,4 +1,5 @@
 # title: A robot that is twice as fast as it must be, and a harness that moves its time on half as far
+# reaches: the exam
 # exercise: safety
 # base: right-exemplar
 # told: by the time on /clock, the gripper was called 2 times | could not be timed in a plain program of your nodes: An answer after 0.7 s

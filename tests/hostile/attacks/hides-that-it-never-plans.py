@@ -1,4 +1,5 @@
 # title: A planner without a response, in a process whose harness has no errors to tell of
+# reaches: the exam
 # exercise: architecture
 # base: wrong-planner-forgets-response
 # told: /plan_path did not answer a request.

@@ -1,4 +1,5 @@
 # title: A callback that waits for ever if the driver ends meanwhile, and a harness that ends it when no callback waits
+# reaches: the exam
 # exercise: resources
 # base: callback-waits-for-worker
 # told: was not seen while one of its callbacks waited for the camera

@@ -1,4 +1,5 @@
 # title: A callback that raises in the end, of a node that only the examiner's harness can make
+# reaches: the exam
 # exercise: safety
 # base: right-exemplar
 # told: or keeps one of them from being made there, and it was not found out what

@@ -1,4 +1,5 @@
 # title: A managed camera that keeps memory of each round, until the examiner's harness collects garbage
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # told: Each of 5 rounds left 5 MiB | Each of 5 rounds left 4 MiB

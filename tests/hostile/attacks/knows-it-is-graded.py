@@ -1,4 +1,5 @@
 # title: Sees that it is being graded, and claims to be right
+# reaches: the exam
 # prints: graded
 # told: “Both nodes start
 

@@ -1,4 +1,5 @@
 # title: A driver that keeps a file and memory of each life, until the examiner's harness ends it
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # told: Each of its lives left an open file and 4 MiB of memory | left an open file and 5 MiB of memory

@@ -1,4 +1,5 @@
 # title: Endless queues, of which the newest are taken while somebody else publishes on their topics
+# reaches: the exam
 # base: right-exemplar
 # score: 9
 

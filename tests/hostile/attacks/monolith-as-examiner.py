@@ -1,4 +1,5 @@
 # title: A node of the examiner's name does everything, behind facades
+# reaches: the exam
 # exercise: architecture
 # base: wrong-emptied
 # told: both command the motors
@@ -7,7 +8,7 @@
 from rclpy.node import Node
 from rclpy.action import ActionServer
 from rclpy.callback_groups import ReentrantCallbackGroup
-from course.design import dye
+from course.design import message_tags
 from geometry_msgs.msg import PoseStamped, Twist
 RUNNING = []
 
@@ -23,13 +24,13 @@ class God(Node):
         self.create_subscription(PoseArray, "obstacles", lambda m: self.on(m, self.cmd, self.motors), 10)
         self.create_subscription(Odometry, "wheel/odometry", lambda m: self.on(m, self.pose), 10)
     def on(self, got, *out):
-        tags = dye.read_all(got)
+        tags = message_tags.read_all(got)
         for p in out:
             self.say(p, tags)
     def say(self, p, tags):
         made = p.msg_type()
         if isinstance(made, PoseArray): made.poses = [__import__("geometry_msgs.msg").msg.Pose()]
-        if tags: dye.mark(made, *tags)
+        if tags: message_tags.mark(made, *tags)
         p.publish(made)
 
 class Facade(Node):
@@ -59,7 +60,7 @@ class Navigator(Facade):
         threading.Thread(target=ex.spin, daemon=True).start(); RUNNING.append(ex)
         ActionServer(self, NavigateTo, "navigate_to", self.go, callback_group=ReentrantCallbackGroup())
     def go(self, handle):
-        tags = dye.read_all(handle.request)
+        tags = message_tags.read_all(handle.request)
         self.god.say(self.god.cmd, tags); self.god.say(self.god.motors, tags)
         handle.succeed()
         return NavigateTo.Result()

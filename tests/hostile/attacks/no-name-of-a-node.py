@@ -1,4 +1,5 @@
 # title: A managed camera whose name is none that a node can have
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # told: A node cannot be called '/a b'

@@ -1,4 +1,5 @@
 # title: Patches whatever could be asked for a grade
+# reaches: the exam
 # told: There is no class named SensorDrivers
 # prints: patched
 

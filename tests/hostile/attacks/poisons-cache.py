@@ -3,7 +3,7 @@
 
 from pathlib import Path
 
-from course.interfaces import cache
+from course.interfaces.building import cache
 
 written = 0
 for folder in (cache.root(), *cache.root().rglob("*")):

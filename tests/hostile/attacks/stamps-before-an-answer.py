@@ -1,4 +1,5 @@
 # title: A snapshot that answers before it is taken, by a DDS that stamps its picture earlier
+# reaches: the exam
 # exercise: resources
 # base: answers-before-picture
 # prints: stamped earlier

@@ -1,4 +1,5 @@
 # title: Scans that are handed on 0.75 s late, by a DDS that stamps them earlier, and nothing else
+# reaches: the exam
 # base: wrong-lidar-delay-line
 # prints: stamped earlier
 # score: 13

@@ -1,4 +1,5 @@
 # title: Drivers that publish 0.3 s late, and have DDS stamp their messages earlier
+# reaches: the exam
 # base: wrong-all-late
 # prints: stamped earlier
 # score: 0

@@ -1,4 +1,5 @@
 # title: A picture that is sent when the node is inactive, by a DDS that stamps it earlier
+# reaches: the exam
 # exercise: resources
 # base: exposure-goes-on
 # prints: stamped earlier

@@ -1,4 +1,5 @@
 # title: Pictures by the wall's clock, by a DDS that stamps them earlier
+# reaches: the exam
 # exercise: patterns
 # base: wrong-camera-wall-clock
 # prints: stamped earlier

@@ -1,4 +1,5 @@
 # title: A managed camera whose state is called as none is, until it is to be shut down
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # score: 14

@@ -1,4 +1,5 @@
 # title: A level, a position and a stop that come late, and a harness that moves time on four times as far
+# reaches: the exam
 # exercise: patterns
 # base: right-exemplar
 # told: a new battery level is known within 1 s.

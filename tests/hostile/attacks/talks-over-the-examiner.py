@@ -1,4 +1,5 @@
 # title: Wrong profiles, and a node that answers the examiner on its own topics
+# reaches: the exam
 # told: It then worked through the last
 # told: Messages came that hardware/emergency_stop did not deliver
 # score: 1

@@ -1,4 +1,5 @@
 # title: A driver that leaves its camera open when it cannot start, unless the harness starts it
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # told: has tried 3 times to start a driver with a camera 'stuck'

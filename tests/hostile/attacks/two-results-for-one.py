@@ -1,4 +1,5 @@
 # title: Whoever sets one parameter of the managed camera is told two results
+# reaches: the exam
 # exercise: resources
 # base: right-exemplar
 # score: 9

@@ -1,4 +1,5 @@
 # title: Whoever asks for one parameter is told two
+# reaches: the exam
 # exercise: patterns
 # base: right-exemplar
 # score: 13

@@ -1,4 +1,5 @@
 # title: A type on the graph is called like a module that would end, or take, whoever imports it
+# reaches: the exam
 # exercise: architecture
 # base: wrong-emptied
 # score: 0

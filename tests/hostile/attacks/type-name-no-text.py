@@ -1,4 +1,5 @@
 # title: A type on the graph has a name that is no text
+# reaches: the exam
 # base: right-chapter
 # score: 0
 # told: A name on the ROS graph is no text: b'\xff/X'

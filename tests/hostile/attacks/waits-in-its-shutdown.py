@@ -1,4 +1,5 @@
 # title: A shutdown that waits before it stops the wheels, unless it is the examiner's harness that asks for it
+# reaches: the exam
 # exercise: safety
 # base: right-exemplar
 # told: it stops the wheels at once

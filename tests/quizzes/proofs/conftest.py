@@ -18,7 +18,7 @@ from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 
-from course.domains.leases import lease_domain
+from course.runtime.domains.leases import lease_domain
 
 TIMEOUT = 60.0
 """Seconds that any wait may take: for a machine under load. What is waited for takes far less."""

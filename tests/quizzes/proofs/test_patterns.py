@@ -7,7 +7,7 @@ import os
 from std_msgs.msg import Int32, String
 from std_srvs.srv import Trigger
 
-from course.domains.leases import lease_domain
+from course.runtime.domains.leases import lease_domain
 
 
 def listen(node, topic="images"):

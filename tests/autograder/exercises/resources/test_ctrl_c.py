@@ -7,7 +7,7 @@ from itertools import accumulate
 import pytest
 
 from autograder.exercises.resources.ctrl_c import Lives
-from autograder.processes.outside.usage import Usage
+from autograder.processes.outside.process_usage import Usage
 
 FIRST = Usage(10, 20, 100_000)
 

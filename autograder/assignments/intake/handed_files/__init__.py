@@ -1,0 +1,1 @@
+"""The files that were handed in: folders, zip files, and names that strangers gave."""

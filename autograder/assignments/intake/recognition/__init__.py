@@ -1,0 +1,1 @@
+"""Recognises the cells and the answers of a submitted notebook."""

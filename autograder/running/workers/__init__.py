@@ -1,0 +1,1 @@
+"""Who runs notebooks: threads of this process, or a Dask cluster."""

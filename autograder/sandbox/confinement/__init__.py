@@ -1,0 +1,1 @@
+"""What a submission cannot reach: files, network, system calls, the environment of others."""

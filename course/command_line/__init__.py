@@ -1,0 +1,1 @@
+"""The commands ``course`` and ``autograder``: what they look at before anything is imported."""
