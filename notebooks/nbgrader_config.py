@@ -15,16 +15,16 @@ from nbgrader.preprocessors import (
     SaveAutoGrades,
 )
 
-from autograder.gradebook.feedback.index_page import IndexPages
-from autograder.gradebook.nbgrader_plugins.autograde_steps import (
+from autograder.nbgrader_bridge import (
+    FeedbackExporter,
     FlagForHumans,
     GradeByBehaviour,
+    IndexPages,
     RestoreCells,
+    SettledExport,
+    ShowModelAnswers,
     SubmissionExporter,
 )
-from autograder.gradebook.nbgrader_plugins.model_answers import ShowModelAnswers
-from autograder.gradebook.nbgrader_plugins.nbgrader_speedups import FeedbackExporter
-from autograder.gradebook.nbgrader_plugins.settled_export import SettledExport
 
 c = get_config()  # noqa: F821 - given by nbgrader
 root = Path(__file__).resolve().parent

@@ -91,7 +91,7 @@ def _progress_tables(progress: WorkDone) -> Iterator[tuple[Row, list[tuple[Stude
         head: Row = ("Chapter", "Cells run", "Still to run")
         yield head, [(chapter.notebook, _chapter_row(chapter)) for chapter in progress.chapters]
     if progress.exercises:
-        head = ("ExerciseWork", "Visible checks", "Still open", "Explanations")
+        head = ("Exercise", "Visible checks", "Still open", "Explanations")
         yield head, [(e.notebook, _exercise_row(e, progress.moment)) for e in progress.exercises]
     if progress.quizzes:
         head = ("Quiz", "Passed", "Best attempt", "Attempts")

@@ -68,7 +68,7 @@ from autograder.examination.exam import Exam, Failed
 from course.errors import WaitTimeout
 from course_exercises.lamp.listener import Listener
 
-from tests.autograder.words import EXPECTED
+from .words import EXPECTED
 
 
 @contextmanager

@@ -216,5 +216,5 @@ def test_a_new_mark_stands_on_the_pages_after_the_next_run(graded: Path) -> None
 
 
 def test_an_exercise_is_called_by_its_title() -> None:
-    assert questions.title_of_notebook(NOTEBOOK) == "ExerciseSheet 1: QoS profile design"
+    assert questions.title_of_notebook(NOTEBOOK) == "Exercise 1: QoS profile design"
     assert questions.title_of_notebook("mine") == "mine"
