@@ -419,6 +419,7 @@ def test_an_examiner_that_fails_with_an_excessive_subject_is_no_grader_error(
         raise ExaminerError("The examiner ended without a verdict.")
 
     monkeypatch.setattr(ExaminerProcess, "verdict", fail)
+    monkeypatch.setattr(runner, "EXCESS_TIMEOUT_S", 4.0)  # to start 40 processes beside other work
     cell = (
         "import os, threading, time\n"
         "fork = lambda: [os.fork() or time.sleep(60) for _ in range(40)]\n"
