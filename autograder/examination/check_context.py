@@ -36,6 +36,9 @@ MAX_ERROR, MAX_TRACE, MAX_NAME = 2000, 4000, 500
 NODE_NAME = re.compile(r"(?=.{2,200}$)(/[A-Za-z_][A-Za-z0-9_]*)+", re.ASCII)
 """What a node can be called (ROS 2 design, "Topic and Service name mapping"), if not longer."""
 
+MAX_STEPS, MAX_STEP_CHARS = 40, 300
+"""Steps of a check that are kept for its author, and characters of each."""
+
 PATIENCE_S = 3.0
 """Seconds of wall time that a callback of a subject's may hold up a step of simulated time."""
 
@@ -404,6 +407,7 @@ class CheckContext:
         Attributes:
             memory: what checks found that others need.
             key: the answer key of the part that is examined; the subject never sees it.
+            steps: what the present check has done and seen so far.
         """
         self.ends = ends
         self.programs = programs
@@ -413,6 +417,12 @@ class CheckContext:
         self.key: Mapping[str, Any] = {}
         self.outside = outside
         self.draws = Draws(seed)
+        self.steps: list[str] = []
+
+    def note_step(self, step: str) -> None:
+        """Note what was done and seen, for the author of the exam (`autograder try`)."""
+        if len(self.steps) < MAX_STEPS:
+            self.steps.append(step[:MAX_STEP_CHARS])
 
     def deadline(self, seconds: float) -> FairDeadline:
         """Begin a time that is put off while others keep the subject from running."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType, TracebackType
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 from autograder.examination import points as points_table
 from autograder.examination.check_context import CheckContext, StudentError, SubjectGone
@@ -66,6 +66,14 @@ class Part(NamedTuple):
     key: Mapping[str, Any] = MappingProxyType({})
 
 
+@runtime_checkable
+class FreshForEachCheck(Protocol):
+    """A rig that gives each check something of its own, such as a fresh node."""
+
+    def for_check(self) -> AbstractContextManager[Any]:
+        """Give a check what it takes, for as long as it runs; it raises as a check does."""
+
+
 @dataclass(frozen=True)
 class Check(Generic[RigT]):
     """One check: what it examines, what it needs, and how it helps."""
@@ -83,13 +91,14 @@ class Check(Generic[RigT]):
 class Exam(Generic[RigT]):
     """The checks of one exercise, and the rig they run on.
 
-    ``rig`` is a context manager around the check context: what it gives is what every check takes.
+    ``rig`` is a context manager around the check context: what it gives is what every check takes,
+    or what it has for it (`FreshForEachCheck`).
     With ``fresh_parts`` each part has one of its own, for checks that leave their mark on what the
     nodes do later: what failed in an earlier part is not tried again there, what passed is.
     """
 
     name: str
-    rig: Callable[[CheckContext], AbstractContextManager[RigT]]
+    rig: Callable[[CheckContext], AbstractContextManager[Any]]
     fresh_parts: bool = False
     checks: dict[str, Check[RigT]] = field(default_factory=dict)
     _left_up: ExitStack | None = field(default=None, init=False, repr=False)
@@ -149,7 +158,7 @@ class Exam(Generic[RigT]):
         told: set[str] = set()
         deadline = bench.deadline(SITTING_S)
         with ExitStack() as stack:
-            rig: RigT | None = None
+            rig: Any = None
             for number, part in enumerate(parts):
                 if number == 0 or self.fresh_parts:
                     stack.close()
@@ -164,7 +173,9 @@ class Exam(Generic[RigT]):
                         rig = None
                 table = self.part(part.name)
                 bench.key = part.key
-                results = [self._examine_check(name, rig, done, gone, deadline) for name in table]
+                results = [
+                    self._examine_check(name, rig, bench, done, gone, deadline) for name in table
+                ]
                 told.update(table)
                 results = [self._with_reason(result, done, told) for result in results]
                 checks = tuple(_with_points(result, table[result.name]) for result in results)
@@ -185,7 +196,8 @@ class Exam(Generic[RigT]):
     def _examine_check(
         self,
         name: str,
-        rig: RigT | None,
+        rig: Any,
+        bench: CheckContext,
         done: dict[str, CheckResult],
         gone: list[CheckResult],
         deadline: FairDeadline,
@@ -193,7 +205,7 @@ class Exam(Generic[RigT]):
         if name not in done:
             check = self.checks[name]
             for need in check.needs:
-                self._examine_check(need, rig, done, gone, deadline)
+                self._examine_check(need, rig, bench, done, gone, deadline)
             missing = [done[need] for need in check.needs if not done[need].passed]
             if missing:
                 done[name] = _not_checked(check, missing[0])
@@ -201,7 +213,9 @@ class Exam(Generic[RigT]):
                 done[name] = _too_late(check)
             else:
                 assert rig is not None  # without one, what needs nothing has failed already
-                done[name] = _run_check(check, rig, gone)
+                bench.steps.clear()
+                result = _run_check(check, rig, gone)
+                done[name] = replace(result, steps=tuple(bench.steps))
         return done[name]
 
 
@@ -254,13 +268,14 @@ def _not_reached(check: Check[RigT], gone: CheckResult) -> CheckResult:
     )
 
 
-def _run_check(check: Check[RigT], rig: RigT, gone: list[CheckResult]) -> CheckResult:
+def _run_check(check: Check[RigT], rig: Any, gone: list[CheckResult]) -> CheckResult:
     """Run a check; add its result to ``gone`` if it lost the subject.
 
     What comes after a check that did is not at fault.
     """
     try:
-        note = check.run(rig) or ""
+        with rig.for_check() if isinstance(rig, FreshForEachCheck) else nullcontext(rig) as given:
+            note = check.run(given) or ""
     except Failed as failed:
         result = _failed_result(check, failed.expected, failed.actual)
         if isinstance(failed.__cause__, SubjectGone):

@@ -34,6 +34,7 @@ class CheckResult:
     ``points`` is what was earned of ``max_points``. ``rationale`` says why the behaviour matters
     on a robot, ``expected`` and ``actual`` what was needed and what was observed, ``hints`` lead to
     the mend step by step, ``read`` names where to read more, ``note`` is a remark on a pass.
+    ``steps`` are what the examiner did and saw: for the author of the exam, not for students.
     """
 
     name: str
@@ -47,6 +48,7 @@ class CheckResult:
     hints: tuple[str, ...] = ()
     read: str = ""
     note: str = ""
+    steps: tuple[str, ...] = ()
 
     @property
     def passed(self) -> bool:
@@ -56,7 +58,7 @@ class CheckResult:
     def all_texts(self) -> Iterator[str]:
         """Yield all that it says in words."""
         yield from (self.name, self.title, self.rationale, self.expected, self.actual)
-        yield from (*self.hints, self.read, self.note)
+        yield from (*self.hints, self.read, self.note, *self.steps)
 
 
 @dataclass(frozen=True)
@@ -156,8 +158,10 @@ def _check_from_data(item: dict[str, Any]) -> CheckResult:
     points, max_points = float(item["points"]), float(item["max_points"])
     if not 0 <= points <= max_points:
         raise ValueError(f"{points} points of {max_points}")
-    hints = tuple(item["hints"])
-    result = CheckResult(**{**item, "points": points, "max_points": max_points, "hints": hints})
+    hints, steps = tuple(item["hints"]), tuple(item.get("steps", ()))
+    result = CheckResult(
+        **{**item, "points": points, "max_points": max_points, "hints": hints, "steps": steps}
+    )
     if not all(isinstance(text, str) for text in result.all_texts()):
         raise TypeError("something else where a text belongs")
     return result

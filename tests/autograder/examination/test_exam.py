@@ -80,7 +80,7 @@ def bench(*, ends: bool = False, left: Iterator[float] | None = None) -> CheckCo
     def deadline(_seconds: float) -> Deadline:
         return Deadline(left)
 
-    return cast(CheckContext, SimpleNamespace(ends=ends, key={}, deadline=deadline))
+    return cast(CheckContext, SimpleNamespace(ends=ends, key={}, deadline=deadline, steps=[]))
 
 
 def sit(exam: Exam[list[str]], *parts: str) -> list[Verdict]:
@@ -275,7 +275,7 @@ def test_every_exam_and_the_table_of_points_agree(name: str) -> None:
     assert sorted(worth) == sorted(exam.checks), "each check has points in exactly one part"
     for check in exam.checks.values():
         assert check.rationale, f"{check.name} must say why it matters on a robot"
-        assert len(check.hints) == 3
+        assert len(check.hints) <= 3
         assert check.read
 
 

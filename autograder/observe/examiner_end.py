@@ -1,0 +1,151 @@
+"""The examiner's end of a task: it hears what student nodes publish, and says what they hear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import Executor
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.task import Future
+
+from autograder.observe.nouns import Service, Topic
+from autograder.observe.participants import of_others
+from autograder.observe.qos_refusal import find_refusal
+from autograder.observe.quiet_node import QuietNode
+
+# What is offered meets every demand but that of a deadline, so a student's QoS is free.
+OFFERED = QoSProfile(
+    depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE
+)
+LOSSLESS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
+UNDEMANDING = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+@dataclass(frozen=True)
+class Heard:
+    """A message that came: when, in s of the node's time, and what it says."""
+
+    at_s: float
+    value: Any
+
+
+class Request:
+    """A request that the student's node has sent to a service which the examiner plays.
+
+    Attributes:
+        at_s: when it came, in s of the node's time.
+        message: the request itself.
+    """
+
+    def __init__(self, at_s: float, message: Any, response: Any, executor: Executor) -> None:
+        """Wait for `answer`."""
+        self.at_s, self.message, self._response = at_s, message, response
+        self._executor = executor
+        self.answered = Future(executor=executor)
+
+    def answer(self, **fields: Any) -> None:
+        """Send the answer, with these fields; only the first one counts."""
+        if self.answered.done():
+            return
+        for name, value in fields.items():
+            setattr(self._response, name, value)
+        self.answered.set_result(self._response)
+        self._executor.wake()
+
+
+class ExaminerEnd(QuietNode):
+    """A node of the examiner's with an end for each topic of a task.
+
+    Attributes:
+        now_s: the time of the node under test, which `ObservedNode.advance` moves.
+    """
+
+    def __init__(self) -> None:
+        """Create no endpoints yet."""
+        super().__init__("examiner")
+        self.now_s = 0.0
+        self._heard: dict[str, list[Heard]] = {}
+        self._listening: dict[str, Any] = {}
+        self._telling: dict[str, Any] = {}
+        self._asking: dict[str, Any] = {}
+        self._requests: dict[str, list[Request]] = {}
+
+    def listen(self, topic: Topic) -> None:
+        """Listen to a topic, with what its publishers offer: lossless wherever that is possible."""
+        offers = [
+            end.qos_profile for end in of_others(self.get_publishers_info_by_topic(str(topic)))
+        ]
+        reliable = all(qos.reliability == ReliabilityPolicy.RELIABLE for qos in offers)
+        wanted = LOSSLESS if reliable else UNDEMANDING
+        present = self._listening.get(topic.name)
+        if present is not None and present.qos_profile.reliability == wanted.reliability:
+            return
+        if present is not None:
+            self.destroy_subscription(present)
+        heard = self._heard.setdefault(topic.name, [])
+
+        def note(message: Any) -> None:
+            heard.append(Heard(self.now_s, topic.value(message)))
+
+        self._listening[topic.name] = self.create_subscription(topic.type, str(topic), note, wanted)
+
+    def heard(self, topic: Topic) -> list[Heard]:
+        """Return what came on a topic so far."""
+        return list(self._heard.get(topic.name, ()))
+
+    def forget(self) -> None:
+        """Forget what came so far, and answer what waits: it was another node's."""
+        for heard in self._heard.values():
+            heard.clear()
+        for requests in self._requests.values():
+            for request in requests:
+                request.answer()
+            requests.clear()
+
+    def serve(self, service: Service) -> None:
+        """Play a service: each request waits until it is answered."""
+        if service.name in self._requests:
+            return
+        requests = self._requests.setdefault(service.name, [])
+
+        async def respond(message: Any, response: Any) -> Any:
+            executor = self.executor
+            assert isinstance(executor, Executor)
+            request = Request(self.now_s, message, response, executor)
+            requests.append(request)
+            return await request.answered
+
+        group = ReentrantCallbackGroup()
+        self.create_service(service.type, str(service), respond, callback_group=group)
+
+    def requests(self, service: Service) -> list[Request]:
+        """Return the requests that came to a service which the examiner plays."""
+        return list(self._requests.get(service.name, ()))
+
+    def publisher(self, topic: Topic) -> Any:
+        """Return the examiner's publisher on a topic; it is there from the first call on."""
+        if topic.name not in self._telling:
+            self._telling[topic.name] = self.create_publisher(topic.type, str(topic), OFFERED)
+        return self._telling[topic.name]
+
+    def client_of(self, name: str, service_type: Any) -> Any:
+        """Return the examiner's client of a service; it is there from the first call on."""
+        if name not in self._asking:
+            self._asking[name] = self.create_client(service_type, name)
+        return self._asking[name]
+
+    def unserved(self, topic: Topic) -> str:
+        """Return why a subscription of others on a topic hears nothing; empty if one does."""
+        offers = [end.qos_profile for end in self.get_publishers_info_by_topic(str(topic))]
+        demands = [
+            end.qos_profile for end in of_others(self.get_subscriptions_info_by_topic(str(topic)))
+        ]
+        refusals = [find_refusal(offer, demand) for offer in offers for demand in demands]
+        if refusals and (first := refusals[0]) is not None and all(refusals):
+            return (
+                f"Its subscription to {topic} demands more than any publisher offers: "
+                f"{first.requested}, where {first.offered} is offered."
+            )
+        return ""
