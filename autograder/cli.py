@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from autograder.commands import marks_command, quiz_command
+from autograder.commands import marks_command, new_command, quiz_command
 from autograder.running.interruption import Stopped
 from autograder.util.terminal import Terminal, visible_json
 from course.errors import CourseError
@@ -29,6 +29,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(marks_command.app, name="marks")
+app.add_typer(new_command.app, name="new")
 app.add_typer(quiz_command.app, name="quiz")
 out = Terminal()
 err = Terminal(stderr=True)
@@ -240,6 +241,68 @@ def corpus(
         for line in (*flips, *(f"{t.case.name}: {t.difference}" for t in different)):
             out.print(f"  {line}", soft_wrap=True)
     if different or flips:
+        raise typer.Exit(EXIT_DIFFERENT)
+
+
+@app.command("try")
+def try_(
+    exercise: str,
+    what: Annotated[
+        str, typer.Argument(help="A case of its corpus, or a notebook's file; else its exemplar.")
+    ] = "",
+    watch: Annotated[
+        bool, typer.Option("--watch", help="And again as soon as one of its files changes.")
+    ] = False,
+    root: Root = None,
+) -> None:
+    """Run an exam once, and show what it did and saw, step by step."""
+    from autograder.commands import try_command
+    from course.workspace.content import ContentError
+
+    with suppress(ContentError):
+        _use_root(root)
+    if watch:
+        try_command.try_again_and_again(exercise, what, say=_line_printer(False))
+        return
+    tried = try_command.try_exam(exercise, what, say=_line_printer(False))
+    for line in tried.as_lines():
+        out.print(line, soft_wrap=True)
+    if tried.difference:
+        raise typer.Exit(EXIT_DIFFERENT)
+
+
+@app.command()
+def mutate(
+    exercise: str, jobs: Jobs = IN_FLIGHT, root: Root = None, as_json: AsJson = False
+) -> None:
+    """Make a student's small mistakes in an exemplar, one at a time, and list what passes its exam.
+
+    What survives is a check that is missing, or changes nothing: then say why in the table
+    [equivalent] of the exercise's corpus/mutants.toml.
+    """
+    from autograder.corpus import mutate as mutating
+    from course.workspace.content import ContentError
+
+    with suppress(ContentError):
+        _use_root(root)
+    done = mutating.mutate(exercise, jobs=jobs, say=_line_printer(as_json))
+    if as_json:
+        _print_json({
+            "caught": {m.key: checks for m, checks in done.caught.items()},
+            "survivors": [vars(mutation) for mutation in done.survivors],
+            "equivalent": {m.key: why for m, why in done.equivalent.items()},
+            "stale": done.stale,
+        })  # fmt: skip
+    else:
+        out.print(
+            f"{len(done.caught)} caught, {len(done.survivors)} survive, "
+            f"{len(done.equivalent)} are known to change nothing."
+        )
+        for mutation in done.survivors:
+            out.print(f"  {mutation}\n    key: {mutation.key!r}", soft_wrap=True)
+        for key in done.stale:
+            out.print(f"  There is no such mutation any more: {key!r}", soft_wrap=True)
+    if done.survivors or done.stale:
         raise typer.Exit(EXIT_DIFFERENT)
 
 

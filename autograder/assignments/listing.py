@@ -12,6 +12,7 @@ is ``authoring/quizzes/NAME.py``. Notebooks that only one assignment has may als
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -71,6 +72,37 @@ def write_list(root: Path, name: str, exercises: list[str]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     listed = ", ".join(f'"{exercise}"' for exercise in exercises)
     (folder / f"{name}.toml").write_text(f"exercises = [{listed}]\n", encoding="utf-8")
+
+
+def add_exercise(root: Path, name: str, exercise: str) -> None:
+    """Add an exercise to the list of an assignment, which is new or not; comments in it stay.
+
+    Raises:
+        AssignmentBuildError: its list is not sound.
+        OSError: it cannot be written.
+    """
+    file = root / ASSIGNMENTS / f"{name}.toml"
+    if not file.is_file():
+        write_list(root, name, [exercise])
+        return
+    wanted = [*_read_list(file)["exercises"], exercise]
+    text = file.read_text(encoding="utf-8")
+    begin = re.search(r"^exercises\s*=\s*\[", text, re.MULTILINE)
+    if begin is None:
+        text = f'exercises = ["{exercise}"]\n{text}'
+    else:
+        end = text.index("]", begin.end())
+        listed = text[begin.end() : end].rstrip()
+        comma = "" if not listed or listed.endswith(",") else ","
+        space = " " if listed else ""
+        text = f'{text[: begin.end()]}{listed}{comma}{space}"{exercise}"{text[end:]}'
+    try:
+        added = tomllib.loads(text).get("exercises") == wanted
+    except tomllib.TOMLDecodeError:
+        added = False
+    if not added:
+        raise AssignmentBuildError(f"Please add '{exercise}' to the exercises in {file} yourself.")
+    file.write_text(text, encoding="utf-8")
 
 
 def read_assignment(root: Path, name: str) -> Assignment:

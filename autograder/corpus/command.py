@@ -48,7 +48,7 @@ def run_corpus(
         ExamError: an unknown exam.
         CorpusError: no case of that name; or a corpus that is not well formed.
     """
-    chosen = _choose_cases(load_cases(exam), only)
+    chosen = choose_cases(load_cases(exam), only)
     trust = needs_trust(say)
     done = []
     with trials.busy_loops(load):
@@ -61,7 +61,7 @@ def run_corpus(
     return done
 
 
-def _choose_cases(every: dict[str, list[Case]], only: Sequence[str]) -> dict[str, list[Case]]:
+def choose_cases(every: dict[str, list[Case]], only: Sequence[str]) -> dict[str, list[Case]]:
     """Return the cases with the names in ``only``; all, if there are none."""
     names = sorted({case.name for own in every.values() for case in own})
     for name in only:

@@ -16,6 +16,7 @@ The text is that of the cell ``<exam>-solution``. A line ``# %% <grade id>`` beg
 ``corpus/mutants.toml`` has one table a mutant: ``title``, ``fails`` (a list), ``says`` (a table),
 and ``splices``: a list of {cell, old, new}, applied to the exemplar's cells, so that mutants follow
 the exemplar. ``cell`` is ``<exam>-solution`` if it is left out. Without splices it is the exemplar.
+Its table ``equivalent`` says of mutations that ``autograder mutate`` makes why they change nothing.
 
 ``every/<name>.py`` beside this module are cases for every exam: their text replaces the solution
 cell, and the other solution cells are emptied; with "in: the stub" it replaces the stub's mark.
@@ -34,7 +35,7 @@ from autograder.corpus.case import EVERYTHING, ROOTS, Case, CorpusError, Splice
 from autograder.running.runner import CELL_TIMEOUT_S
 from autograder.util import exercise_folders
 
-MUTANTS = "mutants.toml"
+MUTANTS, EQUIVALENT = "mutants.toml", "equivalent"
 STUB, AS_STUB = "wrong-stub", "as the stub"
 
 _HEADER = re.compile(r"(?:# (?:title|fails|says|in|seconds|points): .*\n)+")
@@ -135,6 +136,8 @@ def _read_mutants(exam: str, file: Path) -> Iterator[Case]:
     except tomllib.TOMLDecodeError as error:
         raise CorpusError(f"{file} is not TOML: {error}.") from error
     for name, data in tables.items():
+        if name == EQUIVALENT:
+            continue
         try:
             yield Case(
                 exam, name, data["title"], frozenset(data["fails"]), says=data.get("says", {}),

@@ -1,0 +1,150 @@
+"""``autograder new``: a course, an exercise or a quiz to begin with; each works at once."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from autograder.assignments import listing
+from autograder.util import exercise_folders
+from autograder.util.terminal import Terminal
+from course.errors import CourseError
+from course.workspace.content import CONFIG, content_root, working_root
+from quizzes.bank.schema import EXAMPLES
+
+app = typer.Typer(help="Begin a course, an exercise or a quiz.", no_args_is_help=True)
+out = Terminal()
+
+TEMPLATE = Path(__file__).with_name("new_exercise")
+"""The files of a small exercise that works: each ends in .txt, as none of them is a module here."""
+
+QUIZ = "lesson.yaml"
+"""The example that a new quiz begins as."""
+
+Root = Annotated[
+    Path | None,
+    typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
+]
+
+
+class NewError(CourseError):
+    """Something new that cannot be made; the message says why, and what to do."""
+
+
+@app.command("course")
+def course_command(
+    folder: Path,
+    chapter: Annotated[
+        bool, typer.Option("--chapter-5", help="With the texts of chapter 5 and its exercises.")
+    ] = False,
+) -> None:
+    """Make a course root: nbgrader's configuration, and a place for exercises of your own."""
+    made = make_course(folder, with_chapter=chapter)
+    out.print(f"A course: {made}", soft_wrap=True)
+    out.print(f"Go on with: cd {folder} && autograder new exercise NAME --assignment lab1")
+
+
+@app.command("exercise")
+def exercise_command(
+    name: str,
+    assignment: Annotated[
+        str, typer.Option("--assignment", help="The assignment that it belongs to, new or not.")
+    ],
+    root: Root = None,
+) -> None:
+    """Make an exercise that builds and grades: a lamp that blinks, to be made into your own."""
+    folder = make_exercise(root or working_root(), name, assignment)
+    out.print(f"An exercise: {folder}", soft_wrap=True)
+    out.print(f"Go on with: autograder try {name}, then change its files.")
+
+
+@app.command("quiz")
+def quiz_command(name: str, root: Root = None) -> None:
+    """Make a bank of questions, to be made into your own."""
+    file = make_quiz(root or working_root(), name)
+    out.print(f"A quiz: {file}", soft_wrap=True)
+    out.print(f"Go on with: autograder quiz lint {name}")
+
+
+def make_course(folder: Path, *, with_chapter: bool = False) -> Path:
+    """Make a course root of a folder that is new or empty; return it.
+
+    Raises:
+        NewError: there is something in it, or it cannot be written.
+    """
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise NewError(f"{folder} is not empty: choose a folder that is not there yet.")
+        (folder / exercise_folders.FOLDER).mkdir(parents=True)
+        (folder / listing.ASSIGNMENTS).mkdir(parents=True)
+        shutil.copyfile(content_root() / CONFIG, folder / CONFIG)
+        if with_chapter:
+            shutil.copytree(content_root() / "authoring", folder / "authoring", dirs_exist_ok=True)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    return folder.resolve()
+
+
+def make_exercise(root: Path, name: str, assignment: str) -> Path:
+    """Make an exercise in the course at ``root``, and add it to an assignment; return its folder.
+
+    Raises:
+        NewError: it is no course root, or has that exercise, or the name cannot be one.
+        AssignmentBuildError: the assignment's list is not sound.
+    """
+    _require_course(root)
+    if not name.isidentifier() or not name.islower():
+        raise NewError(
+            f"An exercise cannot be called '{name}': take small letters, digits and underscores, "
+            "as a Python module has."
+        )
+    exercise_folders.use_course(root)
+    if name in exercise_folders.current_exercises().folders:
+        raise NewError(f"There is an exercise '{name}' already: choose another name.")
+    folder = root / exercise_folders.FOLDER / name
+    try:
+        for file in sorted(TEMPLATE.rglob("*.txt")):
+            target = folder / file.relative_to(TEMPLATE).with_suffix("")
+            target.parent.mkdir(parents=True, exist_ok=True)
+            text = file.read_text(encoding="utf-8").replace("NAME", name)
+            target.write_text(text, encoding="utf-8")
+        listing.add_exercise(root, assignment, name)
+    except OSError as error:
+        raise _unwritable(folder, error) from error
+    return folder
+
+
+def make_quiz(root: Path, name: str) -> Path:
+    """Make a bank of the course at ``root`` from the example; return its file.
+
+    Raises:
+        NewError: it is no course root, or has that quiz, or the name cannot be one.
+    """
+    _require_course(root)
+    if not name.replace("-", "_").isidentifier():
+        raise NewError(f"A quiz cannot be called '{name}': take letters, digits and hyphens.")
+    file = root / "authoring" / "banks" / f"{name}.yaml"
+    if file.exists():
+        raise NewError(f"There is a quiz {file} already: choose another name.")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        text = (EXAMPLES / QUIZ).read_text(encoding="utf-8")
+        file.write_text(text.replace("quiz: lesson", f"quiz: {name}", 1), encoding="utf-8")
+    except OSError as error:
+        raise _unwritable(file, error) from error
+    return file
+
+
+def _require_course(root: Path) -> None:
+    if not (root / CONFIG).is_file():
+        raise NewError(f"{root} is no course root: make one with `autograder new course FOLDER`.")
+
+
+def _unwritable(place: Path, error: OSError) -> NewError:
+    return NewError(
+        f"{place} cannot be written ({error.strerror or error}): make room there, or choose "
+        "another folder."
+    )

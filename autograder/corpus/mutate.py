@@ -1,0 +1,96 @@
+"""What ``autograder mutate`` does: make small mistakes in an exemplar, and run its exam on each."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from autograder import exercises
+from autograder.assignments import submission
+from autograder.assignments.cells import without_markers
+from autograder.corpus import trials
+from autograder.corpus.case import Case, CorpusError
+from autograder.corpus.command import needs_trust
+from autograder.corpus.corpus_files import EQUIVALENT, MUTANTS
+from autograder.corpus.mutations import Mutation, find_mutations
+from autograder.util import exercise_folders
+
+
+@dataclass(frozen=True)
+class Mutated:
+    """What became of the mutations of an exercise.
+
+    Attributes:
+        caught: {mutation: the checks that failed}.
+        survivors: those that passed every check.
+        equivalent: {mutation: why it changes nothing}, as the corpus says; they were not run.
+        stale: what the corpus says of mutations that there are not.
+    """
+
+    caught: dict[Mutation, list[str]] = field(default_factory=dict)
+    survivors: list[Mutation] = field(default_factory=list)
+    equivalent: dict[Mutation, str] = field(default_factory=dict)
+    stale: list[str] = field(default_factory=list)
+
+
+def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _line: None) -> Mutated:
+    """Run the exam of an exercise on every mutation of its exemplar.
+
+    Args:
+        exam: the exercise.
+        jobs: how many run at a time.
+        say: is told a line a mutation.
+
+    Raises:
+        ExamError: an unknown exercise.
+        CorpusError: its list of equivalent mutations is not well formed.
+    """
+    source, released = trials.make_notebooks(exercises.load_exam(exam).name)
+    grade_id = f"{exam}-solution"
+    cells = {submission.grade_id(cell): cell.source for cell in source.cells}
+    mutations = find_mutations(without_markers(cells[grade_id]))
+    reasons = known_equivalent(exam)
+    result = Mutated(stale=sorted(reasons.keys() - {mutation.key for mutation in mutations}))
+    result.equivalent.update({m: reasons[m.key] for m in mutations if m.key in reasons})
+    of_case = {
+        f"mutation-{number}": mutation
+        for number, mutation in enumerate(mutations)
+        if mutation not in result.equivalent
+    }
+    cases = [
+        Case(exam, name, str(mutation), frozenset(), cells={grade_id: mutation.text})
+        for name, mutation in of_case.items()
+    ]
+
+    def note(trial: trials.CorpusTrial) -> None:
+        mutation = of_case[trial.case.name]
+        failed = [check for check, status in trial.check_statuses.items() if status != "passed"]
+        if failed:
+            result.caught[mutation] = failed
+        else:
+            result.survivors.append(mutation)
+        say(f"{'caught' if failed else 'SURVIVES'}  {mutation}")
+
+    trials.run(cases, source, released, jobs=jobs, trust=needs_trust(say), done=note)
+    result.survivors.sort(key=lambda mutation: mutation.line)
+    return result
+
+
+def known_equivalent(exam: str) -> dict[str, str]:
+    """Return {key of a mutation: why it changes nothing}, as the exercise's corpus says.
+
+    Raises:
+        CorpusError: it is no table of texts.
+    """
+    folder = exercise_folders.current_exercises().folders[exam] / exercise_folders.CORPUS
+    file = folder / MUTANTS
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8")).get(EQUIVALENT, {})
+    except FileNotFoundError:
+        return {}
+    except tomllib.TOMLDecodeError as error:
+        raise CorpusError(f"{file} is not TOML: {error}.") from error
+    if not all(isinstance(why, str) for why in table.values()):
+        raise CorpusError(f"{file}: [{EQUIVALENT}] says of each mutation why it changes nothing.")
+    return dict(table)

@@ -1,0 +1,190 @@
+"""Mutations: small changes to a right solution, such as a student makes by mistake.
+
+Each operator is a mistake of the field: a policy the other way round, a depth, a call that cleans
+up left out, a reply that is not returned, a sleep in a callback, a callback group dropped, a bound
+moved. A mutation that an exam does not notice is a check that is missing, or changes nothing.
+
+Example:
+    >>> [str(m) for m in find_mutations("qos.depth = 5\\nself.timer.cancel()\\n")]
+    ['line 1, number: `qos.depth = 5` becomes `qos.depth = 6`', 'line 2, call left out: \
+`self.timer.cancel()` becomes `pass`']
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+_OTHER_NAME = {
+    "RELIABLE": "BEST_EFFORT", "BEST_EFFORT": "RELIABLE", "VOLATILE": "TRANSIENT_LOCAL",
+    "TRANSIENT_LOCAL": "VOLATILE", "KEEP_ALL": "KEEP_LAST", "KEEP_LAST": "KEEP_ALL",
+    "ReentrantCallbackGroup": "MutuallyExclusiveCallbackGroup",
+    "MutuallyExclusiveCallbackGroup": "ReentrantCallbackGroup",
+    "succeed": "abort", "abort": "succeed", "canceled": "succeed", "ACCEPT": "REJECT",
+    "REJECT": "ACCEPT",
+}  # fmt: skip
+_OTHER_COMPARISON = {
+    ast.Lt: "<=", ast.LtE: "<", ast.Gt: ">=", ast.GtE: ">", ast.Eq: "!=", ast.NotEq: "==",
+    ast.Is: "is not", ast.IsNot: "is", ast.In: "not in", ast.NotIn: "in",
+}  # fmt: skip
+_SLEEP_S = 2.0
+"""Seconds that a callback sleeps: longer than a node may be held up in any task."""
+
+
+@dataclass(frozen=True)
+class Mutation:
+    """One change of one place.
+
+    Attributes:
+        operator: the kind of mistake.
+        line: where it is, from 1 on.
+        before: the line as it was, and ``after``: as it is now, both without indentation.
+        text: all of the solution with the mistake.
+    """
+
+    operator: str
+    line: int
+    before: str
+    after: str
+    text: str
+
+    @property
+    def key(self) -> str:
+        """What names it where a corpus says that it changes nothing: no number of a line."""
+        return f"{self.operator}: {self.before} -> {self.after}"
+
+    def __str__(self) -> str:
+        """Return it as a phrase."""
+        return f"line {self.line}, {self.operator}: `{self.before}` becomes `{self.after}`"
+
+
+_Edit = tuple[str, ast.AST, str]
+"""The operator, what is replaced, and by what."""
+
+
+def find_mutations(text: str) -> list[Mutation]:
+    """Return all mutations of a solution, in the order of its lines, each of which compiles.
+
+    Raises:
+        SyntaxError: the solution does not compile.
+    """
+    tree = ast.parse(text)
+    found: dict[str, Mutation] = {}
+    for operator in (_names, _numbers, _booleans, _comparisons, _conditions, _calls, _returns,
+                     _groups, _sleeps):  # fmt: skip
+        for edit in operator(tree):
+            mutation = _apply(text, *edit)
+            if mutation is not None:
+                found.setdefault(mutation.text, mutation)
+    return sorted(found.values(), key=lambda mutation: (mutation.line, mutation.operator))
+
+
+def _apply(text: str, operator: str, node: ast.AST, new: str) -> Mutation | None:
+    assert isinstance(node, ast.expr | ast.stmt | ast.keyword)
+    lines = text.splitlines(keepends=True)
+    begin = _offset(lines, node.lineno, node.col_offset)
+    end = _offset(lines, node.end_lineno or node.lineno, node.end_col_offset or 0)
+    mutated = text[:begin] + new + text[end:]
+    try:
+        ast.parse(mutated)
+    except SyntaxError:
+        return None
+    if mutated == text:
+        return None
+    after = mutated[text.rfind("\n", 0, begin) + 1 :].split("\n", 1)[0].strip()
+    return Mutation(operator, node.lineno, lines[node.lineno - 1].strip(), after, mutated)
+
+
+def _offset(lines: list[str], line: int, column: int) -> int:
+    """Return the place in the text of a column that Python counts in bytes of UTF-8."""
+    before = sum(map(len, lines[: line - 1]))
+    return before + len(lines[line - 1].encode()[:column].decode())
+
+
+def _names(tree: ast.AST) -> Iterator[_Edit]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and node.attr in _OTHER_NAME:
+            whole = ast.unparse(node).removesuffix(node.attr)
+            yield "other policy or end", node, whole + _OTHER_NAME[node.attr]
+        elif isinstance(node, ast.Name) and node.id in _OTHER_NAME:
+            yield "other callback group", node, _OTHER_NAME[node.id]
+
+
+def _numbers(tree: ast.AST) -> Iterator[_Edit]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and type(node.value) is int:
+            yield "number", node, str(node.value + 1)
+        elif isinstance(node, ast.Constant) and type(node.value) is float:
+            yield "number", node, repr(node.value * 2 if node.value else 1.0)
+
+
+def _booleans(tree: ast.AST) -> Iterator[_Edit]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and type(node.value) is bool:
+            yield "true or false", node, str(not node.value)
+
+
+def _comparisons(tree: ast.AST) -> Iterator[_Edit]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare):
+            for index, op in enumerate(node.ops):
+                yield "bound", node, _comparison(node, index, _OTHER_COMPARISON[type(op)])
+
+
+def _comparison(node: ast.Compare, changed: int, new: str) -> str:
+    words = [ast.unparse(node.left)]
+    for index, (op, right) in enumerate(zip(node.ops, node.comparators, strict=True)):
+        sign = ast.unparse(ast.Compare(ast.Name("a"), [op], [ast.Name("b")]))[2:-2]
+        words += [new if index == changed else sign, ast.unparse(right)]
+    return " ".join(words)
+
+
+def _conditions(tree: ast.AST) -> Iterator[_Edit]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If | ast.IfExp | ast.While):
+            test = ast.unparse(node.test)
+            if not isinstance(node.test, ast.Compare) and test != "True":
+                yield "condition", node.test, f"not ({test})"
+
+
+def _calls(tree: ast.AST) -> Iterator[_Edit]:
+    for node in ast.walk(tree):
+        call = node.value if isinstance(node, ast.Expr) else None
+        call = call.value if isinstance(call, ast.Await) else call
+        if not (isinstance(node, ast.Expr) and isinstance(call, ast.Call)):
+            continue
+        if ast.unparse(call.func) != "super().__init__":
+            yield "call left out", node, "pass"
+
+
+def _returns(tree: ast.AST) -> Iterator[_Edit]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Return) and isinstance(node.value, ast.Name):
+            yield "reply not returned", node, "return None"
+
+
+def _groups(tree: ast.AST) -> Iterator[_Edit]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.keyword) and node.arg == "callback_group":
+            yield "callback group dropped", node, "callback_group=None"
+
+
+def _sleeps(tree: ast.AST) -> Iterator[_Edit]:
+    sleep = f"__import__('time').sleep({_SLEEP_S:g})"
+    for node in _functions(tree, lambda name: not name.startswith("__")):
+        first = node.body[0]
+        indent = " " * first.col_offset
+        whole = "\n".join(
+            line if number == 0 else indent + line
+            for number, line in enumerate(ast.unparse(first).splitlines())
+        )
+        yield "sleep in a callback", first, f"{sleep}\n{indent}{whole}"
+
+
+def _functions(
+    tree: ast.AST, wanted: Callable[[str], bool]
+) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and wanted(node.name):
+            yield node
