@@ -13,11 +13,12 @@
 # %% [markdown]
 # # ROS 2 in a notebook: start here
 #
-# 1. Open the chapter, [ch05-building-blocks.ipynb](ch05-building-blocks.ipynb), and run its cells
-#    from top to bottom with **Shift+Enter**. Running a cell again is always safe.
-# 2. Do the five exercises in the folder `ch05`, in the file browser on the left. Their check cells
-#    tell you what your nodes do, what they should do, and why it matters on a robot.
-# 3. Take the quiz, [ch05-quiz/quiz.ipynb](ch05-quiz/quiz.ipynb), as often as you like.
+# 1. Open the first chapter, [ch05-building-blocks.ipynb](ch05-building-blocks.ipynb), and run its
+#    cells from top to bottom with **Shift+Enter**. Running a cell again is always safe.
+# 2. Do its exercises in the folder `ch05`, in the file browser on the left. Their check cells tell
+#    you what your nodes do, what they should do, and why it matters on a robot.
+# 3. Take its quiz, [ch05-quiz/quiz.ipynb](ch05-quiz/quiz.ipynb), as often as you like.
+# 4. Go on with the next chapter, [ch06-python-rclpy.ipynb](ch06-python-rclpy.ipynb).
 #
 # If nothing arrives, `session.diagnose()` says why; if the course itself does not run, type
 # `course doctor` in a terminal.
@@ -33,6 +34,6 @@ import course
 course.progress()
 
 # %% [markdown]
-# It counts the chapter's cells that have run, what the check cells have found, whether your
+# It counts the chapters' cells that have run, what the check cells have found, whether your
 # explanations are written (save the notebook first), and your attempts at the quiz. It stands in
 # the file `progress.json` in this folder and in your notebooks, and nowhere else.

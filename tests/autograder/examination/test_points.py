@@ -27,20 +27,19 @@ def test_chapter_5_has_100_points() -> None:
 
 
 @pytest.mark.parametrize("exam", EXERCISES)
-def test_each_exercise_has_five_written_answers_and_its_own_notebook(exam: str) -> None:
+def test_each_exercise_has_written_answers_and_its_own_notebook(exam: str) -> None:
     entry = EXERCISES[exam]
-    assert list(entry.manual.values()) == [1.0] * 5
+    assert entry.manual
     assert all(cell.startswith(f"{exam}-explanation-") for cell in entry.manual)
     assert [other.notebook for other in EXERCISES.values()].count(entry.notebook) == 1
 
 
 @pytest.mark.parametrize("exam", EXERCISES)
-def test_an_exercise_has_10_visible_points_5_hidden_ones_and_5_for_explanations(exam: str) -> None:
+def test_an_exercise_has_20_points_half_of_them_for_checks_that_a_student_sees(exam: str) -> None:
     entry = EXERCISES[exam]
-    hidden = sum(sum(part.values()) for name, part in entry.parts.items() if name != "visible")
-    assert sum(entry.parts["visible"].values()) == 10
-    assert hidden == pytest.approx(5)
-    assert sum(entry.manual.values()) == 5
+    parts = {name: sum(part.values()) for name, part in entry.parts.items()}
+    assert sum(parts.values()) + sum(entry.manual.values()) == pytest.approx(20)
+    assert parts["visible"] >= 10
 
 
 @pytest.mark.parametrize("exam", EXERCISES)

@@ -1,0 +1,1 @@
+"""Chapter 6, exercise 2: executors and callback groups."""

@@ -1,0 +1,1 @@
+"""Chapter 6, exercise 1: parameters and timers."""
