@@ -95,11 +95,13 @@ class Exam(Generic[RigT]):
     or what it has for it (`FreshForEachCheck`).
     With ``fresh_parts`` each part has one of its own, for checks that leave their mark on what the
     nodes do later: what failed in an earlier part is not tried again there, what passed is.
+    ``read`` is where to read on about a check that does not say so itself.
     """
 
     name: str
     rig: Callable[[CheckContext], AbstractContextManager[Any]]
     fresh_parts: bool = False
+    read: str = ""
     checks: dict[str, Check[RigT]] = field(default_factory=dict)
     _left_up: ExitStack | None = field(default=None, init=False, repr=False)
     """What a check context that ends leaves up: it would be taken down if nobody referred to it."""
@@ -122,7 +124,7 @@ class Exam(Generic[RigT]):
             title, _, rationale = inspect.cleandoc(run.__doc__ or run.__name__).partition("\n")
             self.checks[run.__name__] = Check(
                 run.__name__, title.strip(), " ".join(rationale.split()), run,
-                tuple(needs), tuple(hints), read,
+                tuple(needs), tuple(hints), read or self.read,
             )  # fmt: skip
             return run
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -164,6 +165,24 @@ class Span:
                 expected=self._sentence(f"nothing comes on {topic}."),
                 actual=f"In {self.seconds:g} s of the node's time {_came(len(came))}."
                 + self._note(),
+            )
+
+    def require_values(self, topic: Topic, values: Sequence[Any], *, ordered: bool = True) -> None:
+        """Require that these values come on a topic, and no others.
+
+        Args:
+            topic: one that the node publishes on.
+            values: as `Topic.value` has them.
+            ordered: whether their order matters.
+
+        Raises:
+            Failed: others did.
+        """
+        came = self.values(topic)
+        if came != list(values) and (ordered or Counter(came) != Counter(values)):
+            raise Failed(
+                expected=self._sentence(f"{list(values)!r:.300} comes on {topic}."),
+                actual=f"What came was {came!r:.300}." if came else f"Nothing came.{self._note()}",
             )
 
     def require_at_most(self, topic: Topic, number: int) -> None:

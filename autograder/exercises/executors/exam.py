@@ -5,7 +5,7 @@ from __future__ import annotations
 from std_msgs.msg import Int32, String
 from std_srvs.srv import Trigger
 
-from autograder.examination.exam import Exam, Failed
+from autograder.examination.exam import Exam
 from autograder.observe import ObservedNode, Service, Topic, one_node
 
 BEATS = Topic("safety/beat", Int32, value=lambda message: message.data)
@@ -21,13 +21,14 @@ EXAM: Exam[ObservedNode] = Exam(
         "Guard", publishes=[BEATS, REPORTS, RESULTS, HANDLED], subscribes=[INSPECT, SCANS],
         calls=[INSPECTION], threads=4,
     ),
+    read="Chapter 6, “Executors”",
 )  # fmt: skip
-EXECUTORS, GROUPS = "Chapter 6, “Executors”", "Chapter 6, “Callback groups”"
+GROUPS = "Chapter 6, “Callback groups”"
 FEW, MANY = 2, 6
 """Pieces of work that come at once: fewer, and more, than the executor has threads."""
 
 
-@EXAM.check(hints=("Compare your node with the table.",), read=EXECUTORS)
+@EXAM.check(hints=("Compare your node with the table.",))
 def guard_starts(node: ObservedNode) -> None:
     """The node starts with all its topics and its client.
 
@@ -36,7 +37,7 @@ def guard_starts(node: ObservedNode) -> None:
     node.require_endpoints()
 
 
-@EXAM.check(needs=("guard_starts",), hints=("`self.create_timer(0.05, ...)`",), read=EXECUTORS)
+@EXAM.check(needs=("guard_starts",), hints=("`self.create_timer(0.05, ...)`",))
 def loop_beats(node: ObservedNode) -> None:
     """The safety loop beats 20 times a second, and counts.
 
@@ -47,11 +48,7 @@ def loop_beats(node: ObservedNode) -> None:
     span.require_count(BEATS, first=1)
 
 
-@EXAM.check(
-    needs=("guard_starts",),
-    hints=("Who takes the answer?", "`call_async(...)`, then `add_done_callback` or `await`"),
-    read=EXECUTORS,
-)
+@EXAM.check(needs=("guard_starts",), hints=("Who takes the answer?", "`call_async`, then `await`"))
 def inspections_are_reported(node: ObservedNode) -> None:
     """What an inspection answers is reported.
 
@@ -59,7 +56,7 @@ def inspections_are_reported(node: ObservedNode) -> None:
     """
     node.answer_after(INSPECTION, 0.5, success=True, message="bumper is fine")
     node.send(INSPECT, String(data="bumper"))
-    _require(node.advance(1.5).values(REPORTS), ["bumper is fine"], "is reported")
+    node.advance(1.5).require_values(REPORTS, ["bumper is fine"])
 
 
 @EXAM.check(needs=("guard_starts",), hints=("`analyse(self, scan)`",), read=GROUPS)
@@ -70,13 +67,12 @@ def scans_are_analysed(node: ObservedNode) -> None:
     """
     for scan in range(3):
         node.send(SCANS, Int32(data=scan))
-    _require(sorted(node.advance(3.0).values(RESULTS)), [0, 2, 4], "are the results")
+    node.advance(3.0).require_values(RESULTS, [0, 2, 4], ordered=False)
 
 
 @EXAM.check(
     needs=("loop_beats", "inspections_are_reported"),
     hints=("How many threads wait for an answer?", "A callback that waits for one holds a thread."),
-    read=EXECUTORS,
 )
 def slow_service_holds_nothing_up(node: ObservedNode) -> None:
     """While six inspections take three seconds, the loop beats on, and all are reported.
@@ -87,7 +83,7 @@ def slow_service_holds_nothing_up(node: ObservedNode) -> None:
     for number in range(MANY):
         node.send(INSPECT, String(data=f"part {number}"))
     node.advance(2.5, "While inspections wait", once=True).require_rate(BEATS, hz=20.0)
-    _require(node.advance(3.0).values(REPORTS), ["fine"] * MANY, "are reported")
+    node.advance(3.0, "After all answers").require_values(REPORTS, ["fine"] * MANY)
 
 
 @EXAM.check(
@@ -119,9 +115,4 @@ def nothing_is_lost(node: ObservedNode) -> None:
     for number in range(FEW):
         node.send(SCANS, Int32(data=number))
         node.send(INSPECT, String(data=f"part {number}"))
-    _require(sorted(node.advance(8.0).values(HANDLED)), list(range(1, 2 * FEW + 1)), "are counted")
-
-
-def _require(came: list[object], wanted: list[object], what: str) -> None:
-    if came != wanted:
-        raise Failed(expected=f"{wanted} {what}.", actual=f"What came was {came or 'nothing'}.")
+    node.advance(8.0).require_values(HANDLED, range(1, 2 * FEW + 1), ordered=False)

@@ -14,15 +14,14 @@ BEATS = Topic("heartbeat", Int32, value=lambda message: message.data)
 RATE = Parameter("rate", 1.0)
 PAUSE = Service("heartbeat/pause", SetBool)
 EXAM: Exam[ObservedNode] = Exam(
-    "parameters", one_node("Heartbeat", publishes=[BEATS], serves=[PAUSE], parameters=[RATE])
+    "parameters",
+    one_node("Heartbeat", publishes=[BEATS], serves=[PAUSE], parameters=[RATE]),
+    read="Chapter 6, “Timers”",
 )
-PARAMETERS, TIMERS = "Chapter 6, “Parameters”", "Chapter 6, “Timers”"
+PARAMETERS = "Chapter 6, “Parameters”"
 
 
-@EXAM.check(
-    hints=("Compare your node with the table.", "`self.declare_parameter('rate', 1.0, about)`"),
-    read=PARAMETERS,
-)
+@EXAM.check(hints=("Compare it with the table.", "`declare_parameter(…, about)`"), read=PARAMETERS)
 def node_starts(node: ObservedNode) -> None:
     """The node starts with its topic, its service, and a parameter that says what it is for.
 
@@ -33,11 +32,7 @@ def node_starts(node: ObservedNode) -> None:
     node.require_described(RATE)
 
 
-@EXAM.check(
-    needs=("node_starts",),
-    hints=("Who tells your node how much time has passed?", "`self.create_timer(1.0, self.beat)`"),
-    read=TIMERS,
-)
+@EXAM.check(needs=("node_starts",), hints=("Who tells it the time?", "`self.create_timer(1.0, …)`"))
 def beats_count(node: ObservedNode) -> None:
     """One beat a second comes, and counts from 1 on without a gap.
 
@@ -49,9 +44,7 @@ def beats_count(node: ObservedNode) -> None:
 
 
 @EXAM.check(
-    needs=("beats_count",),
-    hints=("When does your node look at its rate?", "`add_post_set_parameters_callback`"),
-    read=TIMERS,
+    needs=("beats_count",), hints=("When is it told?", "`add_post_set_parameters_callback`")
 )
 def period_follows(node: ObservedNode) -> None:
     """A new rate holds within one old period, and no beat is lost or added on the way.
@@ -85,11 +78,7 @@ def rate_is_bounded(node: ObservedNode) -> None:
             node.set(RATE, bad).require_refused()
 
 
-@EXAM.check(
-    needs=("beats_count",),
-    hints=("What does the service answer?", "`timer.cancel()`, then `timer.reset()`"),
-    read=TIMERS,
-)
+@EXAM.check(needs=("beats_count",), hints=("`timer.cancel()`", "and then `timer.reset()`"))
 def pauses_and_resumes(node: ObservedNode) -> None:
     """The service pauses the beats, also twice, and resumes them where the count was.
 
@@ -105,9 +94,7 @@ def pauses_and_resumes(node: ObservedNode) -> None:
     span.require_count(BEATS, first=last + 1)
 
 
-@EXAM.check(
-    needs=("pauses_and_resumes", "period_follows"), hints=("Is a new timer paused?",), read=TIMERS
-)
+@EXAM.check(needs=("pauses_and_resumes", "period_follows"), hints=("Is a new timer paused?",))
 def stays_paused(node: ObservedNode) -> None:
     """A change of the rate does not end a pause; it holds from the resume on.
 
@@ -120,7 +107,7 @@ def stays_paused(node: ObservedNode) -> None:
     node.advance(5.0, "After it was resumed").require_rate(BEATS, hz=2.0)
 
 
-@EXAM.check(needs=("beats_count",), hints=("What of it still runs?",), read=TIMERS)
+@EXAM.check(needs=("beats_count",), hints=("What of it still runs?",))
 def ends_with_its_node(node: ObservedNode) -> None:
     """After `destroy_node` nothing of it is left, and nothing more comes.
 
