@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "executors-task", "locked": true, "schema_version": 3, "solution": false}
-# # Chapter 6, exercise 2: Executors and callback groups
+# # Exercise 6.2: Executors and callback groups
 #
 # One node watches over a robot. It beats for the motors, has parts of the robot inspected, and looks
 # at scans. The inspections and the scans are slow. **The beat must not be.** You write the node

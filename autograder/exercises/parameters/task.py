@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown] nbgrader={"grade": false, "grade_id": "parameters-task", "locked": true, "schema_version": 3, "solution": false}
-# # Chapter 6, exercise 1: Parameters and timers
+# # Exercise 6.1: Parameters and timers
 #
 # A robot's heartbeat tells a supervisor that the robot is alive. How often it beats is for an operator
 # to choose, while the robot runs. You write the node `Heartbeat`.
