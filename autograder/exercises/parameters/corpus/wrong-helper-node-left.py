@@ -1,5 +1,6 @@
 # title: A second node, which the first one makes and nobody destroys, has the publisher
 # fails: ends_with_its_node
+# says: ends_with_its_node: There still is a publisher on /heartbeat
 
 
 
