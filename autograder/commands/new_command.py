@@ -18,7 +18,7 @@ from quizzes.bank.schema import EXAMPLES
 app = typer.Typer(help="Begin a course, an exercise or a quiz.", no_args_is_help=True)
 out = Terminal()
 
-TEMPLATE = Path(__file__).with_name("new_exercise")
+TEMPLATE = exercise_folders.NEW_EXERCISE
 """The files of a small exercise that works: each ends in .txt, as none of them is a module here."""
 
 QUIZ = "lesson.yaml"

@@ -37,6 +37,9 @@ TABLE = PACKAGE / "corpus" / "README.md"
 DEMO_CLASS = PACKAGE / "commands" / "demo_class.toml"
 """What the class of ``autograder demo`` hands in."""
 
+NEW_EXERCISE = PACKAGE / "commands" / "new_exercise"
+"""What ``autograder new exercise`` makes one of, with its solution."""
+
 
 class ExerciseError(CourseError):
     """An exercise's folder that cannot be used; the message says what to change."""
@@ -189,7 +192,7 @@ def kept_from_students(package: Path = PACKAGE) -> Iterator[Path]:
                 yield from sorted(entry.glob("task.*"))
             elif not _is_needed(entry) and entry.name != OBJECTIVES:
                 yield entry
-    kept = (EVERY, TABLE, DEMO_CLASS)
+    kept = (EVERY, TABLE, DEMO_CLASS, NEW_EXERCISE)
     yield from (package / path.relative_to(PACKAGE) for path in kept)
 
 

@@ -195,6 +195,7 @@ def test_what_an_installer_has_compiled_is_kept_from_submissions_too(tmp_path: P
         "exercises/one/__pycache__/task.cpython-311.pyc", "exercises/one/corpus",
         "exercises/one/task.py", "exercises/one/task-Copy1.py", "exercises/one/notes",
         "exercises/begun/task.py", "corpus/every", "corpus/README.md", "commands/demo_class.toml",
+        "commands/new_exercise",
     }  # fmt: skip
 
 
