@@ -451,10 +451,16 @@ def test_an_action_with_feedback_and_a_cancelled_goal(host):
     wait(lambda: endless.done() and endless.result().done())
     executor_of(client_node).create_task(endless.result().result().cancel_goal_async)
     wait(cancelled.is_set)
-    if not isinstance(executor_of(node), SingleThreadedExecutor | MultiThreadedExecutor):
+    executor = executor_of(node)
+    if not isinstance(executor, SingleThreadedExecutor | MultiThreadedExecutor):
         return  # the session destroys them
-    done = executor_of(node).create_task(lambda: (server.destroy(), client.destroy()))
-    wait(done.done)
+    # One that is destroyed while another thread adds it to its wait set ends rclpy's spin.
+    for each in (node, client_node):
+        executor.remove_node(each)
+    passed = executor.create_task(lambda: None)
+    wait(passed.done)
+    server.destroy()
+    client.destroy()
 
 
 # Callback groups.

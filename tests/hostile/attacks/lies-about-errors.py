@@ -1,5 +1,4 @@
 # title: A callback that raises in the end, in a process whose harness has no errors to tell of
-# reaches: the exam
 # exercise: safety
 # base: right-exemplar
 # told: where the node runs in a plain program of rclpy, that ended: an exception left one of its callbacks
