@@ -37,23 +37,22 @@ class Tried:
     outcome: Outcome
     difference: str = ""
 
-    def as_lines(self, *, hidden_steps: bool = False) -> Iterator[str]:
+    def as_lines(self) -> Iterator[str]:
         """Yield it line by line: each check, what it did and saw, and what was needed."""
         yield f"{self.what}, in {self.outcome.seconds:.1f} s"
         yield from (f"  {note}" for note in self.outcome.notes)
         for verdict in self.outcome.verdicts.values():
             yield f"  {verdict.part}: {verdict.score:g} of {verdict.max_score:g}"
             for check in verdict.checks:
-                yield from _check_lines(check, with_steps=not hidden_steps)
+                yield from _check_lines(check)
         if self.difference:
             yield f"  not as the corpus says: {self.difference}"
 
 
-def _check_lines(check: CheckResult, *, with_steps: bool) -> Iterator[str]:
+def _check_lines(check: CheckResult) -> Iterator[str]:
     points = f"{check.points:g} of {check.max_points:g}"
     yield f"    {_MARKS[check.status]} {check.name} ({points}): {check.title}"
-    if with_steps:
-        yield from (f"        {step}" for step in check.steps)
+    yield from (f"        {step}" for step in check.steps)
     if check.expected:
         yield f"        needed: {check.expected}"
     if check.actual:

@@ -16,6 +16,9 @@ from autograder.corpus.corpus_files import EQUIVALENT, MUTANTS
 from autograder.corpus.mutations import Mutation, find_mutations
 from autograder.util import exercise_folders
 
+_CAUGHT = ("failed", "not_checked")
+"""What a check says of a mutation that is noticed; where the grader failed, nothing was."""
+
 
 @dataclass(frozen=True)
 class Mutated:
@@ -49,7 +52,8 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
     source, released = trials.make_notebooks(exercises.load_exam(exam).name)
     grade_id = f"{exam}-solution"
     cells = {submission.grade_id(cell): cell.source for cell in source.cells}
-    mutations = find_mutations(without_markers(cells[grade_id]))
+    exemplar = without_markers(cells[grade_id])
+    mutations = find_mutations(exemplar)
     reasons = known_equivalent(exam)
     result = Mutated(stale=sorted(reasons.keys() - {mutation.key for mutation in mutations}))
     result.equivalent.update({m: reasons[m.key] for m in mutations if m.key in reasons})
@@ -59,13 +63,15 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
         if mutation not in result.equivalent
     }
     cases = [
-        Case(exam, name, str(mutation), frozenset(), cells={grade_id: mutation.text})
+        Case(
+            exam, name, str(mutation), frozenset(), splices={grade_id: ((exemplar, mutation.text),)}
+        )
         for name, mutation in of_case.items()
     ]
 
     def note(trial: trials.CorpusTrial) -> None:
         mutation = of_case[trial.case.name]
-        failed = [check for check, status in trial.check_statuses.items() if status != "passed"]
+        failed = [check for check, status in trial.check_statuses.items() if status in _CAUGHT]
         if failed:
             result.caught[mutation] = failed
         else:

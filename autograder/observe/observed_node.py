@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -61,13 +61,12 @@ class Task:
 class Change:
     """What became of a wish to set a parameter: see `ObservedNode.set`."""
 
-    node: ObservedNode
     parameter: Parameter
     value: Any
     accepted: bool
     reason: str
     present: Any
-    before: Any = field(default=None)
+    before: Any
 
     def require_accepted(self) -> None:
         """Require that the parameter has the value now.
@@ -371,7 +370,7 @@ class ObservedNode:
         reply = self._ask("set_parameters", SetParameters, request)
         (result,) = reply.results or [None]
         made = Change(
-            self, parameter, value, bool(result and result.successful),
+            parameter, value, bool(result and result.successful),
             str(result.reason) if result else "", self.get(parameter), before,
         )  # fmt: skip
         said = "accepted" if made.accepted else f"refused, {with_reason(made.reason)}"

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from autograder.examination.exam import Failed
 from autograder.observe.examiner_end import Heard
 from autograder.observe.nouns import Topic
 from autograder.observe.phrases import capitalize_first
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 PACES = (0.6, 2.0)
 """Seconds of wall time in which a second of the node's time passes, where a rate is taken again.
@@ -62,7 +59,7 @@ def rate_of(
         hz: what it is to be.
         leeway: part of the number that may be missing or too many; one always may.
     """
-    most = max((times_s.count(at) for at in set(times_s)), default=0)
+    most = max(Counter(times_s).values(), default=0)
     # One of the stride before may have been on its way.
     allowed = math.ceil(hz * stride_s) + 2
     return Rate(len(times_s), hz * seconds, leeway, most, allowed)
@@ -130,10 +127,9 @@ class Span:
         """
         rate = self._rate(topic, hz, leeway)
         span = self
-        for pace in PACES if self._again else ():
-            if rate.is_right:
-                return
-            assert self._again is not None
+        for pace in PACES:
+            if rate.is_right or self._again is None:
+                break
             span = self._again(pace)
             rate = span._rate(topic, hz, leeway)
         if rate.is_right:
