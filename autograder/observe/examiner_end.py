@@ -17,7 +17,7 @@ from autograder.observe.quiet_node import QuietNode
 
 # What is offered meets every demand but that of a deadline, so a student's QoS is free.
 OFFERED = QoSProfile(
-    depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.VOLATILE
+    depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
 LOSSLESS = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.RELIABLE)
 UNDEMANDING = QoSProfile(history=HistoryPolicy.KEEP_ALL, reliability=ReliabilityPolicy.BEST_EFFORT)
@@ -99,6 +99,11 @@ class ExaminerEnd(QuietNode):
         """Forget what came so far, and answer what waits: it was another node's."""
         for heard in self._heard.values():
             heard.clear()
+        for (
+            publisher
+        ) in self._telling.values():  # it would hand a new node what it told the old one
+            self.destroy_publisher(publisher)
+        self._telling.clear()
         for requests in self._requests.values():
             for request in requests:
                 request.answer()
