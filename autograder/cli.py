@@ -6,7 +6,6 @@ import io
 import json
 import os
 import sys
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,6 +13,7 @@ import typer
 from rich.table import Table
 
 from autograder.commands import marks_command, new_command, quiz_command
+from autograder.commands.options import AsJson, Root, use_root, use_root_if_any
 from autograder.running.interruption import Stopped
 from autograder.util.terminal import Terminal, visible_json
 from course.errors import CourseError
@@ -34,17 +34,12 @@ app.add_typer(quiz_command.app, name="quiz")
 out = Terminal()
 err = Terminal(stderr=True)
 
-Root = Annotated[
-    Path | None,
-    typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
-]
 IN_FLIGHT = 5 * (os.cpu_count() or 1)
 """Notebooks run at a time: most of its time a subject waits, for DDS or a timer.
 
 With fewer than five a processor it has nothing to do now and then, for up to a tenth of the time.
 """
 Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Notebooks run at a time.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
 @app.command()
@@ -58,10 +53,18 @@ def build(
     ] = False,
 ) -> None:
     """Build the notebooks from their text sources."""
+    from autograder import exercises
+    from autograder.assignments import listing
     from autograder.assignments.build_notebooks import build as build_notebooks
 
-    for path in build_notebooks(_use_root(root), check=check, with_solutions=with_solutions):
+    where = use_root(root)
+    listed = {name for one in listing.of_course(where).values() for name in one.exercises}
+    for name in sorted(listed):
+        exercises.require_sound(name)
+    for path in build_notebooks(where, check=check, with_solutions=with_solutions):
         out.print(str(path), soft_wrap=True)
+    for name in sorted(exercises.own_names() - listed):
+        err.print(f"The exercise '{name}' is in no assignment: {listing.ASSIGNMENTS} lists them.")
 
 
 @app.command()
@@ -69,7 +72,7 @@ def release(assignment: str, root: Root = None) -> None:
     """Make the student version of an assignment with nbgrader."""
     from autograder.gradebook.release import make_release as release_assignment
 
-    out.print(str(release_assignment(_use_root(root), assignment)), soft_wrap=True)
+    out.print(str(release_assignment(use_root(root), assignment)), soft_wrap=True)
 
 
 @app.command()
@@ -109,7 +112,7 @@ def grade(
     from autograder.gradebook.course_gradebook import CourseGradebook
     from autograder.grading import engine, run_progress
 
-    where = _use_root(root)
+    where = use_root(root)
     done = engine.grade(
         where, assignment, students=student or (), jobs=jobs, fresh=fresh, trust=trust,
         scheduler=scheduler, progress=run_progress.for_console(out, err, machine=as_json),
@@ -164,7 +167,7 @@ def claim(
     from autograder.commands import claim_command
 
     said = claim_command.keep_claim(
-        _use_root(root), assignment, student, notebook, file, nothing=nothing, withdraw=withdraw
+        use_root(root), assignment, student, notebook, file, nothing=nothing, withdraw=withdraw
     )
     out.print(said, soft_wrap=True)
 
@@ -181,7 +184,7 @@ def extend(
     """Give students more time for an assignment, in place of an earlier extension of theirs."""
     from autograder.gradebook import extensions
 
-    for due in extensions.grant_extensions(_use_root(root), assignment, students, hours):
+    for due in extensions.grant_extensions(use_root(root), assignment, students, hours):
         then = (
             "it counts once the work is graded."
             if due.waits
@@ -217,10 +220,8 @@ def corpus(
 ) -> None:
     """Grade the graders: run every case of known verdict, and compare."""
     from autograder.corpus import command, tables
-    from course.workspace.content import ContentError
 
-    with suppress(ContentError):  # outside of a course root, there are those of the package
-        _use_root(root)
+    use_root_if_any(root)
     if as_table:
         sys.stdout.write(tables.checks_matrix(command.load_cases(exercise)))
         return
@@ -257,10 +258,8 @@ def try_(
 ) -> None:
     """Run an exam once, and show what it did and saw, step by step."""
     from autograder.commands import try_command
-    from course.workspace.content import ContentError
 
-    with suppress(ContentError):
-        _use_root(root)
+    use_root_if_any(root)
     if watch:
         try_command.try_again_and_again(exercise, what, say=_line_printer(False))
         return
@@ -281,10 +280,8 @@ def mutate(
     [equivalent] of the exercise's corpus/mutants.toml.
     """
     from autograder.corpus import mutate as mutating
-    from course.workspace.content import ContentError
 
-    with suppress(ContentError):
-        _use_root(root)
+    use_root_if_any(root)
     done = mutating.mutate(exercise, jobs=jobs, say=_line_printer(as_json))
     if as_json:
         _print_json({
@@ -352,7 +349,7 @@ def report(
     """
     from autograder.commands import quiz_report, report_command
 
-    where = _use_root(root)
+    where = use_root(root)
     assignment = quiz_report.assignment_of(where, assignment)
     made = report_command.make_report(
         where, assignment, column=column, provisional=provisional, threshold=similarity,
@@ -407,7 +404,7 @@ def feedback(
 
     if platform not in ("moodle", "canvas"):
         raise typer.BadParameter("moodle or canvas", param_hint="--platform")
-    where = _use_root(root)
+    where = use_root(root)
     file = to or where / "reports" / assignment / f"feedback-{platform}.zip"
     packed = feedback_archive.pack_feedback(where, assignment, platform, names, file)  # type: ignore[arg-type]
     if as_json:
@@ -479,15 +476,6 @@ def _line_printer(silent: bool) -> Any:
 
 def _print_json(data: Any) -> None:
     sys.stdout.write(visible_json(json.dumps(data, default=str, ensure_ascii=False)) + "\n")
-
-
-def _use_root(root: Path | None) -> Path:
-    from autograder.util import exercise_folders
-    from course.workspace.content import working_root
-
-    found = working_root() if root is None else root.resolve()
-    exercise_folders.use_course(found)
-    return found
 
 
 def main() -> None:

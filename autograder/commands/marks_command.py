@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from autograder.commands.options import AsJson, Root, use_root
 from autograder.util.terminal import Terminal, visible_json
 
 app = typer.Typer(
@@ -17,12 +18,6 @@ app = typer.Typer(
     add_completion=False,
 )  # fmt: skip
 out = Terminal()
-
-Root = Annotated[
-    Path | None,
-    typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
-]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON for machines.")]
 
 
 @app.command("export")
@@ -44,7 +39,7 @@ def export_marks(
     from autograder.gradebook.written_answers import answers, answers_page
     from autograder.util.work_files import write_whole
 
-    gradebook = CourseGradebook(_course_root(root))
+    gradebook = CourseGradebook(use_root(root))
     asked = (
         [answers.find_question(gradebook, assignment, question)]
         if question
@@ -94,7 +89,7 @@ def import_marks(
     from autograder.gradebook.written_answers import answers
     from course.messages.yaml_text import format_count
 
-    entered = answers.enter_marks(CourseGradebook(_course_root(root)), file)
+    entered = answers.enter_marks(CourseGradebook(use_root(root)), file)
     if as_json:
         _print_json(vars(entered))
     else:
@@ -116,12 +111,3 @@ def import_marks(
 
 def _print_json(data: Any) -> None:
     sys.stdout.write(visible_json(json.dumps(data, default=str, ensure_ascii=False)) + "\n")
-
-
-def _course_root(root: Path | None) -> Path:
-    from autograder.util import exercise_folders
-    from course.workspace.content import working_root
-
-    found = working_root() if root is None else root.resolve()
-    exercise_folders.use_course(found)
-    return found

@@ -9,10 +9,11 @@ from typing import Annotated
 import typer
 
 from autograder.assignments import listing
+from autograder.commands.options import Root, course_root
 from autograder.util import exercise_folders
 from autograder.util.terminal import Terminal
 from course.errors import CourseError
-from course.workspace.content import CONFIG, content_root, working_root
+from course.workspace.content import CONFIG, content_root
 from quizzes.bank.schema import EXAMPLES
 
 app = typer.Typer(help="Begin a course, an exercise or a quiz.", no_args_is_help=True)
@@ -23,11 +24,6 @@ TEMPLATE = exercise_folders.NEW_EXERCISE
 
 QUIZ = "lesson.yaml"
 """The example that a new quiz begins as."""
-
-Root = Annotated[
-    Path | None,
-    typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
-]
 
 
 class NewError(CourseError):
@@ -56,7 +52,7 @@ def exercise_command(
     root: Root = None,
 ) -> None:
     """Make an exercise that builds and grades: a lamp that blinks, to be made into your own."""
-    folder = make_exercise(root or working_root(), name, assignment)
+    folder = make_exercise(course_root(root), name, assignment)
     out.print(f"An exercise: {folder}", soft_wrap=True)
     out.print(f"Go on with: autograder try {name}, then change its files.")
 
@@ -64,7 +60,7 @@ def exercise_command(
 @app.command("quiz")
 def quiz_command(name: str, root: Root = None) -> None:
     """Make a bank of questions, to be made into your own."""
-    file = make_quiz(root or working_root(), name)
+    file = make_quiz(course_root(root), name)
     out.print(f"A quiz: {file}", soft_wrap=True)
     out.print(f"Go on with: autograder quiz lint {name}")
 
@@ -92,10 +88,9 @@ def make_exercise(root: Path, name: str, assignment: str) -> Path:
     """Make an exercise in the course at ``root``, and add it to an assignment; return its folder.
 
     Raises:
-        NewError: it is no course root, or has that exercise, or the name cannot be one.
+        NewError: it has that exercise, or the name cannot be one.
         AssignmentBuildError: the assignment's list is not sound.
     """
-    _require_course(root)
     if not name.isidentifier() or not name.islower():
         raise NewError(
             f"An exercise cannot be called '{name}': take small letters, digits and underscores, "
@@ -121,9 +116,8 @@ def make_quiz(root: Path, name: str) -> Path:
     """Make a bank of the course at ``root`` from the example; return its file.
 
     Raises:
-        NewError: it is no course root, or has that quiz, or the name cannot be one.
+        NewError: it has that quiz, or the name cannot be one.
     """
-    _require_course(root)
     if not name.replace("-", "_").isidentifier():
         raise NewError(f"A quiz cannot be called '{name}': take letters, digits and hyphens.")
     file = root / "authoring" / "banks" / f"{name}.yaml"
@@ -136,11 +130,6 @@ def make_quiz(root: Path, name: str) -> Path:
     except OSError as error:
         raise _unwritable(file, error) from error
     return file
-
-
-def _require_course(root: Path) -> None:
-    if not (root / CONFIG).is_file():
-        raise NewError(f"{root} is no course root: make one with `autograder new course FOLDER`.")
 
 
 def _unwritable(place: Path, error: OSError) -> NewError:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from autograder.commands.options import Root, course_root
 from autograder.util.terminal import Terminal
 from course.errors import CourseError
 
@@ -26,10 +27,6 @@ err = Terminal(stderr=True)
 _NAMES = "such as ch05 or one of the course's own (authoring/banks), or a bank's YAML file."
 Quiz = Annotated[str, typer.Argument(help=f"A quiz {_NAMES}")]
 Quizzes = Annotated[list[str], typer.Argument(help=f"Quizzes {_NAMES}")]
-Root = Annotated[
-    Path | None,
-    typer.Option("--root", help="The nbgrader course root (default: the one you are in)."),
-]
 To = Annotated[Path | None, typer.Option("--to", help="The file to write.")]
 
 
@@ -124,11 +121,13 @@ def schema(
 def _banks_folder(root: Path | None) -> Path | None:
     """Return the folder of the course's own banks; None if there is no course here."""
     from autograder.assignments.quiz_cells import BANKS
-    from course.workspace.content import ContentError, working_root
+    from course.workspace.content import ContentError
 
     try:
-        return (working_root() if root is None else root.resolve()) / BANKS
+        return course_root(root) / BANKS
     except ContentError:
+        if root is not None:
+            raise
         return None
 
 

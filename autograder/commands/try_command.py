@@ -13,9 +13,8 @@ from nbformat import NotebookNode
 
 from autograder import exercises
 from autograder.assignments import submission
-from autograder.assignments.cells import without_markers
 from autograder.corpus import command, trials
-from autograder.corpus.case import Case, CorpusError
+from autograder.corpus.case import Case, CorpusError, Splice, solution_cell
 from autograder.examination.verdict import CheckResult
 from autograder.running import runner
 from autograder.running.runner import Outcome
@@ -84,21 +83,14 @@ def try_exam(
         (case,) = command.choose_cases(command.load_cases(exam), [what])[exam]
         handed_in = case.make_submission(source, released)
     else:
-        handed_in = _exemplar(exam, source).make_submission(source, released)
+        splices: dict[str, tuple[Splice, ...]] = {solution_cell(exam): ()}
+        exemplar = Case(exam, "exemplar", "The exemplar", frozenset(), splices=splices)
+        handed_in = exemplar.make_submission(source, released)
     notebook, _ = submission.restore_cells(handed_in, source, released)
     program = submission.extract_program(notebook)
     outcome = runner.run(program, trust=command.needs_trust(say), seed=0)
     difference = case.verdict_of(outcome) if case else ""
     return Tried(what or f"the exemplar of {exam}", outcome, difference)
-
-
-def _exemplar(exam: str, source: NotebookNode) -> Case:
-    cells = {
-        submission.grade_id(cell): without_markers(cell.source)
-        for cell in source.cells
-        if cell.cell_type == "code" and submission.nbgrader_metadata(cell).get("solution")
-    }
-    return Case(exam, "exemplar", "The exemplar", frozenset(), cells=cells)
 
 
 def try_again_and_again(exam: str, what: str = "", *, say: Callable[[str], None]) -> None:

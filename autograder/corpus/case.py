@@ -29,6 +29,11 @@ OURS = ("autograder", "site-packages", "/tmp/", "/project/src", "Traceback", "ip
 Splice = tuple[str, str]
 
 
+def solution_cell(exam: str) -> str:
+    """Return the grade id of the cell that holds an exercise's solution."""
+    return f"{exam}-solution"
+
+
 class CorpusError(CourseError):
     """A case of the corpus that is not well formed, or a corpus that is not there."""
 

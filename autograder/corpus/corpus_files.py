@@ -31,7 +31,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from autograder.corpus.case import EVERYTHING, ROOTS, Case, CorpusError, Splice
+from autograder.corpus.case import EVERYTHING, ROOTS, Case, CorpusError, Splice, solution_cell
 from autograder.running.runner import CELL_TIMEOUT_S
 from autograder.util import exercise_folders
 
@@ -124,18 +124,35 @@ def _parse_fails(text: str) -> frozenset[str]:
 
 def _split_cells(exam: str, body: str) -> dict[str, str]:
     first, *rest = _CELL.split(body)
-    texts = {f"{exam}-solution": first.strip() + "\n"} if first.strip() or not rest else {}
+    texts = {solution_cell(exam): first.strip() + "\n"} if first.strip() or not rest else {}
     for grade_id, text in zip(rest[::2], rest[1::2], strict=True):
         texts[grade_id] = text.strip() + "\n"
     return texts
 
 
-def _read_mutants(exam: str, file: Path) -> Iterator[Case]:
+def equivalent_mutations(exam: str) -> dict[str, str]:
+    """Return {key of a mutation: why it changes nothing}, as an exercise's corpus says.
+
+    Raises:
+        CorpusError: it is no table of texts.
+    """
+    folder = exercise_folders.current_exercises().folders[exam] / exercise_folders.CORPUS
+    file = folder / MUTANTS
+    table = _read_tables(file).get(EQUIVALENT, {})
+    if not all(isinstance(why, str) for why in table.values()):
+        raise CorpusError(f"{file}: [{EQUIVALENT}] says of each mutation why it changes nothing.")
+    return dict(table)
+
+
+def _read_tables(file: Path) -> dict[str, Any]:
     try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
+        return tomllib.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
     except tomllib.TOMLDecodeError as error:
         raise CorpusError(f"{file} is not TOML: {error}.") from error
-    for name, data in tables.items():
+
+
+def _read_mutants(exam: str, file: Path) -> Iterator[Case]:
+    for name, data in _read_tables(file).items():
         if name == EQUIVALENT:
             continue
         try:
@@ -151,8 +168,8 @@ def _read_mutants(exam: str, file: Path) -> Iterator[Case]:
 
 
 def _parse_splices(exam: str, data: list[dict[str, Any]]) -> dict[str, tuple[Splice, ...]]:
-    splices: dict[str, tuple[Splice, ...]] = {f"{exam}-solution": ()}
+    splices: dict[str, tuple[Splice, ...]] = {solution_cell(exam): ()}
     for splice in data:
-        cell = splice.get("cell", f"{exam}-solution")
+        cell = splice.get("cell", solution_cell(exam))
         splices[cell] = (*splices.get(cell, ()), (splice["old"], splice["new"]))
     return splices

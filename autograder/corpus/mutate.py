@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -10,11 +9,10 @@ from autograder import exercises
 from autograder.assignments import submission
 from autograder.assignments.cells import without_markers
 from autograder.corpus import trials
-from autograder.corpus.case import Case, CorpusError
+from autograder.corpus.case import Case, solution_cell
 from autograder.corpus.command import needs_trust
-from autograder.corpus.corpus_files import EQUIVALENT, MUTANTS
+from autograder.corpus.corpus_files import equivalent_mutations
 from autograder.corpus.mutations import Mutation, find_mutations
-from autograder.util import exercise_folders
 
 _CAUGHT = ("failed", "not_checked")
 """What a check says of a mutation that is noticed; where the grader failed, nothing was."""
@@ -50,11 +48,11 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
         CorpusError: its list of equivalent mutations is not well formed.
     """
     source, released = trials.make_notebooks(exercises.load_exam(exam).name)
-    grade_id = f"{exam}-solution"
+    grade_id = solution_cell(exam)
     cells = {submission.grade_id(cell): cell.source for cell in source.cells}
     exemplar = without_markers(cells[grade_id])
     mutations = find_mutations(exemplar)
-    reasons = known_equivalent(exam)
+    reasons = equivalent_mutations(exam)
     result = Mutated(stale=sorted(reasons.keys() - {mutation.key for mutation in mutations}))
     result.equivalent.update({m: reasons[m.key] for m in mutations if m.key in reasons})
     of_case = {
@@ -81,22 +79,3 @@ def mutate(exam: str, *, jobs: int = 2, say: Callable[[str], None] = lambda _lin
     trials.run(cases, source, released, jobs=jobs, trust=needs_trust(say), done=note)
     result.survivors.sort(key=lambda mutation: mutation.line)
     return result
-
-
-def known_equivalent(exam: str) -> dict[str, str]:
-    """Return {key of a mutation: why it changes nothing}, as the exercise's corpus says.
-
-    Raises:
-        CorpusError: it is no table of texts.
-    """
-    folder = exercise_folders.current_exercises().folders[exam] / exercise_folders.CORPUS
-    file = folder / MUTANTS
-    try:
-        table = tomllib.loads(file.read_text(encoding="utf-8")).get(EQUIVALENT, {})
-    except FileNotFoundError:
-        return {}
-    except tomllib.TOMLDecodeError as error:
-        raise CorpusError(f"{file} is not TOML: {error}.") from error
-    if not all(isinstance(why, str) for why in table.values()):
-        raise CorpusError(f"{file}: [{EQUIVALENT}] says of each mutation why it changes nothing.")
-    return dict(table)

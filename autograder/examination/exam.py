@@ -19,7 +19,9 @@ from autograder.examination.check_context import CheckContext, StudentError, Sub
 from autograder.examination.plain_programs import SlowProgramError
 from autograder.examination.verdict import CheckResult, Status, Verdict
 from autograder.processes.fair_deadline import FairDeadline
+from autograder.util import exercise_folders
 from course.errors import CourseError
+from course.util.close_matches import did_you_mean
 
 RigT = TypeVar("RigT")
 
@@ -145,8 +147,27 @@ class Exam(Generic[RigT]):
             )
         for name in table:
             if name not in self.checks:
-                raise ExamError(f"points.toml names a check '{name}' that '{self.name}' lacks.")
+                raise ExamError(
+                    f"points.toml names a check '{name}' that the exam '{self.name}' lacks."
+                    f"{did_you_mean(name, self.checks)} Give one of them the other's name."
+                )
         return table
+
+    def require_points(self) -> None:
+        """Require that the exercise's points name each check once, and nothing else.
+
+        Raises:
+            ExamError: they do not.
+        """
+        parts = points_table.table()[self.name].parts
+        worth = [check for part in parts for check in self.part(part)]
+        file = exercise_folders.exercise_file(self.name, exercise_folders.POINTS)
+        for name in self.checks:
+            if (times := worth.count(name)) != 1:
+                says = "has no points" if times == 0 else f"has points {times} times"
+                raise ExamError(
+                    f"The check '{name}' of exam '{self.name}' {says}: name it once in {file}."
+                )
 
     def sit(self, parts: Iterable[Part], bench: CheckContext) -> Iterator[Verdict]:
         """Run the checks of each part, and what they need, each once; yield a verdict a part.

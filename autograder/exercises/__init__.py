@@ -11,9 +11,13 @@ import importlib
 import importlib.util
 import sys
 import threading
+import traceback
 from importlib.machinery import ModuleSpec
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+from autograder.examination import points
 from autograder.examination.exam import Exam, ExamError
 from autograder.util import exercise_folders
 from autograder.util.exercise_folders import COURSE_PACKAGE, FOLDER, Exercises
@@ -28,11 +32,17 @@ def exercise_names() -> list[str]:
     return list(exercise_folders.current_exercises().folders)
 
 
+def own_names() -> frozenset[str]:
+    """Return the names of those that the course root in use has of its own."""
+    return exercise_folders.current_exercises().own
+
+
 def load_exam(name: str) -> Exam[Any]:
     """Return the exam of the exercise called ``name``.
 
     Raises:
-        ExamError: there is none, and the message names the ones there are; or it has none.
+        ExamError: there is none, and the message names the ones there are; or it has none, or its
+            module cannot be loaded.
         ExerciseError: it has no ``exam.py``.
     """
     exercises = exercise_folders.current_exercises()
@@ -43,7 +53,17 @@ def load_exam(name: str) -> Exam[Any]:
         return exam
     with _importing:
         _stand_for(exercises)
-        return _exam_of_module(importlib.import_module(f"{COURSE_PACKAGE}.{name}.exam"), name)
+        return _exam_of_module(_import_own(f"{COURSE_PACKAGE}.{name}.exam", exercises), name)
+
+
+def require_sound(name: str) -> None:
+    """Require that an exercise has an exam which its points fit, unless people alone grade it.
+
+    Raises:
+        ExamError, ExerciseError: it has none, or that does not load, or they do not fit.
+    """
+    if points.table()[name].parts:
+        load_exam(name).require_points()
 
 
 def require_exercise(name: str) -> None:
@@ -53,6 +73,28 @@ def require_exercise(name: str) -> None:
             f"There is no exam '{name}': there are {', '.join(exercise_names())}."
             f"{did_you_mean(name, exercise_names())}"
         )
+
+
+def _import_own(module: str, exercises: Exercises) -> ModuleType:
+    """Import a module of the course root's, of which the author is not one of ours."""
+    try:
+        return importlib.import_module(module)
+    except ExamError:
+        raise
+    except Exception as error:
+        where = [
+            f"{frame.filename}, line {frame.lineno}"
+            for frame in traceback.extract_tb(error.__traceback__)
+            if Path(frame.filename).is_relative_to(exercises.root or "")
+        ]
+        said = str(error)
+        if isinstance(error, SyntaxError):  # its text says where, too
+            said = error.msg
+            where.append(f"{error.filename}, line {error.lineno}")
+        raise ExamError(
+            f"The exam cannot be loaded: {type(error).__name__}: {said}, in "
+            f"{where[-1] if where else module}. Mend it there."
+        ) from error
 
 
 def _exam_of_module(module: Any, name: str) -> Exam[Any]:

@@ -156,22 +156,24 @@ class ObservedNode:
                 )
 
     def _missing(self) -> list[str]:
-        lacking = [
-            f"no publisher on {topic}" for topic in self._task.publishes
-            if not of_others(self._end.get_publishers_info_by_topic(str(topic)))
-        ] + [
-            f"no subscription to {topic}" for topic in self._task.subscribes
-            if not of_others(self._end.get_subscriptions_info_by_topic(str(topic)))
-        ]  # fmt: skip
-        served = self._end.count_services
-        lacking += [
-            f"no service {service}" for service in self._task.serves if not served(str(service))
+        return [f"no {what}" for what, is_there in self._ends() if not is_there]
+
+    def _ends(self) -> list[tuple[str, bool]]:
+        """Return each end that the task wants, in words, and whether it is on the graph."""
+        task, end = self._task, self._end
+        publishers, subscriptions = (
+            end.get_publishers_info_by_topic,
+            end.get_subscriptions_info_by_topic,
+        )
+        return [
+            *((f"publisher on {t}", bool(of_others(publishers(str(t))))) for t in task.publishes),
+            *(
+                (f"subscription to {t}", bool(of_others(subscriptions(str(t)))))
+                for t in task.subscribes
+            ),
+            *((f"service {s}", bool(end.count_services(str(s)))) for s in task.serves),
+            *((f"client of {s}", bool(end.count_clients(str(s)))) for s in task.calls),
         ]
-        calling = self._end.count_clients
-        lacking += [
-            f"no client of {service}" for service in self._task.calls if not calling(str(service))
-        ]
-        return lacking
 
     def _await_discovery(self) -> None:
         endpoints = {
@@ -448,21 +450,8 @@ class ObservedNode:
         Raises:
             Failed: one is.
         """
-        ends = (self._task.publishes, self._task.subscribes, self._task.serves, self._task.calls)
-        found = sum(map(len, ends))
-        if not self.wait(lambda: len(self._missing()) == found):
-            missing = self._missing()
-            left = [
-                f"{what} {noun}"
-                for what, nouns in (
-                    ("a publisher on", self._task.publishes),
-                    ("a subscription to", self._task.subscribes),
-                    ("the service", self._task.serves),
-                    ("a client of", self._task.calls),
-                )
-                for noun in nouns
-                if not any(phrase.endswith(str(noun)) for phrase in missing)
-            ]
+        self.wait(lambda: not any(is_there for _, is_there in self._ends()))
+        if left := [f"a {what}" for what, is_there in self._ends() if is_there]:
             raise Failed(
                 expected="After `destroy_node()` nothing of the node is left on the graph.",
                 actual=f"There still is {', '.join(left)}.",

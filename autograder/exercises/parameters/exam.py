@@ -84,7 +84,7 @@ def pauses_and_resumes(node: ObservedNode) -> None:
 
     Maintenance needs silence; the supervisor must not take it for a restart.
     """
-    last = node.advance(2.0).values(BEATS)[-1]
+    last = node.advance(2.0).last_value(BEATS)
     for _ in range(2):
         node.require_success(PAUSE, data=True)
         node.advance(3.0, "While it is paused").require_silence(BEATS)

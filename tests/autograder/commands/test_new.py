@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 
@@ -15,7 +16,9 @@ from autograder.assignments.cells import AssignmentBuildError
 from autograder.commands import new_command, try_command
 from autograder.commands.new_command import NewError
 from autograder.corpus import command
+from autograder.examination.exam import ExamError
 from autograder.util import exercise_folders
+from course.workspace.content import ContentError
 from tests.machine import needs_sandbox
 
 
@@ -102,8 +105,14 @@ def test_a_name_that_no_module_could_have_is_refused(root: Path, name: str) -> N
 
 
 def test_a_folder_that_is_no_course_is_said_so(tmp_path: Path) -> None:
-    with pytest.raises(NewError, match="is no course root: make one"):
-        new_command.make_exercise(tmp_path, "lamp", "lab1")
+    for arguments in (
+        ("new", "exercise", "lamp", "--assignment", "lab1"), ("build",), ("corpus",),
+        ("try", "qos"), ("mutate", "qos"), ("grade", "ch05"), ("marks", "export", "ch05"),
+        ("quiz", "lint", "ch05"),
+    ):  # fmt: skip
+        result = run(*arguments, "--root", tmp_path)
+        assert isinstance(result.exception, ContentError)
+        assert "is no course root" in str(result.exception)
 
 
 @pytest.mark.parametrize(
@@ -134,3 +143,37 @@ def test_a_list_that_is_no_toml_is_not_touched(root: Path) -> None:
     with pytest.raises(AssignmentBuildError, match="is no TOML"):
         listing.add_exercise(root, "lab1", "lamp")
     assert file.read_text() == "exercises = [\n"
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "said"),
+    [
+        (
+            "exam.py",
+            "EXAM:",
+            "raise ValueError('boo')\nEXAM:",
+            "ValueError: boo, in .*exam.py",
+        ),
+        ("exam.py", "EXAM:", "def broken(:\nEXAM:", "SyntaxError: invalid syntax, in .*line"),
+        ("points.toml", "blinks = 1", "", "check 'blinks' of exam 'lamp' has no points: name it"),
+        ("points.toml", "blinks =", "blinkss =", "'blinkss' .* lacks. Did you mean 'blinks'"),
+        ("points.toml", "on_and_off = 1", "on_and_off = 1\nblinks = 1", "has points 2 times"),
+    ],
+)
+def test_build_says_what_of_an_exam_does_not_fit(
+    root: Path, file: str, old: str, new: str, said: str
+) -> None:
+    folder = new_command.make_exercise(root, "lamp", "lab1")
+    text = (folder / file).read_text()
+    (folder / file).write_text(text.replace(old, new, 1))
+    result = run("build", "--root", root)
+    assert isinstance(result.exception, ExamError)
+    assert re.search(said, str(result.exception))
+    assert not (root / "source").exists()
+
+
+def test_build_says_which_exercise_is_in_no_assignment(root: Path) -> None:
+    new_command.make_exercise(root, "lamp", "lab1")
+    listing.write_list(root, "lab1", ["qos"])
+    result = run("build", "--root", root)
+    assert "The exercise 'lamp' is in no assignment" in result.output
