@@ -154,7 +154,7 @@ def _read_list(file: Path) -> dict[str, list[str]]:
 def _require_known(name: str, known: list[str], who: str) -> None:
     if name not in known:
         raise AssignmentBuildError(
-            f"{who} '{name}', which there is not: there is {', '.join(known) or 'none'}."
+            f"{who} '{name}', which does not exist. There is {', '.join(known) or 'none'}."
             f"{did_you_mean(name, known)}"
         )
 

@@ -16,6 +16,7 @@ from autograder.examination.verdict import CheckResult
 from autograder.running.runner import CELL_TIMEOUT_S, Outcome
 from autograder.sandbox import abilities
 from course.errors import CourseError
+from course.util.close_matches import is_it
 
 STUB_MARK = "# Your work goes here."
 """What nbgrader leaves in place of a solution (``ClearSolutions.code_stub``)."""
@@ -83,6 +84,19 @@ class Case:
     def fails_in_words(self) -> str:
         """What must fail, as a phrase for a table."""
         return ", ".join(sorted(self.fails)) or "nothing"
+
+    def require_checks(self) -> None:
+        """Require that what it names are checks of its exam.
+
+        Raises:
+            CorpusError: one is not.
+        """
+        known = exercises.load_exam(self.exam).checks
+        for name in (*sorted(self.must_fail), *self.says):
+            if name not in known:
+                raise self._corpus_error(
+                    f"it names a check '{name}', which its exam does not have{is_it(name, known)}"
+                )
 
     def make_submission(self, source: NotebookNode, released: NotebookNode) -> NotebookNode:
         """Return the released notebook as this student hands it in.

@@ -21,6 +21,7 @@ from autograder.assignments.build_notebooks import build
 from autograder.corpus.case import Case
 from autograder.examination import points
 from autograder.examination.draws import USUAL_SEED
+from autograder.examination.program import Program
 from autograder.gradebook.release import make_release
 from autograder.running import runner
 from autograder.running.runner import Outcome
@@ -95,12 +96,14 @@ def run(
     """Run every case ``repeat`` times, ``jobs`` at a time, and compare.
 
     ``trust`` and ``seed`` are those of `runner.run`; what cases say is worded for the usual seed.
+
+    Raises:
+        CorpusError: a case does not fit its exercise; then none is run.
     """
+    programs = {case.name: _make_program(case, source, released) for case in cases}
 
     def one(case: Case) -> CorpusTrial:
-        handed_in = case.make_submission(source, released)
-        notebook, _ = submission.restore_cells(handed_in, source, released)
-        program = submission.extract_program(notebook)
+        program = programs[case.name]
         outcome = runner.run(program, cell_timeout=case.cell_timeout, trust=trust, seed=seed)
         trial = CorpusTrial(case, outcome, case.verdict_of(outcome))
         done(trial)
@@ -112,6 +115,13 @@ def run(
 
     with ThreadPoolExecutor(max_workers=jobs) as pool:
         return list(pool.map(one, rounds()))
+
+
+def _make_program(case: Case, source: NotebookNode, released: NotebookNode) -> Program:
+    case.require_checks()
+    handed_in = case.make_submission(source, released)
+    notebook, _ = submission.restore_cells(handed_in, source, released)
+    return submission.extract_program(notebook)
 
 
 # A loop looks who its parent is, again and again: a parent that was killed cannot end it.

@@ -265,3 +265,26 @@ def test_a_splice_that_does_not_fit_the_exemplar_is_refused() -> None:
     case = Case("qos", "mutant", "t", frozenset({"imu_burst"}), splices=splices)
     with pytest.raises(CorpusError, match="'not there' stands 0 times in the exemplar"):
         case.make_submission(source, released)
+
+
+@pytest.mark.parametrize(
+    ("case", "said"),
+    [
+        (
+            Case("qos", "wrong-x", "t", frozenset({"imu_brst"})),
+            r"qos/wrong-x: it names a check 'imu_brst', which its exam does not have "
+            r"\(is it 'imu_burst'\?\)",
+        ),
+        (
+            Case("qos", "right-x", "t", frozenset(), cells={"qos-other": "x = 1"}),
+            "qos/right-x: there is no cell 'qos-other' in the notebook",
+        ),
+    ],
+)
+def test_no_case_is_run_if_one_does_not_fit_its_exercise(
+    case: Case, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runner, "run", lambda *_, **__: pytest.fail("nothing should be run"))
+    good = Case("qos", "right-exemplar", "t", frozenset(), splices={"qos-solution": ()})
+    with pytest.raises(CorpusError, match=said):
+        trials.run([good, case], *notebooks("qos"))
