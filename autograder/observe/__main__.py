@@ -8,12 +8,16 @@ from collections.abc import Iterator
 from typing import Any
 
 from autograder import observe
+from autograder.observe.mark_tracer import MarkTracer, Trace
+from autograder.observe.marked_goals import MarkedGoals
 from autograder.observe.observed_node import Change
 from autograder.observe.span import Span
 
 DESCRIBED: tuple[Any, ...] = (
     observe.one_node, observe.Topic, observe.Service, observe.Action, observe.Parameter,
     observe.ObservedNode, Span, Change,
+    observe.RosGraph, observe.GraphTopic, observe.GraphService, observe.GraphReader,
+    observe.find_link_faults, MarkTracer, Trace, MarkedGoals,
 )  # fmt: skip
 
 
