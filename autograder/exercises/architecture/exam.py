@@ -7,49 +7,44 @@ the task allows; only the robot's boundary has fixed names.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from autograder.examination.check_context import StudentError
 from autograder.examination.exam import Exam, Failed
-from autograder.exercises.architecture.link_faults import (
-    describe_substitute,
-    is_carried,
-    join_names,
-    link_faults,
-    name_all_nodes,
-    name_nodes,
-    similar_name,
+from autograder.exercises.architecture.missing_jobs import (
+    EYES_PHRASE,
+    why_no_driving,
+    why_no_navigation,
     why_no_obstacles,
     why_no_planner,
     why_no_pose,
+    why_no_readings,
 )
-from autograder.exercises.architecture.rig import ArchitectureRig, architecture_rig
-from autograder.exercises.architecture.robot_roles import (
-    ACTION,
-    MOTORS,
-    MOTORS_TYPE,
-    SENSORS,
-    STREAMS,
-    WHEELS,
-)
-from autograder.exercises.architecture.traces import (
-    describe_lost_mark,
-    error_note,
-    require_plans,
-    see_scan_arrive,
-)
-from autograder.exercises.architecture.tracing import POURS, GoalRejectedError
-from autograder.observe.marked_types import TypeNotInstalledError, load_type
-from course.design import message_tags
-from course.errors import WaitTimeout
+from autograder.exercises.architecture.rig import OUTSIDE, ArchitectureRig, architecture_rig
+from autograder.exercises.architecture.robot_jobs import ACTION, MOTORS, SCAN, STREAMS, WHEELS
+from autograder.observe.graph import GraphTopic
+from autograder.observe.graph_faults import find_link_faults
+from autograder.observe.mark_tracer import Trace
+from autograder.observe.marked_types import is_installed
+from autograder.observe.phrases import as_phrase, name_nodes
 
-EXAM: Exam[ArchitectureRig] = Exam("architecture", architecture_rig)
+EXAM: Exam[ArchitectureRig] = Exam(
+    "architecture", architecture_rig, read="Chapter 5, “Topics: continuous data sharing”"
+)
 
 MOST_JOBS = 2
+MOST_FAULTS = 4
 
 READ_NODES = "Chapter 5, “Nodes: the processing units”"
-READ_TOPICS = "Chapter 5, “Topics: continuous data sharing”"
 READ_SERVICES = "Chapter 5, “Services: synchronous request-response”"
 READ_ACTIONS = "Chapter 5, “Actions: long-running operations with feedback”"
 READ_PATTERNS = "Chapter 5, “When to use what”"
+
+
+def require_none(faults: str, *, expected: str) -> None:
+    """Fail if there are any faults."""
+    if faults:
+        raise Failed(expected=expected, actual=faults)
 
 
 @EXAM.check(
@@ -65,18 +60,12 @@ def design_runs(rig: ArchitectureRig) -> str:
 
     An architecture on paper never fails. What cannot be brought up cannot drive either.
     """
+    expected = "The notebook has a `design` whose nodes all come up."
     try:
         rig.start()
     except StudentError as error:
-        raise Failed(
-            expected="The notebook has a `design` whose nodes all come up.",
-            actual=error.feedback_text,
-        ) from None
-    if not rig.graph.nodes:
-        raise Failed(
-            expected="The notebook has a `design` whose nodes all come up.",
-            actual="No node appeared on the ROS graph.",
-        )
+        raise Failed(expected=expected, actual=error.feedback_text) from None
+    require_none("" if rig.graph.nodes else "No node appeared on the ROS graph.", expected=expected)
     return f"On the graph: {name_nodes(rig.graph.nodes)}."
 
 
@@ -87,7 +76,6 @@ def design_runs(rig: ArchitectureRig) -> str:
         "A driver reads no topic: it publishes what the hardware delivers.",
         "Publish /scan as LaserScan, /camera/image as Image and /wheel/odometry as Odometry.",
     ),
-    read=READ_TOPICS,
 )
 def drivers_publish(rig: ArchitectureRig) -> None:
     """Drivers publish the readings of LIDAR, camera and wheel encoders.
@@ -95,18 +83,10 @@ def drivers_publish(rig: ArchitectureRig) -> None:
     Everything the robot knows begins here. A driver that only drives can be swapped for another
     LIDAR, a simulator or a recording, and no other node notices.
     """
-    faults = []
-    for name, wanted in SENSORS.items():
-        types = {end.type for end in rig.graph.get_topic(name).writers}
-        if not types:
-            faults.append(f"Nobody publishes on {name}{similar_name(name, rig.graph)}.")
-        elif wanted not in types:
-            faults.append(f"{name} is published as {', '.join(sorted(types))}, not as {wanted}.")
-    if faults:
-        raise Failed(
-            expected="Each of the three sensors has a node that publishes its readings.",
-            actual=" ".join(faults),
-        )
+    require_none(
+        why_no_readings(rig.graph),
+        expected="Each of the three sensors has a node that publishes its readings.",
+    )
 
 
 @EXAM.check(
@@ -125,22 +105,10 @@ def navigation_action(rig: ArchitectureRig) -> None:
     Driving to a waypoint takes a while, wants feedback and must be stoppable: a service call would
     leave its caller waiting. And a navigator that hears of no sensor drives blind.
     """
-    expected = "One node is the server of /navigate_to, and topics bring it what the sensors see."
-    servers = rig.jobs.navigators
-    if not servers:
-        raise Failed(
-            expected=expected, actual=f"No node is its server{describe_substitute(rig.graph)}."
-        )
-    if len(servers) > 1:
-        raise Failed(
-            expected=expected, actual=f"It has {len(servers)} servers: {name_nodes(servers)}."
-        )
-    if not rig.jobs.informed_navigators:
-        raise Failed(
-            expected=expected,
-            actual=f"{name_nodes(servers)} is the server, but no topic brings it readings, "
-            "obstacle information or the pose: it would drive blind.",
-        )
+    require_none(
+        why_no_navigation(rig.jobs),
+        expected=f"One node is the server of {ACTION}, and topics bring it what the sensors see.",
+    )
 
 
 @EXAM.check(
@@ -152,7 +120,6 @@ def navigation_action(rig: ArchitectureRig) -> None:
         "For example: obstacle_detection subscribes to scan and publishes obstacles as PoseArray, "
         "and the navigation node subscribes to obstacles.",
     ),
-    read=READ_TOPICS,
 )
 def obstacle_information(rig: ArchitectureRig) -> str:
     """Obstacle detection turns sensor topics into obstacle information that steers the robot.
@@ -160,14 +127,16 @@ def obstacle_information(rig: ArchitectureRig) -> str:
     Detection runs at the rate of the sensors, navigation at its own. In a node of its own it can be
     tested with recorded scans, improved and restarted while the robot goes on.
     """
-    found = rig.jobs.obstacle_topics
-    if not found:
-        raise Failed(
-            expected="A node reads /scan or /camera/image and publishes on a topic what is in the "
-            "way; another node reads that, and it leads to the motors.",
-            actual=why_no_obstacles(rig.jobs),
-        )
-    return " ".join(is_carried(topic) for topic in found[:3])
+    require_none(
+        why_no_obstacles(rig.jobs),
+        expected=f"A node reads {EYES_PHRASE} and publishes on a topic what is in the way; another "
+        "node reads that, and it leads to the motors.",
+    )
+    return " ".join(
+        f"It is on {topic.name} ({topic.types[0].rsplit('/', 1)[-1]}), from "
+        f"{name_nodes(topic.written_by)}."
+        for topic in rig.jobs.obstacle_topics[:3]
+    )
 
 
 @EXAM.check(
@@ -178,7 +147,6 @@ def obstacle_information(rig: ArchitectureRig) -> str:
         "For example: state_estimation subscribes to wheel/odometry and publishes pose as "
         "PoseStamped or PoseWithCovarianceStamped.",
     ),
-    read=READ_TOPICS,
 )
 def pose_published(rig: ArchitectureRig) -> None:
     """State estimation reads sensors and publishes the robot's pose.
@@ -186,18 +154,17 @@ def pose_published(rig: ArchitectureRig) -> None:
     Wheels slip: the pose is estimated from several sensors, many times a second. Navigation,
     planning and displays all need the same pose, so one node publishes it for everyone.
     """
-    if not rig.jobs.pose_topics:
-        raise Failed(
-            expected="A node that reads sensors publishes the pose, as Odometry or one of the Pose "
-            "types, on a topic other than /wheel/odometry.",
-            actual=why_no_pose(rig.jobs),
-        )
+    require_none(
+        why_no_pose(rig.jobs),
+        expected="A node that reads sensors publishes the pose, as Odometry or one of the Pose "
+        f"types, on a topic other than {WHEELS}.",
+    )
     poses = [topic.name for topic in rig.jobs.pose_topics]
-    if rig.jobs.pose_of_wheels and not rig.has_pose_estimate(poses):
+    if rig.jobs.pose_of_wheels and not rig.has_pose(poses):
         raise Failed(
             expected="While the wheel encoders report, the pose is published.",
             actual=f"Odometry came in on {WHEELS}, and nothing was ever published on "
-            f"{join_names(poses, 'or')}{error_note(rig)}.",
+            f"{as_phrase(poses, 'or')}{rig.error_note()}.",
         )
 
 
@@ -217,12 +184,11 @@ def planner_service(rig: ArchitectureRig) -> None:
     A path is needed when there is a goal, not ten times a second: one request, one answer. In a
     node of its own the planner may take its time while the robot goes on avoiding obstacles.
     """
-    if reasons := why_no_planner(rig.jobs):
-        raise Failed(
-            expected="A node that reads the map serves path planning; another node, which has the "
-            "goal, calls it.",
-            actual=reasons,
-        )
+    require_none(
+        why_no_planner(rig.jobs),
+        expected="A node that reads the map serves path planning; another node, which has the "
+        "goal, calls it.",
+    )
 
 
 @EXAM.check(
@@ -233,7 +199,6 @@ def planner_service(rig: ArchitectureRig) -> None:
         "For example: controller subscribes to velocity, which navigation publishes, and publishes "
         "motors/command as Twist.",
     ),
-    read=READ_TOPICS,
 )
 def motors_driven(rig: ArchitectureRig) -> None:
     """One controller drives the motors, by order of navigation.
@@ -241,28 +206,10 @@ def motors_driven(rig: ArchitectureRig) -> None:
     Two nodes that both command the motors make a robot that jerks between two wills; one that
     listens to nobody drives past every goal.
     """
-    expected = "One node publishes /motors/command as Twist, and navigation leads to it."
-    drivers = rig.jobs.controllers
-    types = {end.type for end in rig.graph.get_topic(MOTORS).writers}
-    if not drivers:
-        raise Failed(
-            expected=expected,
-            actual=f"Nobody publishes on {MOTORS}{similar_name(MOTORS, rig.graph)}.",
-        )
-    if types != {MOTORS_TYPE}:
-        raise Failed(expected=expected, actual=f"It is published as {join_names(sorted(types))}.")
-    if len(drivers) > 1:
-        raise Failed(expected=expected, actual=f"{name_all_nodes(drivers)} command the motors.")
-    if twins := drivers & rig.graph.namesakes:
-        raise Failed(
-            expected=expected, actual=f"Two nodes called {name_nodes(twins)} command them."
-        )
-    if not drivers & rig.jobs.goal_reaches:
-        raise Failed(
-            expected=expected,
-            actual=f"{name_nodes(drivers)} drives the motors, but nothing leads there from the "
-            f"server of {ACTION}.",
-        )
+    require_none(
+        why_no_driving(rig.jobs),
+        expected=f"One node publishes {MOTORS} as Twist, and navigation leads to it.",
+    )
 
 
 @EXAM.check(
@@ -281,15 +228,14 @@ def links_connect(rig: ArchitectureRig) -> None:
     A wrong name or profile raises no error in ROS 2: the link simply stays silent, and you look for
     the mistake everywhere else.
     """
-    faults = link_faults(rig.graph)
-    if not any(rig.graph.iterate_links(("topic",))):
+    faults = find_link_faults(rig.graph, OUTSIDE)
+    if not any(rig.graph.links(("topic",))):
         faults.append("No topic leads from one node to another.")
-    if faults:
-        more = f" And {len(faults) - 4} more." if len(faults) > 4 else ""
-        raise Failed(
-            expected=f"Nothing dangles, apart from {MOTORS} and {ACTION} at the robot's boundary.",
-            actual=" ".join(faults[:4]) + more,
-        )
+    more = len(faults) - MOST_FAULTS
+    require_none(
+        " ".join(faults[:MOST_FAULTS]) + (f" And {more} more." if more > 0 else ""),
+        expected=f"Nothing dangles, apart from {MOTORS} and {ACTION} at the robot's boundary.",
+    )
 
 
 @EXAM.check(
@@ -307,12 +253,13 @@ def streams_are_topics(rig: ArchitectureRig) -> None:
     A robot that asks once a second whether the way is free has driven half a metre between two
     questions, and if the answer is late it stands still or, worse, drives on.
     """
-    if not any(rig.jobs.leads_to_motors(topic, STREAMS) for topic in rig.jobs.obstacle_topics):
+    topics = rig.jobs.obstacle_topics
+    if not any(rig.jobs.leads_to_motors(topic, STREAMS) for topic in topics):
         raise Failed(
             expected=f"From the obstacle information to {MOTORS} there are topics (or action "
             "goals) all the way.",
-            actual=f"{join_names([t.name for t in rig.jobs.obstacle_topics])} gets there only by "
-            f"way of the service {join_names(rig.jobs.services_on_the_way(), 'or')}.",
+            actual=f"{as_phrase(topic.name for topic in topics)} gets there only by way of the "
+            f"service {as_phrase(rig.jobs.services_on_the_way(), 'or')}.",
         )
 
 
@@ -337,13 +284,16 @@ def jobs_divided(rig: ArchitectureRig) -> None:
 
     A node that does it all cannot be tested in parts, and when it fails the whole robot fails.
     """
-    busy = {n: jobs for n, jobs in rig.jobs.of_each_node().items() if len(jobs) > MOST_JOBS}
-    if busy:
-        raise Failed(
-            expected="No node drives sensors, estimates, detects, plans, navigates and controls: "
-            "two of these jobs at most.",
-            actual=" ".join(f"{name_nodes([n])} {join_names(jobs)}." for n, jobs in busy.items()),
-        )
+    busy = [
+        f"{name_nodes([node])} {as_phrase(jobs)}."
+        for node, jobs in rig.jobs.of_each_node().items()
+        if len(jobs) > MOST_JOBS
+    ]
+    require_none(
+        " ".join(busy),
+        expected="No node drives sensors, estimates, detects, plans, navigates and controls: two "
+        "of these jobs at most.",
+    )
 
 
 @EXAM.check(
@@ -361,36 +311,49 @@ def goal_reaches_motors(rig: ArchitectureRig) -> None:
     This is the dye test: each node passes on marked messages, and the mark of a goal has to arrive
     at the motors. Lines on a drawing carry nothing; links do.
     """
-    expected = f"The mark of a goal sent to {ACTION} is seen on {MOTORS}."
-    name = rig.graph.get_action(ACTION).type
-    try:
-        action_type = load_type(name)
-    except TypeNotInstalledError:
+    if (goals := rig.goals) is None:
         raise Failed(
-            expected=expected,
-            actual=f"{ACTION} is of type {name}, which is not installed where the examiner runs.",
-        ) from None
-    if not message_tags.has_room(action_type.Goal):
-        raise Failed(expected=expected, actual=f"A goal of {name} holds neither number nor text.")
-    try:
-        poured = rig.colour_goal(ACTION, action_type, [MOTORS])
-    except WaitTimeout as timeout:
-        raise Failed(expected=expected, actual=str(timeout)) from None
-    except GoalRejectedError:
-        raise Failed(
-            expected=expected,
-            actual=f"The server of {ACTION} rejected each of {POURS} goals, with sensor readings "
-            "coming in between.",
-        ) from None
-    if not poured.enough and not (poured.arrived and poured.turned_away):
-        raise Failed(expected=expected, actual=describe_lost_mark(rig, poured, [MOTORS]))
-    if poured.turned_away:
+            expected=f"A goal of {ACTION} can bear a mark: it holds a number or a text.",
+            actual=f"Its type, {rig.graph.action(ACTION).type}, has no room for one, or is not "
+            "installed where the examiner runs.",
+        )
+    trace = rig.trace_goals(goals)
+    if trace.arrived and goals.turned_away:
+        others = "the next" if goals.turned_away == 1 else f"{goals.turned_away} others"
         raise Failed(
             expected=f"The server of {ACTION} takes a goal whenever the one before is over.",
-            actual=f"It took a goal, and after that was over it rejected "
-            f"{'the next' if poured.turned_away == 1 else f'{poured.turned_away} others'}.",
+            actual=f"It took a goal, and after that was over it rejected {others}.",
         )
+    if not trace.is_enough:
+        raise lost_mark(rig, trace, f"a goal sent to {ACTION}", [MOTORS], goals.remark)
     require_plans(rig)
+
+
+def require_plans(rig: ArchitectureRig) -> None:
+    """Fail if path planning never answers, which a node of the library that asks does not notice.
+
+    By now goals have been driven to, so one that raised before it had a map, say, can answer.
+    """
+    services = rig.jobs.planning_services
+    if services and not any(rig.answers(service) for service in services):
+        servers = {node for service in services for node in service.servers}
+        raise Failed(
+            expected="Path planning answers each request: its callback returns the response that "
+            "it was given.",
+            actual=f"{as_phrase(service.name for service in services)} did not answer a request"
+            f"{rig.error_note(servers)}.",
+        )
+
+
+def lost_mark(
+    rig: ArchitectureRig, trace: Trace, of: str, wanted: Iterable[str], remark: str = ""
+) -> Failed:
+    """Return the finding that too few marks came where they were wanted, and how far they got."""
+    aside = f"; {remark}" if remark else ""
+    return Failed(
+        expected=f"The mark of {of} is seen on {as_phrase(wanted, 'or')}.",
+        actual=f"{trace.describe(wanted)}{aside}{rig.error_note()}.",
+    )
 
 
 @EXAM.check(
@@ -408,17 +371,64 @@ def scan_reaches_motors(rig: ArchitectureRig) -> None:
 
     The second dye test: a scan that never gets to the motors is an obstacle that the robot hits.
     """
-    topics = {topic.name: topic for topic in rig.jobs.obstacle_topics if rig.knows_type(topic)}
+    every = rig.jobs.obstacle_topics
+    topics = {topic.name: topic for topic in every if is_installed(topic.types)}
     if not topics:
-        topic = rig.jobs.obstacle_topics[0]
         raise Failed(
             expected="Obstacle information has a message type that is installed.",
-            actual=f"{topic.name} is of type {join_names(topic.types)}, unknown to the examiner.",
+            actual=f"{every[0].name} is of type {as_phrase(every[0].types)}, unknown to the "
+            "examiner.",
         )
-    see_scan_arrive(rig, topics)
-    if faults := rig.new_faults():
+    follow_scan(rig, topics)
+    if faults := rig.late_faults():
         raise Failed(
             expected="Every endpoint is there as soon as its node is, and those that come later "
             "keep to the same rules.",
-            actual=f"While marks were poured in, this was new on the graph: {' '.join(faults[:4])}",
+            actual="While marks were poured in, this was new on the graph: "
+            f"{' '.join(faults[:MOST_FAULTS])}",
+        )
+
+
+def follow_scan(rig: ArchitectureRig, topics: dict[str, GraphTopic]) -> None:
+    """Follow the mark of a scan to obstacle information, and from just there to the motors.
+
+    What the scan's mark does not get to is no way for it: where one way is a dead end, the others
+    are tried by themselves.
+    """
+    lost: Failed | None = None
+    while topics:
+        eye = rig.jobs.source_sensor(topics.values())
+        trace = rig.trace([rig.graph.topic(eye)], topics)
+        if not trace.is_enough:
+            what = f"{'a scan' if eye == SCAN else 'an image'} on {eye}"
+            raise lost or lost_mark(rig, trace, what, topics)
+        reached = [t for name, t in topics.items() if rig.tracer.seen_on([name], trace.arrived)]
+        names = [topic.name for topic in reached]
+        trace = rig.trace(reached, [MOTORS])
+        if trace.is_enough:
+            require_stream(rig, trace, names)
+            return
+        lost = lost or lost_mark(rig, trace, f"a message on {as_phrase(names, 'or')}", [MOTORS])
+        topics = {name: topic for name, topic in topics.items() if name not in names}
+    assert lost is not None
+    raise lost
+
+
+def require_stream(rig: ArchitectureRig, trace: Trace, names: list[str]) -> None:
+    """Fail if what arrived at the motors came by no topic that their node reads: it was asked for.
+
+    A node that carries out goals gets it with these.
+    """
+    drivers = rig.jobs.controllers
+    by_goal = any(drivers & action.servers for action in rig.graph.actions.values())
+    last = [t for t in rig.graph.topics.values() if t.writers and t.read_by & drivers]
+    if by_goal or not last or not all(is_installed(topic.types) for topic in last):
+        return
+    if not rig.tracer.await_mark([topic.name for topic in last], trace.arrived):
+        raise Failed(
+            expected=f"What is on {as_phrase(names, 'or')} gets to {MOTORS} over topics or action "
+            "goals.",
+            actual=f"Its mark was seen on {MOTORS}, but on no topic that {name_nodes(drivers)} "
+            f"reads ({as_phrase(topic.name for topic in last)}): it came with a request of a "
+            "service, or an answer, only when somebody asked.",
         )
