@@ -19,10 +19,10 @@ from rclpy.node import Node
 
 from autograder.examination.check_context import CheckContext, StudentError
 from autograder.observe.examiner_end import UNDEMANDING
-from autograder.observe.graph import GraphTopic, RosGraph
+from autograder.observe.graph import GraphService, GraphTopic, RosGraph
 from autograder.observe.marked_goals import WAYPOINT_M, MarkedGoals
 from autograder.observe.marked_publishers import REPEAT_S, MarkedPublishers, MarkedStream, Periodic
-from autograder.observe.marked_types import TypeNotInstalledError, load_type
+from autograder.observe.marked_types import TypeNotInstalledError, load_type, marked_message
 from autograder.observe.patience import SETTLE_S, Patience
 from autograder.observe.phrases import as_phrase
 from autograder.observe.stillness import Stillness
@@ -151,6 +151,17 @@ class MarkTracer:
         """Return whether one of some marks is seen on one of these topics, once all are at rest."""
         patience = Patience(Stillness(self._outside))
         return patience.wait(self._session, lambda: bool(self.seen_on(topics, marks)))
+
+    def is_answered(self, service: GraphService) -> bool:
+        """Return whether a service answers a request as of a robot; True if its type is unknown."""
+        with suppress(TypeNotInstalledError):
+            kind = load_type(service.type)
+            request = marked_message(kind.Request, fresh_tag(), WAYPOINT_M)
+            try:
+                self._session.call(kind, service.name, request, SETTLE_S)
+            except WaitTimeout:
+                return False
+        return True
 
     def publish_until(
         self, topics: Iterable[GraphTopic], condition: Callable[[], bool], free: Collection[str]

@@ -17,22 +17,13 @@ from autograder.exercises.architecture.robot_jobs import (
     WHEELS,
     Jobs,
 )
-from autograder.observe.graph import GraphService, GraphTopic, RosGraph
-from autograder.observe.graph_faults import find_link_faults
-from autograder.observe.graph_reader import GraphReader
+from autograder.observe import GraphReader, GraphTopic, RosGraph, find_link_faults
 from autograder.observe.mark_tracer import MarkTracer, Trace
-from autograder.observe.marked_goals import WAYPOINT_M, MarkedGoals
-from autograder.observe.marked_types import (
-    TypeNotInstalledError,
-    is_installed,
-    load_type,
-    marked_message,
-)
-from autograder.observe.patience import SETTLE_S
+from autograder.observe.marked_goals import MarkedGoals
+from autograder.observe.marked_types import TypeNotInstalledError, is_installed, load_type
 from autograder.observe.phrases import callback_raised
 from autograder.observe.quiet_node import QuietNode
-from course.design.message_tags import fresh_tag, has_room
-from course.errors import WaitTimeout
+from course.design.message_tags import has_room
 
 DESIGN = "design"
 OUTSIDE = (MOTORS, ACTION)
@@ -109,17 +100,6 @@ class ArchitectureRig:
     def _sensors(self, *names: str) -> list[GraphTopic]:
         topics = [self.graph.topic(name) for name in names]
         return [topic for topic in topics if topic.readers and is_installed(topic.types)]
-
-    def answers(self, service: GraphService) -> bool:
-        """Whether a service answers a lifelike request; one of a type unknown here is not asked."""
-        with suppress(TypeNotInstalledError):
-            kind = load_type(service.type)
-            request = marked_message(kind.Request, fresh_tag(), WAYPOINT_M)
-            try:
-                self._bench.session.call(kind, service.name, request, SETTLE_S)
-            except WaitTimeout:
-                return False
-        return True
 
     def error_note(self, nodes: Collection[str] = ()) -> str:
         """Return what a callback raised, of any node or of some, as the end of a sentence."""

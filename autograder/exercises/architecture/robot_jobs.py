@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from functools import cached_property
 
-from autograder.observe.graph import GraphService, GraphTopic, RosGraph
+from autograder.observe import GraphService, GraphTopic, RosGraph
 from autograder.observe.marked_types import bears_marks
 
 
@@ -104,14 +104,10 @@ class Jobs:
         """
         read = self.graph.readers_of(self.sensor_topics)
         aware = self.graph.reachable_nodes(read | self.sensing_nodes, ("topic",))
-        made_up = set() if self.pose_topics else {topic.name for topic in self.poses}
-        telling = [
-            topic.name
-            for topic in self.graph.topics.values()
-            if (others := topic.written_by - self.navigators)
-            and (others & aware or topic.name in made_up)
-            and set(topic.types) - NO_PLACE
-        ]
+        if not self.pose_topics:
+            aware |= {node for topic in self.poses for node in topic.written_by}
+        sources = self.graph.topics_from(aware - self.navigators)
+        telling = [topic.name for topic in sources if set(topic.types) - NO_PLACE]
         return (read | self.graph.readers_of(telling)) & self.navigators
 
     @cached_property
