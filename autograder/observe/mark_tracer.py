@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -20,11 +20,12 @@ from rclpy.node import Node
 from autograder.examination.check_context import CheckContext, StudentError
 from autograder.observe.examiner_end import UNDEMANDING
 from autograder.observe.graph import GraphService, GraphTopic, RosGraph
+from autograder.observe.mark_trace import Trace
 from autograder.observe.marked_goals import WAYPOINT_M, MarkedGoals
 from autograder.observe.marked_publishers import REPEAT_S, MarkedPublishers, MarkedStream, Periodic
 from autograder.observe.marked_types import TypeNotInstalledError, load_type, marked_message
 from autograder.observe.patience import SETTLE_S, Patience
-from autograder.observe.phrases import as_phrase
+from autograder.observe.phrases import as_phrase, callback_raised
 from autograder.observe.stillness import Stillness
 from course.design.message_tags import fresh_tag, read_all
 from course.errors import WaitTimeout
@@ -48,48 +49,6 @@ NEXT_WAYPOINT_M = 3.0
 """Metres to a later goal's place: a robot that reckons how far it has got may be at the first."""
 
 
-@dataclass(frozen=True)
-class Trace:
-    """What became of marks.
-
-    Attributes:
-        sent: those that were sent, and taken.
-        arrived: those that came out where they were to.
-        is_enough: whether enough of them arrived.
-        lost_on: topics on which marks were seen that did not arrive.
-
-    Example:
-        >>> Trace({1, 2}, set(), False, ["/velocity"]).describe(["/motors/command"])
-        'It was seen on /velocity, but never on /motors/command'
-        >>> Trace({1, 2}, {1}, False, ["/plan"]).describe(["/left", "/right"])
-        'Of 2 marks 1 was seen on /left or /right; the others were seen on /plan, but never there'
-    """
-
-    sent: Collection[int]
-    arrived: Collection[int]
-    is_enough: bool
-    lost_on: Sequence[str] = ()
-
-    def describe(self, wanted: Iterable[str]) -> str:
-        """Return, as a clause, how far the marks got that were wanted on one of some topics."""
-        there = as_phrase(wanted, "or")
-        way = f"{as_phrase(self.lost_on)}, but" if self.lost_on else "no topic, and so"
-        if not self.arrived:
-            return f"It was seen on {way} never on {there}"
-        return (
-            f"Of {len(self.sent)} marks {len(self.arrived)} was seen on {there}; the others were "
-            f"seen on {way} never there"
-        )
-
-    def joined_with(self, later: Trace) -> Trace:
-        """Return what became of both, where enough of ``later`` must have arrived, too."""
-        return replace(
-            later,
-            sent={*self.sent, *later.sent},
-            arrived={*self.arrived, *later.arrived},
-        )
-
-
 class MarkTracer:
     """Sends marked messages and goals into a graph, and notes which marks go over which topic.
 
@@ -109,7 +68,7 @@ class MarkTracer:
         self.seen: dict[str, set[int]] = defaultdict(set)
         self.heard: set[str] = set()
         self._subject, self._session, self._outside = bench.subject, bench.session, bench.outside
-        self._publishers = MarkedPublishers(node)
+        self._publishers, self._note_step = MarkedPublishers(node), bench.note_step
         self._readers: dict[str, int] = {}  # how many each topic has, with the examiner's own
         self._stream: MarkedStream | None = None
         for topic in graph.topics.values():
@@ -163,25 +122,34 @@ class MarkTracer:
                 return False
         return True
 
-    def publish_until(
-        self, topics: Iterable[GraphTopic], condition: Callable[[], bool], free: Collection[str]
+    def error_note(self, nodes: Collection[str] = ()) -> str:
+        """Return what a callback raised, of any node or of some, as the end of a sentence."""
+        errors = self._subject.errors()
+        if nodes:
+            errors = [error for error in errors if any(f" of {n}: " in error for n in nodes)]
+        return f"; {callback_raised(errors[-1])}" if errors else ""
+
+    def gets_message(
+        self, topics: Collection[str], sensors: Iterable[GraphTopic], free: Collection[str]
     ) -> bool:
-        """Publish readings, ten a second, until a condition holds; return whether it does.
+        """Return whether anything comes on one of some topics while sensors report, or has before.
 
         Args:
-            topics: of sensors.
-            condition: what is waited for.
+            topics: by their names.
+            sensors: topics on which readings come ten times a second.
             free: names of those that see free room around the robot, and bear no marks: a robot
                 that has seen something in its way may stand still from then on.
         """
-        sensors = list(topics)
+        reporting = list(sensors)
 
-        def publish() -> None:
-            for topic in sensors:
+        def report() -> None:
+            for topic in reporting:
                 self._publishers.publish(topic, 0 if topic.name in free else fresh_tag())
 
-        publish()
-        return self._wait(condition, SETTLE_S, Periodic(REPORT_S, publish))
+        report()
+        return self._wait(
+            lambda: not self.heard.isdisjoint(topics), SETTLE_S, Periodic(REPORT_S, report)
+        )
 
     def trace_messages(
         self,
@@ -270,7 +238,7 @@ class MarkTracer:
 
         trace = self._trace(GOALS_S, send, wake, wanted, goes_on=lambda: goals.outlasts)
         if not trace.is_enough:
-            return trace
+            return replace(trace, remark=f"{goals.remark}{trace.remark}")
         goals.cancel_last()
         if goals.outlasts:
             goals.wait_for_end()
@@ -303,11 +271,15 @@ class MarkTracer:
             if taken or not (goes_on() and self.seen_on(wanted, sent)):
                 self._await_another(sent, wanted, seconds if taken else QUICK_S, meanwhile)
             arrived = self.seen_on(wanted, sent)
+            self._note_step(
+                f"a mark was {'sent' if taken else 'not taken'}; of {len(sent)} now {len(arrived)} "
+                f"seen on {as_phrase(wanted, 'or')}"
+            )
             if len(arrived) >= needed or (arrived and goes_on()):
-                return Trace(sent, arrived, True)
+                return Trace(wanted, sent, arrived, True)
         seen = [*self.seen.items()]  # at once: another thread adds to it
         lost_on = sorted(name for name, marks in seen if marks & (sent - arrived))
-        return Trace(sent, arrived, False, lost_on)
+        return Trace(wanted, sent, arrived, False, lost_on, self.error_note())
 
     def _await_another(
         self,

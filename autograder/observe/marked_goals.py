@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any
 
+from autograder.examination.exam import Failed
 from autograder.observe.marked_types import marked_message
 from autograder.observe.patience import SETTLE_S
 from autograder.observe.phrases import end_phrase
@@ -88,17 +89,31 @@ class MarkedGoals:
     def _all_over(self) -> bool:
         return all(run.done for run in self._runs)
 
+    def require_next_taken(self) -> None:
+        """Require that the server took goals whenever earlier ones were over.
+
+        Raises:
+            Failed: it rejected one, or more.
+        """
+        if self.turned_away:
+            others = "the next" if self.turned_away == 1 else f"{self.turned_away} others"
+            raise Failed(
+                expected=f"The server of {self.action} takes a goal whenever the one before is "
+                "over.",
+                actual=f"It took a goal, and after that was over it rejected {others}.",
+            )
+
     @property
     def remark(self) -> str:
-        """What became of goals of which nothing came, as a phrase; empty if none is worth it."""
+        """What became of goals that set nothing off, as the end of a sentence."""
         aborted = sum(run.status == GoalState.ABORTED for run in self._runs)
         if self.silence and self._runs:
-            return f"while a goal went on, {self.action} did not answer to another"
+            return f"; while a goal went on, {self.action} did not answer to another"
         if self.silence:
-            return self.silence
+            return f"; {self.silence}"
         if self.rejected:
             each = "each" if self.rejected == self.sent else f"{self.rejected}"
-            return f"the server of {self.action} rejected {each} of {self.sent} goals"
+            return f"; the server of {self.action} rejected {each} of {self.sent} goals"
         if aborted:
-            return f"{'a goal' if aborted == 1 else f'{aborted} goals'} {end_phrase('aborted')}"
-        return "each was cancelled before the next was sent" if self.cancelled else ""
+            return f"; {'a goal' if aborted == 1 else f'{aborted} goals'} {end_phrase('aborted')}"
+        return "; each was cancelled before the next was sent" if self.cancelled else ""

@@ -7,9 +7,6 @@ the task allows; only the robot's boundary has fixed names.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-from autograder.examination.check_context import StudentError
 from autograder.examination.exam import Exam, Failed
 from autograder.exercises.architecture.missing_jobs import (
     EYES_PHRASE,
@@ -20,17 +17,32 @@ from autograder.exercises.architecture.missing_jobs import (
     why_no_pose,
     why_no_readings,
 )
-from autograder.exercises.architecture.rig import OUTSIDE, ArchitectureRig, architecture_rig
-from autograder.exercises.architecture.robot_jobs import ACTION, MOTORS, SCAN, STREAMS, WHEELS
+from autograder.exercises.architecture.robot_jobs import (
+    ACTION,
+    EYES,
+    MOTORS,
+    SCAN,
+    SENSORS,
+    STREAMS,
+    WHEELS,
+    Jobs,
+)
 from autograder.observe import GraphTopic, RosGraph, find_link_faults
-from autograder.observe.mark_tracer import Trace
+from autograder.observe.mark_trace import Trace
 from autograder.observe.marked_types import is_installed
+from autograder.observe.observed_design import ObservedDesign, declared_nodes
 from autograder.observe.phrases import as_phrase, name_nodes
 
-EXAM: Exam[ArchitectureRig] = Exam(
-    "architecture", architecture_rig, read="Chapter 5, “Topics: continuous data sharing”"
+THREADS = 8
+"""Threads that run the design's nodes: one that waits in a callback holds up itself alone."""
+EXAM: Exam[ObservedDesign] = Exam(
+    "architecture",
+    declared_nodes("design", threads=THREADS),
+    read="Chapter 5, “Topics: continuous data sharing”",
 )
 
+OUTSIDE = (MOTORS, ACTION)
+"""What is read, or used, by somebody outside the design."""
 MOST_JOBS = 2
 MOST_FAULTS = 4
 
@@ -54,18 +66,13 @@ def require_none(faults: str, *, expected: str) -> None:
     ),
     read=READ_NODES,
 )
-def design_runs(rig: ArchitectureRig) -> str:
+def design_runs(design: ObservedDesign) -> str:
     """Every node of the design comes up on the ROS graph.
 
     An architecture on paper never fails. What cannot be brought up cannot drive either.
     """
-    expected = "The notebook has a `design` whose nodes all come up."
-    try:
-        rig.start()
-    except StudentError as error:
-        raise Failed(expected=expected, actual=error.feedback_text) from None
-    require_none("" if rig.graph.nodes else "No node appeared on the ROS graph.", expected=expected)
-    return f"On the graph: {name_nodes(rig.graph.nodes)}."
+    design.start()
+    return f"On the graph: {name_nodes(design.graph.nodes)}."
 
 
 @EXAM.check(
@@ -76,14 +83,14 @@ def design_runs(rig: ArchitectureRig) -> str:
         "Publish /scan as LaserScan, /camera/image as Image and /wheel/odometry as Odometry.",
     ),
 )
-def drivers_publish(rig: ArchitectureRig) -> None:
+def drivers_publish(design: ObservedDesign) -> None:
     """Drivers publish the readings of LIDAR, camera and wheel encoders.
 
     Everything the robot knows begins here. A driver that only drives can be swapped for another
     LIDAR, a simulator or a recording, and no other node notices.
     """
     require_none(
-        why_no_readings(rig.graph),
+        why_no_readings(design.graph),
         expected="Each of the three sensors has a node that publishes its readings.",
     )
 
@@ -98,14 +105,14 @@ def drivers_publish(rig: ArchitectureRig) -> None:
     ),
     read=READ_ACTIONS,
 )
-def navigation_action(rig: ArchitectureRig) -> None:
+def navigation_action(design: ObservedDesign) -> None:
     """Navigation is an action server that sensor data reaches.
 
     Driving to a waypoint takes a while, wants feedback and must be stoppable: a service call would
     leave its caller waiting. And a navigator that hears of no sensor drives blind.
     """
     require_none(
-        why_no_navigation(rig.jobs),
+        why_no_navigation(Jobs(design.graph)),
         expected=f"One node is the server of {ACTION}, and topics bring it what the sensors see.",
     )
 
@@ -120,21 +127,22 @@ def navigation_action(rig: ArchitectureRig) -> None:
         "and the navigation node subscribes to obstacles.",
     ),
 )
-def obstacle_information(rig: ArchitectureRig) -> str:
+def obstacle_information(design: ObservedDesign) -> str:
     """Obstacle detection turns sensor topics into obstacle information that steers the robot.
 
     Detection runs at the rate of the sensors, navigation at its own. In a node of its own it can be
     tested with recorded scans, improved and restarted while the robot goes on.
     """
+    jobs = Jobs(design.graph)
     require_none(
-        why_no_obstacles(rig.jobs),
+        why_no_obstacles(jobs),
         expected=f"A node reads {EYES_PHRASE} and publishes on a topic what is in the way; another "
         "node reads that, and it leads to the motors.",
     )
     return " ".join(
         f"It is on {topic.name} ({topic.types[0].rsplit('/', 1)[-1]}), from "
         f"{name_nodes(topic.written_by)}."
-        for topic in rig.jobs.obstacle_topics[:3]
+        for topic in jobs.obstacle_topics[:3]
     )
 
 
@@ -147,23 +155,25 @@ def obstacle_information(rig: ArchitectureRig) -> str:
         "PoseStamped or PoseWithCovarianceStamped.",
     ),
 )
-def pose_published(rig: ArchitectureRig) -> None:
+def pose_published(design: ObservedDesign) -> None:
     """State estimation reads sensors and publishes the robot's pose.
 
     Wheels slip: the pose is estimated from several sensors, many times a second. Navigation,
     planning and displays all need the same pose, so one node publishes it for everyone.
     """
+    jobs = Jobs(design.graph)
     require_none(
-        why_no_pose(rig.jobs),
+        why_no_pose(jobs),
         expected="A node that reads sensors publishes the pose, as Odometry or one of the Pose "
         f"types, on a topic other than {WHEELS}.",
     )
-    poses = [topic.name for topic in rig.jobs.pose_topics]
-    if rig.jobs.pose_of_wheels and not rig.has_pose(poses):
+    poses = [topic.name for topic in jobs.pose_topics]
+    sensors = design.inputs([WHEELS, SCAN])
+    if jobs.pose_of_wheels and not design.tracer.gets_message(poses, sensors, free=EYES):
         raise Failed(
             expected="While the wheel encoders report, the pose is published.",
             actual=f"Odometry came in on {WHEELS}, and nothing was ever published on "
-            f"{as_phrase(poses, 'or')}{rig.error_note()}.",
+            f"{as_phrase(poses, 'or')}{design.tracer.error_note()}.",
         )
 
 
@@ -177,14 +187,14 @@ def pose_published(rig: ArchitectureRig) -> None:
     ),
     read=READ_SERVICES,
 )
-def planner_service(rig: ArchitectureRig) -> None:
+def planner_service(design: ObservedDesign) -> None:
     """A path-planning service knows the map and gets the goal.
 
     A path is needed when there is a goal, not ten times a second: one request, one answer. In a
     node of its own the planner may take its time while the robot goes on avoiding obstacles.
     """
     require_none(
-        why_no_planner(rig.jobs),
+        why_no_planner(Jobs(design.graph)),
         expected="A node that reads the map serves path planning; another node, which has the "
         "goal, calls it.",
     )
@@ -199,14 +209,14 @@ def planner_service(rig: ArchitectureRig) -> None:
         "motors/command as Twist.",
     ),
 )
-def motors_driven(rig: ArchitectureRig) -> None:
+def motors_driven(design: ObservedDesign) -> None:
     """One controller drives the motors, by order of navigation.
 
     Two nodes that both command the motors make a robot that jerks between two wills; one that
     listens to nobody drives past every goal.
     """
     require_none(
-        why_no_driving(rig.jobs),
+        why_no_driving(Jobs(design.graph)),
         expected=f"One node publishes {MOTORS} as Twist, and navigation leads to it.",
     )
 
@@ -221,14 +231,14 @@ def motors_driven(rig: ArchitectureRig) -> None:
     ),
     read="Chapter 5, “Experiment 2: two ends that do not fit”",
 )
-def links_connect(rig: ArchitectureRig) -> None:
+def links_connect(design: ObservedDesign) -> None:
     """Every topic has a writer and a reader, every call a server, and DDS connects them.
 
     A wrong name or profile raises no error in ROS 2: the link simply stays silent, and you look for
     the mistake everywhere else.
     """
-    faults = find_link_faults(rig.graph, OUTSIDE)
-    if not any(rig.graph.links(("topic",))):
+    faults = find_link_faults(design.graph, OUTSIDE)
+    if not any(design.graph.links(("topic",))):
         faults.append("No topic leads from one node to another.")
     more = len(faults) - MOST_FAULTS
     require_none(
@@ -246,19 +256,20 @@ def links_connect(rig: ArchitectureRig) -> None:
     ),
     read=READ_PATTERNS,
 )
-def streams_are_topics(rig: ArchitectureRig) -> None:
+def streams_are_topics(design: ObservedDesign) -> None:
     """What is in the way reaches the motors as a stream, not by asking.
 
     A robot that asks once a second whether the way is free has driven half a metre between two
     questions, and if the answer is late it stands still or, worse, drives on.
     """
-    topics = rig.jobs.obstacle_topics
-    if not any(rig.jobs.leads_to_motors(topic, STREAMS) for topic in topics):
+    jobs = Jobs(design.graph)
+    topics = jobs.obstacle_topics
+    if not any(jobs.leads_to_motors(topic, STREAMS) for topic in topics):
         raise Failed(
             expected=f"From the obstacle information to {MOTORS} there are topics (or action "
             "goals) all the way.",
             actual=f"{as_phrase(topic.name for topic in topics)} gets there only by way of the "
-            f"service {as_phrase(rig.jobs.services_on_the_way(), 'or')}.",
+            f"service {as_phrase(jobs.services_on_the_way(), 'or')}.",
         )
 
 
@@ -271,14 +282,14 @@ def streams_are_topics(rig: ArchitectureRig) -> None:
     ),
     read=READ_NODES,
 )
-def jobs_divided(rig: ArchitectureRig) -> None:
+def jobs_divided(design: ObservedDesign) -> None:
     """No node does everything: each takes on at most two of the robot's six jobs.
 
     A node that does it all cannot be tested in parts, and when it fails the whole robot fails.
     """
     busy = [
         f"{name_nodes([node])} {as_phrase(jobs)}."
-        for node, jobs in rig.jobs.of_each_node().items()
+        for node, jobs in Jobs(design.graph).of_each_node().items()
         if len(jobs) > MOST_JOBS
     ]
     require_none(
@@ -297,57 +308,43 @@ def jobs_divided(rig: ArchitectureRig) -> None:
     ),
     read=READ_PATTERNS,
 )
-def goal_reaches_motors(rig: ArchitectureRig) -> None:
+def goal_reaches_motors(design: ObservedDesign) -> None:
     """A navigation goal that goes in comes out at the motors.
 
     This is the dye test: each node passes on marked messages, and the mark of a goal has to arrive
     at the motors. Lines on a drawing carry nothing; links do.
     """
-    if (goals := rig.goals) is None:
+    if (goals := design.goals(ACTION)) is None:
         raise Failed(
             expected=f"A goal of {ACTION} can bear a mark: it holds a number or a text.",
-            actual=f"Its type, {rig.graph.action(ACTION).type}, has no room for one, or is not "
+            actual=f"Its type, {design.graph.action(ACTION).type}, has no room for one, or is not "
             "installed where the examiner runs.",
         )
-    trace = rig.trace_goals(goals)
-    if trace.arrived and goals.turned_away:
-        others = "the next" if goals.turned_away == 1 else f"{goals.turned_away} others"
-        raise Failed(
-            expected=f"The server of {ACTION} takes a goal whenever the one before is over.",
-            actual=f"It took a goal, and after that was over it rejected {others}.",
-        )
-    if not trace.is_enough:
-        raise lost_mark(rig, trace, f"a goal sent to {ACTION}", [MOTORS], goals.remark)
-    require_plans(rig)
+    trace = design.tracer.trace_goals(
+        goals, [MOTORS], beside=design.inputs([WHEELS]), seeing=design.inputs(EYES)
+    )
+    if trace.arrived:
+        goals.require_next_taken()
+    trace.require_arrival(f"a goal sent to {ACTION}")
+    require_plans(design)
 
 
-def require_plans(rig: ArchitectureRig) -> None:
+def require_plans(design: ObservedDesign) -> None:
     """Fail if path planning never answers, which a node of the library that asks does not notice.
 
     By now goals have been driven to, so one that raised before it had a map, say, can answer. One
     with which nobody connects is a matter of another check.
     """
-    offered = rig.jobs.planning_services
+    offered = Jobs(design.graph).planning_services
     services = [one for one in offered if not find_link_faults(RosGraph.of(services=[one]))]
-    if services and not any(rig.tracer.is_answered(service) for service in services):
+    if services and not any(design.tracer.is_answered(service) for service in services):
         servers = {node for service in services for node in service.servers}
         raise Failed(
             expected="Path planning answers each request: its callback returns the response that "
             "it was given.",
             actual=f"{as_phrase(service.name for service in services)} did not answer a request"
-            f"{rig.error_note(servers)}.",
+            f"{design.tracer.error_note(servers)}.",
         )
-
-
-def lost_mark(
-    rig: ArchitectureRig, trace: Trace, of: str, wanted: Iterable[str], remark: str = ""
-) -> Failed:
-    """Return the finding that too few marks came where they were wanted, and how far they got."""
-    aside = f"; {remark}" if remark else ""
-    return Failed(
-        expected=f"The mark of {of} is seen on {as_phrase(wanted, 'or')}.",
-        actual=f"{trace.describe(wanted)}{aside}{rig.error_note()}.",
-    )
 
 
 @EXAM.check(
@@ -360,30 +357,34 @@ def lost_mark(
     ),
     read=READ_PATTERNS,
 )
-def scan_reaches_motors(rig: ArchitectureRig) -> None:
+def scan_reaches_motors(design: ObservedDesign) -> None:
     """A scan becomes obstacle information, and that reaches the motors.
 
     The second dye test: a scan that never gets to the motors is an obstacle that the robot hits.
     """
-    every = rig.jobs.obstacle_topics
-    topics = {topic.name: topic for topic in every if is_installed(topic.types)}
+    every = Jobs(design.graph).obstacle_topics
+    topics = [topic for topic in every if is_installed(topic.types)]
     if not topics:
         raise Failed(
             expected="Obstacle information has a message type that is installed.",
             actual=f"{every[0].name} is of type {as_phrase(every[0].types)}, unknown to the "
             "examiner.",
         )
-    follow_scan(rig, topics)
-    if faults := rig.late_faults():
+    require_stream(design, follow_scan(design, topics))
+    now = design.read_again()
+    faults = find_link_faults(now.added_since(design.graph), OUTSIDE)
+    if len(now.topic(MOTORS).written_by) > 1:
+        faults.insert(0, why_no_driving(Jobs(now)))
+    if faults:
         raise Failed(
             expected="Every endpoint is there as soon as its node is, and those that come later "
             "keep to the same rules.",
             actual="While marks were poured in, this was new on the graph: "
-            f"{' '.join(faults[:MOST_FAULTS])}",
+            + " ".join(faults[:MOST_FAULTS]),
         )
 
 
-def follow_scan(rig: ArchitectureRig, topics: dict[str, GraphTopic]) -> None:
+def follow_scan(design: ObservedDesign, topics: list[GraphTopic]) -> Trace:
     """Follow the mark of a scan to obstacle information, and from just there to the motors.
 
     What the scan's mark does not get to is no way for it: where one way is a dead end, the others
@@ -391,37 +392,41 @@ def follow_scan(rig: ArchitectureRig, topics: dict[str, GraphTopic]) -> None:
     """
     lost: Failed | None = None
     while topics:
-        eye = rig.jobs.source_sensor(topics.values())
-        trace = rig.trace([rig.graph.topic(eye)], topics)
+        eye = Jobs(design.graph).source_sensor(topics)
+        trace = trace_messages(design, [design.graph.topic(eye)], [t.name for t in topics])
         if not trace.is_enough:
-            what = f"{'a scan' if eye == SCAN else 'an image'} on {eye}"
-            raise lost or lost_mark(rig, trace, what, topics)
-        reached = [t for name, t in topics.items() if rig.tracer.seen_on([name], trace.arrived)]
-        names = [topic.name for topic in reached]
-        trace = rig.trace(reached, [MOTORS])
+            raise lost or trace.finding(f"{'a scan' if eye == SCAN else 'an image'} on {eye}")
+        reached = [t for t in topics if design.tracer.seen_on([t.name], trace.arrived)]
+        trace = trace_messages(design, reached, [MOTORS])
         if trace.is_enough:
-            require_stream(rig, trace, names)
-            return
-        lost = lost or lost_mark(rig, trace, f"a message on {as_phrase(names, 'or')}", [MOTORS])
-        topics = {name: topic for name, topic in topics.items() if name not in names}
+            return trace
+        lost = lost or trace.finding(f"a message on {as_phrase((t.name for t in reached), 'or')}")
+        topics = [topic for topic in topics if topic not in reached]
     assert lost is not None
     raise lost
 
 
-def require_stream(rig: ArchitectureRig, trace: Trace, names: list[str]) -> None:
+def trace_messages(design: ObservedDesign, topics: list[GraphTopic], wanted: list[str]) -> Trace:
+    """Follow marked messages, while the other sensors go on and a goal is under way."""
+    others = SENSORS.keys() - {topic.name for topic in topics}
+    return design.tracer.trace_messages(
+        topics, wanted, beside=design.inputs(others), goals=design.goals(ACTION)
+    )
+
+
+def require_stream(design: ObservedDesign, trace: Trace) -> None:
     """Fail if what arrived at the motors came by no topic that their node reads: it was asked for.
 
     A node that carries out goals gets it with these.
     """
-    drivers = rig.jobs.controllers
-    by_goal = any(drivers & action.servers for action in rig.graph.actions.values())
-    last = [t for t in rig.graph.topics.values() if t.writers and t.read_by & drivers]
+    drivers = Jobs(design.graph).controllers
+    by_goal = any(drivers & action.servers for action in design.graph.actions.values())
+    last = [t for t in design.graph.topics.values() if t.writers and t.read_by & drivers]
     if by_goal or not last or not all(is_installed(topic.types) for topic in last):
         return
-    if not rig.tracer.await_mark([topic.name for topic in last], trace.arrived):
+    if not design.tracer.await_mark([topic.name for topic in last], trace.arrived):
         raise Failed(
-            expected=f"What is on {as_phrase(names, 'or')} gets to {MOTORS} over topics or action "
-            "goals.",
+            expected=f"Obstacle information gets to {MOTORS} over topics or action goals.",
             actual=f"Its mark was seen on {MOTORS}, but on no topic that {name_nodes(drivers)} "
             f"reads ({as_phrase(topic.name for topic in last)}): it came with a request of a "
             "service, or an answer, only when somebody asked.",

@@ -77,7 +77,8 @@ def why_no_driving(jobs: Jobs) -> str:
     if types != [MOTORS_TYPE]:
         return f"It is published as {as_phrase(types)}."
     if len(drivers) > 1:
-        return all_command_motors(drivers)
+        both = "both" if len(drivers) == 2 else "all"
+        return f"{name_nodes(drivers)} {both} command the motors."
     if drivers & jobs.graph.namesakes:
         return f"Two nodes called {name_nodes(drivers)} command them."
     if not drivers & jobs.goal_reaches:
@@ -86,11 +87,6 @@ def why_no_driving(jobs: Jobs) -> str:
             f"{ACTION}."
         )
     return ""
-
-
-def all_command_motors(drivers: frozenset[str]) -> str:
-    """Say that several nodes command the motors."""
-    return f"{name_nodes(drivers)} {'both' if len(drivers) == 2 else 'all'} command the motors."
 
 
 def why_no_obstacles(jobs: Jobs) -> str:

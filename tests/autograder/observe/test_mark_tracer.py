@@ -1,4 +1,4 @@
-"""How many marks are enough, and when a goal counts as turned away: decided without DDS."""
+"""How many marks are enough, and when a goal counts as turned away: mostly without DDS."""
 
 from __future__ import annotations
 
@@ -7,15 +7,22 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from geometry_msgs.msg import PoseArray, Twist
 from rclpy.duration import Duration
 from rclpy.qos import LivelinessPolicy, QoSProfile
+from sensor_msgs.msg import Image, LaserScan
 from test_msgs.action import NestedMessage
 
+from autograder.examination.exam import Failed
 from autograder.observe import mark_tracer, marked_publishers
 from autograder.observe.graph import End, RosGraph
+from autograder.observe.graph_reader import read_graph
+from autograder.observe.mark_trace import Trace
 from autograder.observe.mark_tracer import MarkTracer
 from autograder.observe.marked_goals import MarkedGoals
 from autograder.observe.marked_publishers import fitting_qos
+from autograder.observe.quiet_node import QuietNode
+from course import Design, Session
 from course.design import message_tags
 from course.errors import WaitTimeout
 from course.runtime.requests.actions import GoalState
@@ -59,13 +66,21 @@ class FakeServer:
             raise WaitTimeout(f"Waited {timeout} s for {what}.")
 
 
+def bench_of(session: Any) -> Any:
+    return SimpleNamespace(
+        session=session,
+        subject=SimpleNamespace(errors=list),
+        outside=None,
+        note_step=lambda step: None,
+    )
+
+
 def trace_goals(
     *, accepts: Callable[[int], bool] = lambda _: True, ends: bool = True, yields: bool = True,
     arrives: Callable[[int], bool] = lambda _: True,
-) -> tuple[mark_tracer.Trace, MarkedGoals]:  # fmt: skip
+) -> tuple[Trace, MarkedGoals]:  # fmt: skip
     server = FakeServer(accepts=accepts, ends=ends, yields=yields)
-    bench: Any = SimpleNamespace(session=server, subject=None, outside=None)
-    tracer = MarkTracer(bench, cast("Any", None), RosGraph())
+    tracer = MarkTracer(bench_of(server), cast("Any", None), RosGraph())
     server.on_mark = lambda mark: tracer.seen[
         MOTORS if arrives(len(server.marks)) else "/velocity"
     ].add(mark)
@@ -91,24 +106,26 @@ def test_one_mark_is_not_enough_of_goals_that_end() -> None:
     trace, goals = trace_goals(arrives=lambda number: number == 1)
     assert not trace.is_enough
     assert goals.sent == len(mark_tracer.GOALS_S)
-    assert trace.describe([MOTORS]) == (
+    assert trace.finding("a goal").actual.startswith(
         "Of 8 marks 1 was seen on /motors/command; the others were seen on /velocity, but never "
         "there"
     )
-    assert goals.remark.startswith("8 goals ended as aborted")
+    assert goals.remark.startswith("; 8 goals ended as aborted")
 
 
 def test_a_server_that_takes_no_second_goal_turns_it_away() -> None:
     trace, goals = trace_goals(accepts=lambda number: number == 0)
     assert not trace.is_enough
     assert goals.turned_away == goals.sent - 1
+    with pytest.raises(Failed, match="after that was over it rejected 7 others"):
+        goals.require_next_taken()
 
 
 def test_a_server_that_never_took_a_goal_turns_none_away() -> None:
     trace, goals = trace_goals(accepts=lambda _: False)
     assert not trace.sent
     assert not goals.turned_away
-    assert goals.remark == "the server of /navigate_to rejected each of 8 goals"
+    assert goals.remark == "; the server of /navigate_to rejected each of 8 goals"
 
 
 def test_a_publisher_offers_what_each_subscription_asks_for() -> None:
@@ -137,3 +154,20 @@ def test_what_is_periodic_waits_for_its_time(monkeypatch: pytest.MonkeyPatch) ->
     for now[0] in (2.5, 3.0):
         act()
     assert acts == [1.0, 2.0, 3.0]
+
+
+def test_a_mark_is_followed_through_real_nodes() -> None:
+    with Session() as subject, Session(domain_id=subject.domain_id) as examiner:
+        design = Design()
+        design.node("detector").subscribes("scan", LaserScan).publishes("obstacles", PoseArray)
+        design.node("controller").subscribes("obstacles", PoseArray).publishes("motors", Twist)
+        design.node("camera").publishes("image", Image)
+        design.run(subject)
+        node = examiner.run(QuietNode, "examiner")
+        examiner.until(lambda: len(read_graph(node).topics) == 4, timeout=20)
+        graph = read_graph(node)
+        tracer = MarkTracer(bench_of(examiner), node, graph)
+        trace = tracer.trace_messages([graph.topic("/scan")], ["/motors"])
+        assert trace.is_enough
+        assert tracer.seen_on(["/obstacles"], trace.arrived) == trace.arrived
+        assert not tracer.seen_on(["/image"], trace.arrived)

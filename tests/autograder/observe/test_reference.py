@@ -7,7 +7,14 @@ import doctest
 import pytest
 
 from autograder.corpus import mutations
-from autograder.observe import graph, graph_faults, mark_tracer, nouns, observed_node
+from autograder.observe import (
+    graph,
+    graph_faults,
+    mark_trace,
+    nouns,
+    observed_design,
+    observed_node,
+)
 from autograder.observe.__main__ import reference
 from course.workspace.content import content_root
 
@@ -18,7 +25,7 @@ def test_the_page_is_what_the_docstrings_say() -> None:
 
 
 @pytest.mark.parametrize(
-    "module", [mutations, nouns, observed_node, graph, graph_faults, mark_tracer]
+    "module", [mutations, nouns, observed_node, graph, graph_faults, mark_trace, observed_design]
 )
 def test_the_examples_run(module: object) -> None:
     result = doctest.testmod(module)  # type: ignore[arg-type]
