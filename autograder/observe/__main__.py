@@ -8,12 +8,19 @@ from collections.abc import Iterator
 from typing import Any
 
 from autograder import observe
+from autograder.observe.mark_trace import Trace
+from autograder.observe.mark_tracer import MarkTracer
+from autograder.observe.marked_goals import MarkedGoals
+from autograder.observe.observed_design import ObservedDesign, declared_nodes
 from autograder.observe.observed_node import Change
 from autograder.observe.span import Span
 
 DESCRIBED: tuple[Any, ...] = (
     observe.one_node, observe.Topic, observe.Service, observe.Action, observe.Parameter,
     observe.ObservedNode, Span, Change,
+    declared_nodes, ObservedDesign, MarkTracer, MarkedGoals, Trace,
+    observe.RosGraph, observe.GraphTopic, observe.GraphService, observe.GraphReader,
+    observe.find_link_faults,
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The types on a robot's graph, as far as they are installed where the examiner runs."""
+"""Messages of the types on a graph, as far as these are installed where the examiner runs."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any
 
 from autograder.examination.subject.own_interfaces import DEFINITIONS
 from course.design import message_tags
+from course.design.lifelike import AHEAD_M, lifelike_message
 from course.errors import CourseError
 from course.interfaces import define
 from course.messages import types
@@ -28,6 +29,27 @@ def load_type(name: str) -> Any:
         return types.load_named(name)
     except (LookupError, CourseError):
         raise TypeNotInstalledError(name) from None
+
+
+def is_installed(names: Iterable[str]) -> bool:
+    """Return whether all of these types are installed."""
+    try:
+        return bool([load_type(name) for name in names])
+    except TypeNotInstalledError:
+        return False
+
+
+def marked_message(msg_type: Any, tag: int, ahead_m: float = AHEAD_M) -> Any:
+    """Return a message as a robot would send it, with a mark in it.
+
+    Args:
+        msg_type: its class.
+        tag: the mark, one of `course.design.message_tags.TAGS`.
+        ahead_m: metres straight on to every place that it names.
+    """
+    message = lifelike_message(msg_type, ahead_m)
+    message_tags.mark(message, tag)
+    return message
 
 
 def bears_marks(names: Iterable[str]) -> bool:

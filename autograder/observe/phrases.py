@@ -2,15 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 ABORTED = (
     "by a call of abort(), or because the execute callback raised, or returned without succeed() "
     "or canceled()"
 )
 
 
-def as_phrase(items: list[str]) -> str:
-    """Return a list as a phrase: "a, b and c"."""
-    return " and ".join(part for part in (", ".join(items[:-1]), *items[-1:]) if part)
+def as_phrase(items: Iterable[str], last: str = "and") -> str:
+    """Return several things as a phrase: "a, b and c", or with another word before the ``last``."""
+    *first, end = [*items] or [""]
+    return f"{', '.join(first)} {last} {end}" if first else end
+
+
+def name_nodes(names: Iterable[str]) -> str:
+    """Return the names of nodes as a phrase: "controller and navigation"."""
+    return as_phrase(sorted(name.removeprefix("/") for name in names))
+
+
+def who_does(names: Iterable[str], verb: str) -> str:
+    """Return which nodes do it: "camera publishes", "camera and lidar publish"."""
+    doers = list(names)
+    ending = ("es" if verb.endswith("sh") else "s") if len(doers) == 1 else ""
+    return f"{name_nodes(doers)} {verb}{ending}"
 
 
 def pictures_phrase(number: int) -> str:

@@ -7,49 +7,55 @@ the task allows; only the robot's boundary has fixed names.
 
 from __future__ import annotations
 
-from autograder.examination.check_context import StudentError
 from autograder.examination.exam import Exam, Failed
-from autograder.exercises.architecture.link_faults import (
-    describe_substitute,
-    is_carried,
-    join_names,
-    link_faults,
-    name_all_nodes,
-    name_nodes,
-    similar_name,
+from autograder.exercises.architecture.missing_jobs import (
+    EYES_PHRASE,
+    why_no_driving,
+    why_no_navigation,
     why_no_obstacles,
     why_no_planner,
     why_no_pose,
+    why_no_readings,
 )
-from autograder.exercises.architecture.rig import ArchitectureRig, architecture_rig
-from autograder.exercises.architecture.robot_roles import (
+from autograder.exercises.architecture.robot_jobs import (
     ACTION,
+    EYES,
     MOTORS,
-    MOTORS_TYPE,
+    SCAN,
     SENSORS,
     STREAMS,
     WHEELS,
+    Jobs,
 )
-from autograder.exercises.architecture.traces import (
-    describe_lost_mark,
-    error_note,
-    require_plans,
-    see_scan_arrive,
+from autograder.observe import GraphTopic, RosGraph, find_link_faults
+from autograder.observe.mark_trace import Trace
+from autograder.observe.marked_types import is_installed
+from autograder.observe.observed_design import ObservedDesign, declared_nodes
+from autograder.observe.phrases import as_phrase, name_nodes
+
+THREADS = 8
+"""Threads that run the design's nodes: one that waits in a callback holds up itself alone."""
+EXAM: Exam[ObservedDesign] = Exam(
+    "architecture",
+    declared_nodes("design", threads=THREADS),
+    read="Chapter 5, “Topics: continuous data sharing”",
 )
-from autograder.exercises.architecture.tracing import POURS, GoalRejectedError
-from autograder.observe.marked_types import TypeNotInstalledError, load_type
-from course.design import message_tags
-from course.errors import WaitTimeout
 
-EXAM: Exam[ArchitectureRig] = Exam("architecture", architecture_rig)
-
+OUTSIDE = (MOTORS, ACTION)
+"""What is read, or used, by somebody outside the design."""
 MOST_JOBS = 2
+MOST_FAULTS = 4
 
 READ_NODES = "Chapter 5, “Nodes: the processing units”"
-READ_TOPICS = "Chapter 5, “Topics: continuous data sharing”"
 READ_SERVICES = "Chapter 5, “Services: synchronous request-response”"
 READ_ACTIONS = "Chapter 5, “Actions: long-running operations with feedback”"
 READ_PATTERNS = "Chapter 5, “When to use what”"
+
+
+def require_none(faults: str, *, expected: str) -> None:
+    """Fail if there are any faults."""
+    if faults:
+        raise Failed(expected=expected, actual=faults)
 
 
 @EXAM.check(
@@ -60,24 +66,13 @@ READ_PATTERNS = "Chapter 5, “When to use what”"
     ),
     read=READ_NODES,
 )
-def design_runs(rig: ArchitectureRig) -> str:
+def design_runs(design: ObservedDesign) -> str:
     """Every node of the design comes up on the ROS graph.
 
     An architecture on paper never fails. What cannot be brought up cannot drive either.
     """
-    try:
-        rig.start()
-    except StudentError as error:
-        raise Failed(
-            expected="The notebook has a `design` whose nodes all come up.",
-            actual=error.feedback_text,
-        ) from None
-    if not rig.graph.nodes:
-        raise Failed(
-            expected="The notebook has a `design` whose nodes all come up.",
-            actual="No node appeared on the ROS graph.",
-        )
-    return f"On the graph: {name_nodes(rig.graph.nodes)}."
+    design.start()
+    return f"On the graph: {name_nodes(design.graph.nodes)}."
 
 
 @EXAM.check(
@@ -87,26 +82,17 @@ def design_runs(rig: ArchitectureRig) -> str:
         "A driver reads no topic: it publishes what the hardware delivers.",
         "Publish /scan as LaserScan, /camera/image as Image and /wheel/odometry as Odometry.",
     ),
-    read=READ_TOPICS,
 )
-def drivers_publish(rig: ArchitectureRig) -> None:
+def drivers_publish(design: ObservedDesign) -> None:
     """Drivers publish the readings of LIDAR, camera and wheel encoders.
 
     Everything the robot knows begins here. A driver that only drives can be swapped for another
     LIDAR, a simulator or a recording, and no other node notices.
     """
-    faults = []
-    for name, wanted in SENSORS.items():
-        types = {end.type for end in rig.graph.get_topic(name).writers}
-        if not types:
-            faults.append(f"Nobody publishes on {name}{similar_name(name, rig.graph)}.")
-        elif wanted not in types:
-            faults.append(f"{name} is published as {', '.join(sorted(types))}, not as {wanted}.")
-    if faults:
-        raise Failed(
-            expected="Each of the three sensors has a node that publishes its readings.",
-            actual=" ".join(faults),
-        )
+    require_none(
+        why_no_readings(design.graph),
+        expected="Each of the three sensors has a node that publishes its readings.",
+    )
 
 
 @EXAM.check(
@@ -119,28 +105,16 @@ def drivers_publish(rig: ArchitectureRig) -> None:
     ),
     read=READ_ACTIONS,
 )
-def navigation_action(rig: ArchitectureRig) -> None:
+def navigation_action(design: ObservedDesign) -> None:
     """Navigation is an action server that sensor data reaches.
 
     Driving to a waypoint takes a while, wants feedback and must be stoppable: a service call would
     leave its caller waiting. And a navigator that hears of no sensor drives blind.
     """
-    expected = "One node is the server of /navigate_to, and topics bring it what the sensors see."
-    servers = rig.jobs.navigators
-    if not servers:
-        raise Failed(
-            expected=expected, actual=f"No node is its server{describe_substitute(rig.graph)}."
-        )
-    if len(servers) > 1:
-        raise Failed(
-            expected=expected, actual=f"It has {len(servers)} servers: {name_nodes(servers)}."
-        )
-    if not rig.jobs.informed_navigators:
-        raise Failed(
-            expected=expected,
-            actual=f"{name_nodes(servers)} is the server, but no topic brings it readings, "
-            "obstacle information or the pose: it would drive blind.",
-        )
+    require_none(
+        why_no_navigation(Jobs(design.graph)),
+        expected=f"One node is the server of {ACTION}, and topics bring it what the sensors see.",
+    )
 
 
 @EXAM.check(
@@ -152,22 +126,24 @@ def navigation_action(rig: ArchitectureRig) -> None:
         "For example: obstacle_detection subscribes to scan and publishes obstacles as PoseArray, "
         "and the navigation node subscribes to obstacles.",
     ),
-    read=READ_TOPICS,
 )
-def obstacle_information(rig: ArchitectureRig) -> str:
+def obstacle_information(design: ObservedDesign) -> str:
     """Obstacle detection turns sensor topics into obstacle information that steers the robot.
 
     Detection runs at the rate of the sensors, navigation at its own. In a node of its own it can be
     tested with recorded scans, improved and restarted while the robot goes on.
     """
-    found = rig.jobs.obstacle_topics
-    if not found:
-        raise Failed(
-            expected="A node reads /scan or /camera/image and publishes on a topic what is in the "
-            "way; another node reads that, and it leads to the motors.",
-            actual=why_no_obstacles(rig.jobs),
-        )
-    return " ".join(is_carried(topic) for topic in found[:3])
+    jobs = Jobs(design.graph)
+    require_none(
+        why_no_obstacles(jobs),
+        expected=f"A node reads {EYES_PHRASE} and publishes on a topic what is in the way; another "
+        "node reads that, and it leads to the motors.",
+    )
+    return " ".join(
+        f"It is on {topic.name} ({topic.types[0].rsplit('/', 1)[-1]}), from "
+        f"{name_nodes(topic.written_by)}."
+        for topic in jobs.obstacle_topics[:3]
+    )
 
 
 @EXAM.check(
@@ -178,26 +154,26 @@ def obstacle_information(rig: ArchitectureRig) -> str:
         "For example: state_estimation subscribes to wheel/odometry and publishes pose as "
         "PoseStamped or PoseWithCovarianceStamped.",
     ),
-    read=READ_TOPICS,
 )
-def pose_published(rig: ArchitectureRig) -> None:
+def pose_published(design: ObservedDesign) -> None:
     """State estimation reads sensors and publishes the robot's pose.
 
     Wheels slip: the pose is estimated from several sensors, many times a second. Navigation,
     planning and displays all need the same pose, so one node publishes it for everyone.
     """
-    if not rig.jobs.pose_topics:
-        raise Failed(
-            expected="A node that reads sensors publishes the pose, as Odometry or one of the Pose "
-            "types, on a topic other than /wheel/odometry.",
-            actual=why_no_pose(rig.jobs),
-        )
-    poses = [topic.name for topic in rig.jobs.pose_topics]
-    if rig.jobs.pose_of_wheels and not rig.has_pose_estimate(poses):
+    jobs = Jobs(design.graph)
+    require_none(
+        why_no_pose(jobs),
+        expected="A node that reads sensors publishes the pose, as Odometry or one of the Pose "
+        f"types, on a topic other than {WHEELS}.",
+    )
+    poses = [topic.name for topic in jobs.pose_topics]
+    sensors = design.inputs([WHEELS, SCAN])
+    if jobs.pose_of_wheels and not design.tracer.gets_message(poses, sensors, free=EYES):
         raise Failed(
             expected="While the wheel encoders report, the pose is published.",
             actual=f"Odometry came in on {WHEELS}, and nothing was ever published on "
-            f"{join_names(poses, 'or')}{error_note(rig)}.",
+            f"{as_phrase(poses, 'or')}{design.tracer.error_note()}.",
         )
 
 
@@ -211,18 +187,17 @@ def pose_published(rig: ArchitectureRig) -> None:
     ),
     read=READ_SERVICES,
 )
-def planner_service(rig: ArchitectureRig) -> None:
+def planner_service(design: ObservedDesign) -> None:
     """A path-planning service knows the map and gets the goal.
 
     A path is needed when there is a goal, not ten times a second: one request, one answer. In a
     node of its own the planner may take its time while the robot goes on avoiding obstacles.
     """
-    if reasons := why_no_planner(rig.jobs):
-        raise Failed(
-            expected="A node that reads the map serves path planning; another node, which has the "
-            "goal, calls it.",
-            actual=reasons,
-        )
+    require_none(
+        why_no_planner(Jobs(design.graph)),
+        expected="A node that reads the map serves path planning; another node, which has the "
+        "goal, calls it.",
+    )
 
 
 @EXAM.check(
@@ -233,36 +208,17 @@ def planner_service(rig: ArchitectureRig) -> None:
         "For example: controller subscribes to velocity, which navigation publishes, and publishes "
         "motors/command as Twist.",
     ),
-    read=READ_TOPICS,
 )
-def motors_driven(rig: ArchitectureRig) -> None:
+def motors_driven(design: ObservedDesign) -> None:
     """One controller drives the motors, by order of navigation.
 
     Two nodes that both command the motors make a robot that jerks between two wills; one that
     listens to nobody drives past every goal.
     """
-    expected = "One node publishes /motors/command as Twist, and navigation leads to it."
-    drivers = rig.jobs.controllers
-    types = {end.type for end in rig.graph.get_topic(MOTORS).writers}
-    if not drivers:
-        raise Failed(
-            expected=expected,
-            actual=f"Nobody publishes on {MOTORS}{similar_name(MOTORS, rig.graph)}.",
-        )
-    if types != {MOTORS_TYPE}:
-        raise Failed(expected=expected, actual=f"It is published as {join_names(sorted(types))}.")
-    if len(drivers) > 1:
-        raise Failed(expected=expected, actual=f"{name_all_nodes(drivers)} command the motors.")
-    if twins := drivers & rig.graph.namesakes:
-        raise Failed(
-            expected=expected, actual=f"Two nodes called {name_nodes(twins)} command them."
-        )
-    if not drivers & rig.jobs.goal_reaches:
-        raise Failed(
-            expected=expected,
-            actual=f"{name_nodes(drivers)} drives the motors, but nothing leads there from the "
-            f"server of {ACTION}.",
-        )
+    require_none(
+        why_no_driving(Jobs(design.graph)),
+        expected=f"One node publishes {MOTORS} as Twist, and navigation leads to it.",
+    )
 
 
 @EXAM.check(
@@ -275,21 +231,20 @@ def motors_driven(rig: ArchitectureRig) -> None:
     ),
     read="Chapter 5, “Experiment 2: two ends that do not fit”",
 )
-def links_connect(rig: ArchitectureRig) -> None:
+def links_connect(design: ObservedDesign) -> None:
     """Every topic has a writer and a reader, every call a server, and DDS connects them.
 
     A wrong name or profile raises no error in ROS 2: the link simply stays silent, and you look for
     the mistake everywhere else.
     """
-    faults = link_faults(rig.graph)
-    if not any(rig.graph.iterate_links(("topic",))):
+    faults = find_link_faults(design.graph, OUTSIDE)
+    if not any(design.graph.links(("topic",))):
         faults.append("No topic leads from one node to another.")
-    if faults:
-        more = f" And {len(faults) - 4} more." if len(faults) > 4 else ""
-        raise Failed(
-            expected=f"Nothing dangles, apart from {MOTORS} and {ACTION} at the robot's boundary.",
-            actual=" ".join(faults[:4]) + more,
-        )
+    more = len(faults) - MOST_FAULTS
+    require_none(
+        " ".join(faults[:MOST_FAULTS]) + (f" And {more} more." if more > 0 else ""),
+        expected=f"Nothing dangles, apart from {MOTORS} and {ACTION} at the robot's boundary.",
+    )
 
 
 @EXAM.check(
@@ -301,30 +256,25 @@ def links_connect(rig: ArchitectureRig) -> None:
     ),
     read=READ_PATTERNS,
 )
-def streams_are_topics(rig: ArchitectureRig) -> None:
+def streams_are_topics(design: ObservedDesign) -> None:
     """What is in the way reaches the motors as a stream, not by asking.
 
     A robot that asks once a second whether the way is free has driven half a metre between two
     questions, and if the answer is late it stands still or, worse, drives on.
     """
-    if not any(rig.jobs.leads_to_motors(topic, STREAMS) for topic in rig.jobs.obstacle_topics):
+    jobs = Jobs(design.graph)
+    topics = jobs.obstacle_topics
+    if not any(jobs.leads_to_motors(topic, STREAMS) for topic in topics):
         raise Failed(
             expected=f"From the obstacle information to {MOTORS} there are topics (or action "
             "goals) all the way.",
-            actual=f"{join_names([t.name for t in rig.jobs.obstacle_topics])} gets there only by "
-            f"way of the service {join_names(rig.jobs.services_on_the_way(), 'or')}.",
+            actual=f"{as_phrase(topic.name for topic in topics)} gets there only by way of the "
+            f"service {as_phrase(jobs.services_on_the_way(), 'or')}.",
         )
 
 
 @EXAM.check(
-    needs=(
-        "drivers_publish",
-        "navigation_action",
-        "obstacle_information",
-        "pose_published",
-        "planner_service",
-        "motors_driven",
-    ),
+    needs=("navigation_action", "pose_published", "planner_service", "motors_driven"),
     hints=(
         "Which node would you have to change for a new LIDAR, and which for a new motor?",
         "List for each node which of the six jobs it does.",
@@ -332,22 +282,25 @@ def streams_are_topics(rig: ArchitectureRig) -> None:
     ),
     read=READ_NODES,
 )
-def jobs_divided(rig: ArchitectureRig) -> None:
+def jobs_divided(design: ObservedDesign) -> None:
     """No node does everything: each takes on at most two of the robot's six jobs.
 
     A node that does it all cannot be tested in parts, and when it fails the whole robot fails.
     """
-    busy = {n: jobs for n, jobs in rig.jobs.of_each_node().items() if len(jobs) > MOST_JOBS}
-    if busy:
-        raise Failed(
-            expected="No node drives sensors, estimates, detects, plans, navigates and controls: "
-            "two of these jobs at most.",
-            actual=" ".join(f"{name_nodes([n])} {join_names(jobs)}." for n, jobs in busy.items()),
-        )
+    busy = [
+        f"{name_nodes([node])} {as_phrase(jobs)}."
+        for node, jobs in Jobs(design.graph).of_each_node().items()
+        if len(jobs) > MOST_JOBS
+    ]
+    require_none(
+        " ".join(busy),
+        expected="No node drives sensors, estimates, detects, plans, navigates and controls: two "
+        "of these jobs at most.",
+    )
 
 
 @EXAM.check(
-    needs=("navigation_action", "motors_driven", "links_connect"),
+    needs=("navigation_action", "motors_driven"),
     hints=(
         "Follow the goal from navigate_to from node to node: which one does not pass it on?",
         "Each link on the way must carry data: a message without a number or a text cannot.",
@@ -355,46 +308,47 @@ def jobs_divided(rig: ArchitectureRig) -> None:
     ),
     read=READ_PATTERNS,
 )
-def goal_reaches_motors(rig: ArchitectureRig) -> None:
+def goal_reaches_motors(design: ObservedDesign) -> None:
     """A navigation goal that goes in comes out at the motors.
 
     This is the dye test: each node passes on marked messages, and the mark of a goal has to arrive
     at the motors. Lines on a drawing carry nothing; links do.
     """
-    expected = f"The mark of a goal sent to {ACTION} is seen on {MOTORS}."
-    name = rig.graph.get_action(ACTION).type
-    try:
-        action_type = load_type(name)
-    except TypeNotInstalledError:
+    if (goals := design.goals(ACTION)) is None:
         raise Failed(
-            expected=expected,
-            actual=f"{ACTION} is of type {name}, which is not installed where the examiner runs.",
-        ) from None
-    if not message_tags.has_room(action_type.Goal):
-        raise Failed(expected=expected, actual=f"A goal of {name} holds neither number nor text.")
-    try:
-        poured = rig.colour_goal(ACTION, action_type, [MOTORS])
-    except WaitTimeout as timeout:
-        raise Failed(expected=expected, actual=str(timeout)) from None
-    except GoalRejectedError:
-        raise Failed(
-            expected=expected,
-            actual=f"The server of {ACTION} rejected each of {POURS} goals, with sensor readings "
-            "coming in between.",
-        ) from None
-    if not poured.enough and not (poured.arrived and poured.turned_away):
-        raise Failed(expected=expected, actual=describe_lost_mark(rig, poured, [MOTORS]))
-    if poured.turned_away:
-        raise Failed(
-            expected=f"The server of {ACTION} takes a goal whenever the one before is over.",
-            actual=f"It took a goal, and after that was over it rejected "
-            f"{'the next' if poured.turned_away == 1 else f'{poured.turned_away} others'}.",
+            expected=f"A goal of {ACTION} can bear a mark: it holds a number or a text.",
+            actual=f"Its type, {design.graph.action(ACTION).type}, has no room for one, or is not "
+            "installed where the examiner runs.",
         )
-    require_plans(rig)
+    trace = design.tracer.trace_goals(
+        goals, [MOTORS], beside=design.inputs([WHEELS]), seeing=design.inputs(EYES)
+    )
+    if trace.arrived:
+        goals.require_next_taken()
+    trace.require_arrival(f"a goal sent to {ACTION}")
+    require_plans(design)
+
+
+def require_plans(design: ObservedDesign) -> None:
+    """Fail if path planning never answers, which a node of the library that asks does not notice.
+
+    By now goals have been driven to, so one that raised before it had a map, say, can answer. One
+    with which nobody connects is a matter of another check.
+    """
+    offered = Jobs(design.graph).planning_services
+    services = [one for one in offered if not find_link_faults(RosGraph.of(services=[one]))]
+    if services and not any(design.tracer.is_answered(service) for service in services):
+        servers = {node for service in services for node in service.servers}
+        raise Failed(
+            expected="Path planning answers each request: its callback returns the response that "
+            "it was given.",
+            actual=f"{as_phrase(service.name for service in services)} did not answer a request"
+            f"{design.tracer.error_note(servers)}.",
+        )
 
 
 @EXAM.check(
-    needs=("drivers_publish", "obstacle_information", "motors_driven", "links_connect"),
+    needs=("obstacle_information", "motors_driven"),
     hints=(
         "Follow a scan from /scan to the obstacle information, and from there to the motors.",
         "Somewhere a node reads and does not write, or a message has no room for what it says.",
@@ -403,22 +357,77 @@ def goal_reaches_motors(rig: ArchitectureRig) -> None:
     ),
     read=READ_PATTERNS,
 )
-def scan_reaches_motors(rig: ArchitectureRig) -> None:
+def scan_reaches_motors(design: ObservedDesign) -> None:
     """A scan becomes obstacle information, and that reaches the motors.
 
     The second dye test: a scan that never gets to the motors is an obstacle that the robot hits.
     """
-    topics = {topic.name: topic for topic in rig.jobs.obstacle_topics if rig.knows_type(topic)}
+    every = Jobs(design.graph).obstacle_topics
+    topics = [topic for topic in every if is_installed(topic.types)]
     if not topics:
-        topic = rig.jobs.obstacle_topics[0]
         raise Failed(
             expected="Obstacle information has a message type that is installed.",
-            actual=f"{topic.name} is of type {join_names(topic.types)}, unknown to the examiner.",
+            actual=f"{every[0].name} is of type {as_phrase(every[0].types)}, unknown to the "
+            "examiner.",
         )
-    see_scan_arrive(rig, topics)
-    if faults := rig.new_faults():
+    require_stream(design, follow_scan(design, topics))
+    now = design.read_again()
+    faults = find_link_faults(now.added_since(design.graph), OUTSIDE)
+    if len(now.topic(MOTORS).written_by) > 1:
+        faults.insert(0, why_no_driving(Jobs(now)))
+    if faults:
         raise Failed(
             expected="Every endpoint is there as soon as its node is, and those that come later "
             "keep to the same rules.",
-            actual=f"While marks were poured in, this was new on the graph: {' '.join(faults[:4])}",
+            actual="While marks were poured in, this was new on the graph: "
+            + " ".join(faults[:MOST_FAULTS]),
+        )
+
+
+def follow_scan(design: ObservedDesign, topics: list[GraphTopic]) -> Trace:
+    """Follow the mark of a scan to obstacle information, and from just there to the motors.
+
+    What the scan's mark does not get to is no way for it: where one way is a dead end, the others
+    are tried by themselves.
+    """
+    lost: Failed | None = None
+    while topics:
+        eye = Jobs(design.graph).source_sensor(topics)
+        trace = trace_messages(design, [design.graph.topic(eye)], [t.name for t in topics])
+        if not trace.is_enough:
+            raise lost or trace.finding(f"{'a scan' if eye == SCAN else 'an image'} on {eye}")
+        reached = [t for t in topics if design.tracer.seen_on([t.name], trace.arrived)]
+        trace = trace_messages(design, reached, [MOTORS])
+        if trace.is_enough:
+            return trace
+        lost = lost or trace.finding(f"a message on {as_phrase((t.name for t in reached), 'or')}")
+        topics = [topic for topic in topics if topic not in reached]
+    assert lost is not None
+    raise lost
+
+
+def trace_messages(design: ObservedDesign, topics: list[GraphTopic], wanted: list[str]) -> Trace:
+    """Follow marked messages, while the other sensors go on and a goal is under way."""
+    others = SENSORS.keys() - {topic.name for topic in topics}
+    return design.tracer.trace_messages(
+        topics, wanted, beside=design.inputs(others), goals=design.goals(ACTION)
+    )
+
+
+def require_stream(design: ObservedDesign, trace: Trace) -> None:
+    """Fail if what arrived at the motors came by no topic that their node reads: it was asked for.
+
+    A node that carries out goals gets it with these.
+    """
+    drivers = Jobs(design.graph).controllers
+    by_goal = any(drivers & action.servers for action in design.graph.actions.values())
+    last = [t for t in design.graph.topics.values() if t.writers and t.read_by & drivers]
+    if by_goal or not last or not all(is_installed(topic.types) for topic in last):
+        return
+    if not design.tracer.await_mark([topic.name for topic in last], trace.arrived):
+        raise Failed(
+            expected=f"Obstacle information gets to {MOTORS} over topics or action goals.",
+            actual=f"Its mark was seen on {MOTORS}, but on no topic that {name_nodes(drivers)} "
+            f"reads ({as_phrase(topic.name for topic in last)}): it came with a request of a "
+            "service, or an answer, only when somebody asked.",
         )
