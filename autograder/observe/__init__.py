@@ -5,6 +5,9 @@ The door for exercises:
     from autograder.observe import Parameter, Service, Topic, one_node
 """
 
+from autograder.observe.choices import Choices as Choices
+from autograder.observe.choices import Question as Question
+from autograder.observe.findings import in_context as in_context
 from autograder.observe.nouns import Action as Action
 from autograder.observe.nouns import Parameter as Parameter
 from autograder.observe.nouns import Service as Service

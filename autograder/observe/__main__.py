@@ -8,12 +8,18 @@ from collections.abc import Iterator
 from typing import Any
 
 from autograder import observe
+from autograder.observe.merged_subscriptions import MergedSubscription
 from autograder.observe.observed_node import Change
+from autograder.observe.program_trials import ProgramTrials
 from autograder.observe.span import Span
+from autograder.observe.stepped_goal import SteppedGoal
+from autograder.observe.stepped_observer import SteppedObserver
+from autograder.observe.stream_rate import StreamRate, require_stream
 
 DESCRIBED: tuple[Any, ...] = (
     observe.one_node, observe.Topic, observe.Service, observe.Action, observe.Parameter,
-    observe.ObservedNode, Span, Change,
+    observe.ObservedNode, Span, Change, observe.in_context, observe.Choices, observe.Question,
+    SteppedObserver, SteppedGoal, MergedSubscription, require_stream, StreamRate, ProgramTrials,
 )  # fmt: skip
 
 

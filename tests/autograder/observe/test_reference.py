@@ -7,7 +7,15 @@ import doctest
 import pytest
 
 from autograder.corpus import mutations
-from autograder.observe import nouns, observed_node
+from autograder.observe import (
+    choices,
+    findings,
+    merged_subscriptions,
+    name_patterns,
+    nouns,
+    observed_node,
+    stream_rate,
+)
 from autograder.observe.__main__ import reference
 from course.workspace.content import content_root
 
@@ -17,7 +25,13 @@ def test_the_page_is_what_the_docstrings_say() -> None:
     assert page.read_text() == reference(), f"run: python -m autograder.observe > {page}"
 
 
-@pytest.mark.parametrize("module", [mutations, nouns, observed_node])
+@pytest.mark.parametrize(
+    "module",
+    [
+        choices, findings, merged_subscriptions, mutations, name_patterns, nouns, observed_node,
+        stream_rate,
+    ],
+)  # fmt: skip
 def test_the_examples_run(module: object) -> None:
     result = doctest.testmod(module)  # type: ignore[arg-type]
     assert result.attempted
