@@ -1,4 +1,7 @@
-"""A goal that the examiner sends to a node whose time it moves, and what is heard of it."""
+"""A goal that the examiner sends to a node whose time it moves, and what is heard of it.
+
+An answer, or the end of a goal, that is not there at once may wait for the node's clock.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,9 @@ class SteppedGoal:
     """A goal that was accepted.
 
     Attributes:
-        feedback: what was heard of it so far, by whoever had sent it before the server began.
+        action: what it was sent to.
+        run: the goal at the side of whoever has sent it: its state, and its result.
+        feedback: what counts of the feedback messages so far.
     """
 
     def __init__(
@@ -46,7 +51,7 @@ class SteppedGoal:
             action: the node's.
             goal: the message.
             feedback: what of a feedback message counts.
-            where: what was asked for, and where, to begin a sentence with.
+            where: what is asked for, to begin a sentence with: "The goal for station 3".
 
         Raises:
             Failed: it is rejected, or not answered.

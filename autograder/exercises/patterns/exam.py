@@ -11,35 +11,23 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 
 from autograder.examination.exam import Exam, Failed
-from autograder.exercises.patterns import readings
+from autograder.exercises.patterns import drive_ends, readings
 from autograder.exercises.patterns.drive import SPEED_MARGIN, Drive
-from autograder.exercises.patterns.drive_ends import (
-    call_off,
-    drive_to_goal,
-    require_others,
-    require_standing,
-)
 from autograder.exercises.patterns.interface_patterns import await_patterns, require_pattern
 from autograder.exercises.patterns.plain_program import TRIALS
-from autograder.exercises.patterns.robot import (
-    CHARGE,
-    NODE,
-    POSITION,
-    SPEED_AT_START,
-    THREADS,
-    Robot,
-)
+from autograder.exercises.patterns.robot import CHARGE, POSITION, SPEED_AT_START, Robot
 from autograder.exercises.patterns.scenarios import CHOICES, SCENARIOS
 from autograder.observe.findings import in_context
 from autograder.observe.stream_rate import require_stream
-
-EXAM: Exam[Robot] = Exam("patterns", Robot, fresh_parts=True)
 
 FILM_S, PASSING_S = 2.0, 0.3
 """Seconds of the node's clock in which pictures are counted, and in which a station is passed."""
 POSITIONS_M = ((0.3, 0.2, 0.4), (0.6, 0.5, 0.7), (0.9, 0.8, 0.95))
 """Before the first drive: the usual ones, and from what to what they are drawn."""
 LOWEST, HIGHEST, MISTYPED = 0.1, 1.0, 5.0  # m/s
+SLOW, FAST = ("a low speed limit", 0.3, 0.2, 0.4), ("a high speed limit", 0.8, 0.6, 0.9)
+TOO_FAST = ("a speed that is too high", 1.1, 1.01, 1.3)
+"""Speed limits in m/s: the usual ones, and from what to what they are drawn."""
 START, MOST_STARTS, WAY = 1, 6, 3
 """The stations from which the robot may drive first, and how many it passes."""
 
@@ -47,6 +35,7 @@ START, MOST_STARTS, WAY = 1, 6, 3
 READ_CHOICES = "Chapter 5, “When to use what”"
 READ_PATTERNS = f"{READ_CHOICES}, and the section on the pattern of your choice"
 READ_PARAMETERS = "ROS 2 documentation, “Concepts: Parameters”"
+EXAM: Exam[Robot] = Exam("patterns", Robot, fresh_parts=True, read=READ_PATTERNS)
 
 
 @EXAM.check(
@@ -62,9 +51,7 @@ def node_starts(robot: Robot) -> str:
 
     Whoever wants to know or command anything finds nobody if the robot's interface is not there.
     """
-    robot.subject.open(threads=THREADS, sim_time=True)
-    robot.subject.start(NODE)
-    robot.note_standstill()
+    robot.start()
     await_patterns(robot)
     robot.note_standstill()
     found = robot.found.offers
@@ -96,7 +83,6 @@ def choices_made(robot: Robot) -> None:
         "A timer callback every 0.1 s that hands out self.take_picture() under robot/camera, once "
         "for all who look.",
     ),
-    read=READ_PATTERNS,
 )
 def camera_streams(robot: Robot) -> None:
     """Camera images come ten times a second, for everybody who looks.
@@ -119,7 +105,6 @@ def camera_streams(robot: Robot) -> None:
         "Answer whoever asks, with success set to True and message to str(self.position); or tell "
         "everybody at least twice a second.",
     ),
-    read=READ_PATTERNS,
 )
 def position_answered(robot: Robot) -> str:
     """Whoever wants to know the robot's position gets the present one.
@@ -128,6 +113,8 @@ def position_answered(robot: Robot) -> str:
     """
     pattern = require_pattern(robot, "position")
     robot.require_heard(POSITION)
+    if pattern == "topic":
+        readings.listen_to_position(robot)
     for number, metres in enumerate(POSITIONS_M):  # the robot never goes back
         robot.report(POSITION, robot.draws.number(f"position {number}", *metres))
         readings.require_position(robot, pattern)
@@ -164,14 +151,15 @@ def parameter_changes(robot: Robot) -> str:
     Somebody mistypes 5 for 0.5 m/s: the robot has to say no, and say why.
     """
     require_pattern(robot, "parameters")
-    draw, (slow, _) = robot.draws.number, draw_limits(robot)
+    draw = robot.draws.number
+    slow = draw(*SLOW)
     # Where only a service knows it, the first drive tells: see speed_takes_effect.
     robot.max_speed.require(SPEED_AT_START)
-    with require_standing(robot):
+    with drive_ends.require_standing(robot):
         for good in (HIGHEST, LOWEST, draw("a good speed", 0.37, 0.21, 0.89), slow):
             robot.max_speed.set(good).require_accepted()
     low = draw("a speed that is too low", 0.05, 0.01, 0.09)
-    for bad in (draw("a speed below 0", -0.5, -0.9, -0.1), 0.0, low, MISTYPED, draw_high(robot)):
+    for bad in (draw("a speed below 0", -0.5, -0.9, -0.1), 0.0, low, MISTYPED, draw(*TOO_FAST)):
         change = robot.max_speed.set(bad)
         if change.accepted:
             robot.max_speed.set(slow)  # with a bad one no robot can drive on
@@ -188,17 +176,6 @@ def parameter_changes(robot: Robot) -> str:
     )
 
 
-def draw_limits(robot: Robot) -> tuple[float, float]:
-    """Return a low and a high speed limit (m/s)."""
-    draw = robot.draws.number
-    return draw("a low speed limit", 0.3, 0.2, 0.4), draw("a high speed limit", 0.8, 0.6, 0.9)
-
-
-def draw_high(robot: Robot) -> float:
-    """Return a speed limit (m/s) that is a little too high."""
-    return robot.draws.number("a speed that is too high", 1.1, 1.01, 1.3)
-
-
 @EXAM.check(
     needs=("node_starts",),
     hints=(
@@ -207,7 +184,6 @@ def draw_high(robot: Robot) -> float:
         "In charge_changed, hand out BatteryState(percentage=self.charge) under robot/battery, "
         "once for all who listen.",
     ),
-    read=READ_PATTERNS,
 )
 def battery_broadcast(robot: Robot) -> None:
     """A new battery level reaches everybody who listens.
@@ -254,7 +230,6 @@ def battery_late_joiner(robot: Robot) -> str:
         "One callback does the whole drive: a report at each station, and at the end drive(0.0), "
         "goal_handle.succeed() and a Result with the stations passed.",
     ),
-    read=READ_PATTERNS,
 )
 def navigation_drives(robot: Robot) -> None:
     """A navigation goal is driven to, with a report at each station and at the end.
@@ -268,7 +243,7 @@ def navigation_drives(robot: Robot) -> None:
         if robot.max_speed.last_set is None:
             robot.first_top = drive.find_top_speed(SPEED_AT_START)
         # An earlier part of the exam may have found already what is found in a blocked aisle.
-        drive_to_goal(drive, blocked="aisle" not in robot.found.works)
+        drive_ends.drive_to_goal(drive, blocked="aisle" not in robot.found.works)
     robot.found.works.add("aisle")
     drive_again(robot, "a drive")
     TRIALS.require(robot.bench, "navigation blocked")
@@ -279,7 +254,7 @@ def drive_again(robot: Robot, before: str) -> None:
     with in_next_drive(before), Drive(robot, round(robot.position) + 1) as drive:
         if robot.obeys and robot.max_speed.last_set is not None:
             drive.require_speed(robot.max_speed.last_set)
-        drive_to_goal(drive)
+        drive_ends.drive_to_goal(drive)
 
 
 def in_next_drive(before: str) -> AbstractContextManager[None]:
@@ -309,7 +284,8 @@ def speed_takes_effect(robot: Robot) -> None:
             actual="On the first drive, before anybody had changed max_speed, hardware/speed went "
             f"up to {first:g} m/s.",
         )
-    for limit, bad in zip(draw_limits(robot), (MISTYPED, draw_high(robot)), strict=True):
+    draw = robot.draws.number
+    for limit, bad in ((draw(*SLOW), MISTYPED), (draw(*FAST), draw(*TOO_FAST))):
         robot.max_speed.set(limit)
         robot.max_speed.set(bad)  # the good one stays
         refused = f", and {bad:g} m/s refused after that"
@@ -319,7 +295,7 @@ def speed_takes_effect(robot: Robot) -> None:
             drive.require_report()
             drive.robot.pass_time(PASSING_S)
             drive.require_speed(limit, refused)
-            drive_to_goal(drive)
+            drive_ends.drive_to_goal(drive)
     robot.obeys = True
 
 
@@ -347,12 +323,14 @@ def navigation_cancel(robot: Robot) -> None:
         drive.require_report()
         drive.require_driving()
         drive.leave_station()
-        call_off(drive)
-    with in_context(f"After {before} all goes on.", "Then:"), require_standing(robot):
-        require_others(robot, robot.draws.number("the level after a drive", 0.35, 0.25, 0.45))
+        drive_ends.call_off(drive)
+    with in_context(f"After {before} all goes on.", "Then:"), drive_ends.require_standing(robot):
+        drive_ends.require_others(
+            robot, robot.draws.number("the level after a drive", 0.35, 0.25, 0.45)
+        )
     with in_next_drive(before), Drive(robot, far) as drive:
         drive.require_driving()  # and not yet at any station
-        call_off(drive)
+        drive_ends.call_off(drive)
     drive_again(robot, before)
     TRIALS.require(robot.bench, "navigation called off")
 

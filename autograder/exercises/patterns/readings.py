@@ -48,13 +48,12 @@ def require_film(robot: Robot) -> None:
 def require_content(robot: Robot) -> None:
     """Require that the last message on the camera's topic holds a picture."""
     width, height, step, size = robot.pictures.last
-    fault = ""
-    if not height or not width or not size:
-        fault = f"It is empty: {width} x {height}, {size} bytes."
-    elif size != height * step:
-        fault = f"It has {size} bytes, which are not {height} rows of {step} bytes (step)."
-    if fault:
-        raise Failed(expected="A message on robot/camera holds a picture.", actual=fault)
+    if not width or not size or size != height * step:
+        raise Failed(
+            expected="A message on robot/camera holds a picture: its height times its step bytes.",
+            actual=f"It has {size} bytes, a width of {width}, a height of {height} and a step of "
+            f"{step}.",
+        )
 
 
 def require_position(robot: Robot, pattern: str, slack: float = 1.0) -> None:

@@ -85,6 +85,16 @@ class Robot(SteppedObserver):
         """The last commanded speed in m/s."""
         return float(self.speeds.last or 0.0)
 
+    def start(self) -> None:
+        """Have the student's node made, on simulated time.
+
+        Raises:
+            StudentError: it could not be made.
+        """
+        self.subject.open(threads=THREADS, sim_time=True)
+        self.subject.start(NODE)
+        self.note_standstill()
+
     def report(self, topic: Topic, value: float) -> None:
         """Have the hardware report a value once, and the student's node take it in."""
         if topic is POSITION:
