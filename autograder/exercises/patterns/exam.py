@@ -26,7 +26,7 @@ POSITIONS_M = ((0.3, 0.2, 0.4), (0.6, 0.5, 0.7), (0.9, 0.8, 0.95))
 """Before the first drive: the usual ones, and from what to what they are drawn."""
 LOWEST, HIGHEST, MISTYPED = 0.1, 1.0, 5.0  # m/s
 SLOW, FAST = ("a low speed limit", 0.3, 0.2, 0.4), ("a high speed limit", 0.8, 0.6, 0.9)
-TOO_FAST = ("a speed that is too high", 1.1, 1.01, 1.3)
+TOO_SLOW = ("a speed that is too low", 0.05, 0.01, 0.09)
 """Speed limits in m/s: the usual ones, and from what to what they are drawn."""
 START, MOST_STARTS, WAY = 1, 6, 3
 """The stations from which the robot may drive first, and how many it passes."""
@@ -158,8 +158,8 @@ def parameter_changes(robot: Robot) -> str:
     with drive_ends.require_standing(robot):
         for good in (HIGHEST, LOWEST, draw("a good speed", 0.37, 0.21, 0.89), slow):
             robot.max_speed.set(good).require_accepted()
-    low = draw("a speed that is too low", 0.05, 0.01, 0.09)
-    for bad in (draw("a speed below 0", -0.5, -0.9, -0.1), 0.0, low, MISTYPED, draw(*TOO_FAST)):
+    low, high = draw(*TOO_SLOW), draw("a speed that is too high", 1.1, 1.01, 1.3)
+    for bad in (draw("a speed below 0", -0.5, -0.9, -0.1), 0.0, low, MISTYPED, high):
         change = robot.max_speed.set(bad)
         if change.accepted:
             robot.max_speed.set(slow)  # with a bad one no robot can drive on
@@ -285,7 +285,7 @@ def speed_takes_effect(robot: Robot) -> None:
             f"up to {first:g} m/s.",
         )
     draw = robot.draws.number
-    for limit, bad in ((draw(*SLOW), MISTYPED), (draw(*FAST), draw(*TOO_FAST))):
+    for limit, bad in ((draw(*SLOW), MISTYPED), (draw(*FAST), draw(*TOO_SLOW))):
         robot.max_speed.set(limit)
         robot.max_speed.set(bad)  # the good one stays
         refused = f", and {bad:g} m/s refused after that"
