@@ -109,13 +109,13 @@ class SteppedGoal:
         """How it ended, as a phrase: "ended as ABORTED ..."; or that it has not."""
         return end_phrase(self.run.status.name) if self.is_done else "went on and on"
 
-    def require_end(self, state: GoalState, needed: str, where: str) -> None:
+    def require_end(self, state: GoalState, needed: str, where: Callable[[], str]) -> None:
         """Let the node's time pass until it ends, and require how.
 
         Args:
             state: as what it is to end.
             needed: a sentence to put before that.
-            where: what was there meanwhile, as a phrase: "with the robot at 3 m".
+            where: returns what is there then, as a phrase: "with the robot at 3 m".
 
         Raises:
             Failed: it ends otherwise, or not at all.
@@ -124,7 +124,7 @@ class SteppedGoal:
         if not self.is_done or self.run.status != state:
             raise Failed(
                 expected=f"{needed} The goal ends as {state.name}.",
-                actual=f"The goal {self.end_phrase}, {where}{self._observer.error_note()}.",
+                actual=f"The goal {self.end_phrase}, {where()}{self._observer.error_note()}.",
             )
 
     def cancel(
