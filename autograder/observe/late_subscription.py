@@ -38,7 +38,7 @@ class LateSubscription:
         )
         kept = [offer.durability == DurabilityPolicy.TRANSIENT_LOCAL for offer in offers]
         self.is_durable = reliable and all(kept)
-        self.unkept = "TRANSIENT_LOCAL, but BEST_EFFORT" if any(kept) else "VOLATILE"
+        self.unkept = "TRANSIENT_LOCAL, but BEST_EFFORT" if offers and all(kept) else "VOLATILE"
         self._topic, self._heard = topic, list[Any]()
         durable, volatile = DurabilityPolicy.TRANSIENT_LOCAL, DurabilityPolicy.VOLATILE
         qos = QoSProfile(
