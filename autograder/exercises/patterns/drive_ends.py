@@ -1,157 +1,167 @@
-"""How a drive ends: the robot has arrived, or was called off, and stands."""
+"""A blocked aisle on a drive, and how a drive ends: the robot has arrived, or was called off."""
 
 from __future__ import annotations
 
-import time
-from concurrent.futures import Future
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from autograder.examination.exam import Failed
-from autograder.exercises.patterns.blocked_aisle import block_aisle, hold_before_goal
-from autograder.exercises.patterns.discovery import wait_for_discovery
-from autograder.exercises.patterns.driving import Drive
-from autograder.exercises.patterns.rig import SETTLE, STEP
-from autograder.exercises.patterns.stations import require_report
-from autograder.observe.patience import IDLE_S
-from autograder.observe.phrases import end_phrase
-from course.errors import WaitTimeout
+from autograder.exercises.patterns import readings
+from autograder.exercises.patterns.drive import Drive
+from autograder.exercises.patterns.robot import SPEED_AT_START, Robot
+from autograder.observe.findings import in_context
 from course.runtime.requests.actions import GoalState
 
-LOOKING, STOPPING, UNDER_WAY = 0.6, 4.0, 2.0
-"""Seconds of wall time for those who look by the wall's clock whether they are called off, for a
-stop to become visible, and for one that was under way when the result came."""
-STOPS = 0.5
+FURTHER = (0.8, 0.9)
+"""Parts of the way to which the robot creeps on, for who is content with less than all of it."""
+BLOCKED_S, BLOCKED_WALL_S = 1.2, 0.3
+"""Seconds of the node's clock, and at last on the wall, for which the robot cannot get on."""
+WAITS_S, WAITS_ON_S = 4.0, 15.0
+"""Seconds of the node's clock for which it cannot get on after that, and then once more: longer
+than a metre takes who reckons by the time, and than the patience of who gives up."""
+COARSE_S, COARSER_S = 0.2, 0.5
+"""Seconds of the node's clock between two looks of those who wait all that time."""
+NEAR_M, HELD_UP_S = 0.1, 0.6
+"""Metres before the goal where the robot is held up, twice as far as a place may count as the
+station, and for how many seconds of the node's clock."""
+UNDER_WAY_S = 2.0
+"""Seconds of wall time for a stop that was under way when the result came."""
+STOPS_S = 0.5
 """Seconds of the node's clock within which a robot that is called off is told to stop."""
-WATCHED, STANDS, SELDOM = 2.0, 0.5, 0.25
-"""Seconds of the node's clock: for which a cancelled robot must stay where it is; for which every
-robot must at the end of a drive; and between two clock messages meanwhile."""
+STANDS_S, SELDOM_S = 2.5, 0.25
+"""Seconds of the node's clock for which a robot must stand at the end of a drive, and between two
+clock messages meanwhile."""
 
 
-def to_the_end(drive: Drive, *, blocked: bool = False) -> None:
+def drive_to_goal(drive: Drive, *, blocked: bool = False) -> None:
     """Let the robot drive to its goal, with a report at each station on the way.
 
     Args:
         drive: the drive.
         blocked: whether the aisle is blocked for a while after the first station, and for a
             moment just before the goal.
-
-    Raises:
-        Failed: it does not drive, does not report, or does not end as it should.
     """
     while drive.station < drive.goal:
         drive.require_driving()
         if blocked and drive.station == drive.goal - 1:
-            hold_before_goal(drive)
+            _hold_before_goal(drive)
         drive.roll_on()
         if drive.station < drive.goal:
-            require_report(drive)
+            drive.require_report()
         if blocked and drive.station == drive.start + 1:
-            block_aisle(drive)
-    arrived = "At the station named the robot has arrived."
-    require_end(drive, GoalState.SUCCEEDED, arrived, stopped=True)
+            _block_aisle(drive)
+    _require_stop(drive, GoalState.SUCCEEDED, "At the station named the robot has arrived.")
+    drive.require_result()
 
 
-def require_end(drive: Drive, state: GoalState, expected: str, *, stopped: bool = False) -> None:
-    """Wait for the end of the goal, and for the robot to stand still, and stay so.
+def _block_aisle(drive: Drive) -> None:
+    """Let the aisle be blocked before the next station: feedback stands still, nothing else."""
+    drive.leave_station()
+    drive.robot.pass_time(BLOCKED_S)
+    drive.require_no_further()
+    with in_context("The drive holds nobody up.", "In a blocked aisle:"):
+        # Twice: a position that is looked up now and then may be right by chance, but then it has
+        # just been looked up.
+        drive.move_to(drive.station + FURTHER[0])
+        level = drive.robot.draws.number("the level in a drive", 0.55, 0.46, 0.65)
+        require_others(drive.robot, level)
+        drive.move_to(drive.station + FURTHER[1])
+        require_position(drive.robot)
+    drive.robot.pass_time(WAITS_S, COARSE_S)
+    drive.require_no_further()
+    drive.robot.pass_time(WAITS_ON_S, COARSER_S)
+    _wait_on_the_wall(drive)
 
-    Args:
-        drive: the drive.
-        state: how the goal must end.
-        expected: what is needed, as a sentence.
-        stopped: whether the robot must stand when the result comes, not a while later.
 
-    Raises:
-        Failed: it does not end, ends otherwise, or the robot goes on.
+def _hold_before_goal(drive: Drive) -> None:
+    """Let the robot be held up just before its goal, so that it cannot be there yet."""
+    drive.leave_station()
+    drive.move_to(drive.goal - NEAR_M)
+    drive.robot.pass_time(HELD_UP_S, COARSE_S)
+    _wait_on_the_wall(drive)
+    drive.require_driving()
+
+
+def _wait_on_the_wall(drive: Drive) -> None:
+    """Give those who look by the wall's clock the time to get ahead of the robot."""
+    drive.robot.wait(lambda: drive.is_ahead or drive.sent.is_done, BLOCKED_WALL_S)
+    drive.require_no_further()
+
+
+def require_others(robot: Robot, level: float) -> None:
+    """Require that no drive holds up or has ended what worked without one, as a battery ``level``.
+
+    What did not work has failed in a check of its own.
     """
-    rig = drive.rig
-    rig.wait_stepping(lambda: drive.run.done)
-    if not drive.run.done or drive.run.status != state:
-        how = end_phrase(drive.run.status.name) if drive.run.done else "went on and on"
-        stood = drive.standstill_note
-        if stood and not drive.run.done and state == GoalState.CANCELED:
-            stood = (
-                " It stood there all the time: does your node look whether a drive is called off "
-                "only at the next station, or once the robot has moved?"
-            )
+    works = robot.found.works
+    require_position(robot)
+    if "camera" in works:
+        readings.require_film(robot)
+    if "battery" in works:
+        readings.require_level(robot, level)
+    if "parameters" in works:
+        robot.max_speed.set(robot.max_speed.last_set or SPEED_AT_START).require_accepted()
+
+
+def require_position(robot: Robot) -> None:
+    """Require that the position can be learnt, if it could without a drive."""
+    if robot.found.position_by:
+        readings.require_position(robot, robot.found.position_by)
+
+
+@contextmanager
+def require_standing(robot: Robot) -> Iterator[None]:
+    """Have the limit changed in the block, while the robot has no goal."""
+    robot.speeds.clear()
+    yield
+    robot.step()
+    robot.drain()
+    if any(robot.speeds.values):
         raise Failed(
-            expected=f"{expected} The goal ends as {state.name}.",
-            actual=f"The goal {how}, with the robot {drive.place_phrase}{rig.error_note()}.{stood}",
+            expected="A new max_speed is for drives: without a goal the robot stands.",
+            actual="max_speed was changed while the robot had no goal, and hardware/speed said "
+            f"{max(robot.speeds.values, key=abs):g} m/s.",
         )
+
+
+def call_off(drive: Drive) -> None:
+    """Cancel the goal, and require that the robot stops in time and stays where it is."""
+    robot = drive.robot
+    over_ns = drive.sent.cancel(lambda: robot.speed == 0, STOPS_S)
+    _require_stop(
+        drive, GoalState.CANCELED, "A drive that is called off ends there, wherever the robot is."
+    )
+    require_stopped_by(robot, over_ns, STOPS_S)
+
+
+def require_stopped_by(robot: Robot, moment_ns: int, seconds: float) -> None:
+    """Require that the robot had been told to stop by a moment, and nothing since."""
+    if robot.speed != 0 or robot.speeds.same_since_ns > moment_ns:
+        raise Failed(
+            expected=f"A drive that is called off stops the robot within {STOPS_S:g} s.",
+            actual=f"{seconds:g} s of the node's time later hardware/speed had not said 0.0 yet.",
+        )
+
+
+def _require_stop(drive: Drive, state: GoalState, needed: str) -> None:
+    """Wait for the end of the goal, and for the robot to stand still, and stay so."""
+    robot = drive.robot
+    drive.sent.require_end(state, needed, lambda: f"with the robot {drive.place}")
     # Which of two messages comes first is the transport's affair: a stop may be under way.
-    late = stopped and not rig.wait(lambda: rig.speed == 0, UNDER_WAY)
-    told = rig.speed
-    rig.wait_stepping(lambda: rig.speed == 0)
-    if state == GoalState.CANCELED:
-        rig.step(WATCHED, SELDOM)
-    rig.step(STANDS, SELDOM)
-    wait_for_discovery(rig)  # whatever was on its way has come in by now
-    if not rig.node.speeds or rig.speed != 0:
+    is_late = state == GoalState.SUCCEEDED and not robot.wait(lambda: robot.speed == 0, UNDER_WAY_S)
+    told = robot.speed
+    robot.wait_stepping(lambda: robot.speed == 0)
+    robot.step(STANDS_S, SELDOM_S)
+    robot.await_discovery()  # whatever was on its way has come in by now
+    if robot.speeds.last != 0:
         raise Failed(
-            expected=f"{expected} The robot is told to stop: hardware/speed is 0.0.",
+            expected=f"{needed} The robot is told to stop: hardware/speed is 0.0.",
             actual=f"The goal ended as {state.name}, but the last speed that the motors were "
-            f"told was {rig.speed:g} m/s: the robot drives on.",
+            f"told was {robot.speed:g} m/s: the robot drives on.",
         )
-    if late:
+    if is_late:
         raise Failed(
-            expected=f"{expected} The robot is told to stop first, and then the goal ends.",
+            expected=f"{needed} The robot is told to stop first, and then the goal ends.",
             actual=f"The result came while the motors were still told {told:g} m/s; only later "
             "were they told to stop.",
-        )
-
-
-def cancel_drive(drive: Drive, seconds: float, looking: float = LOOKING) -> int:
-    """Ask for the goal to be cancelled, and let the robot have the time to be told to stop.
-
-    The time counts from the request on: the answer, too, may wait for the node's clock.
-
-    Args:
-        drive: the drive.
-        seconds: of the node's clock until the stop.
-        looking: seconds of wall time before that clock moves on.
-
-    Returns:
-        When that time was over (ns): a stop that was told by then is in time, see `stopped_by`.
-
-    Raises:
-        Failed: the request was refused, or got no answer.
-    """
-    rig = drive.rig
-
-    def stopped() -> bool:
-        return rig.speed == 0
-
-    answer, began = rig.submit_request("to cancel", lambda: drive.run.cancel(SETTLE)), rig.elapsed
-    if answer.done():
-        _require_agreed(drive, answer)
-    else:
-        rig.await_answer(answer, "to cancel", seconds)
-    # Who looks by the clock on the wall gets the time to do so before the node's moves on.
-    rig.wait(stopped, looking)
-    while not stopped() and seconds - (rig.elapsed - began) > STEP / 2:
-        rig.step(STEP)
-    # The robot has had its time: only a message that is under way is waited for.
-    rig.start_patience(STOPPING, stepped=IDLE_S).wait(rig.session, stopped)
-    over = time.time_ns()
-    rig.await_answer(answer, "to cancel")
-    _require_agreed(drive, answer)
-    return over
-
-
-def stopped_by(drive: Drive, moment: int) -> bool:
-    """Return whether the robot had been told to stop by a ``moment`` (ns), and nothing since."""
-    speeds = drive.rig.node.speeds
-    return drive.rig.speed == 0 and speeds.same_since <= moment
-
-
-def _require_agreed(drive: Drive, answer: Future[bool]) -> None:
-    try:
-        agreed = answer.result()
-    except WaitTimeout:
-        raise Failed(
-            expected="A request to cancel a drive is answered.",
-            actual=f"It got no answer, {drive.moment_phrase}{drive.rig.error_note()}.",
-        ) from None
-    if not agreed:
-        raise Failed(
-            expected="A request to cancel a drive is accepted.",
-            actual=f"It was refused, {drive.moment_phrase}{drive.rig.error_note()}.",
         )

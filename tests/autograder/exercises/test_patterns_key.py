@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import nbformat
@@ -16,8 +15,7 @@ from autograder.assignments.build_notebooks import build
 from autograder.corpus.trials import one_notebook
 from autograder.examination import answer_keys
 from autograder.examination.exam import Failed
-from autograder.exercises.patterns import scenarios
-from autograder.exercises.patterns.choices import compare_choice
+from autograder.exercises.patterns.scenarios import CHOICES
 from autograder.gradebook.release import make_release
 from autograder.grading import engine
 from autograder.running import runner
@@ -48,8 +46,8 @@ def key(root: Path) -> dict[str, Any]:
 
 def test_the_key_is_read_from_the_hidden_cell_without_running_it(root: Path) -> None:
     found = key(root)
-    assert list(found) == list(scenarios.SCENARIOS)
-    assert all(set(right) <= set(scenarios.PATTERNS) for right in found.values())
+    assert list(found) == list(CHOICES.questions)
+    assert all(set(right) <= set(CHOICES.words) for right in found.values())
 
 
 @pytest.mark.parametrize(
@@ -86,10 +84,10 @@ def test_the_subject_is_told_neither_the_key_nor_the_part(root: Path) -> None:
 
 def test_no_text_of_a_choice_check_names_a_pattern() -> None:
     checks = exercises.load_exam("patterns").checks
-    for scenario in scenarios.SCENARIOS:
+    for scenario in CHOICES.questions:
         check = checks[f"{scenario}_choice"]
         said = " ".join((check.title, check.rationale, *check.hints, check.read)).lower()
-        for pattern in scenarios.PATTERNS:
+        for pattern in CHOICES.words:
             assert pattern not in said, (scenario, pattern)
 
 
@@ -99,32 +97,21 @@ def test_no_visible_check_of_the_node_says_which_pattern_to_take() -> None:
     for name in exercises.load_exam("patterns").part("visible"):
         check = checks[name]
         said = " ".join((check.title, check.rationale, *check.hints, check.read)).lower()
-        for word in () if name == "choices_made" else (*scenarios.PATTERNS, "publish", "trigger"):
+        for word in () if name == "choices_made" else (*CHOICES.words, "publish", "trigger"):
             assert word not in said, (name, word)
-
-
-def rig_with(right: dict[str, Any], choices: dict[str, str]) -> Any:
-    return SimpleNamespace(bench=SimpleNamespace(key=right), memory={"choices": choices})
 
 
 def test_the_report_of_a_wrong_choice_names_no_other_pattern(root: Path) -> None:
     """Every wrong answer to every question, as the student would read it."""
     checks = exercises.load_exam("patterns").checks
     for scenario, right in key(root).items():
-        for pattern in set(scenarios.PATTERNS) - set(right):
-            rig = rig_with(key(root), {scenario: pattern})
+        for pattern in set(CHOICES.words) - set(right):
             with pytest.raises(Failed) as failed:
-                compare_choice(rig, scenario)
+                CHOICES.require_right(scenario, pattern, key(root))
             said = f"{failed.value} {checks[f'{scenario}_choice'].hints}".lower()
             assert f'you chose "{pattern}"' in said
-            for other in set(scenarios.PATTERNS) - {pattern}:
+            for other in set(CHOICES.words) - {pattern}:
                 assert other not in said, (scenario, pattern)
-
-
-def test_a_part_without_its_key_is_the_graders_fault() -> None:
-    rig = rig_with({}, {"camera": "topic"})
-    with pytest.raises(LookupError, match="no answer key came along"):
-        compare_choice(rig, "camera")
 
 
 @needs_isolation

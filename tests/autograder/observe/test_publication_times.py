@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from autograder.exercises.patterns.merged_subscriptions import Ears
 from autograder.observe.publication_times import TRANSIT_NS, published_at
 
 RECEIVED = 10 * TRANSIT_NS
@@ -36,14 +35,3 @@ def test_what_comes_after_a_rest_was_published_after_it(
 ) -> None:
     info = {"source_timestamp": stamp, "received_timestamp": RECEIVED}
     assert published_at(info, settled) == published
-
-
-def test_a_message_of_two_subscriptions_counts_once_whatever_its_stamp_says() -> None:
-    ears = Ears[str]()
-    forged = RECEIVED * 100
-    for received in (RECEIVED, RECEIVED + 7):  # by the one and by the other
-        info = {"source_timestamp": forged, "received_timestamp": received}
-        ears.add_message(published_at(info), "forged", forged)
-    ears.add_message(RECEIVED + 5, "later", RECEIVED + 5)
-    assert list(ears) == ["forged", "later"]
-    assert ears.newest_time == RECEIVED + 5

@@ -2,7 +2,7 @@
 # reaches: the exam
 # exercise: patterns
 # base: right-exemplar
-# told: The feedback so far was
+# told: the feedback so far was
 # score: 10
 
 from autograder.examination.subject.server import SubjectServer

@@ -2,9 +2,9 @@
 # reaches: the exam
 # exercise: patterns
 # base: right-exemplar
-# told: a new battery level is known within 1 s.
-# told: whoever wants to know the position gets it, at most 0.5 s old.
-# told: a drive that is called off stops the robot within 0.5 s.
+# told: knows a new level within 1 s.
+# told: Whoever wants to know the position gets it in metres, at most 0.5 s old
+# told: A drive that is called off stops the robot within 0.5 s.
 # score: 8
 
 from autograder.examination.subject.server import SubjectServer
