@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import time
 
-from autograder.examination.exam import Failed, NotExaminable
-from autograder.exercises.qos.readings import IMU, STOP, Sensor
-from autograder.exercises.qos.sensor_paths import SensorRig
-from autograder.exercises.qos.slow_consumer import TOO_BUSY, TRIES, YOUNG_S
+from autograder.examination.exam import Failed
+from autograder.exercises.qos.readings import IMU, STOP, Sensor, SensorRig
+from autograder.exercises.qos.slow_consumer import YOUNG_S
+from autograder.observe.relays.slow_reader import TRIES, too_busy
 
 PRESSES = "presses"
 """The series of the stop events that bear the words of earlier ones."""
@@ -58,11 +58,9 @@ def require_each_of_the_same(rig: SensorRig) -> None:
     for attempt in range(TRIES):
         if _are_all_handed_on(rig, f"{ALIKE} {attempt}"):
             return
-    raise NotExaminable(
-        TOO_BUSY.format(
-            "tell IMU readings that were left out, as they read like the one before, from readings "
-            "that had grown old"
-        )
+    raise too_busy(
+        "tell IMU readings that were left out, as they read like the one before, from readings "
+        "that had grown old"
     )
 
 
@@ -92,7 +90,7 @@ def _left_out(rig: SensorRig, sensor: Sensor, series: str) -> Failed:
         len(ends.numbers(series)) for ends in (path.sent, path.published, path.handed)
     )
     return Failed(
-        expected=f"{sensor.name} readings are acted on even if they read like the one before: a "
+        expected=f"{sensor} readings are acted on even if they read like the one before: a "
         "robot that stands still has many of them.",
         actual=f"{sent} came in that differ in nothing but their stamps. The driver published "
         f"{published} of them on {sensor.topic}, and the consumer handed on "

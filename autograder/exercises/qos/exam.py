@@ -14,8 +14,17 @@ from autograder.exercises.qos.equal_readings import (
     require_same_again,
 )
 from autograder.exercises.qos.radio_gap import LOST, lose_readings, require_heard
-from autograder.exercises.qos.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Sensor
-from autograder.exercises.qos.sensor_paths import CONSUMERS, DRIVERS, SensorRig, sensor_rig
+from autograder.exercises.qos.readings import (
+    CAMERA,
+    CONSUMERS,
+    DRIVERS,
+    IMU,
+    LIDAR,
+    SENSORS,
+    STOP,
+    Sensor,
+    SensorRig,
+)
 from autograder.exercises.qos.single_readings import require_published_at_once, require_unaltered
 from autograder.exercises.qos.slow_consumer import (
     BURST,
@@ -31,9 +40,10 @@ from autograder.exercises.qos.stop_events import (
 from autograder.observe import Topic
 from autograder.observe.endpoint_qos import describe_missing, is_reliable
 from autograder.observe.late_joiner import hear_past
+from autograder.observe.relays.observed_relays import relays_of
 from autograder.observe.sequence_faults import describe_fault, faulty_numbers
 
-EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
+EXAM: Exam[SensorRig] = Exam("qos", relays_of(SENSORS, consumer=CONSUMERS))
 
 OPEN_SCANS = range(1, 20, 2)
 """Scans with beams that have no echo, which are sent until the consumer hands one on."""
@@ -62,7 +72,7 @@ def nodes_start(rig: SensorRig) -> None:
     rig.have_stand_ins()
     rig.start_node(CONSUMERS)
     publishes = [Topic(name, s.type) for s in SENSORS for name in (s.topic, s.output)]
-    subscribes = [Topic(name, s.type) for s in SENSORS for name in (s.hardware, s.topic)]
+    subscribes = [Topic(name, s.type) for s in SENSORS for name in (s.source, s.topic)]
     missing: list[str] = []
 
     def are_there() -> bool:
@@ -89,7 +99,7 @@ def readings_flow(rig: SensorRig) -> None:
     Two incompatible profiles never connect, and nothing fails aloud: the robot is simply blind.
     """
     for path in rig.paths.values():
-        path.listen_to_consumer()
+        path.listen_to_output()
     heard = {sensor: path.handed for sensor, path in rig.paths.items()}
     silent = rig.probe(heard, give_up=lambda sensor: rig.paths[sensor].find_ends().refusals)
     if silent:
@@ -106,8 +116,7 @@ def readings_flow(rig: SensorRig) -> None:
         if sensor.output in path.blank:
             raise Failed(
                 expected="The consumers hand on what they act on, not only its header.",
-                actual=f"The {sensor.name} readings on {sensor.output} have a header and nothing "
-                "else.",
+                actual=f"The {sensor} readings on {sensor.output} have a header and nothing else.",
             )
 
 
@@ -119,7 +128,7 @@ def _describe_silence(rig: SensorRig, sensor: Sensor) -> str:
     changed = "{} carries messages, but not what {}: their content was changed."
     if not len(path.published):
         if sensor.topic in path.foreign:
-            return changed.format(sensor.topic, f"{sensor.hardware} delivered")
+            return changed.format(sensor.topic, f"{sensor.source} delivered")
         return f"Nothing of {sensor.name} is published on {sensor.topic}."
     if sensor.output in path.foreign:
         return changed.format(sensor.output, f"{sensor.topic} carried")
@@ -320,7 +329,7 @@ def late_joiner(rig: SensorRig) -> None:
     topics = [Topic(s.topic, s.type, value=rig.paths[s].find_mark) for s in sensors]
     for sensor, past in zip(sensors, hear_past(rig, rig.node, DRIVERS, topics), strict=True):
         expected = f"A late reader of {sensor.topic} gets new readings only"
-        old = f"It was handed {sensor.name} readings from before it started"
+        old = f"It was handed {sensor} readings from before it started"
         if past.plain:
             raise Failed(
                 expected=f"{expected}.",

@@ -10,11 +10,10 @@ a queue that holds just these, or not, as the heartbeat comes before or after it
 from __future__ import annotations
 
 from autograder.examination.exam import Failed
-from autograder.exercises.qos.readings import CAMERA, STOP, Sensor
-from autograder.exercises.qos.sensor_paths import SensorRig
-from autograder.observe.arrivals import Arrivals
+from autograder.exercises.qos.readings import CAMERA, STOP, Sensor, SensorRig
 from autograder.observe.endpoint_qos import is_reliable, lossless_profile, undemanding_profile
 from autograder.observe.radio_link import open_radio_link
+from autograder.observe.relays.arrivals import Arrivals
 
 LOST = {STOP: 100, CAMERA: 5}
 """Readings sent while the link is down: as many stop events as the task promises to keep."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import partial
 
 from autograder.examination.exam import Failed
-from autograder.exercises.qos.readings import SENSORS, Sensor
-from autograder.exercises.qos.sensor_paths import SensorRig
-from autograder.observe.relay_latency import RelayLatency, send_one_by_one
+from autograder.exercises.qos.readings import SENSORS, Sensor, SensorRig
+from autograder.observe.relays.relay_latency import RelayLatency, send_one_by_one
 
 AT_ONCE_S = 0.15
 """From the hardware to the topic: the task says 0.1."""
@@ -36,7 +35,7 @@ def require_published_at_once(rig: SensorRig) -> None:
             why = f"{raised}." if raised else ": does the driver wait for the next one?"
             raise Failed(
                 expected=f"{expected}.",
-                actual=f"One more {sensor.name} reading came in, and it was not published on "
+                actual=f"One more {sensor} reading came in, and it was not published on "
                 f"{sensor.topic}{why}",
             )
     for sensor in SENSORS:
@@ -44,7 +43,7 @@ def require_published_at_once(rig: SensorRig) -> None:
             late_s = singles[sensor].late_times_s
             raise Failed(
                 expected=f"{expected}, within 0.1 s.",
-                actual=f"{singles[sensor].counts[1]} {sensor.name} readings came in one by one, "
+                actual=f"{singles[sensor].counts[1]} {sensor} readings came in one by one, "
                 f"and {len(late_s)} of them were published on {sensor.topic} {min(late_s):.2f} s "
                 "later or more: what does the driver wait for?",
             )
@@ -57,7 +56,7 @@ def require_each_published(rig: SensorRig, sensor: Sensor) -> None:
     if single.is_thinned:
         came, went = single.counts
         raise Failed(
-            expected=f"The driver publishes each {sensor.name} reading as it comes in.",
+            expected=f"The driver publishes each {sensor} reading as it comes in.",
             actual=f"Of {came} that came in, {went} went over {sensor.topic}{rig.error_note()}.",
         )
 
@@ -67,6 +66,6 @@ def require_unaltered(rig: SensorRig, sensor: Sensor) -> None:
     if sensor.topic in rig.paths[sensor].altered:
         raise Failed(
             expected="The drivers publish each reading with its content unchanged.",
-            actual=f"The {sensor.name} readings on {sensor.topic} are not what {sensor.hardware} "
+            actual=f"The {sensor} readings on {sensor.topic} are not what {sensor.source} "
             "delivered: something in the message was changed or left out.",
         )

@@ -7,13 +7,12 @@ from rclpy.qos import QoSProfile
 
 from autograder.examination.exam import Failed
 from autograder.exercises.qos.equal_readings import PRESSES
-from autograder.exercises.qos.readings import STOP
-from autograder.exercises.qos.sensor_paths import DRIVERS, SensorRig
+from autograder.exercises.qos.readings import DRIVERS, STOP, SensorRig
 from autograder.exercises.qos.slow_consumer import require_backlog
-from autograder.observe.arrivals import Arrivals
 from autograder.observe.endpoint_qos import lossless_profile, undemanding_profile
-from autograder.observe.message_stream import LAG_S
 from autograder.observe.patience import SETTLE_S
+from autograder.observe.relays.arrivals import Arrivals
+from autograder.observe.relays.message_stream import LAG_S
 from autograder.observe.sequence_faults import (
     describe_fault,
     faulty_numbers,
@@ -73,10 +72,10 @@ def _require_all_heard(rig: SensorRig, listeners: list[Arrivals]) -> None:
     with rig.keep_busy(DRIVERS):
         for number in range(QUEUED):
             path.send(SERIES, number)
-        path.hardware.wait_for_all_acked(Duration(seconds=SETTLE_S))
-    rig.wait_for_driver(STOP, SERIES, QUEUED - 1, LAG_S)
+        path.source.wait_for_all_acked(Duration(seconds=SETTLE_S))
+    rig.wait_for_relay(STOP, SERIES, QUEUED - 1, LAG_S)
     path.send(SERIES, QUEUED)
-    if rig.wait_for_driver(STOP, SERIES, QUEUED):  # else there is nothing left to wait for
+    if rig.wait_for_relay(STOP, SERIES, QUEUED):  # else there is nothing left to wait for
         rig.wait(lambda: all(len(heard.numbers(SERIES)) >= EVENTS for heard in listeners))
     published = {n for heard in (path.published, *listeners) for n in heard.numbers(SERIES)}
     for heard in listeners:
@@ -146,6 +145,6 @@ def require_only_events(rig: SensorRig, topic: str) -> None:
     if topic in rig.paths[STOP].foreign:
         raise Failed(
             expected=f"Nothing but stop events comes on {topic}.",
-            actual=f"Messages came that {STOP.hardware} did not deliver. Whoever hears one takes "
+            actual=f"Messages came that {STOP.source} did not deliver. Whoever hears one takes "
             "it for a press of the button.",
         )
