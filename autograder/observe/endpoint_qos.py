@@ -12,7 +12,9 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from autograder.examination.exam import Failed
 from autograder.observe.nouns import Topic
+from autograder.observe.observed_process import ObservedProcess
 from autograder.observe.participants import of_others
 from autograder.observe.qos_refusal import Refusal, find_refusal
 
@@ -129,3 +131,22 @@ def _describe_ends(what: str, topic: Topic, ends: Sequence[TopicEndpointInfo]) -
     if wanted not in types:
         return [f"The {what} {topic.name} has type {', '.join(sorted(types))}, not {wanted}."]
     return []
+
+
+def require_endpoints(
+    process: ObservedProcess, node: Node, *, publishes: Iterable[Topic], subscribes: Iterable[Topic]
+) -> None:
+    """Require that the student's nodes have endpoints on these topics, of their types.
+
+    Raises:
+        Failed: one is missing, or has another type.
+    """
+    missing: list[str] = []
+
+    def are_there() -> bool:
+        missing[:] = describe_missing(node, publishes=publishes, subscribes=subscribes)
+        return not any(line.startswith("There is no") for line in missing)
+
+    process.wait(are_there)
+    if missing:
+        raise Failed(expected="Every topic of the task has its endpoint.", actual=" ".join(missing))

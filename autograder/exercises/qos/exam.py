@@ -38,7 +38,7 @@ from autograder.exercises.qos.stop_events import (
     require_only_events,
 )
 from autograder.observe import Topic
-from autograder.observe.endpoint_qos import describe_missing, is_reliable
+from autograder.observe.endpoint_qos import is_reliable, require_endpoints
 from autograder.observe.late_joiner import hear_past
 from autograder.observe.relays.observed_relays import relays_of
 from autograder.observe.sequence_faults import describe_fault, faulty_numbers
@@ -73,15 +73,7 @@ def nodes_start(rig: SensorRig) -> None:
     rig.start_node(CONSUMERS)
     publishes = [Topic(name, s.type) for s in SENSORS for name in (s.topic, s.output)]
     subscribes = [Topic(name, s.type) for s in SENSORS for name in (s.source, s.topic)]
-    missing: list[str] = []
-
-    def are_there() -> bool:
-        missing[:] = describe_missing(rig.node, publishes=publishes, subscribes=subscribes)
-        return not any(line.startswith("There is no") for line in missing)
-
-    rig.wait(are_there)
-    if missing:
-        raise Failed(expected="Every topic of the task has its endpoint.", actual=" ".join(missing))
+    require_endpoints(rig, rig.node, publishes=publishes, subscribes=subscribes)
 
 
 @EXAM.check(
@@ -98,18 +90,7 @@ def readings_flow(rig: SensorRig) -> None:
 
     Two incompatible profiles never connect, and nothing fails aloud: the robot is simply blind.
     """
-    for path in rig.paths.values():
-        path.listen_to_output()
-    heard = {sensor: path.handed for sensor, path in rig.paths.items()}
-    silent = rig.probe(heard, give_up=lambda sensor: rig.paths[sensor].find_ends().refusals)
-    if silent:
-        refused_first = sorted(silent, key=lambda s: not rig.paths[s].find_ends().refusals)
-        told = " ".join(_describe_silence(rig, sensor) for sensor in refused_first)
-        raise Failed(
-            expected="Each of the four sensors' readings comes out at the consumer.",
-            actual=f"{told.removesuffix('.')}{rig.error_note()}.",
-        )
-    rig.probe_stand_ins()
+    rig.require_flow("Each of the four sensors' readings comes out at the consumer.")
     require_published_at_once(rig)
     for sensor, path in rig.paths.items():
         require_unaltered(rig, sensor)
@@ -118,21 +99,6 @@ def readings_flow(rig: SensorRig) -> None:
                 expected="The consumers hand on what they act on, not only its header.",
                 actual=f"The {sensor} readings on {sensor.output} have a header and nothing else.",
             )
-
-
-def _describe_silence(rig: SensorRig, sensor: Sensor) -> str:
-    path = rig.paths[sensor]
-    if refusals := path.find_ends().refusals:
-        why = refusals[0].as_sentence("your publisher", "your subscription", sensor.topic)
-        return f"Nothing of {sensor.name} arrives: {why}"
-    changed = "{} carries messages, but not what {}: their content was changed."
-    if not len(path.published):
-        if sensor.topic in path.foreign:
-            return changed.format(sensor.topic, f"{sensor.source} delivered")
-        return f"Nothing of {sensor.name} is published on {sensor.topic}."
-    if sensor.output in path.foreign:
-        return changed.format(sensor.output, f"{sensor.topic} carried")
-    return f"{sensor.topic} carries readings, but none comes out on {sensor.output}."
 
 
 @EXAM.check(

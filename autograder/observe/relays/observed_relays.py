@@ -9,6 +9,7 @@ from itertools import count
 from typing import Any, Generic, TypeVar
 
 from autograder.examination.check_context import CheckContext
+from autograder.examination.exam import Failed
 from autograder.observe.observed_process import ObservedProcess
 from autograder.observe.quiet_node import QuietNode
 from autograder.observe.relays.arrivals import Arrivals
@@ -77,12 +78,25 @@ class ObservedRelays(ObservedProcess, Generic[KindT]):
             for path in paths:
                 path.renew_stand_in()
 
-    def probe_stand_ins(self) -> None:
-        """See the consumer hear the stand-ins, which offer what the student's nodes do by now."""
-        self.have_stand_ins()
+    def require_flow(self, expected: str) -> None:
+        """Require that messages of each kind come out, and begin to listen for them.
+
+        Raises:
+            Failed: some do not.
+        """
+        for path in self.paths.values():
+            path.listen_to_output()
+        heard = {kind: path.handed for kind, path in self.paths.items()}
+        silent = self.probe(heard, give_up=lambda kind: self.paths[kind].find_ends().refusals)
+        if silent:
+            refused_first = sorted(silent, key=lambda k: not self.paths[k].find_ends().refusals)
+            told = " ".join(self.paths[kind].describe_silence() for kind in refused_first)
+            actual = f"{told.removesuffix('.')}{self.error_note()}."
+            raise Failed(expected=expected, actual=actual)
+        self.have_stand_ins()  # which offer what the student's nodes do by now
         if self.can_hold:
             with self._standing_in():
-                self.probe({kind: path.handed for kind, path in self.paths.items()})
+                self.probe(heard)
 
     def probe(
         self, heard: Mapping[KindT, Arrivals], give_up: Callable[[KindT], Any] = lambda _: False

@@ -75,6 +75,21 @@ class RelayPath:
         self.sent.note(series, number, now_ns, now_ns)
         self._entry.publish(message)
 
+    def describe_silence(self) -> str:
+        """Return in a sentence why nothing comes out at the output."""
+        topic, output = self._messages.topic, self._messages.output
+        if refusals := self.find_ends().refusals:
+            why = refusals[0].as_sentence("your publisher", "your subscription", topic)
+            return f"Nothing of {self._messages} arrives: {why}"
+        changed = "{} carries messages, but not what {}: their content was changed."
+        if not len(self.published):
+            if topic in self.foreign:
+                return changed.format(topic, f"{self._messages.source} delivered")
+            return f"Nothing of {self._messages} is published on {topic}."
+        if output in self.foreign:
+            return changed.format(output, f"{topic} carried")
+        return f"{topic} carries {self._messages.noun}s, but none comes out on {output}."
+
     def _mark_of(self, series: str, number: int) -> Mark:
         if (series, number) not in self._marks:
             mark = Mark.draw(self._run)
