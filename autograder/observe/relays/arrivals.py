@@ -58,7 +58,10 @@ class Arrivals:
 
     def first_times(self, series: str) -> dict[int, int]:
         """Return when each message of a series was first published: {number: ns since 1970}."""
-        return {a.number: a.published_ns for a in reversed(self.of(series))}
+        times: dict[int, int] = {}
+        for arrival in self.of(series):
+            times.setdefault(arrival.number, arrival.published_ns)
+        return times
 
     def count_repeated(self, but: Collection[str] = ()) -> int:
         """Return how many messages arrived more than once, in all series ``but`` these."""
