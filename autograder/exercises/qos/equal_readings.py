@@ -8,51 +8,46 @@ from __future__ import annotations
 
 import time
 
-from autograder.examination.exam import Failed, NotExaminable
-from autograder.exercises.qos.readings import IMU, STOP, Sensor
-from autograder.exercises.qos.rig import PRESSES, SensorRig
-from autograder.exercises.qos.sensor_examiner import LAG
-from autograder.exercises.qos.slow_reader import TRIES, YOUNG
+from autograder.examination.exam import Failed
+from autograder.exercises.qos.readings import IMU, STOP, Sensor, SensorRig
+from autograder.exercises.qos.slow_consumer import YOUNG_S
+from autograder.observe.relays.slow_reader import TRIES, too_busy
 
+PRESSES = "presses"
+"""The series of the stop events that bear the words of earlier ones."""
 WORDS = (0, 1, 0, 0, 1)
 """Events that bear the same words again: pressed, released, pressed, pressed (at another button),
 released."""
-SAME = 3  # IMU readings that read alike, of which each counts
-BATCH = 20  # others that come after them: a consumer may take readings so many at a time
-MOST = 20  # scans or frames that read alike, until two have been handed on
-_PHASE = "alike"
+SAME, BATCH = 3, 20
+"""IMU readings that read alike, of which each counts, and others that come after them."""
+MOST = 20
+"""Scans or frames that read alike, until two have been handed on."""
+ALIKE = "alike"
+"""The series of readings that read alike."""
 
 
-def require_told_apart(rig: SensorRig) -> None:
+def require_each_press(rig: SensorRig) -> None:
     """Fail unless the consumer also hands on events that bear the words of earlier ones."""
-    for sent, number in enumerate(WORDS, 1):
-        rig.node.publish(STOP, PRESSES, number)
-        # Of stop events only one is ever on its way into a driver.
-        rig.wait(lambda n=sent: len(rig.witnessed_indices(STOP, PRESSES)) >= n, LAG)  # type: ignore[misc]
-    rig.wait(lambda: len(rig.consumed_indices(STOP, PRESSES)) >= len(WORDS))
-    if (got := rig.consumed_indices(STOP, PRESSES)) != list(WORDS):
+    path = rig.paths[STOP]
+    for number in WORDS:
+        rig.send_alone(STOP, PRESSES, number)
+    rig.wait(lambda: len(path.handed.numbers(PRESSES)) >= len(WORDS))
+    if (got := path.handed.numbers(PRESSES)) != list(WORDS):
         raise Failed(
             expected="A stop event is handled even if it bears the words of an earlier one, be it "
             "the one right before: one press of a button reads like another.",
             actual=f"{len(WORDS)} events came in, which read as pressed, released, pressed, "
             "pressed (at another button), released do. The driver published "
-            f"{len(rig.witnessed_indices(STOP, PRESSES))} of them, and your consumer handed on "
+            f"{len(path.published.numbers(PRESSES))} of them, and your consumer handed on "
             f"{len(got)}{rig.error_note()}.",
         )
 
 
 def require_same_again(rig: SensorRig, sensor: Sensor) -> None:
     """Fail unless a consumer that acts on the newest acts on one that reads like the last, too."""
-
-    def again() -> bool:
-        return len(rig.consumed_indices(sensor, _PHASE)) > 1
-
-    for _ in range(MOST):
-        rig.node.publish(sensor, _PHASE, 0)
-        if rig.wait(again, 1 / sensor.rate):
-            return
-    if not rig.wait(again):
-        raise _left_out(rig, sensor, 0, MOST)
+    handed = rig.paths[sensor].handed
+    if not rig.send_until(lambda: len(handed.numbers(ALIKE)) > 1, sensor, ALIKE, [0] * MOST):
+        raise _left_out(rig, sensor, ALIKE)
 
 
 def require_each_of_the_same(rig: SensorRig) -> None:
@@ -60,41 +55,42 @@ def require_each_of_the_same(rig: SensorRig) -> None:
 
     Tried again if the machine took so long that a design may rightly have found them too old.
     """
-    for number in range(TRIES):
-        began = time.time_ns()
-        for _ in range(SAME):
-            rig.node.publish(IMU, _PHASE, number)
-        rig.wait(lambda n=number: rig.witnessed_indices(IMU, _PHASE).count(n) >= SAME)  # type: ignore[misc]
-        rig.wait_for_rest()
-        aged = time.time_ns() - began > YOUNG * 1e9
-        if _all_out(rig, number):
+    for attempt in range(TRIES):
+        if _are_all_handed_on(rig, f"{ALIKE} {attempt}"):
             return
-        if not aged or rig.witnessed_indices(IMU, _PHASE).count(number) < SAME:
-            raise _left_out(rig, IMU, number, SAME)
-    raise NotExaminable(
-        "This machine was too busy to tell IMU readings that were left out, as they read like the "
-        "one before, from readings that had grown old. After a hand-in a person looks at it."
+    raise too_busy(
+        "tell IMU readings that were left out, as they read like the one before, from readings "
+        "that had grown old"
     )
 
 
-def _all_out(rig: SensorRig, number: int) -> bool:
-    """Return whether all that read alike come out; who takes readings in batches is given more."""
+def _are_all_handed_on(rig: SensorRig, series: str) -> bool:
+    """Return whether all came out, False if they may have been too old; fail if they were not.
 
-    def out() -> bool:
-        return rig.consumed_indices(IMU, _PHASE).count(number) >= SAME
+    A consumer may take readings so many at a time: so others come after them.
+    """
+    path = rig.paths[IMU]
+    began = time.monotonic()
+    for _ in range(SAME):
+        path.send(series, 0)
+    rig.wait(lambda: len(path.published.numbers(series)) >= SAME)
+    rig.wait_for_rest()
+    is_aged = time.monotonic() - began > YOUNG_S
+    later = f"{series}, later"
+    if rig.send_until(lambda: len(path.handed.numbers(series)) >= SAME, IMU, later, range(BATCH)):
+        return True
+    if is_aged and len(path.published.numbers(series)) >= SAME:
+        return False
+    raise _left_out(rig, IMU, series)
 
-    for later in range(BATCH):
-        if rig.wait(out, 1 / IMU.rate):
-            return True
-        rig.node.publish(IMU, f"{_PHASE}, later", number * BATCH + later)
-    return rig.wait(out)
 
-
-def _left_out(rig: SensorRig, sensor: Sensor, number: int, sent: int) -> Failed:
-    published = rig.witnessed_indices(sensor, _PHASE).count(number)
-    handed = rig.consumed_indices(sensor, _PHASE).count(number)
+def _left_out(rig: SensorRig, sensor: Sensor, series: str) -> Failed:
+    path = rig.paths[sensor]
+    sent, published, handed = (
+        len(ends.numbers(series)) for ends in (path.sent, path.published, path.handed)
+    )
     return Failed(
-        expected=f"{sensor.name} readings are acted on even if they read like the one before: a "
+        expected=f"{sensor} readings are acted on even if they read like the one before: a "
         "robot that stands still has many of them.",
         actual=f"{sent} came in that differ in nothing but their stamps. The driver published "
         f"{published} of them on {sensor.topic}, and the consumer handed on "

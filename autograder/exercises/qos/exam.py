@@ -7,42 +7,48 @@ profile for both sides or two, a transient-local stop.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
-from rclpy.qos import DurabilityPolicy, ReliabilityPolicy
-from rclpy.topic_endpoint_info import TopicEndpointInfo
-
-from autograder.examination.check_context import StudentError
 from autograder.examination.exam import Exam, Failed, NotExaminable
-from autograder.exercises.qos.backlog_checks import (
-    altered_failure,
-    require_burst,
-    require_fresh,
-    require_open_scans,
-    require_whole,
-)
-from autograder.exercises.qos.backlogs import BURST
-from autograder.exercises.qos.driver_latency import each_at_once
 from autograder.exercises.qos.equal_readings import (
     require_each_of_the_same,
+    require_each_press,
     require_same_again,
-    require_told_apart,
 )
-from autograder.exercises.qos.late_joiner import require_no_past
-from autograder.exercises.qos.packet_loss import Aftermath, radio_gap
-from autograder.exercises.qos.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Sensor
-from autograder.exercises.qos.rig import CONSUMERS, DRIVERS, SensorRig, sensor_rig
+from autograder.exercises.qos.radio_gap import LOST, lose_readings, require_heard
+from autograder.exercises.qos.readings import (
+    CAMERA,
+    CONSUMERS,
+    DRIVERS,
+    IMU,
+    LIDAR,
+    SENSORS,
+    STOP,
+    Sensor,
+    SensorRig,
+)
+from autograder.exercises.qos.single_readings import require_published_at_once, require_unaltered
+from autograder.exercises.qos.slow_consumer import (
+    BURST,
+    require_burst,
+    require_fresh,
+    require_none_left_out,
+)
 from autograder.exercises.qos.stop_events import (
-    describe_fault,
-    faulty_numbers,
     require_all_handled,
-    require_all_heard,
-    require_no_repeats,
+    require_heard_by_all,
     require_only_events,
 )
-from autograder.observe.qos_refusal import Refusal, find_refusal
+from autograder.observe import Topic
+from autograder.observe.endpoint_qos import is_reliable, require_endpoints
+from autograder.observe.late_joiner import hear_past
+from autograder.observe.relays.observed_relays import relays_of
+from autograder.observe.sequence_faults import describe_fault, faulty_numbers
 
-EXAM: Exam[SensorRig] = Exam("qos", sensor_rig)
+EXAM: Exam[SensorRig] = Exam("qos", relays_of(SENSORS, consumer=CONSUMERS))
+
+OPEN_SCANS = range(1, 20, 2)
+"""Scans with beams that have no echo, which are sent until the consumer hands one on."""
+PAST = 5
+"""Readings of each sensor before somebody joins late."""
 
 READ_RELIABILITY = "Chapter 5, “QoS profiles: reliability”"
 READ_HISTORY = "Chapter 5, “QoS profiles: history”"
@@ -62,44 +68,12 @@ def nodes_start(rig: SensorRig) -> None:
 
     A robot whose driver does not come up has no eyes: everything else waits for this.
     """
-    for name in (DRIVERS, CONSUMERS):
-        try:
-            rig.subject.start(name)
-        except StudentError as error:
-            raise Failed(
-                expected=f"{name}() makes a node without an error.",
-                actual=error.feedback_text,
-            ) from None
-        if name == DRIVERS:
-            rig.have_stand_ins()
-    faults: list[str] = []
-
-    def all_there() -> bool:
-        faults[:] = _endpoint_faults(rig)
-        return not any(line.startswith("There is no") for line in faults)
-
-    rig.wait(all_there)
-    if faults:
-        raise Failed(expected="Every topic of the task has its endpoint.", actual=" ".join(faults))
-
-
-def _endpoint_faults(rig: SensorRig) -> Iterator[str]:
-    """Yield what is missing, or has another type than the task says, a sentence each."""
-    for sensor in SENSORS:
-        ends = (
-            ("subscription to", f"hardware/{sensor.name}", rig.find_subscriptions),
-            ("publisher on", sensor.topic, rig.find_publishers),
-            ("subscription to", sensor.topic, rig.find_subscriptions),
-            ("publisher on", f"consumer/{sensor.name}", rig.find_publishers),
-        )
-        wanted = f"{sensor.type.__module__.split('.')[0]}/msg/{sensor.type.__name__}"
-        for what, topic, endpoints in ends:
-            types = {endpoint.topic_type for endpoint in endpoints(topic)}
-            if not types:
-                yield f"There is no {what} {topic}."
-            elif wanted not in types:
-                told = ", ".join(sorted(types))
-                yield f"The {what} {topic} has type {told}, not {wanted}."
+    rig.start_node(DRIVERS)
+    rig.have_stand_ins()
+    rig.start_node(CONSUMERS)
+    publishes = [Topic(name, s.type) for s in SENSORS for name in (s.topic, s.output)]
+    subscribes = [Topic(name, s.type) for s in SENSORS for name in (s.source, s.topic)]
+    require_endpoints(rig, rig.node, publishes=publishes, subscribes=subscribes)
 
 
 @EXAM.check(
@@ -116,58 +90,15 @@ def readings_flow(rig: SensorRig) -> None:
 
     Two incompatible profiles never connect, and nothing fails aloud: the robot is simply blind.
     """
-    rig.listen_to_consumers()
-    silent = rig.probe(SENSORS, rig.node.consumed, give_up=lambda s: _qos_refusals(rig, s))
-    if silent:
-        raise Failed(
-            expected="Each of the four sensors' readings comes out at the consumer.",
-            actual=_describe_silence(rig, silent),
-        )
-    rig.probe_stand_ins()
-    rig.run_once(each_at_once)
-    for sensor in SENSORS:
-        if sensor.topic in rig.node.altered:
-            raise altered_failure(sensor)
-        if (target := f"consumer/{sensor.name}") in rig.node.blank:
+    rig.require_flow("Each of the four sensors' readings comes out at the consumer.")
+    require_published_at_once(rig)
+    for sensor, path in rig.paths.items():
+        require_unaltered(rig, sensor)
+        if sensor.output in path.blank:
             raise Failed(
                 expected="The consumers hand on what they act on, not only its header.",
-                actual=f"The {sensor.name} readings on {target} have a header and nothing else.",
+                actual=f"The {sensor} readings on {sensor.output} have a header and nothing else.",
             )
-
-
-def _qos_refusals(rig: SensorRig, sensor: Sensor) -> list[Refusal]:
-    """Return why DDS connects no driver to any consumer; empty if it does, or if there are none."""
-    offers, requests = (
-        [end.qos_profile for end in ends]
-        for ends in (rig.find_publishers(sensor.topic), rig.find_subscriptions(sensor.topic))
-    )
-    found = [find_refusal(offered, requested) for offered in offers for requested in requests]
-    reasons = [reason for reason in found if reason is not None]
-    return reasons if len(reasons) == len(found) else []
-
-
-def _describe_silence(rig: SensorRig, silent: list[Sensor]) -> str:
-    """Return why these are silent. What a callback raised is told once, at the end."""
-    refused_first = sorted(silent, key=lambda sensor: not _qos_refusals(rig, sensor))
-    told = " ".join(_why_silent(rig, sensor) for sensor in refused_first)
-    return f"{told.removesuffix('.')}{rig.error_note()}."
-
-
-def _why_silent(rig: SensorRig, sensor: Sensor) -> str:
-    if reasons := _qos_refusals(rig, sensor):
-        why = reasons[0].as_sentence("your publisher", "your subscription", sensor.topic)
-        return f"Nothing of {sensor.name} arrives: {why}"
-    if not rig.node.witnessed[sensor.name]:
-        if sensor.topic in rig.node.foreign:
-            return _describe_change(sensor.topic, f"hardware/{sensor.name} delivered")
-        return f"Nothing of {sensor.name} is published on {sensor.topic}."
-    if (target := f"consumer/{sensor.name}") in rig.node.foreign:
-        return _describe_change(target, f"{sensor.topic} carried")
-    return f"{sensor.topic} carries readings, but none comes out on {target}."
-
-
-def _describe_change(topic: str, what: str) -> str:
-    return f"{topic} carries messages, but not what {what}: their content was changed."
 
 
 @EXAM.check(
@@ -185,19 +116,16 @@ def camera_best_effort(rig: SensorRig) -> str:
     RELIABLE repairs a loss by sending the old frame again, in order: on Wi-Fi the picture freezes
     and then plays the past. A connection is reliable only if both sides ask for it.
     """
-    offered, requested = rig.find_publishers(CAMERA.topic), rig.find_subscriptions(CAMERA.topic)
-    if any(map(_is_reliable, offered)) and any(map(_is_reliable, requested)):
+    ends = rig.paths[CAMERA].find_ends()
+    is_offered = any(map(is_reliable, ends.publishers))
+    if is_offered and any(map(is_reliable, ends.subscriptions)):
         raise Failed(
             expected="The link from driver to consumer on camera/image is best effort.",
             actual="The driver offers RELIABLE and the consumer requests it, so DDS re-sends.",
         )
-    if any(map(_is_reliable, offered)):
+    if is_offered:
         return "The driver offers RELIABLE, the consumer asks for less: the link is best effort."
     return "The price: a subscriber that insists on RELIABLE now receives no picture."
-
-
-def _is_reliable(endpoint: TopicEndpointInfo) -> bool:
-    return bool(endpoint.qos_profile.reliability == ReliabilityPolicy.RELIABLE)
 
 
 @EXAM.check(
@@ -236,13 +164,25 @@ def lidar_fresh(rig: SensorRig) -> str:
     """
     expected = f"After a pause no scan older than 0.5 s (the last {LIDAR.most}) is acted on."
     require_fresh(rig, LIDAR, expected)
-    require_open_scans(rig)
+    _require_open_scans(rig)
     require_same_again(rig, LIDAR)
     return _describe_practice(rig, LIDAR)
 
 
+def _require_open_scans(rig: SensorRig) -> None:
+    path, series = rig.paths[LIDAR], "open"
+    if not rig.send_until(lambda: path.handed.numbers(series), LIDAR, series, OPEN_SCANS):
+        raise Failed(
+            expected="Scans with beams that have no echo (inf, or nan) are acted on, too: nearly "
+            "every scan has some.",
+            actual=f"Of {len(OPEN_SCANS)} such scans the driver published "
+            f"{len(path.published.first_times(series))}, and the consumer handed on none"
+            f"{rig.error_note()}.",
+        )
+
+
 def _describe_practice(rig: SensorRig, sensor: Sensor) -> str:
-    if all(map(_is_reliable, rig.find_publishers(sensor.topic))):
+    if rig.paths[sensor].find_ends().is_offered_reliably:
         return (
             "RELIABLE is the chapter's answer. Many drivers in the field publish best effort "
             "(SensorDataQoS) instead; both are right here."
@@ -278,7 +218,7 @@ def imu_burst(rig: SensorRig) -> str:
         require_burst(rig, expected)  # what it does lose is seen on a busy machine, too
         raise
     require_burst(rig, expected)
-    require_whole(rig)
+    require_none_left_out(rig)
     require_each_of_the_same(rig)
     return _describe_practice(rig, IMU)
 
@@ -298,12 +238,9 @@ def stop_reaches_all(rig: SensorRig) -> None:
     A safety node asks for RELIABLE, a logger on Wi-Fi perhaps for BEST_EFFORT: neither may miss a
     stop. Only a RELIABLE offer serves both.
     """
-    offers_all = all(map(_is_reliable, rig.find_publishers(STOP.topic)))
-    with rig.node.temporary_listeners():
-        listeners = require_all_heard(rig, give_up=not offers_all)
-        require_no_repeats(rig, listeners)
+    require_heard_by_all(rig)
     require_only_events(rig, STOP.topic)
-    if not any(map(_is_reliable, rig.find_subscriptions(STOP.topic))):
+    if not any(map(is_reliable, rig.paths[STOP].find_ends().subscriptions)):
         raise Failed(
             expected="Your own consumer cannot lose a stop on a bad network either.",
             actual="It requests BEST_EFFORT, so DDS does not repair a lost event for it.",
@@ -324,20 +261,18 @@ def stop_complete(rig: SensorRig) -> str:
 
     Pressed, released, pressed again: whoever sees only the last event does not know what happened.
     """
-    if rig.can_expire(STOP):  # the cause of what may be lost: first
+    ends = rig.paths[STOP].find_ends()
+    if ends.can_expire:  # the cause of what may be lost: first
         raise Failed(
             expected="A stop event waits for a busy consumer as long as it must.",
             actual="A lifespan on emergency/stop throws events away when they get old.",
         )
     require_all_handled(rig)
-    require_told_apart(rig)
-    if STOP.topic not in rig.node.foreign:  # else it only passes on what another check has found
-        require_only_events(rig, f"consumer/{STOP.name}")
-    durable = any(
-        e.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        for e in rig.find_publishers(STOP.topic)
-    )
-    return "TRANSIENT_LOCAL also tells a node that starts late: well thought." if durable else ""
+    require_each_press(rig)
+    if STOP.topic not in rig.paths[STOP].foreign:  # else it only passes on what was found there
+        require_only_events(rig, STOP.output)
+    told = "TRANSIENT_LOCAL also tells a node that starts late: well thought."
+    return told if ends.is_offered_durably else ""
 
 
 @EXAM.check(
@@ -354,15 +289,24 @@ def late_joiner(rig: SensorRig) -> None:
 
     A planner that restarts in mid-drive must not take a scan from before for the present.
     """
-    require_no_past(rig, (CAMERA, LIDAR, IMU))
-
-
-_UNHEARD = "A consumer at the far end of the link heard nothing, not even before the gap."
-
-
-def _after_gap(rig: SensorRig, sensor: Sensor) -> Aftermath:
-    found: dict[str, Aftermath] = rig.run_once(radio_gap)
-    return found[sensor.name]
+    sensors = (CAMERA, LIDAR, IMU)
+    for sensor in sensors:
+        rig.send_burst(sensor, "past", PAST)
+    topics = [Topic(s.topic, s.type, value=rig.paths[s].find_mark) for s in sensors]
+    for sensor, past in zip(sensors, hear_past(rig, rig.node, DRIVERS, topics), strict=True):
+        expected = f"A late reader of {sensor.topic} gets new readings only"
+        old = f"It was handed {sensor} readings from before it started"
+        if past.plain:
+            raise Failed(
+                expected=f"{expected}.",
+                actual=f"{old}, though it did not ask for any: does the driver publish a reading "
+                "again?",
+            )
+        if past.asking:
+            raise Failed(
+                expected=f"{expected}, even if it asks for the past (TRANSIENT_LOCAL).",
+                actual=f"{old}.",
+            )
 
 
 @EXAM.check(
@@ -379,15 +323,13 @@ def stop_repaired(rig: SensorRig) -> None:
 
     RELIABLE alone does not promise it: DDS can send again only what the publisher has kept.
     """
-    found = _after_gap(rig, STOP)
-    got = found.heard
-    if got != list(range(found.count)):
+    expected = "After a gap in the radio link all {} stop events of the gap arrive, in order."
+    count = LOST[STOP]
+    got = require_heard(rig.run_once(lose_readings), STOP, expected.format(count))
+    if got != list(range(count)):
         raise Failed(
-            expected=f"After a gap in the radio link all {found.count} stop events of the gap "
-            "arrive, in order.",
-            actual=_UNHEARD
-            if got is None
-            else f"{describe_fault(got, found.count)}: it got {faulty_numbers(got, found.count)}.",
+            expected=expected.format(count),
+            actual=f"{describe_fault(got, count)}: it got {faulty_numbers(got, count, 'reading')}.",
         )
 
 
@@ -406,15 +348,13 @@ def camera_moves_on(rig: SensorRig) -> None:
     Frames of the past are of no use to who drives by the picture, and they cost the bandwidth that
     the link has just got back.
     """
-    found = _after_gap(rig, CAMERA)
     expected = "After a gap in the radio link the next frame arrives, and none from the gap."
-    if found.heard is None:
-        raise Failed(expected=expected, actual=_UNHEARD)
-    if not found.heard or found.heard[-1] != found.count:
+    got = require_heard(rig.run_once(lose_readings), CAMERA, expected)
+    if got[-1:] != [LOST[CAMERA]]:
         raise Failed(expected=expected, actual="The next frame did not arrive.")
-    if old := [number for number in found.heard if number < found.count - 1]:
-        frames = "A frame that was" if len(old) == 1 else f"{len(old)} frames that were"
-        sent = "was" if len(old) == 1 else "were"
+    if old := len([number for number in got if number < LOST[CAMERA] - 1]):
+        frames = "A frame that was" if old == 1 else f"{old} frames that were"
+        sent = "was" if old == 1 else "were"
         raise Failed(
             expected=expected,
             actual=f"{frames} lost in the gap {sent} sent again before it.",

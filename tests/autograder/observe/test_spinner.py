@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import pytest
 from std_msgs.msg import String
 
-from autograder.exercises.qos.readings import CAMERA, IMU, LIDAR, SENSORS, STOP, Sensor
-from autograder.exercises.qos.sensor_examiner import ExaminerNode, lossless_profile
+from autograder.observe.endpoint_qos import lossless_profile
 from autograder.observe.quiet_node import QuietNode
 from autograder.observe.spinner import MOST_AT_ONCE, Spinner
 from course import Session, WaitTimeout
@@ -73,47 +72,3 @@ def test_its_nodes_end_with_it(session: Session) -> None:
     session.until(
         lambda: "guest" not in [n for n, _ in session.observer.get_node_names_and_namespaces()]
     )
-
-
-@pytest.mark.parametrize("sensor", SENSORS, ids=lambda sensor: sensor.name)
-def test_a_reading_is_known_as_it_went_out_and_altered_if_anything_differs(
-    session: Session, spinner: Spinner, sensor: Sensor
-) -> None:
-    node = ExaminerNode(session.context)
-    spinner.add_node(node)
-    change = False
-
-    def relay(message: object) -> None:
-        if change:
-            _alter(sensor, message)
-        out.publish(message)
-
-    driver = session.run(QuietNode, "driver")
-    out = driver.create_publisher(sensor.type, sensor.topic, lossless_profile())
-    driver.create_subscription(sensor.type, f"hardware/{sensor.name}", relay, lossless_profile())
-    hardware = node.hardware[sensor.name]
-    spinner.until(
-        lambda: hardware.get_subscription_count() and out.get_subscription_count(), 5.0, "a link"
-    )
-    for number in range(5):
-        node.publish(sensor, "as it is", number)
-    spinner.until(lambda: len(node.witnessed[sensor.name]) == 5, 5.0, "five readings")
-    assert [tag.number for tag in node.witnessed[sensor.name]] == list(range(5))
-    assert not node.altered
-    assert not node.foreign
-    change = True
-    node.publish(sensor, "altered", 0)
-    spinner.until(lambda: node.altered | node.foreign, 5.0, "an altered one")
-    assert (node.foreign if sensor is STOP else node.altered) == {sensor.topic}
-
-
-def _alter(sensor: Sensor, message: object) -> None:
-    match message:
-        case String():
-            message.data = "stop"
-        case _ if sensor is CAMERA:
-            message.encoding = "8UC1"  # type: ignore[attr-defined]
-        case _ if sensor is LIDAR:
-            message.range_max = 10.0  # type: ignore[attr-defined]
-        case _ if sensor is IMU:
-            message.orientation_covariance[0] = -1.0  # type: ignore[attr-defined]

@@ -46,7 +46,7 @@ def test_a_change_of_one_exam_runs_nothing_else_again(copy: Path) -> None:
     before = of_all(copy)
     with longer(copy / "autograder/exercises/qos/exam.py"):
         assert {name for name, digest in of_all(copy).items() if before[name] != digest} == {"qos"}
-    for part, more in {"rig.py": b"", "points.toml": b"[late]\nimu_burst = 1"}.items():
+    for part, more in {"readings.py": b"", "points.toml": b"[late]\nimu_burst = 1"}.items():
         with longer(copy / "autograder/exercises/qos" / part, more):
             changed = {name for name, digest in of_all(copy).items() if before[name] != digest}
             assert changed == {"qos"}, part
@@ -82,8 +82,8 @@ def test_an_exam_is_its_own_business(covered: dict[str, set[str]], name: str) ->
 @pytest.mark.parametrize(
     ("module", "concerned"),
     [
-        ("autograder.exercises.qos.rig", {"qos"}),
-        ("autograder.exercises.qos.packet_loss", {"qos"}),
+        ("autograder.exercises.qos.readings", {"qos"}),
+        ("autograder.exercises.qos.radio_gap", {"qos"}),
         ("autograder.exercises.safety.navigator_client", {"safety"}),
         ("autograder.examination.subject.server", set(exercises.exercise_names())),
         ("autograder.sandbox.resource_limits", set(exercises.exercise_names())),

@@ -9,19 +9,14 @@ chance has no part in it.
 
 from __future__ import annotations
 
-from collections import defaultdict
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from rclpy.qos import QoSProfile
-
 from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import NotExaminable
-from autograder.exercises.qos.readings import Heard, Sensor
-from autograder.exercises.qos.sensor_examiner import ExaminerNode
 from autograder.observe.quiet_node import QuietNode
-from autograder.processes.outside.asking import Outside
 from autograder.processes.outside.warden_requests import CannotLoseError
 from course.runtime.core_session import CoreSession
 
@@ -31,24 +26,23 @@ NOT_HERE = (
 )
 
 
-class Radio:
-    """The far end of a radio link."""
+class RadioLink:
+    """A radio link to a node of the examiner's that is far away.
 
-    def __init__(self, near: ExaminerNode, domain_id: int, outside: Outside) -> None:
-        """Bring it up on ``domain_id``; it listens for readings that ``near`` sends."""
-        self._near, self._outside = near, outside
+    Attributes:
+        node: the far one, for subscriptions and publishers.
+    """
+
+    def __init__(self, bench: CheckContext) -> None:
+        """Bring up the far end, in the domain of the examiner's session."""
+        self._outside = bench.outside
         before = _own_ports()
-        self.session = CoreSession(domain_id=domain_id)
-        self._node = self.session.run(QuietNode, f"{near.get_name()}_far")
+        self._session = CoreSession(domain_id=bench.session.domain_id)
+        self.node = self._session.run(QuietNode, f"examiner_{secrets.token_hex(4)}_far")
         # What it shares with the near end is the multicast port, which only announces.
         self._ports = sorted(_own_ports() - before)
         if not self._ports:
             raise RuntimeError("the far end of the radio link has no UDP port of its own")
-        self.heard: Heard = defaultdict(list)
-
-    def listen(self, sensor: Sensor, qos: QoSProfile) -> None:
-        """Subscribe to a sensor's topic."""
-        self._near.listen(sensor, sensor.topic, qos, self.heard, on=self._node)
 
     @contextmanager
     def lose_packets(self) -> Iterator[None]:
@@ -67,21 +61,32 @@ class Radio:
         finally:
             self._outside.ask("deliver")
 
+    def close(self) -> None:
+        """Take the far end down."""
+        self._session.close()
+
 
 @contextmanager
-def open_radio(bench: CheckContext, near: ExaminerNode) -> Iterator[Radio]:
-    """Give a radio link from the subject to a consumer far away.
+def open_radio_link(bench: CheckContext) -> Iterator[RadioLink]:
+    """Give a radio link from the student's nodes to a node of the examiner's far away.
+
+    Example, in a check of an `autograder.observe.observed_process.ObservedProcess`::
+
+        with open_radio_link(process.bench) as link:
+            link.node.create_subscription(String, "emergency/stop", heard.append, reliable)
+            with link.lose_packets():
+                ...  # what is published now reaches the far end only if it is sent again
 
     Raises:
         NotExaminable: the network is not the subject's own: others' packets must not get lost.
     """
     if not bench.outside.own_network:
         raise NotExaminable(NOT_HERE.format(why=""))
-    link = Radio(near, bench.session.domain_id, bench.outside)
+    link = RadioLink(bench)
     try:
         yield link
     finally:
-        link.session.close()
+        link.close()
 
 
 def _own_ports() -> set[int]:
