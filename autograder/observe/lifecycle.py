@@ -5,12 +5,12 @@ Sources: the ROS 2 design article "Managed nodes", and the interfaces of ``lifec
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import GetParameters, SetParameters
-from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.parameter import parameter_value_to_python
 
@@ -190,14 +190,29 @@ class LifecycleManager:
         return reply
 
 
-def find_lifecycle_nodes(node: Node, names: set[str]) -> list[str]:
-    """Return which of the nodes of these full names are lifecycle nodes, as ``node`` sees them.
+def find_lifecycle_node(
+    observer: Observer, node: str, list_nodes: Callable[[], Iterable[str]]
+) -> str:
+    """Wait for a lifecycle node, and return its full name; empty if it is not known which it is.
 
-    Of one that was destroyed rclpy 7.1 leaves the services there until Python collects it: so the
-    names are to be those of nodes that are there.
+    Of one that was destroyed rclpy 7.1 leaves the services there until Python collects it: so it
+    must be a node that is there.
+
+    Args:
+        observer: someone in its network.
+        node: the name that it is expected to have; else it is the only lifecycle node.
+        list_nodes: returns the names of the nodes that are there.
     """
-    services = {name for name, _ in node.get_service_names_and_types()}
-    return [name for name in sorted(names) if f"{name}{CHANGE_STATE}" in services]
+
+    def find() -> list[str]:
+        services = {name for name, _ in observer.node.get_service_names_and_types()}
+        return [name for name in {*list_nodes()} if f"{name}{CHANGE_STATE}" in services]
+
+    observer.wait(lambda: node in find())
+    found = find()
+    if node in found:
+        return node
+    return found[0] if len(found) == 1 else ""
 
 
 def _is_same(present: Any, value: Any) -> bool:

@@ -9,6 +9,7 @@ from autograder.observe.flat_rounds import require_flat
 from autograder.observe.lifecycle import LifecycleManager
 from autograder.observe.node_graph import node_phrase
 from autograder.observe.node_lives import GHOSTS_S, NodeLives
+from autograder.observe.observer import Observer
 from autograder.observe.patience import SETTLE_S
 from autograder.observe.phrases import as_phrase
 
@@ -18,6 +19,8 @@ FOUND_S = 3.0
 """Seconds in which a node in another context is found, as a participant of its own."""
 TIME_STEP_S = 0.1
 """Seconds of simulated time in a step while a node is waited for that ends late."""
+FIRST_ROUNDS = 2
+"""From “configure” to “cleanup”, before those that are measured."""
 UP, DOWN = ("configure", "activate"), ("deactivate", "cleanup")
 
 
@@ -131,3 +134,15 @@ class LifecycleLeaks:
             lives.subject.collect()  # who shuts a helper's context down leaves the rest to Python
             lives.pass_time(lambda: not list_left(), TIME_STEP_S)
         return list_left()
+
+
+def memory_kept(observer: Observer, manager: LifecycleManager, rounds: int) -> int:
+    """Return the KiB of memory that each round through the states keeps, of so many.
+
+    Some rounds are made before that: they may cost what no later ones do.
+    """
+    for number in (FIRST_ROUNDS, rounds):
+        before = observer.process.read_usage()
+        for _ in range(number):
+            manager.make_transitions(*UP, *DOWN)
+    return observer.process.read_usage().growth_since(before).memory // rounds

@@ -10,7 +10,7 @@ import re
 import secrets
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import Any, Self
 
 from rclpy.node import Node
 
@@ -72,6 +72,13 @@ class NodeLives(Observer):
         self.provoked = False
         self._clean = False
         self._leaves_ghosts = False
+
+    def __enter__(self) -> Self:
+        """Give itself to the checks of an exam."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Leave the examiner's node to its session, which takes it down."""
 
     # A life.
 

@@ -211,7 +211,7 @@ class Driver(ObservedCamera):
         before = self.count()
 
         def has_come() -> bool:
-            return any(picture.zoom == factor for picture in self.pictures()[before:])
+            return any(picture.value.zoom == factor for picture in self.pictures()[before:])
 
         for _ in range(TICKS):
             self.rig.advance(STEP_S)
@@ -233,7 +233,7 @@ class Driver(ObservedCamera):
 
     def last_zoom(self) -> int:
         """Return the zoom of the picture that came last."""
-        return self.pictures()[-1].zoom
+        return int(self.pictures()[-1].value.zoom)
 
     # The end of a busy one.
 

@@ -21,6 +21,15 @@ TRIED = 3
 ALONE = "When the driver runs in a program of its own,"
 ENDED = f"{ALONE} which is ended by Ctrl-C,"
 OPEN, ON_GRAPH = "a camera open", "an endpoint on the graph"
+LEFT = {
+    OPEN: ("camera_given_back", "its destroy_node() closes the camera.", "It was still open."),
+    ON_GRAPH: (
+        "endpoints_gone",
+        "nothing of it is on the graph.",
+        "Its publisher or service still was.",
+    ),
+}
+"""What may be left of a driver: the check in which it counts, what is needed, and what was seen."""
 
 
 def require_driver_in_program(rig: CameraRig, check: str) -> None:
@@ -75,19 +84,9 @@ class DriverWatch(CameraProgram):
                 self._stop()
                 return
             self.wait(self.is_on_graph)
-            left = self._end_life()
-            if OPEN in left:
-                self.note_fault(
-                    "camera_given_back",
-                    f"{ENDED} its destroy_node() closes the camera.",
-                    "It was still open.",
-                )
-            if ON_GRAPH in left:
-                self.note_fault(
-                    "endpoints_gone",
-                    f"{ENDED} nothing of it is on the graph.",
-                    "Its publisher or service still was.",
-                )
+            for left in self._end_life():
+                check, expected, actual = LEFT[left]
+                self.note_fault(check, f"{ENDED} {expected}", actual)
             if self.faults:
                 return
             self.note_usage()

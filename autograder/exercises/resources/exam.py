@@ -8,8 +8,7 @@ composition or a context manager behind ``destroy_node()``.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from functools import partial, wraps
+from functools import partial
 
 from autograder.examination.exam import Exam, NotExaminable
 from autograder.exercises.resources.driver import (
@@ -28,19 +27,15 @@ from autograder.exercises.resources.leaks import (
 )
 from autograder.exercises.resources.managed import run_managed
 from autograder.exercises.resources.managed_ctrl_c import require_managed_in_program
-from autograder.exercises.resources.rig import (
-    DRIVER,
-    MANAGED,
-    RATE_HZ,
-    CameraRig,
-    camera_rig,
-    new_device,
-)
+from autograder.exercises.resources.rig import DRIVER, MANAGED, RATE_HZ, CameraRig, new_device
 from autograder.observe.flat_rounds import require_flat_lives
 from autograder.observe.nouns import Parameter
 
-EXAM: Exam[CameraRig] = Exam("resources", camera_rig)
-READ_NODES = "Chapter 5, “Nodes: lifecycle management” and “Nodes: resource management”"
+EXAM: Exam[CameraRig] = Exam(
+    "resources",
+    CameraRig,
+    read="Chapter 5, “Nodes: lifecycle management” and “Nodes: resource management”",
+)
 READ_MANAGED = "ROS 2 design, “Managed nodes”"
 FASTEST_HZ = 30.0
 """The highest rate that is allowed."""
@@ -49,18 +44,6 @@ LIVES, LIFE_KIB = 50, 100
 """Of the driver, and KiB of memory that each may keep."""
 TAKES = 4
 """Of an experiment in which the examiner may come too late."""
-
-
-def once_per_notebook(check: Callable[[CameraRig], None]) -> Callable[[CameraRig], None]:
-    """Run a check that others need once a notebook, not once a part of the exam."""
-
-    @wraps(check)
-    def run(rig: CameraRig) -> None:
-        if check.__name__ not in rig.memory:
-            check(rig)
-            rig.memory[check.__name__] = True
-
-    return run
 
 
 @EXAM.check(
@@ -72,7 +55,6 @@ def once_per_notebook(check: Callable[[CameraRig], None]) -> Callable[[CameraRig
     ),
     read="Chapter 5, “Nodes: the processing units”",
 )
-@once_per_notebook
 def driver_runs(rig: CameraRig) -> None:
     """The driver opens its camera, sends ten pictures a second, zooms, and takes snapshots.
 
@@ -103,9 +85,7 @@ def driver_runs(rig: CameraRig) -> None:
         "If you override destroy_node(), the inherited one is not called by itself.",
         "End your own destroy_node() with super().destroy_node(), whatever happened before.",
     ),
-    read=READ_NODES,
 )
-@once_per_notebook
 def endpoints_gone(rig: CameraRig) -> None:
     """After destroy_node() nothing of the driver is on the graph any more.
 
@@ -127,9 +107,7 @@ def endpoints_gone(rig: CameraRig) -> None:
         "Override destroy_node(): end the thread, call self.camera.close(), then "
         "super().destroy_node().",
     ),
-    read=READ_NODES,
 )
-@once_per_notebook
 def camera_given_back(rig: CameraRig) -> None:
     """After destroy_node() the camera is closed, and the driver can be started again.
 
@@ -153,7 +131,6 @@ def camera_given_back(rig: CameraRig) -> None:
         "Wake your thread in destroy_node() (put an end mark into its queue) and join() it; keep "
         "what belongs to one life in attributes that are set in __init__.",
     ),
-    read=READ_NODES,
 )
 def lives_are_flat(rig: CameraRig) -> None:
     """Over 50 lives the driver's process keeps its threads, files and memory.
@@ -174,7 +151,6 @@ def lives_are_flat(rig: CameraRig) -> None:
         "Look at each line of your destroy_node(): what does it find when it runs again?",
         "Set what you have given back to None, and ask `is not None` before you give it back.",
     ),
-    read=READ_NODES,
 )
 def cleanup_twice(rig: CameraRig) -> None:
     """Calling destroy_node() twice does no harm.
@@ -208,7 +184,6 @@ def cleanup_twice(rig: CameraRig) -> None:
         "Set every attribute that destroy_node() looks at to None first, put the rest of the "
         "constructor into try, and in `except BaseException:` call self.destroy_node() and raise.",
     ),
-    read=READ_NODES,
 )
 def failed_start(rig: CameraRig) -> None:
     """A driver that cannot start says so, and leaves nothing behind.
@@ -244,7 +219,6 @@ def failed_start(rig: CameraRig) -> None:
     ),
     read=READ_MANAGED,
 )
-@once_per_notebook
 def managed_runs(rig: CameraRig) -> None:
     """The managed camera goes through its states, and sends pictures when it is active.
 
@@ -309,7 +283,6 @@ def silent_when_inactive(rig: CameraRig) -> None:
     ),
     read=READ_MANAGED,
 )
-@once_per_notebook
 def managed_gives_back(rig: CameraRig) -> None:
     """After “cleanup” the managed camera holds nothing, and can be configured anew.
 
@@ -439,7 +412,6 @@ def managed_shutdown(rig: CameraRig) -> None:
         "A lock that was acquired and not released stops whoever wants it next, in silence.",
         "Hold locks with `with self.lock:`, which releases them on an exception, too.",
     ),
-    read=READ_NODES,
 )
 def callback_raises(rig: CameraRig) -> None:
     """A zoom that the camera refuses costs that one message, and nothing else.
@@ -469,7 +441,6 @@ def callback_raises(rig: CameraRig) -> None:
         "Do not wait without end in a callback: let the read() itself be what it waits for, or "
         "give the wait a timeout and look whether the driver is ending.",
     ),
-    read=READ_NODES,
 )
 def cleanup_when_busy(rig: CameraRig) -> None:
     """Cleanup while a callback still waits for the camera ends well, and a restart works.

@@ -127,12 +127,12 @@ class ManagedCamera(ObservedCamera):
         asked = self.count_asked()
         self.make_transitions("activate")
         # Pictures of one publisher arrive in order: what was sent earlier is here by then.
-        if not self.see_picture(lambda: self.pictures()[-1].number >= asked):
+        if not self.see_picture(lambda: self.pictures()[-1].value.number >= asked):
             raise Failed(
                 expected="After a second “activate” pictures come again.",
                 actual=f"None came{self.rig.error_note()}.",
             )
-        if old := [p for p in self.pictures() if p.published > inactive and p.number < asked]:
+        if old := [p for p in self.pictures() if p.published > inactive and p.value.number < asked]:
             raise Failed(
                 expected="An inactive node publishes nothing, and one that is active again only "
                 "pictures that its camera has taken since.",

@@ -10,7 +10,8 @@ from autograder.examination.plain_programs import Programs
 from autograder.exercises.resources.camera_examiner import IMAGE
 from autograder.exercises.resources.camera_program import GONE, KEPT_KIB, CameraProgram
 from autograder.exercises.resources.rig import MANAGED, RATE_HZ, CameraRig, new_device
-from autograder.observe.lifecycle import LifecycleManager, find_lifecycle_nodes
+from autograder.observe.lifecycle import LifecycleManager, find_lifecycle_node
+from autograder.observe.lifecycle_leaks import memory_kept
 from autograder.observe.observer import ENDED_S
 from autograder.observe.phrases import as_phrase
 from autograder.observe.process_usage import Usage, list_kept
@@ -22,8 +23,8 @@ USUAL_HZ = 20
 ROUND_HZ = 0.1
 """During the rounds: a timer that goes on while it is inactive does not come to a tick, whose error
 would end the program. That is another check's, and would depend on the machine here."""
-FIRST_ROUNDS, ROUNDS = 2, 5
-"""From “configure” to “cleanup”: some may cost what no later ones do."""
+ROUNDS = 5
+"""From “configure” to “cleanup”, whose memory is measured."""
 ALONE = "When the managed camera runs in a program of its own,"
 ENDED = f"{ALONE} which is ended by Ctrl-C while it is active,"
 WORKS, ENDS = "managed_gives_back", "managed_shutdown"
@@ -73,7 +74,7 @@ class ManagedWatch(CameraProgram):
 
     def _begin_life(self, node: str, *, is_first: bool) -> tuple[str, float]:
         """Have the managed camera activated; return its name and its rate in Hz."""
-        name = self._find_managed(node)
+        name, self.device = self._find_managed(node), new_device()
         manager = LifecycleManager(self, name, MANAGED)
         hz = float(self.rig.draws.whole("a rate by the machine's clock", USUAL_HZ, 15, 25))
         try:
@@ -92,15 +93,8 @@ class ManagedWatch(CameraProgram):
         return name, hz
 
     def _find_managed(self, node: str) -> str:
-        """Return the name of the managed camera: it is known, or that of the one lifecycle node."""
-
-        def find() -> list[str]:
-            return find_lifecycle_nodes(self.node, {*self.find_nodes().values()})
-
-        self.wait(lambda: node in find())
-        there = find()
-        if node in there or len(there) == 1:
-            return node if node in there else there[0]
+        if name := find_lifecycle_node(self, node, lambda: self.find_nodes().values()):
+            return name
         if self.is_gone():
             raise Failed(expected=f"{ALONE} it can be made as well.", actual=GONE)
         raise NotExaminable(
@@ -115,11 +109,7 @@ class ManagedWatch(CameraProgram):
             manager.make_transitions("cleanup")
         else:  # that is another check's
             manager.set_parameters(rate=RATE_HZ)
-        for rounds in (FIRST_ROUNDS, ROUNDS):
-            before = self.process.read_usage()
-            for _ in range(rounds):
-                manager.make_transitions("configure", "activate", "deactivate", "cleanup")
-        kept_kib = self.process.read_usage().growth_since(before).memory // ROUNDS
+        kept_kib = memory_kept(self, manager, ROUNDS)
         if kept_kib >= KEPT_KIB:
             self.note_fault(
                 WORKS,
@@ -160,7 +150,8 @@ class ManagedWatch(CameraProgram):
                 f"{ENDED} its destroy_node() returns, and may be called a second time.",
                 GONE,
             )
-        self._note_left(left)
+        else:
+            self._note_left(left)
 
     def _note_left(self, left: list[str]) -> None:
         if left:

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import secrets
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 from sensor_msgs.msg import Image
 from std_msgs.msg import Int32
@@ -18,13 +17,8 @@ from std_srvs.srv import Trigger
 
 from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import Failed
-from autograder.exercises.resources.camera_examiner import (
-    IMAGE,
-    SNAPSHOT,
-    ZOOM,
-    ExaminerNode,
-    Picture,
-)
+from autograder.exercises.resources.camera_examiner import IMAGE, SNAPSHOT, ZOOM, ExaminerNode
+from autograder.observe.lossless_listener import Published
 from autograder.observe.node_lives import NodeLives
 from autograder.observe.nouns import Service, Topic
 from autograder.observe.observer import ENDED_S
@@ -67,12 +61,6 @@ class CameraRig(NodeLives):
             self.node.settled = time.time_ns()
 
 
-@contextmanager
-def camera_rig(bench: CheckContext) -> Iterator[CameraRig]:
-    """Give a rig; the examiner's session takes its endpoints down at its end."""
-    yield CameraRig(bench)
-
-
 def new_device(kind: str = "front") -> str:
     """Return a device that nobody else uses; ``kind`` is its name's beginning."""
     return f"{kind}-{secrets.token_hex(4)}"
@@ -105,7 +93,7 @@ class ObservedCamera:
         """Whether its stream runs."""
         return bool(self.rig.process.file_positions(f"camera-stream:{self.device}"))
 
-    def pictures(self) -> list[Picture]:
+    def pictures(self) -> list[Published]:
         """Return its pictures that went over the topic, in order of arrival."""
         return self.rig.node.pictures_of(self.device)
 
@@ -129,7 +117,7 @@ class ObservedCamera:
         before = count_unpublished()
 
         def is_newest_here() -> bool:
-            newest = [picture.number for picture in self.pictures()[-1:]]
+            newest = [picture.value.number for picture in self.pictures()[-1:]]
             return newest >= [self.count_asked() - 1] or count_unpublished() - before >= UNPUBLISHED
 
         patience = self.rig.start_patience(ARRIVES_ASLEEP_S, ARRIVES_S)
