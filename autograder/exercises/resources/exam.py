@@ -21,9 +21,10 @@ from autograder.exercises.resources.driver import (
 from autograder.exercises.resources.driver_ctrl_c import require_driver_in_program
 from autograder.exercises.resources.leaks import (
     live_shortly,
-    require_flat_refusals,
+    refuse_zooms,
     require_flat_snapshots,
     require_flat_starts,
+    require_flat_work,
 )
 from autograder.exercises.resources.managed import run_managed
 from autograder.exercises.resources.managed_ctrl_c import require_managed_in_program
@@ -406,7 +407,7 @@ def managed_shutdown(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("endpoints_gone", "camera_given_back"),
+    needs=("driver_runs",),
     hints=(
         "What had your zoom callback already done when camera.zoom(99) raised?",
         "A lock that was acquired and not released stops whoever wants it next, in silence.",
@@ -428,7 +429,9 @@ def callback_raises(rig: CameraRig) -> None:
             driver.require_zoom_kept(zoom, f"After a zoom of {factor}")
         driver.require_zoom(1, "After a zoom of -1", once=True)
         driver.require_rate(RATE_HZ, " after a zoom that was refused", after=driver.refuse_zoom)
-        require_flat_refusals(driver)
+        before = rig.process.read_usage()
+        refuse_zooms(driver)
+    require_flat_work(rig, before, "refused zooms")
 
 
 @EXAM.check(

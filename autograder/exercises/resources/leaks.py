@@ -6,6 +6,7 @@ from autograder.exercises.resources.driver import Driver, attempt_start, start_d
 from autograder.exercises.resources.rig import DRIVER, PERIOD_S, STEP_S, CameraRig, new_device
 from autograder.observe.flat_rounds import require_flat
 from autograder.observe.observer import ENDED_S
+from autograder.observe.process_usage import Usage
 
 PICTURES = 5
 """A life, of 64 KiB: who keeps them is known by their number."""
@@ -49,24 +50,20 @@ def require_flat_snapshots(rig: CameraRig) -> None:
     for _ in range(WORK):
         driver.require_snapshot()
     end_driver(driver)
-    what = "snapshots and the end of the driver"
-    expected = (
-        "What snapshots take is given back by the end of a life: no thread and no file stays."
-    )
-    require_flat(rig, before, WORK, what=what, expected=expected)
+    require_flat_work(rig, before, "snapshots")
 
 
-def require_flat_refusals(driver: Driver) -> None:
-    """Fail if a driver that many zooms were refused leaves anything behind at its end."""
-    rig, before = driver.rig, driver.rig.process.read_usage()
+def refuse_zooms(driver: Driver) -> None:
+    """Send many zooms that the camera refuses; each is taken up before the next one."""
     for _ in range(WORK):
         driver.refuse_zoom()
-        rig.advance(MOMENT_S)
-    rig.stop(DRIVER)
-    driver.require_closed("After destroy_node()")
-    driver.require_gone("After destroy_node()")
-    what = "refused zooms and the end of the driver"
-    expected = "What refused zooms take is given back by the end of a life: no thread and no file."
+        driver.rig.advance(MOMENT_S)
+
+
+def require_flat_work(rig: CameraRig, before: Usage, work: str) -> None:
+    """Fail if a life with much ``work``, now over, has left threads or files behind."""
+    expected = f"What {work} take is given back by the end of a life: no thread and no file stays."
+    what = f"{work} and the end of the driver"
     require_flat(rig, before, WORK, what=what, expected=expected)
 
 
