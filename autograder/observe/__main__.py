@@ -8,12 +8,24 @@ from collections.abc import Iterator
 from typing import Any
 
 from autograder import observe
+from autograder.observe.flat_rounds import require_flat, require_flat_lives
+from autograder.observe.lifecycle import LifecycleManager
+from autograder.observe.lifecycle_leaks import LifecycleLeaks
+from autograder.observe.lossless_listener import LosslessListener
+from autograder.observe.node_graph import NodeGraph
+from autograder.observe.node_lives import NodeLives
 from autograder.observe.observed_node import Change
+from autograder.observe.observer import Observer
+from autograder.observe.process_usage import ObservedProcess
+from autograder.observe.program_observer import ProgramObserver
 from autograder.observe.span import Span
+from autograder.observe.stepped_rate import MessageCounter
 
 DESCRIBED: tuple[Any, ...] = (
     observe.one_node, observe.Topic, observe.Service, observe.Action, observe.Parameter,
     observe.ObservedNode, Span, Change,
+    Observer, NodeLives, NodeGraph, ObservedProcess, require_flat, require_flat_lives,
+    MessageCounter, LosslessListener, LifecycleManager, LifecycleLeaks, ProgramObserver,
 )  # fmt: skip
 
 
@@ -41,6 +53,9 @@ def _section(described: Any, level: int, name: str, *, is_property: bool = False
     yield ""
     yield f"{'#' * level} `{name}{signature}`"
     yield ""
+    if level == 2 and not hasattr(observe, name):
+        yield f"`from {described.__module__} import {name}`"
+        yield ""
     yield "```text"
     yield from (inspect.getdoc(described) or "").splitlines()
     yield "```"
