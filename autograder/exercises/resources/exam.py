@@ -336,7 +336,7 @@ def configure_refused(rig: CameraRig) -> None:
 
 
 @EXAM.check(
-    needs=("managed_gives_back",),
+    needs=("managed_runs",),
     hints=(
         "Which of your methods runs after an exception in on_activate?",
         "on_error. The one that you inherit returns SUCCESS and gives nothing back.",
