@@ -88,7 +88,10 @@ class Observer:
         def is_over() -> bool:
             nonlocal holds
             holds = bool(condition())
-            return holds or self.is_gone()
+            if not holds and self.is_gone():
+                holds = bool(condition())  # its end may be what is waited for
+                return True
+            return holds
 
         if timeout is None:
             patience = self.start_patience(idle)
