@@ -45,6 +45,13 @@ class NodeLives(Observer):
         memory: what checks found that others need.
         provoked: whether callbacks were made to raise in this session: the next life has a new one,
             in which that explains nothing.
+
+    Example::
+
+        with lives.life("Talker") as node:
+            lives.require_endpoints(node)
+            lives.stop("Talker", bare=True)
+            lives.require_gone(node, "After destroy_node()")
     """
 
     def __init__(
@@ -261,14 +268,18 @@ class NodeLives(Observer):
             )
 
     def require_gone(
-        self, node: str, when: str, count: Callable[[], int] = lambda: 0, what: str = "messages"
+        self,
+        node: str,
+        when: str,
+        count: Callable[[], int] | None = None,
+        what: str = "messages",
     ) -> None:
         """Require that no endpoint of a node is on the graph, nor a node that it made.
 
         Args:
             node: its full name.
             when: what has ended it, to begin a sentence with.
-            count: returns how many messages it has sent.
+            count: returns how many messages it has sent, if that is known.
             what: what they are called.
 
         Raises:
@@ -280,9 +291,9 @@ class NodeLives(Observer):
         self.catch_up()  # what was said of an end by then may have been lost, and is said again
         if not (left := self.graph.list_leftovers(node)):
             return
-        before = count()
+        before = count() if count else 0
         self.advance(1.0)
-        sent = count() - before
+        sent = count() - before if count else 0
         more = f" In one more second {sent} {what} came." if sent else ""
         if f"{NODE}{node}" in left:
             more += " Only the inherited destroy_node() takes a node down."

@@ -76,6 +76,11 @@ class MessageCounter:
         count: returns how many have come so far.
         let_arrive: waits for messages that are on their way.
         what: what they are called: "pictures".
+
+    Example::
+
+        counter = MessageCounter(lives, lambda: len(pictures), wait_for_the_last, "pictures")
+        counter.require_rate(10.0, " after a snapshot", after=take_snapshot)
     """
 
     lives: NodeLives
@@ -89,7 +94,7 @@ class MessageCounter:
         when: str = "",
         *,
         seconds: int = 1,
-        after: Callable[[], object] = lambda: None,
+        after: Callable[[], object] | None = None,
     ) -> None:
         """Require a rate by the node's clock, one message after the other.
 
@@ -110,7 +115,8 @@ class MessageCounter:
         for pace in PACES_S:
             if pace < self.lives.memory.get(_SLOWLY, 0.0):
                 continue
-            after()
+            if after is not None:
+                after()
             count = self._count_steps(hz, seconds, pace)
             if count.is_right:
                 self.lives.memory[_SLOWLY] = pace
