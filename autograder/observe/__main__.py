@@ -8,5 +8,68 @@ from collections.abc import Iterator
 from typing import Any
 
 from autograder import observe
-    observe.ObservedNode, Span, Change, observe.in_context, observe.Choices, observe.Question,
-    SteppedObserver, SteppedGoal, MergedSubscription, require_stream, StreamRate, SteppedTrials,
+from autograder.observe.flat_rounds import require_flat, require_flat_lives
+from autograder.observe.lifecycle import LifecycleManager
+from autograder.observe.lifecycle_leaks import LifecycleLeaks
+from autograder.observe.lossless_listener import LosslessListener
+from autograder.observe.node_graph import NodeGraph
+from autograder.observe.node_lives import NodeLives
+from autograder.observe.observed_node import Change
+from autograder.observe.observer import Observer
+from autograder.observe.process_usage import ObservedProcess
+from autograder.observe.program_observer import ProgramObserver
+from autograder.observe.span import Span
+from autograder.observe.stepped_rate import MessageCounter
+
+DESCRIBED: tuple[Any, ...] = (
+    observe.one_node, observe.Topic, observe.Service, observe.Action, observe.Parameter,
+    observe.ObservedNode, Span, Change,
+    Observer, NodeLives, NodeGraph, ObservedProcess, require_flat, require_flat_lives,
+    MessageCounter, LosslessListener, LifecycleManager, LifecycleLeaks, ProgramObserver,
+)  # fmt: skip
+
+
+def reference() -> str:
+    """Return the page in Markdown."""
+    return "\n".join(_lines()).rstrip() + "\n"
+
+
+def _lines() -> Iterator[str]:
+    yield "# What an exam looks and provokes with"
+    yield ""
+    yield "Made by `python -m autograder.observe` from the docstrings; a test keeps it in step."
+    for described in DESCRIBED:
+        yield from _section(described, 2, described.__name__)
+        if inspect.isclass(described):
+            for name, member in vars(described).items():
+                if not name.startswith("_") and inspect.getdoc(member):
+                    function = member.fget if isinstance(member, property) else member
+                    if inspect.isfunction(function) and function.__name__ == name:
+                        yield from _section(function, 3, name, is_property=function is not member)
+
+
+def _section(described: Any, level: int, name: str, *, is_property: bool = False) -> Iterator[str]:
+    signature = "" if is_property or inspect.isclass(described) else _signature(described)
+    yield ""
+    yield f"{'#' * level} `{name}{signature}`"
+    yield ""
+    if level == 2 and not hasattr(observe, name):
+        yield f"`from {described.__module__} import {name}`"
+        yield ""
+    yield "```text"
+    yield from (inspect.getdoc(described) or "").splitlines()
+    yield "```"
+
+
+def _signature(function: Any) -> str:
+    found = inspect.signature(function)
+    kept = [
+        parameter.replace(annotation=inspect.Parameter.empty)
+        for parameter in found.parameters.values()
+        if parameter.name != "self"
+    ]
+    return str(found.replace(parameters=kept, return_annotation=inspect.Signature.empty))
+
+
+if __name__ == "__main__":
+    sys.stdout.write(reference())

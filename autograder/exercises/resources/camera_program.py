@@ -1,73 +1,40 @@
-"""The student's program: makes a camera driver's nodes, and has them destroyed in several ways.
+"""The student's nodes in plain programs that are ended by Ctrl-C: nobody asks them for anything.
 
-What it raises in this is a failure of the check.
+The harness asks a student's process to destroy a node, so that process knows when it is looked at.
+A program that is interrupted is not asked. Nor is it told what time it is: it has the machine's.
+What is seen there counts in the check that sees the same in the student's process.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import suppress
-from typing import Any
+from autograder.examination.plain_programs import Program
+from autograder.exercises.resources.camera_examiner import IMAGE, SNAPSHOT, ExaminerNode
+from autograder.exercises.resources.rig import CameraRig
+from autograder.observe.program_observer import ProgramObserver
 
-from autograder.examination.check_context import REPLY_TIMEOUT_S, StudentError, Subject, SubjectGone
-from autograder.examination.exam import Failed
-from autograder.exercises.resources.camera_graph import CameraGraph
+KEPT_KIB = 1024
+"""KiB that a life, a start or a round may keep: nobody has Python collect what is garbage."""
+GONE = "The program was gone: an exception left it, or an exit."
 
 
-class Program:
-    """One subject, as the place where nodes begin and end."""
+class CameraProgram(ProgramObserver):
+    """A plain program of a node that has a camera, watched life after life."""
 
-    def __init__(self, subject: Subject, graph: CameraGraph) -> None:
-        """Act on ``subject``; ``graph`` is told which nodes are its own."""
-        self._subject = subject
-        self._graph = graph
+    node: ExaminerNode
 
-    def start(self, name: str, *args: Any) -> str:
-        """Make a node; return its fully qualified name."""
-        try:
-            node = self._subject.start(name, *args)
-        except StudentError as error:
-            shown = ", ".join(repr(arg) for arg in args)
-            raise Failed(
-                expected=f"{name}({shown}) makes a node without an error.",
-                actual=error.feedback_text,
-            ) from None
-        self._graph.note_started(node)
-        return node
+    def __init__(self, rig: CameraRig, program: Program, device: str) -> None:
+        """Watch ``program``, in which the camera is ``device``."""
+        super().__init__(program, rig.outside, ExaminerNode)
+        self.rig, self.device = rig, device
 
-    def stop(self, name: str, *, bare: bool = False) -> None:
-        """Have the node taken out of its executor and destroyed.
+    def asked(self, device: str = "") -> list[int]:
+        """Return how often each open camera of the device, or of another, was asked."""
+        return self.process.file_positions(f"camera:{device or self.device}")
 
-        A session tidies up after its ``destroy_node()``; ``bare``: nobody does.
-        """
-        self._run_cleanup(name, lambda: self._subject.stop(name, bare=bare))
+    def count(self) -> int:
+        """Return how many pictures have come."""
+        return len(self.node.pictures_of(self.device))
 
-    def destroy(self, name: str) -> None:
-        """Have ``destroy_node()`` called while the node spins."""
-        self._run_cleanup(name, lambda: self._subject.call(name, "destroy_node"))
-
-    def destroy_again(self, name: str) -> None:
-        """Have ``destroy_node()`` called a second time, which must return as well."""
-        try:
-            self.destroy(name)
-        except SubjectGone as gone:
-            if not self._subject.hangs:
-                raise
-            raise Failed(
-                expected="destroy_node() can be called a second time.",
-                actual=f"The second call did not return within {REPLY_TIMEOUT_S:.0f} s.",
-            ) from gone
-
-    def drop_node(self, name: str) -> None:
-        """Have the session let go of a node that is destroyed; it destroys it once more."""
-        with suppress(StudentError):
-            self._subject.stop(name)
-
-    def _run_cleanup(self, name: str, act: Callable[[], object]) -> None:
-        try:
-            act()
-        except StudentError as error:
-            raise Failed(
-                expected=f"destroy_node() of {name} ends without an error.",
-                actual=error.feedback_text,
-            ) from None
+    def is_on_graph(self) -> bool:
+        """Whether a publisher of pictures or a service for them is on the graph."""
+        return bool(self.node.count_publishers(IMAGE) or self.node.count_services(SNAPSHOT))

@@ -8,105 +8,43 @@ composition or a context manager behind ``destroy_node()``.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from functools import wraps
+from functools import partial
 
-from autograder.examination.exam import Exam, Failed, NotExaminable
-from autograder.exercises.resources.camera_duties import (
-    DRIVER,
-    require_callbacks_ended,
-    require_closed,
-    require_default_device,
-    require_endpoints,
-    require_gone,
-    require_open,
-    require_picture,
-    require_threads_ended,
-)
-from autograder.exercises.resources.camera_rate import (
-    require_own_clock,
-    require_rate,
-    require_tick_zoom,
-)
-from autograder.exercises.resources.camera_requests import (
-    require_no_queue,
-    require_one_picture_each,
-    require_snapshot,
-    require_snapshots_under_way,
-    require_zoom,
-    require_zoom_at_once,
-    require_zoom_kept,
-)
-from autograder.exercises.resources.ctrl_c import (
-    require_closed_at_the_end,
-    require_no_harm_at_the_end,
-    require_nothing_kept_at_the_end,
-    require_off_graph_at_the_end,
-    require_pace,
-)
-from autograder.exercises.resources.leak_test import MEMORY, measure_growth
-from autograder.exercises.resources.leaks import (
+from autograder.examination.exam import Exam, NotExaminable
+from autograder.exercises.resources.driver import (
+    Driver,
     attempt_start,
-    failing_starts,
-    failing_starts_memory,
+    require_default_device,
+    run_driver,
+    start_driver,
+)
+from autograder.exercises.resources.driver_ctrl_c import require_driver_in_program
+from autograder.exercises.resources.leaks import (
+    live_shortly,
     refuse_zooms,
-    require_flat_refusals,
     require_flat_snapshots,
+    require_flat_starts,
+    require_flat_work,
 )
-from autograder.exercises.resources.managed import Managed
-from autograder.exercises.resources.managed_ctrl_c import (
-    require_managed_ended,
-    require_managed_pace,
-)
-from autograder.exercises.resources.managed_holdings import (
-    require_no_helper_finalized,
-    require_no_publisher_yet,
-    require_nothing_held,
-    require_off_graph,
-    require_one_publisher,
-    require_only_pictures,
-)
-from autograder.exercises.resources.managed_inactive import (
-    require_fresh,
-    require_silent_at_once,
-    require_still,
-    require_still_held,
-    require_stopped,
-)
-from autograder.exercises.resources.managed_life import MANAGED
-from autograder.exercises.resources.managed_transitions import (
-    require_configuration,
-    require_flat_rounds,
-    require_no_thread_inactive,
-    require_refusals,
-)
-from autograder.exercises.resources.rig import PERIOD, CameraRig, camera_rig
-from autograder.exercises.resources.unasked_starts import (
-    require_nothing_left_unasked,
-    require_start_raises_unasked,
-)
-from autograder.observe.phrases import as_phrase
+from autograder.exercises.resources.managed import run_managed
+from autograder.exercises.resources.managed_ctrl_c import require_managed_in_program
+from autograder.exercises.resources.rig import DRIVER, MANAGED, RATE_HZ, CameraRig, new_device
+from autograder.observe.flat_rounds import require_flat_lives
+from autograder.observe.nouns import Parameter
 
-EXAM: Exam[CameraRig] = Exam("resources", camera_rig)
-
-FAILING_STARTS = 2
-TAKES = 4  # of an experiment in which the examiner may come too late
-FASTEST = 30.0  # Hz, the highest rate that is allowed
-
-READ_NODES = "Chapter 5, “Nodes: lifecycle management” and “Nodes: resource management”"
+EXAM: Exam[CameraRig] = Exam(
+    "resources",
+    CameraRig,
+    read="Chapter 5, “Nodes: lifecycle management” and “Nodes: resource management”",
+)
 READ_MANAGED = "ROS 2 design, “Managed nodes”"
-
-
-def once_per_notebook(check: Callable[[CameraRig], None]) -> Callable[[CameraRig], None]:
-    """Run a check that others need once a notebook, not once a part of the exam."""
-
-    @wraps(check)
-    def run(rig: CameraRig) -> None:
-        if check.__name__ not in rig.memory:
-            check(rig)
-            rig.memory[check.__name__] = True
-
-    return run
+FASTEST_HZ = 30.0
+"""The highest rate that is allowed."""
+DESTROYED = "After destroy_node()"
+LIVES, LIFE_KIB = 50, 100
+"""Of the driver, and KiB of memory that each may keep."""
+TAKES = 4
+"""Of an experiment in which the examiner may come too late."""
 
 
 @EXAM.check(
@@ -118,35 +56,27 @@ def once_per_notebook(check: Callable[[CameraRig], None]) -> Callable[[CameraRig
     ),
     read="Chapter 5, “Nodes: the processing units”",
 )
-@once_per_notebook
 def driver_runs(rig: CameraRig) -> None:
     """The driver opens its camera, sends ten pictures a second, zooms, and takes snapshots.
 
     Only a node that does its work has something to clean up.
     """
-    device = rig.new_device()
-    with rig.run_life(DRIVER, device) as node:
-        require_open(rig, device)
-        require_endpoints(rig, node)
-        require_picture(rig, device)
-        require_own_clock(rig, device)
-        require_rate(rig, device, 1 / PERIOD)
+    with run_driver(rig) as driver:
+        driver.require_open()
+        driver.require_endpoints()
+        driver.require_picture()
+        driver.require_one_by_one(RATE_HZ)
+        driver.require_rate(RATE_HZ)
         zoom = rig.draws.whole("a zoom", 3, 2, 6)
-        require_zoom(rig, device, zoom, "While the driver runs")
-        require_zoom_kept(rig, device, zoom, f"After a zoom of {zoom}")
-        require_one_picture_each(rig, device, "While the driver runs")
-        require_rate(
-            rig,
-            device,
-            1 / PERIOD,
-            " after a snapshot",
-            after=lambda: require_snapshot(rig, device, "While the driver runs"),
-        )
-        zoom = rig.draws.whole("a higher zoom", 8, 7, 8)
-        require_zoom_at_once(rig, device, zoom, "While the driver runs")
-        require_tick_zoom(rig, device, zoom, f"After a zoom of {zoom}")
-    require_default_device(rig, DRIVER)
-    require_pace(rig)
+        driver.require_zoom(zoom)
+        driver.require_zoom_kept(zoom, f"After a zoom of {zoom}")
+        driver.require_one_picture_each()
+        driver.require_rate(RATE_HZ, " after a snapshot", after=driver.require_snapshot)
+        higher = rig.draws.whole("a higher zoom", 8, 7, 8)
+        driver.require_zoom(higher, once=True)
+        driver.require_tick_zoom(higher)
+    require_default_device(rig)
+    require_driver_in_program(rig, "driver_runs")
 
 
 @EXAM.check(
@@ -156,21 +86,18 @@ def driver_runs(rig: CameraRig) -> None:
         "If you override destroy_node(), the inherited one is not called by itself.",
         "End your own destroy_node() with super().destroy_node(), whatever happened before.",
     ),
-    read=READ_NODES,
 )
-@once_per_notebook
 def endpoints_gone(rig: CameraRig) -> None:
     """After destroy_node() nothing of the driver is on the graph any more.
 
     An endpoint that is left is a ghost: others wait for its answers, or take an old picture for a
     new one.
     """
-    device = rig.new_device()
-    with rig.run_life(DRIVER, device) as node:
-        require_endpoints(rig, node)
-        rig.program.stop(DRIVER, bare=True)
-        require_gone(rig, device, "After destroy_node()", node)
-    require_off_graph_at_the_end(rig)
+    with run_driver(rig) as driver:
+        driver.require_endpoints()
+        rig.stop(DRIVER, bare=True)
+        driver.require_gone(DESTROYED)
+    require_driver_in_program(rig, "endpoints_gone")
 
 
 @EXAM.check(
@@ -181,21 +108,19 @@ def endpoints_gone(rig: CameraRig) -> None:
         "Override destroy_node(): end the thread, call self.camera.close(), then "
         "super().destroy_node().",
     ),
-    read=READ_NODES,
 )
-@once_per_notebook
 def camera_given_back(rig: CameraRig) -> None:
     """After destroy_node() the camera is closed, and the driver can be started again.
 
     A device can be open once. If a driver dies with it open, no restart helps: “device is busy”.
     """
-    device = rig.new_device()
-    for _ in range(2):  # it has been started before: for the check that this one needs
-        with rig.run_life(DRIVER, device):
-            require_picture(rig, device, "When the driver is started again,")
-            rig.program.stop(DRIVER)
-            require_closed(rig, device, "After destroy_node()")
-    require_closed_at_the_end(rig)
+    with run_driver(rig) as driver:
+        driver.require_picture("When the driver is started again,")
+        rig.stop(DRIVER)
+        driver.require_closed(DESTROYED)
+    with rig.life(DRIVER, driver.device):
+        driver.require_picture("When the driver is started again,")
+    require_driver_in_program(rig, "camera_given_back")
 
 
 @EXAM.check(
@@ -207,7 +132,6 @@ def camera_given_back(rig: CameraRig) -> None:
         "Wake your thread in destroy_node() (put an end mark into its queue) and join() it; keep "
         "what belongs to one life in attributes that are set in __init__.",
     ),
-    read=READ_NODES,
 )
 def lives_are_flat(rig: CameraRig) -> None:
     """Over 50 lives the driver's process keeps its threads, files and memory.
@@ -216,16 +140,9 @@ def lives_are_flat(rig: CameraRig) -> None:
     thread or a file cannot be made any more, and it then fails in a node that did nothing wrong.
     """
     with rig.clean_session():
-        grown = measure_growth(rig)
-    if leaked := grown.list_leaks():
-        raise Failed(
-            expected=f"{grown.lives_made} lives leave no thread and no file behind, and less than "
-            f"{MEMORY} KiB a life.",
-            actual=f"Each life of the driver left {as_phrase(leaked)} behind.{rig.process_note()}",
-        )
-    with rig.clean_session():
+        require_flat_lives(rig, partial(live_shortly, rig), LIVES, LIFE_KIB)
         require_flat_snapshots(rig)
-    require_nothing_kept_at_the_end(rig)
+    require_driver_in_program(rig, "lives_are_flat")
 
 
 @EXAM.check(
@@ -235,7 +152,6 @@ def lives_are_flat(rig: CameraRig) -> None:
         "Look at each line of your destroy_node(): what does it find when it runs again?",
         "Set what you have given back to None, and ask `is not None` before you give it back.",
     ),
-    read=READ_NODES,
 )
 def cleanup_twice(rig: CameraRig) -> None:
     """Calling destroy_node() twice does no harm.
@@ -243,21 +159,21 @@ def cleanup_twice(rig: CameraRig) -> None:
     Cleanup is called from several places: an error handler, a signal, the end of the program. The
     one that comes second must not turn an orderly end into a crash.
     """
-    with rig.run_life(DRIVER, device := rig.new_device()):
-        require_picture(rig, device)
+    with run_driver(rig) as driver:
+        driver.require_picture()
     # Sessions and the middleware start threads for a first life, and keep them.
     threads = rig.process.thread_ids()
     # Another camera: nothing says that the first one is closed as soon as destroy_node() is over.
-    with rig.run_life(DRIVER, device := rig.new_device()):
-        require_picture(rig, device)
-        rig.program.destroy(DRIVER)
-        rig.program.destroy_again(DRIVER)
-        require_closed(rig, device, "After destroy_node()")
+    with run_driver(rig) as driver:
+        driver.require_picture()
+        rig.destroy(DRIVER)
+        rig.destroy_again(DRIVER)
+        driver.require_closed(DESTROYED)
         # The program still refers to the node: no thread ends because Python collects it.
-        require_threads_ended(rig, threads, "After destroy_node()")
-    with rig.run_life(DRIVER, device := rig.new_device()):
-        require_picture(rig, device, "When the driver is started again after two cleanups,")
-    require_no_harm_at_the_end(rig)
+        rig.require_threads_ended(threads, DESTROYED)
+    with run_driver(rig) as driver:
+        driver.require_picture("When the driver is started again after two cleanups,")
+    require_driver_in_program(rig, "cleanup_twice")
 
 
 @EXAM.check(
@@ -269,7 +185,6 @@ def cleanup_twice(rig: CameraRig) -> None:
         "Set every attribute that destroy_node() looks at to None first, put the rest of the "
         "constructor into try, and in `except BaseException:` call self.destroy_node() and raise.",
     ),
-    read=READ_NODES,
 )
 def failed_start(rig: CameraRig) -> None:
     """A driver that cannot start says so, and leaves nothing behind.
@@ -279,22 +194,20 @@ def failed_start(rig: CameraRig) -> None:
     """
     with rig.clean_session():
         for kind in ("unplugged", "stuck"):
-            device = rig.new_device(kind)
-            attempt_start(rig, device)
-            require_closed(rig, device, f"After CameraDriver({device!r}) has raised")
-            before = failing_starts(rig, kind, FAILING_STARTS)
+            refused = Driver(rig, "", new_device(kind))
+            attempt_start(rig, refused.device)
+            refused.require_closed(f"After CameraDriver({refused.device!r}) has raised")
+            require_flat_starts(rig, kind)
         # A participant's endpoints are told in order: when those of a driver that works are known,
         # those of the failed starts before it are known, too.
-        device = rig.new_device()
-        node = rig.program.start(DRIVER, device)
-        require_picture(rig, device)
-        require_endpoints(rig, node)
-        attempt_start(rig, device)  # it can be open once
-        rig.program.stop(DRIVER)
-        require_gone(rig, device, "After failed starts, one that worked, and its end,", node)
-        failing_starts_memory(rig, kind, FAILING_STARTS, before)
-    require_start_raises_unasked(rig)
-    require_nothing_left_unasked(rig)
+        driver = start_driver(rig)
+        driver.require_picture()
+        driver.require_endpoints()
+        attempt_start(rig, driver.device)  # it can be open once
+        rig.stop(DRIVER)
+        driver.require_gone("After failed starts, one that worked, and its end,")
+        require_flat_starts(rig, "stuck", memory=True)
+    require_driver_in_program(rig, "failed_start")
 
 
 @EXAM.check(
@@ -307,25 +220,21 @@ def failed_start(rig: CameraRig) -> None:
     ),
     read=READ_MANAGED,
 )
-@once_per_notebook
 def managed_runs(rig: CameraRig) -> None:
     """The managed camera goes through its states, and sends pictures when it is active.
 
     A supervisor brings a robot up in step: all devices are opened and found in order before the
     first one moves.
     """
-    device = rig.new_device()
-    with rig.run_life(MANAGED) as name:
-        node = Managed(rig, name)
-        node.require_parameters(device=device)
-        node.make_transitions("configure")
-        require_open(rig, device)
-        node.make_transitions("activate")
-        require_picture(rig, device)
-        require_only_pictures(rig)
-        require_own_clock(rig, device)
-        require_rate(rig, device, 10)
-        node.make_transitions("deactivate", "cleanup")
+    with run_managed(rig) as camera:
+        camera.configure()
+        camera.require_open()
+        camera.make_transitions("activate")
+        camera.require_picture()
+        camera.require_only_pictures()
+        camera.require_one_by_one(RATE_HZ)
+        camera.require_rate(RATE_HZ)
+        camera.make_transitions("deactivate", "cleanup")
 
 
 @EXAM.check(
@@ -345,31 +254,24 @@ def silent_when_inactive(rig: CameraRig) -> None:
     “Inactive” is a promise: the supervisor may now move the camera's arm, or give the bandwidth to
     somebody else.
     """
-    device = rig.new_device()
-    with rig.run_life(MANAGED) as name:
-        node = Managed(rig, name)
-        node.require_parameters(device=device)
+    with run_managed(rig) as camera:
         strange = rig.node.count_strange()
-        node.make_transitions("configure")
-        require_still(rig, device, "configure")
-        node.make_transitions("activate")
-        require_picture(rig, device)
-        node.make_transitions("deactivate")
+        camera.configure()
+        camera.require_still("configure")
+        camera.make_transitions("activate")
+        camera.require_picture()
+        camera.make_transitions("deactivate")
         inactive = time.time_ns()
         rig.settle_messages()
-        require_still(rig, device, "deactivate")
-        require_still_held(rig, device)
-        asked = max(rig.open_cameras(device), default=0)
-        node.make_transitions("activate")
-        require_fresh(rig, device, inactive, asked, strange)
-        require_rate(rig, device, 10, " after a second “activate”")
-        node.make_transitions("deactivate")
-        require_stopped(rig, device, "deactivate")
-        node.make_transitions("cleanup")
-        slow = rig.new_device("slow")
-        node.require_parameters(device=slow)
-        node.make_transitions("configure")
-        require_silent_at_once(rig, node, slow)
+        camera.require_still("deactivate")
+        camera.require_still_held()
+        camera.require_only_new(inactive, strange)
+        camera.require_rate(RATE_HZ, " after a second “activate”")
+        camera.make_transitions("deactivate")
+        camera.require_still("deactivate")
+        camera.make_transitions("cleanup")
+        camera.configure("slow")
+        camera.require_silent_at_once()
 
 
 @EXAM.check(
@@ -382,24 +284,24 @@ def silent_when_inactive(rig: CameraRig) -> None:
     ),
     read=READ_MANAGED,
 )
-@once_per_notebook
 def managed_gives_back(rig: CameraRig) -> None:
     """After “cleanup” the managed camera holds nothing, and can be configured anew.
 
     This is how a driver gets new parameters without ending its process: what it still held from
     its first configuration would be in the way of the second.
     """
-    with rig.run_life(MANAGED) as name:
-        node = Managed(rig, name)
-        require_no_publisher_yet(rig)
-        node.require_defaults()
-        require_configuration(rig, node, 10.0, later=float(rig.draws.whole("later", 20, 15, 25)))
-        slow = rig.draws.whole("a slow rate", 1, 1, 4) + 0.5  # Hz, and neither 1 nor 2
-        for rate in rig.draws.shuffled("rates", (FASTEST, slow)):
-            require_configuration(rig, node, rate, seconds=1 if rate == FASTEST else 6)
-        require_flat_rounds(rig, node)
-        require_no_thread_inactive(rig, node)
-    require_managed_pace(rig, name)
+    with run_managed(rig) as camera:
+        rig.catch_up()
+        camera.require_publishers(0, "Before the first “configure”")
+        camera.manager.require_defaults(Parameter("device", "front"), Parameter("rate", RATE_HZ))
+        camera.require_round(RATE_HZ, later_hz=float(rig.draws.whole("later", 20, 15, 25)))
+        slow_hz = rig.draws.whole("a slow rate", 1, 1, 4) + 0.5  # neither 1 nor 2
+        for hz in rig.draws.shuffled("rates", (FASTEST_HZ, slow_hz)):
+            camera.require_round(hz, seconds=1 if hz == FASTEST_HZ else 6)
+        camera.set_camera(rate=RATE_HZ)
+        camera.leaks.require_flat_rounds(10, kib_each=1024)
+        camera.leaks.require_threads_ended_when_inactive()
+    require_managed_in_program(rig, "managed_gives_back", camera.node)
 
 
 @EXAM.check(
@@ -418,24 +320,23 @@ def configure_refused(rig: CameraRig) -> None:
     A wrong parameter file must be found before the robot drives. A node that takes it as it is, or
     that is stuck half way, is found out when the first picture is missing.
     """
-    with rig.run_life(MANAGED) as name:
-        node = Managed(rig, name)
+    with run_managed(rig) as camera:
         draw = rig.draws.number
         below = draw("a rate below 0", -5.0, -9.0, -0.5)
-        above = draw("a rate that is too high", FASTEST + 0.5, FASTEST + 0.2, FASTEST + 3.0)
-        require_refusals(rig, node, (0.0, below, above, 1000.0))
-        node.require_parameters(device=rig.new_device(), rate=0.5)  # slow, and allowed
-        node.make_transitions("configure", "cleanup")
-        device = rig.new_device()
-        node.require_parameters(device=device, rate=10.0)
-        node.make_transitions("configure", "activate")
+        above = draw("a rate that is too high", FASTEST_HZ + 0.5, FASTEST_HZ + 0.2, FASTEST_HZ + 3)
+        camera.require_refusals("refused rates", "front", (0.0, below, above, 1000.0))
+        camera.require_refusals("unplugged cameras", "unplugged", (RATE_HZ,) * 4)
+        camera.configure(rate=0.5)  # slow, and allowed
+        camera.make_transitions("cleanup")
+        camera.configure(rate=RATE_HZ)
+        camera.make_transitions("activate")
         # A participant's endpoints are told in order: those of the failed attempts are known.
-        require_picture(rig, device)
-        require_one_publisher(rig)
+        camera.require_picture()
+        camera.require_publishers(1, "After “configure”")
 
 
 @EXAM.check(
-    needs=("managed_gives_back",),
+    needs=("managed_runs",),
     hints=(
         "Which of your methods runs after an exception in on_activate?",
         "on_error. The one that you inherit returns SUCCESS and gives nothing back.",
@@ -450,31 +351,17 @@ def activation_error(rig: CameraRig) -> None:
     The state machine has a place for what goes wrong. A node that pretends to be active sends no
     picture; one that keeps the broken camera open cannot be repaired by a second “configure”.
     """
-    with rig.run_life(MANAGED) as name:
-        node = Managed(rig, name)
-        for time in ("", " a second time"):
-            device, threads = rig.new_device("stuck"), rig.process.thread_ids()
-            node.require_parameters(device=device)
-            # Whoever tries the stream when the node is configured finds out even earlier.
-            if (state := node.attempt_transition("configure")) == "inactive":
-                require_one_publisher(rig)
-                state = node.attempt_transition("activate")
-            if state not in ("unconfigured", "finalized"):
-                raise Failed(
-                    expected=f"If the stream does not start{time}, your node ends unconfigured or "
-                    "finalized.",
-                    actual=f"It is {state}.",
-                )
-            require_nothing_held(rig, device, f"After the error{time}")
-            if state == "finalized":
+    with run_managed(rig) as camera:
+        for when in ("", " a second time"):
+            threads = rig.process.thread_ids()
+            if camera.fail_to_activate(when) == "finalized":
                 return
         # The middleware may have started a thread the first time.
-        require_threads_ended(rig, threads, "After the error")
-        device = rig.new_device()
-        node.require_parameters(device=device)
-        node.make_transitions("configure", "activate")
-        require_picture(rig, device)
-        require_rate(rig, device, 10, " after an error and a restart")
+        rig.require_threads_ended(threads, "After the error")
+        camera.configure()
+        camera.make_transitions("activate")
+        camera.require_picture()
+        camera.require_rate(RATE_HZ, " after an error and a restart")
 
 
 @EXAM.check(
@@ -493,41 +380,39 @@ def managed_shutdown(rig: CameraRig) -> None:
     An emergency does not wait for deactivate and cleanup: whoever ends the node in the middle of
     its work must find the camera closed.
     """
-    with rig.run_life(MANAGED) as name:
-        require_no_helper_finalized(rig, Managed(rig, name))
+    with run_managed(rig) as camera:
+        camera.set_camera()
+        camera.leaks.require_no_helper_finalized()
     paths = {"unconfigured": (), "inactive": ("configure",), "active": ("configure", "activate")}
     for end in ("shutdown", "destroy_node()"):
         for state, path in paths.items():
-            device = rig.new_device()
-            with rig.run_life(MANAGED) as name:
-                node, threads = Managed(rig, name), rig.process.thread_ids()
-                node.require_parameters(device=device)
-                node.make_transitions(*path)
-                if path:
-                    require_one_publisher(rig)
-                if end == "shutdown":
-                    node.make_transitions("shutdown")
-                else:
-                    rig.program.stop(MANAGED, bare=True)
+            with run_managed(rig) as camera:
+                threads = rig.process.thread_ids()
+                camera.set_camera()
+                camera.make_transitions(*path)
+                camera.require_publishers(len(path[:1]), f"In the state {state}")
                 when = f"After {end} in the state {state}"
-                require_nothing_held(rig, device, when)
-                if state == "active":  # by now the middleware has the threads that it keeps
-                    require_threads_ended(rig, threads, when)
                 if end == "shutdown":
-                    rig.program.stop(MANAGED, bare=True)  # finalized is a state, too
-                require_off_graph(rig, name, "After destroy_node()")
-                rig.program.destroy_again(MANAGED)
-    require_managed_ended(rig, name)
+                    camera.make_transitions("shutdown")
+                else:
+                    rig.stop(MANAGED, bare=True)
+                camera.require_nothing_held(when)
+                if state == "active":  # by now the middleware has the threads that it keeps
+                    rig.require_threads_ended(threads, when)
+                if end == "shutdown":
+                    rig.stop(MANAGED, bare=True)  # finalized is a state, too
+                rig.require_gone(camera.node, DESTROYED)
+                rig.destroy_again(MANAGED)
+    require_managed_in_program(rig, "managed_shutdown", camera.node)
 
 
 @EXAM.check(
-    needs=("endpoints_gone", "camera_given_back"),
+    needs=("driver_runs",),
     hints=(
         "What had your zoom callback already done when camera.zoom(99) raised?",
         "A lock that was acquired and not released stops whoever wants it next, in silence.",
         "Hold locks with `with self.lock:`, which releases them on an exception, too.",
     ),
-    read=READ_NODES,
 )
 def callback_raises(rig: CameraRig) -> None:
     """A zoom that the camera refuses costs that one message, and nothing else.
@@ -535,28 +420,18 @@ def callback_raises(rig: CameraRig) -> None:
     Somebody will send a wrong value. The driver may refuse it, but it must go on working, and it
     must still end cleanly.
     """
-    device = rig.new_device()
-    with rig.run_life(DRIVER, device) as node:
-        require_endpoints(rig, node)
+    with run_driver(rig) as driver:
+        driver.require_endpoints()
         zoom = rig.draws.whole("a zoom before one that is refused", 2, 2, 8)
-        require_zoom(rig, device, zoom, "While the driver runs")
+        driver.require_zoom(zoom)
         for factor in (rig.draws.whole("a zoom that is too high", 99, 9, 200), 0, -1):
-            rig.refused_zoom(factor)
-            require_zoom_kept(rig, device, zoom, f"After a zoom of {factor}")
-        require_zoom_at_once(rig, device, 1, "After a zoom of -1")
-        require_rate(
-            rig,
-            device,
-            1 / PERIOD,
-            " after a zoom that was refused",
-            after=lambda: rig.refused_zoom(99),
-        )
+            driver.refuse_zoom(factor)
+            driver.require_zoom_kept(zoom, f"After a zoom of {factor}")
+        driver.require_zoom(1, "After a zoom of -1", once=True)
+        driver.require_rate(RATE_HZ, " after a zoom that was refused", after=driver.refuse_zoom)
         before = rig.process.read_usage()
-        refuse_zooms(rig)
-        rig.program.stop(DRIVER)
-        require_closed(rig, device, "After destroy_node()")
-        require_gone(rig, device, "After destroy_node()", node)
-        require_flat_refusals(rig, before)
+        refuse_zooms(driver)
+    require_flat_work(rig, before, "refused zooms")
 
 
 @EXAM.check(
@@ -569,7 +444,6 @@ def callback_raises(rig: CameraRig) -> None:
         "Do not wait without end in a callback: let the read() itself be what it waits for, or "
         "give the wait a timeout and look whether the driver is ending.",
     ),
-    read=READ_NODES,
 )
 def cleanup_when_busy(rig: CameraRig) -> None:
     """Cleanup while a callback still waits for the camera ends well, and a restart works.
@@ -577,51 +451,45 @@ def cleanup_when_busy(rig: CameraRig) -> None:
     Nobody stops a robot between two callbacks. If cleanup and callback wait for each other, the
     process hangs with the camera open, and only the power switch helps.
     """
-    with rig.run_life(DRIVER, rig.new_device()):
+    with run_driver(rig):
         pass
     rig.wait_for_rest()  # a thread may have one step left to its end
-    usual = rig.process.count_threads()
-    for take in range(TAKES):
-        if _destroyed_during_a_snapshot(rig, usual, answered=take == 0):
-            break
-    else:
+    usual = len(rig.process.thread_ids())
+    if not any(_destroyed_in_snapshot(rig, usual, answered=take == 0) for take in range(TAKES)):
         raise NotExaminable(
             "destroy_node() was not seen while one of its callbacks waited for the camera: each "
             f"time, of {TAKES}, snapshots succeeded after it had been asked for. After a hand-in a "
             "person looks at it."
         )
-    device = rig.new_device("slow")
-    with rig.run_life(DRIVER, device):
-        require_picture(rig, device)
-        require_no_queue(rig, device, lambda: rig.program.destroy(DRIVER))
-        require_closed(rig, device, "After destroy_node() with a slow camera")
+    with run_driver(rig, "slow") as driver:
+        driver.require_picture()
+        driver.require_no_queue(partial(rig.destroy, DRIVER))
+        driver.require_closed("After destroy_node() with a slow camera")
 
 
-def _destroyed_during_a_snapshot(rig: CameraRig, usual: int, *, answered: bool) -> bool:
+def _destroyed_in_snapshot(rig: CameraRig, usual: int, *, answered: bool) -> bool:
     """Have a driver destroyed while a callback waits for its picture; return whether one did.
 
-    ``answered``: not before another snapshot has been.
+    ``usual`` is the number of threads without a driver; ``answered``: not before another snapshot
+    has been.
 
     The examiner is held up now and then, and the call may then find all snapshots answered, or fall
     between two of them. So one that succeeded meanwhile leaves it open, and so does a request that
     was made twice, whose picture may have been taken for the next one's.
     """
-    device = rig.new_device("slow")
-    with rig.run_life(DRIVER, device) as node:
-        require_endpoints(rig, node)
+    with run_driver(rig, "slow") as driver:
+        driver.require_endpoints()
         requests = rig.requests
-        require_snapshot(rig, device, "While the driver runs", slow=True)
+        driver.require_snapshot(slow=True)
         once = rig.requests == requests + 1
-        left = require_snapshots_under_way(rig, device, answered=answered)
+        count_left = driver.begin_snapshots(answered=answered)
         when, threads = "After destroy_node() during a snapshot", rig.process.thread_ids()
-        before = left()
-        rig.program.destroy(DRIVER)
-        require_closed(rig, device, when)
-        require_gone(rig, device, when, node)
-        rig.program.drop_node(DRIVER)
-        require_callbacks_ended(rig, threads, usual, when)
-        again = rig.new_device()
-        rig.program.start(DRIVER, again)
-        zoom = rig.draws.whole("a zoom after a restart", 4, 2, 8)
-        require_zoom(rig, again, zoom, "After a restart")
-    return once and 0 < before == left()
+        before = count_left()
+        rig.destroy(DRIVER)
+        driver.require_closed(when)
+        driver.require_gone(when)
+        rig.drop_node(DRIVER)
+        rig.require_callbacks_ended(threads, usual, when)
+        again = start_driver(rig)
+        again.require_zoom(rig.draws.whole("a zoom after a restart", 4, 2, 8), "After a restart")
+    return once and 0 < before == count_left()

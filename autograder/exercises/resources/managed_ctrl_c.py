@@ -1,137 +1,162 @@
-"""A managed camera in a plain program: its pace by the machine's clock, and its end by SIGINT.
-
-What it does there is seen once, after the driver's lives. Whatever is not right then is looked at
-again in a program of its own, in which nothing can come of the driver.
-"""
+"""A managed camera in a plain program: its rounds, its pace, and what it leaves at Ctrl-C."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Collection
 from itertools import pairwise
 
 from autograder.examination.exam import Failed, NotExaminable
 from autograder.examination.plain_programs import Programs
-from autograder.exercises.resources.camera_usage import Usage
-from autograder.exercises.resources.ctrl_c import lives_so_far
-from autograder.exercises.resources.managed_life import (
-    MANAGED,
-    MEMORY,
-    ROUNDS,
-    ManagedLife,
-    watch_managed,
-)
-from autograder.exercises.resources.program_observer import ProgramObserver
-from autograder.exercises.resources.rig import CameraRig
+from autograder.exercises.resources.camera_examiner import IMAGE
+from autograder.exercises.resources.camera_program import GONE, KEPT_KIB, CameraProgram
+from autograder.exercises.resources.rig import MANAGED, RATE_HZ, CameraRig, new_device
+from autograder.observe.lifecycle import LifecycleManager, find_lifecycle_node
+from autograder.observe.lifecycle_leaks import memory_kept
+from autograder.observe.observer import ENDED_S
 from autograder.observe.phrases import as_phrase
+from autograder.observe.process_usage import Usage, list_kept
+from autograder.observe.program_observer import Faults, require_no_fault
 
 LIVES = 3
+USUAL_HZ = 20
+"""Pictures a second: a rate is taken in half the time that the default one takes."""
+ROUND_HZ = 0.1
+"""During the rounds: a timer that goes on while it is inactive does not come to a tick, whose error
+would end the program. That is another check's, and would depend on the machine here."""
+ROUNDS = 5
+"""From “configure” to “cleanup”, whose memory is measured."""
 ALONE = "When the managed camera runs in a program of its own,"
 ENDED = f"{ALONE} which is ended by Ctrl-C while it is active,"
+WORKS, ENDS = "managed_gives_back", "managed_shutdown"
+"""The checks in which it counts how it works, and how it ends."""
 
 
-def require_managed_pace(rig: CameraRig, node: str) -> None:
-    """Fail unless a managed camera, ``node``, keeps its rate by the machine's clock.
+def require_managed_in_program(rig: CameraRig, check: str, node: str) -> None:
+    """Fail if the managed camera ``node`` has shown something against a check in a program."""
 
-    Nor may the rounds before that keep memory.
-    """
-    life = _in_shared_program(rig)
-    if life is None or not life.has_worked:
-        life = _in_own_program(rig, node)
-    if life is None:
-        return
-    _require_active(life)
-    if life.kept >= MEMORY:
-        raise Failed(
-            expected=f"{ALONE} rounds from “configure” to “cleanup” leave less than 1 MiB of "
-            "memory each.",
-            actual=f"Each of {ROUNDS} rounds left {life.kept // 1024} MiB.{rig.process_note()}",
-        )
-    if life.pace:
-        raise Failed(
-            expected=f"{ALONE} it sends as many pictures a second by the machine's clock as its "
-            f"rate says, which was {life.rate} Hz.",
-            actual=life.pace,
-        )
+    def watch_managed(programs: Programs) -> Faults:
+        with programs.program([(MANAGED, [])], twice=True) as program:
+            seen = ManagedWatch(rig, program, new_device())
+            seen.watch_lives(node)
+            return seen.faults
+
+    require_no_fault(rig, check, watch_managed)
 
 
-def require_managed_ended(rig: CameraRig, node: str) -> None:
-    """Fail unless an active managed camera, ``node``, gives everything back at Ctrl-C."""
-    life = _in_shared_program(rig)
-    if life is None or not life.is_clean:
-        life = _in_own_program(rig, node)
-    if life is None:
-        return
-    _require_active(life)
-    if life.raised:
-        raise Failed(
-            expected=f"{ENDED} its destroy_node() returns, and may be called a second time.",
-            actual="The program was gone: an exception left it, or an exit.",
-        )
-    if life.left:
-        raise Failed(
-            expected=f"{ENDED} its destroy_node() leaves nothing behind.",
-            actual=f"It left {as_phrase([*life.left])} behind.{rig.process_note()}",
-        )
+class ManagedWatch(CameraProgram):
+    """Watches a managed camera, which is driven over its services and interrupted when active."""
 
+    def watch_lives(self, node: str) -> None:
+        """Watch its lives: what the program has more after each of them is left by it.
 
-def _require_active(life: ManagedLife) -> None:
-    if life.failed is not None:
-        raise Failed(
-            expected=f"{ALONE} it goes through its states as well: {life.failed.expected}",
-            actual=life.failed.actual,
-        )
-    if not life.made and life.raised:
-        raise Failed(
-            expected=f"{ALONE} it can be made as well.",
-            actual="The program was gone: an exception left it, or an exit.",
-        )
-    if not life.made:
+        So is a node that is there after a later one, and was not after the first.
+        """
+        own: Collection[bytes] | None = None
+        for life in range(LIVES):
+            try:
+                name, hz = self._begin_life(node, is_first=life == 0)
+            except (Failed, NotExaminable) as fault:
+                # rclpy 7.1 leaves an ended node's services: one of them may have been asked later.
+                if life == 0:
+                    self.faults = {WORKS: fault, ENDS: fault}
+                break
+            self._require_pace(hz)
+            self.program.interrupt()
+            self._require_ended(name, own)
+            if self.faults:
+                return
+            self.usages.append(self.process.read_usage())
+            own = {*self.find_nodes()} if own is None else own
+            self.program.interrupt()
+        grown = [after.growth_since(before) for before, after in pairwise(self.usages)]
+        if grown:
+            self._note_left(list_kept(Usage(*map(min, zip(*grown, strict=True)))))
+
+    def _begin_life(self, node: str, *, is_first: bool) -> tuple[str, float]:
+        """Have the managed camera activated; return its name and its rate in Hz."""
+        name, self.device = self._find_managed(node), new_device()
+        manager = LifecycleManager(self, name, MANAGED)
+        hz = float(self.rig.draws.whole("a rate by the machine's clock", USUAL_HZ, 15, 25))
+        try:
+            manager.require_parameters(device=self.device)
+            if is_first:
+                self._require_flat_rounds(manager)
+            if not manager.set_parameters(rate=hz):  # that is another check's
+                hz = RATE_HZ
+                manager.set_parameters(rate=hz)
+            manager.make_transitions("configure", "activate")
+        except Failed as failed:
+            raise Failed(
+                expected=f"{ALONE} it goes through its states as well: {failed.expected}",
+                actual=failed.actual,
+            ) from None
+        return name, hz
+
+    def _find_managed(self, node: str) -> str:
+        if name := find_lifecycle_node(self, node, lambda: self.find_nodes().values()):
+            return name
+        if self.is_gone():
+            raise Failed(expected=f"{ALONE} it can be made as well.", actual=GONE)
         raise NotExaminable(
             f"It was not found out which node of a plain program is {MANAGED}. After a hand-in a "
             "person looks at it."
         )
 
+    def _require_flat_rounds(self, manager: LifecycleManager) -> None:
+        """Note what memory rounds through the states keep: nobody has Python collect it here."""
+        manager.set_parameters(rate=ROUND_HZ)
+        if manager.attempt_transition("configure") == "inactive":
+            manager.make_transitions("cleanup")
+        else:  # that is another check's
+            manager.set_parameters(rate=RATE_HZ)
+        kept_kib = memory_kept(self, manager, ROUNDS)
+        if kept_kib >= KEPT_KIB:
+            self.note_fault(
+                WORKS,
+                f"{ALONE} rounds from “configure” to “cleanup” leave less than 1 MiB of memory "
+                "each.",
+                f"Each of {ROUNDS} rounds left {kept_kib // 1024} MiB.{self.process.others_note()}",
+            )
 
-def _in_shared_program(rig: CameraRig) -> ManagedLife | None:
-    """Return what was seen after the driver's lives; None if these did not go so far."""
-    lives = lives_so_far(rig)
-    return lives.managed if lives is not None else None
+    def _require_pace(self, hz: float) -> None:
+        came = self.wait(self.count, idle=ENDED_S)
+        if pace := self.rate_fault(self.count, hz, "pictures") if came else "None came.":
+            self.note_fault(
+                WORKS,
+                f"{ALONE} it sends as many pictures a second by the machine's clock as its rate "
+                f"says, which was {hz:g} Hz.",
+                pace,
+            )
 
+    def _require_ended(self, name: str, own: Collection[bytes] | None) -> None:
+        """Note what an interrupted node leaves; of nodes those that are not the notebook's own.
 
-def _in_own_program(rig: CameraRig, node: str) -> ManagedLife | None:
-    """Return what was seen in a program of its own, once a notebook; None if there is none."""
-    if rig.programs is None:
-        return None
-    if ManagedLife.__name__ not in rig.memory:
-        rig.memory[ManagedLife.__name__] = _watch_alone(rig, rig.programs, node)
-    found = rig.memory[ManagedLife.__name__]
-    assert isinstance(found, ManagedLife)
-    return found
+        Without them only one of its name is known to be left by it.
+        """
 
+        def nodes_left() -> list[str]:
+            found = self.find_nodes().items()
+            names = {n for end, n in found if (n == name if own is None else end not in own)}
+            return [f"the node {name}" for name in sorted(names)]
 
-def _watch_alone(rig: CameraRig, programs: Programs, node: str) -> ManagedLife:
-    """Watch some lives; what the program has more after each of them is left by it.
+        left = [] if self.wait_for_end(lambda: not self.asked()) else ["its open camera"]
+        if not self.wait_for_end(lambda: not self.node.count_publishers(IMAGE)):
+            left.append(f"its publisher on {IMAGE}")
+        if not self.wait_for_end(lambda: not nodes_left()):
+            left += nodes_left()
+        if self.is_gone():
+            self.note_fault(
+                ENDS,
+                f"{ENDED} its destroy_node() returns, and may be called a second time.",
+                GONE,
+            )
+        else:
+            self._note_left(left)
 
-    So is a node that is there after a later one, and was not after the first.
-    """
-    lives = lives_so_far(rig)
-    own: set[bytes] | None = None if lives is None or lives.own_nodes else set()
-    with programs.program([(MANAGED, [])], twice=True) as program:
-        seen, usages, life = ProgramObserver(rig, program), list[Usage](), ManagedLife()
-        for _ in range(LIVES):
-            again = watch_managed(seen, node, own, weigh=not usages)
-            if usages and again.failed is not None:
-                break  # rclpy 7.1 leaves an ended node's services: one of them may have been asked
-            life = replace(again, kept=max(life.kept, again.kept))
-            if not life.went_on or life.left or life.pace:
-                return life
-            usages.append(rig.process.read_usage())
-            own = {*seen.find_nodes()} if own is None else own
-            program.interrupt()
-    grown = [after.growth_since(before) for before, after in pairwise(usages)]
-    if not grown:
-        return life
-    threads, files, _ = map(min, zip(*grown, strict=True))
-    left = ["a thread"] if threads > 0 else []
-    left += ["an open file"] if files > 0 else []
-    return replace(life, left=tuple(left))
+    def _note_left(self, left: list[str]) -> None:
+        if left:
+            self.note_fault(
+                ENDS,
+                f"{ENDED} its destroy_node() leaves nothing behind.",
+                f"It left {as_phrase(left)} behind.{self.process.others_note()}",
+            )

@@ -3,7 +3,7 @@
 # exercise: resources
 # base: right-exemplar
 # told: Each of 5 rounds left 5 MiB | Each of 5 rounds left 4 MiB
-# score: 11
+# score: 12
 
 from autograder.examination.subject.server import SubjectServer
 

@@ -2,7 +2,7 @@
 # exercise: resources
 # base: right-no-thread
 # told: It took none.
-# score: 4
+# score: 6
 
 import sys
 import threading
