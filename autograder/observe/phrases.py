@@ -18,6 +18,16 @@ def pictures_phrase(number: int) -> str:
     return "one picture" if number == 1 else f"{number} pictures"
 
 
+def there_were(number: int, one: str, several: str) -> str:
+    """Return how many of something there were, as a clause.
+
+    Example:
+        >>> there_were(1, "try", "tries"), there_were(0, "try", "tries")
+        ('there was 1 try', 'there were no tries')
+    """
+    return f"there was 1 {one}" if number == 1 else f"there were {number or 'no'} {several}"
+
+
 def with_reason(reason: str) -> str:
     """Return the reason that came with a refusal, as the end of a sentence: "with the reason …"."""
     return f"with the reason “{reason[:200]}”" if reason.strip() else "and without a reason"

@@ -1,0 +1,256 @@
+"""Nodes in a plain program: does anything that leaves a callback end it, and how long do they take?
+
+What a student's process says of its own errors can be made up, and it is asked to move a session's
+time: one that passes twice as much makes a time-out of 4 s look like one of 2 s. A plain program is
+not asked for anything: it goes on, or it ends, and time is on /clock. So what was right in a
+session is done once more, in short, to all nodes of a notebook, one after the other. If something
+ends their program, each node that a check asks about is tried by itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from autograder.examination.check_context import CheckContext
+from autograder.examination.exam import Failed, NotExaminable
+from autograder.observe.nouns import Task
+from autograder.observe.plain_programs import ObservedProgram
+from autograder.observe.stillness import Stillness
+from course.runtime.waiting import Deadline
+
+TIMED = "timed"
+"""The trial in which it matters how long something takes; there time passes in small strides."""
+FINE_S, FINEST_S = 0.1, 0.01
+"""Seconds in a stride there, as between two looks in a session; and where something has been out of
+bounds, as who waits ten times for 0.05 s may take ten strides: the step of a session's time."""
+MOST_S = 60.0
+"""Seconds that it may take to find out what ends programs, once it is known that something does."""
+NOT_FOUND_OUT = (
+    "Something ends a plain program of your nodes, or keeps one of them from being made there, and "
+    "it was not found out what. After a hand-in a person looks at it."
+)
+
+
+class Bounds(NamedTuple):
+    """What is timed in a program: the task's word on it, and how far off it may be.
+
+    Bounds are those of the session's checks or wider, and closer than half and twice what is right:
+    what is right in a session never fails here.
+    """
+
+    rule: str
+    least: float
+    most: float
+    told: str
+    """What was found, as a sentence, with a place for the number."""
+
+
+@dataclass(frozen=True)
+class NodeTrials:
+    """What is done to a node in a program.
+
+    Attributes:
+        task: what the node is connected to.
+        trials: by name; that of `TIMED` notes `ObservedProgram.times`.
+        times: the bounds of these.
+    """
+
+    task: Task
+    trials: Mapping[str, Callable[[ObservedProgram], None]]
+    times: Mapping[str, Bounds] = field(default_factory=dict)
+
+
+TrialTable = Sequence[NodeTrials]
+
+
+class Times(NamedTuple):
+    """How long things took; ``sure`` is whether nothing can have come later than it seemed."""
+
+    took: Mapping[str, float]
+    sure: bool
+
+    def is_far_off(self, what: str, bounds: Bounds) -> bool:
+        """Return whether a time is out of its bounds, or not known."""
+        return not bounds.least <= self.took.get(what, math.nan) <= bounds.most
+
+
+@dataclass
+class Found:
+    """What programs have shown of a node: which trials end one, if known, and its times."""
+
+    ends: dict[str, bool] = field(default_factory=dict)
+    times: Times | None = None
+
+
+class Played(NamedTuple):
+    """What became of a program: the node and the trial that were under way when it ended, if any.
+
+    ``there`` are the classes whose node was seen.
+    """
+
+    ended: tuple[str, str] | None
+    there: frozenset[str]
+    times: Times
+
+
+class ProgramTrials:
+    """What trials have shown; each is made when a check first asks for it."""
+
+    def __init__(self, bench: CheckContext, still: Stillness, table: TrialTable) -> None:
+        """Nothing has been tried yet."""
+        self._bench, self._still = bench, still
+        self._table = {trials.task.node: trials for trials in table}
+        self._all: Played | None = None
+        self._found: dict[str, Found] = {}
+        self._finer: dict[str, Times] = {}
+        self._deadline: Deadline | None = None
+
+    def require_survival(self, node: str, trial: str) -> None:
+        """Fail if a node ends a program in a trial; nothing where there are no programs.
+
+        Raises:
+            Failed: it does.
+            NotExaminable: it was not found out.
+        """
+        if self._bench.programs is None:
+            return
+        ends = self._findings_of(node).ends
+        if trial not in ends:
+            raise NotExaminable(NOT_FOUND_OUT)
+        if ends[trial]:
+            raise Failed(
+                expected="Nothing leaves a callback as an exception.",
+                actual="What was seen from outside was right, but where the node runs in a plain "
+                "program of rclpy, that ended: an exception left one of its callbacks.",
+            )
+
+    def require_times(self, node: str, *names: str) -> None:
+        """Fail if a node takes far too long, or far too short, for something in a program.
+
+        Raises:
+            Failed: it does.
+            NotExaminable: it cannot be told.
+        """
+        if self._bench.programs is None:
+            return
+        for what in names:
+            bounds = self._table[node].times[what]
+            times = self._findings_of(node).times
+            if times is None:
+                raise NotExaminable(NOT_FOUND_OUT)
+            if times.is_far_off(what, bounds):
+                self._require_in_bounds(bounds, what, self._take_again(node, times.sure))
+
+    def _require_in_bounds(self, bounds: Bounds, what: str, times: Times) -> None:
+        if not times.is_far_off(what, bounds):
+            return
+        if not times.sure or what not in times.took:
+            raise NotExaminable(
+                f"It could not be timed in a plain program of your nodes: {bounds.rule} After a "
+                "hand-in a person looks at it."
+            )
+        raise Failed(
+            expected=bounds.rule,
+            actual="What was seen in a session was right, but where the node runs in a plain "
+            f"program of rclpy, by the time on /clock, {bounds.told.format(times.took[what])}.",
+        )
+
+    def _take_again(self, node: str, sure: bool) -> Times:
+        if node not in self._finer:
+            trials = self._table[node]
+            timed = replace(trials, trials={TIMED: trials.trials[TIMED]})
+            # Each stride lasts long where nothing rests.
+            played = self._play([timed], FINEST_S if sure else FINE_S)
+            seen = played is not None and node in played.there
+            self._finer[node] = played.times if played and seen else Times({}, False)
+        return self._finer[node]
+
+    def _findings_of(self, node: str) -> Found:
+        if self._all is None:
+            self._all = self._play([*self._table.values()]) or Played(
+                ("", ""), frozenset(), Times({}, False)
+            )
+            if self._all.ended is None:
+                for name in self._all.there:
+                    unharmed = dict.fromkeys(self._table[name].trials, False)
+                    self._found[name] = Found(unharmed, self._all.times)
+        if node not in self._found:
+            self._found[node] = self._try_alone(self._table[node])
+        return self._found[node]
+
+    def _try_alone(self, trials: NodeTrials) -> Found:
+        """Find out which trials end a program of one node."""
+        self._deadline = self._deadline or Deadline(MOST_S)
+        found, node, left = Found(), trials.task.node, [*trials.trials]
+        assert self._all is not None
+        once, is_raising = {self._all.ended}, False
+        while left and self._deadline.seconds_left:
+            played = self._play(
+                [replace(trials, trials={name: trials.trials[name] for name in left})],
+                waits_for_end=True,
+            )
+            if played is None or node not in played.there:
+                break
+            if TIMED in left:
+                found.times = played.times
+            ended = played.ended[1] if played.ended else ""
+            unharmed = left[: left.index(ended)] if ended else left
+            found.ends.update(dict.fromkeys(unharmed, False))
+            left = left[len(unharmed) :]
+            # rclpy's own executor has races, too; but hardly in a node that is known to raise.
+            if ended and (is_raising or played.ended in once):
+                is_raising = found.ends[ended] = True
+                left = left[1:]
+            once.add(played.ended)
+        return found
+
+    def _play(
+        self, table: TrialTable, stride_s: float = FINE_S, *, waits_for_end: bool = False
+    ) -> Played | None:
+        """Run nodes in a program and try them; None if one cannot be made.
+
+        ``waits_for_end``: after each trial, so that it is known which one it was.
+        """
+        assert self._bench.programs is not None
+        tasks = [trials.task for trials in table]
+        with self._bench.programs.program(
+            [(task.node, ()) for task in tasks],
+            threads=max(task.threads for task in tasks),
+            sim_time=True,
+        ) as program:
+            if not program.up:
+                return None
+            seen = ObservedProgram(program, self._still, tasks)
+            ended: tuple[str, str] | None = None
+            for node, name, trial in _list_trials(table):
+                ended = node, name
+                _try_once(seen, trial, stride_s if name == TIMED else 0.0)
+                if seen.has_ended() or (waits_for_end and seen.ends_soon()):
+                    break
+            else:
+                ended = ended if seen.ends_soon() else None
+            return Played(ended, seen.there, Times(seen.times, seen.rested))
+
+
+def _list_trials(
+    table: TrialTable,
+) -> list[tuple[str, str, Callable[[ObservedProgram], None]]]:
+    return [
+        (trials.task.node, name, trial) for trials in table for name, trial in trials.trials.items()
+    ]
+
+
+def _try_once(
+    program: ObservedProgram, trial: Callable[[ObservedProgram], None], stride_s: float
+) -> None:
+    # A wrong node may leave the examiner's end where a trial cannot go on.
+    with suppress(Exception):
+        if stride_s:
+            with program.timing(stride_s):
+                trial(program)
+        else:
+            trial(program)
