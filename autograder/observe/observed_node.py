@@ -24,7 +24,7 @@ from autograder.examination.exam import Failed
 from autograder.observe.examiner_end import ExaminerEnd
 from autograder.observe.nouns import Parameter, Service, Task, Topic
 from autograder.observe.patience import Patience
-from autograder.observe.phrases import with_reason
+from autograder.observe.phrases import say_words, with_reason
 from autograder.observe.services import Request
 from autograder.observe.span import PACES, Span
 from autograder.observe.stillness import Stillness
@@ -509,6 +509,25 @@ class ObservedNode:
         """
         if not holds:
             raise Failed(expected=expected, actual=actual + self.error_note())
+
+    def require_word(self, topic: Topic, word: str, within_s: float, when: str) -> None:
+        """Require that one word comes on a topic since it was forgotten, and no other.
+
+        Args:
+            topic: one whose value is a text.
+            word: what it says.
+            within_s: seconds of the node's time that it may take.
+            when: what it is about, to begin a sentence with.
+
+        Raises:
+            Failed: nothing comes in time, or something else has come, too.
+        """
+        self.advance_until(lambda: self.end.values(topic), within_s)
+        came = self.end.values(topic)
+        nothing = f"Within {within_s:.3g} s it said nothing."
+        self.require_that(
+            came == [word], f"{when}, {topic} says “{word}”, once.", say_words(came, nothing)
+        )
 
     def error_note(self) -> str:
         """Return what a callback raised since the node was made, as a sentence to add."""

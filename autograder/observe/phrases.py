@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 ABORTED = (
     "by a call of abort(), or because the execute callback raised, or returned without succeed() "
     "or canceled()"
@@ -26,6 +28,17 @@ def there_were(number: int, one: str, several: str) -> str:
         ('there was 1 try', 'there were no tries')
     """
     return f"there was 1 {one}" if number == 1 else f"there were {number or 'no'} {several}"
+
+
+def say_words(words: Sequence[object], nothing: str = "It said nothing.") -> str:
+    """Return which words were said, one after the other, as a sentence.
+
+    Example:
+        >>> say_words(["lost", "arrived"])
+        'It said “lost”, then “arrived”.'
+    """
+    said = ", then ".join(f"“{word}”" for word in words)
+    return f"It said {said}." if said else nothing
 
 
 def with_reason(reason: str) -> str:

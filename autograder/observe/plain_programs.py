@@ -170,6 +170,14 @@ class ObservedProgram:
             self._stride()
         return holds
 
+    def advance(self, seconds: float = 0.0) -> None:
+        """Let so much time pass, but a stride at least.
+
+        Raises:
+            ProgramEnded: the program has gone.
+        """
+        self.advance_until(lambda: False, max(seconds, self._stride_s))
+
     def _stride(self) -> None:
         if self.has_ended():
             raise ProgramEnded

@@ -13,11 +13,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from autograder.examination.check_context import CheckContext
 from autograder.examination.exam import Failed, NotExaminable
-from autograder.observe.nouns import Task
+from autograder.observe.clock_bound_node import ServerT
+from autograder.observe.nouns import Action, Service, Task
 from autograder.observe.plain_programs import ObservedProgram
 from autograder.observe.stillness import Stillness
 from course.runtime.waiting import Deadline
@@ -47,6 +48,20 @@ class Bounds(NamedTuple):
     most: float
     told: str
     """What was found, as a sentence, with a place for the number."""
+
+
+def served(
+    trial: Callable[[ObservedProgram, ServerT], None],
+    server: Callable[[Any, Callable[[], float]], ServerT],
+    what: Service | Action,
+) -> Callable[[ObservedProgram], None]:
+    """Return a trial during which the examiner plays a server: see `ObservedProgram.served_by`."""
+
+    def run(program: ObservedProgram) -> None:
+        with program.served_by(server, what) as made:
+            trial(program, made)
+
+    return run
 
 
 @dataclass(frozen=True)

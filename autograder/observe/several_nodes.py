@@ -54,11 +54,11 @@ class Nodes:
             self._present = task, ClockBoundNode(self._bench, task, self._end, self._still)
         return self._present[1]
 
-    def require_no_errors(self, trial: str = "") -> None:
+    def require_no_errors(self, *trials: str) -> None:
         """Require that nothing leaves a callback of the present node's.
 
         Args:
-            trial: what was done to it, as far as that is done in a plain program, too.
+            trials: what was done to it, as far as that is done in a plain program, too.
 
         Raises:
             Failed: something does.
@@ -66,7 +66,7 @@ class Nodes:
         """
         task, node = self._present_node()
         node.require_no_errors()
-        if trial:
+        for trial in trials:
             self._trials.require_survival(task.node, trial)
 
     def require_times(self, *names: str) -> None:

@@ -11,48 +11,29 @@ from test_msgs.action import Fibonacci as Drive
 from autograder.exercises.safety.speed_limits import is_motion
 from autograder.observe.actions import SentGoal
 from autograder.observe.clock_bound_node import ClockBoundNode
+from autograder.observe.heartbeats import longest_silence
 from autograder.observe.nouns import Action, Task, Topic
-from autograder.observe.phrases import end_phrase
+from autograder.observe.observed_goal import ObservedGoal
 from autograder.observe.plain_programs import Clocked
-from autograder.observe.silences import longest_silence
 
 COMMANDS = Topic("cmd_vel", Twist)
 FAULTS = Topic("drive/fault", String, value=lambda message: message.data)
 JAMMED = Topic("hardware/jammed", Bool)
 DRIVE = Action("drive", Drive)
 DRIVE_SERVER = Task(
-    "NavigationServer",
-    publishes=[COMMANDS, FAULTS],
-    subscribes=[JAMMED],
-    serves=[DRIVE],
-    threads=4,
+    "NavigationServer", publishes=[COMMANDS, FAULTS], subscribes=[JAMMED], serves=[DRIVE], threads=4
 )
 
-PROMPT_S = 1.0
-"""Seconds for an answer."""
-STOP_S = 0.5
-"""Seconds from the end of a drive to the stop."""
-CANCEL_S = 0.5
-"""Seconds from a cancel to the end of the drive."""
-ABORT_S = 1.0
-"""Seconds from wheels that raise, or a shutdown, to the end of the drive."""
-COMMAND_S = 0.5
-"""Seconds between two commands to the wheels."""
-TOLERANCE_S = 0.25
-"""Seconds that the task allows, and strides."""
-SLACK_S = 1.0
-"""Seconds by which a drive of some seconds may be longer or shorter."""
-LONG_M, LONGEST_M = 8, 10
-"""Metres of a drive that is still under way when something happens."""
-AFTERWARDS_M = 2
-"""Metres of a goal that comes after shutdown(), and seconds in which it would drive, at most."""
+PROMPT_S = 1.0  # for an answer
+STOP_S = 0.5  # from the end of a drive to the stop
+CANCEL_S = 0.5  # from a cancel to the end of the drive
+ABORT_S = 1.0  # from wheels that raise, or a shutdown, to the end of the drive
+COMMAND_S = 0.5  # between two commands to the wheels
+TOLERANCE_S = 0.25  # what the task allows, and strides
+SLACK_S = 1.0  # by which a drive of some seconds may be longer or shorter
 SPEED_M_S, SPEED_TOLERANCE_M_S = 1.0, 0.05
-
-
-def send_goal(node: Clocked, metres: int) -> SentGoal:
-    """Send a goal; what was seen before is forgotten."""
-    node.forget(COMMANDS, FAULTS)
-    return node.end.action_client(DRIVE).send(order=metres)
+LONG_M, LONGEST_M = 8, 10  # of a drive that is still under way when something happens
+AFTERWARDS_M = 2  # of a goal that comes after shutdown(), and s in which it would drive
 
 
 def motions(node: Clocked) -> list[bool]:
@@ -60,23 +41,19 @@ def motions(node: Clocked) -> list[bool]:
     return [is_motion(command) for command in node.end.values(COMMANDS)]
 
 
-def start_drive(
-    node: ClockBoundNode, metres: int, occasion: str = "", *, moves: bool = True
-) -> SentGoal:
-    """Send a goal, and require that it is accepted, and that the robot moves, unless it cannot.
+def send_goal(node: ClockBoundNode, metres: int, occasion: str = "") -> ObservedGoal:
+    """Send a goal, and forget what was before; ``occasion`` says what that was, if it matters."""
+    node.forget(COMMANDS, FAULTS)
+    return ObservedGoal(node, DRIVE, f"A goal of {metres} m {occasion}".rstrip(), order=metres)
 
-    ``occasion`` says what went before it, if that matters.
-    """
-    goal, phrase = send_goal(node, metres), f"goal of {metres} m {occasion}".rstrip()
-    node.advance_until(lambda: goal.accepted is not None, PROMPT_S)
+
+def start_drive(node: ClockBoundNode, metres: int, occasion: str = "") -> ObservedGoal:
+    """Send a goal, and require that it is accepted, and that the robot moves."""
+    goal = send_goal(node, metres, occasion)
+    goal.require_accepted(PROMPT_S)
     node.require_that(
-        goal.accepted,
-        f"A {phrase} is accepted.",
-        "It was not answered." if goal.accepted is None else "It was rejected.",
-    )
-    node.require_that(
-        not moves or node.advance_until(lambda: any(motions(node)), PROMPT_S),
-        f"With a {phrase} the robot drives: cmd_vel is not zero.",
+        node.advance_until(lambda: any(motions(node)), PROMPT_S),
+        f"With a{goal.what[1:]} the robot drives: cmd_vel is not zero.",
         "The goal was accepted, and the wheels were never told to drive.",
     )
     return goal
@@ -85,50 +62,36 @@ def start_drive(
 def require_rejection(node: ClockBoundNode, metres: int) -> None:
     """Require that a goal is rejected before anything moves."""
     goal = send_goal(node, metres)
-    node.advance_until(lambda: goal.accepted is not None, PROMPT_S)
-    node.require_that(
-        goal.accepted is False,
-        f"A goal of {metres} m is rejected.",
-        "It was not answered." if goal.accepted is None else "It was accepted.",
-    )
+    goal.require_rejected(PROMPT_S)
     node.rest()
     node.require_that(
         not any(motions(node)),
-        f"A goal of {metres} m is rejected before anything moves.",
+        f"{goal.what} is rejected before anything moves.",
         "The wheels were told to drive.",
     )
 
 
-def require_end(node: ClockBoundNode, goal: SentGoal, what: str, how: str, limit_s: float) -> None:
-    """Require that a drive is over within so many s, how it ended, and that the robot stands."""
-    node.require_that(
-        node.advance_until(lambda: goal.end, limit_s + TOLERANCE_S),
-        f"{what} is over, and {how}, within {limit_s:g} s.",
-        "After that time there was no result.",
-    )
-    node.require_that(goal.end == how, f"{what} ends as {how}.", f"It {end_phrase(goal.end)}.")
-
-
-def require_stop(node: ClockBoundNode, how: str) -> None:
+def require_stop(node: ClockBoundNode) -> None:
     """Require that the last command is a stop, and stays the last."""
     node.advance(STOP_S + TOLERANCE_S)
     moved = motions(node)
     node.require_that(
         moved[-1:] == [False],
-        f"Within {STOP_S:g} s after the drive has {how}, the last Twist on cmd_vel is zero.",
+        f"Within {STOP_S:g} s after the end of a drive, however it ended, the last Twist on "
+        "cmd_vel is zero.",
         "The last one told the robot to drive." if moved else "No Twist came at all.",
     )
 
 
-def require_marks(node: ClockBoundNode, goal: SentGoal, metres: int) -> None:
+def require_marks(node: ClockBoundNode, sent: SentGoal, metres: int) -> None:
     """Require that marks are told as they are passed; nothing new may be told in between."""
     marks = list(range(1, metres + 1))
     node.require_that(
-        list(goal.result.sequence) == marks,
+        list(sent.result.sequence) == marks,
         f"The result of a goal of {metres} m is {marks}.",
-        f"The result was {list(goal.result.sequence)}.",
+        f"The result was {list(sent.result.sequence)}.",
     )
-    told = [list(feedback.sequence) for feedback in goal.feedback]
+    told = [list(feedback.sequence) for feedback in sent.feedback]
     due = [marks[:count] for count in marks]
     node.require_that(
         [passed for passed, _repeated in groupby(filter(None, told))] == due,
@@ -136,7 +99,7 @@ def require_marks(node: ClockBoundNode, goal: SentGoal, metres: int) -> None:
         f"The feedback was {', then '.join(map(str, told)) or 'nothing'}.",
     )
     for passed in due[:-1]:
-        ahead_s = node.now_s - goal.feedback_at_s[told.index(passed)]
+        ahead_s = node.now_s - sent.feedback_at_s[told.index(passed)]
         before_s = metres - len(passed)
         node.require_that(
             ahead_s >= before_s / 2,
@@ -161,33 +124,30 @@ def require_speed(node: ClockBoundNode) -> None:
 
 def require_one_metre(node: ClockBoundNode, occasion: str) -> None:
     """Require that a goal of 1 m is served as usual: nothing is left of the drive before it."""
-    goal, what = start_drive(node, 1, occasion), f"A goal of 1 m {occasion}"
-    require_end(node, goal, what, "succeeded", 1.0 + SLACK_S)
-    told = [list(message.sequence) for message in (*goal.feedback, goal.result)]
+    goal = start_drive(node, 1, occasion)
+    goal.require_end("succeeded", 1.0 + SLACK_S, TOLERANCE_S)
+    told = [list(message.sequence) for message in (*goal.sent.feedback, goal.sent.result)]
     wrong = [marks for marks in told[:-1] if marks not in ([], [1])]
     node.require_that(
         not wrong and told[-1] == [1],
-        f"{what} has the marks [1], in its feedback and in its result.",
+        f"{goal.what} has the marks [1], in its feedback and in its result.",
         f"The feedback was {wrong[0]}." if wrong else f"The result was {told[-1]}.",
     )
-    require_stop(node, "succeeded")
+    require_stop(node)
 
 
-def cancel_drive(node: ClockBoundNode, goal: SentGoal, what: str) -> None:
+def cancel_drive(node: ClockBoundNode, goal: ObservedGoal, what: str) -> None:
     """Cancel a drive; require that it ends so, and that the robot stands."""
-    node.end.action_client(DRIVE).cancel(goal)
-    node.advance_until(lambda: goal.cancel_accepted is not None, CANCEL_S)
-    node.require_that(
-        goal.cancel_accepted,
-        "A request to cancel is accepted.",
-        "It was not answered." if goal.cancel_accepted is None else "It was refused.",
-    )
-    require_end(node, goal, what, "canceled", CANCEL_S)
-    require_stop(node, "been canceled")
+    goal.require_cancel_accepted(CANCEL_S)
+    goal.what = what
+    goal.require_end("canceled", CANCEL_S, TOLERANCE_S)
+    require_stop(node)
 
 
-def require_reason(node: ClockBoundNode, what: str) -> None:
-    """Require that whoever looks at drive/fault learns why a goal was aborted."""
+def require_abort(node: ClockBoundNode, goal: ObservedGoal, what: str, within_s: float) -> None:
+    """Require that a drive is aborted, that the robot stands, and that drive/fault says why."""
+    goal.what = what
+    goal.require_end("aborted", within_s, TOLERANCE_S)
     faults = node.end.values(FAULTS)
     came = "what came on drive/fault was empty" if faults else "nothing came on drive/fault"
     node.require_that(
@@ -195,6 +155,7 @@ def require_reason(node: ClockBoundNode, what: str) -> None:
         "The reason is published on drive/fault, in words.",
         f"{what} was aborted, and {came}.",
     )
+    require_stop(node)
 
 
 def require_commands(node: ClockBoundNode, until_s: float) -> None:
@@ -211,7 +172,8 @@ def require_commands(node: ClockBoundNode, until_s: float) -> None:
 
 def drives_afterwards(node: Clocked) -> bool:
     """Send a goal after shutdown(): whatever is answered, return whether anything moves."""
-    goal = send_goal(node, AFTERWARDS_M)
+    node.forget(COMMANDS)
+    goal = node.end.action_client(DRIVE).send(order=AFTERWARDS_M)
     node.advance_until(
         lambda: goal.accepted is False or goal.end or any(motions(node)), AFTERWARDS_M
     )

@@ -17,7 +17,7 @@ from std_msgs.msg import Bool
 
 from autograder.examination.exam import Exam, Failed
 from autograder.exercises.safety import drive_server, navigator_client, program_trials, shutdown
-from autograder.exercises.safety.drive_server import DRIVE_SERVER, cancel_drive, start_drive
+from autograder.exercises.safety.drive_server import DRIVE_SERVER, SLACK_S, TOLERANCE_S
 from autograder.exercises.safety.gripper_client import (
     COARSE_S,
     DEADLINE_S,
@@ -28,17 +28,14 @@ from autograder.exercises.safety.gripper_client import (
     ExaminedGrip,
     carry_out,
     give_up,
-    request_grip,
-    require_heartbeat,
+    require_beats,
 )
 from autograder.exercises.safety.navigator_client import (
-    DIED_S,
     LOST_S,
     NAVIGATE,
     NAVIGATION_CLIENT,
     ExaminedJourney,
     Journey,
-    require_outcome,
 )
 from autograder.exercises.safety.speed_limits import (
     JAMMED,
@@ -51,21 +48,17 @@ from autograder.exercises.safety.speed_limits import (
 )
 from autograder.observe.actions import ActionServerEnd
 from autograder.observe.clock_bound_node import WallWait
+from autograder.observe.phrases import say_words
 from autograder.observe.services import ServiceServer
 from autograder.observe.several_nodes import Nodes, several_nodes
 
 EXAM: Exam[Nodes] = Exam("safety", several_nodes(program_trials.TRIALS))
 
-SLOW_S, LATE_S = 0.7, 1.3
-"""Seconds after a try at which its answer is in time, or late, whatever the tolerance."""
-APART_S = 0.5
-"""Seconds from one request to another, whose answer takes so long that the first's 1 s is over."""
-BACK_S = 1.8
-"""Seconds after a request in which the gripper comes back: a third try is still to come."""
-LATER_S = 1.5
-"""Seconds in which a request that was refused might be made up for."""
-METRES, FAR = (3, 2, 7), (40, 20, 90)
-"""Of a drive whose length does not matter, and of one that is long: the usual ones, and bounds."""
+SLOW_S, LATE_S = 0.7, 1.3  # after a try: in time, or late, whatever the tolerance
+APART_S = 0.5  # between requests; the second's answer takes so long that the first's 1 s is over
+BACK_S = 1.8  # after a request in which the gripper comes back: a third try is still to come
+LATER_S = 1.5  # in which a request that was refused might be made up for
+METRES, FAR = (3, 2, 7), (40, 20, 90)  # of drives: the usual ones, and bounds
 IN_A_ROW = (
     " That was at the second request in a row that got no answer; at the first all was right."
 )
@@ -127,8 +120,8 @@ def gripper_refuses(nodes: Nodes) -> None:
         for grip in range(draws.whole("grips before a refusal", 0, 0, 2)):
             carry_out(node, gripper, draws.flag(f"grip {grip} before a refusal"), 0.0)
         close = draws.flag("the grip that is refused")
-        request_grip(node, gripper, close).refuse("When the gripper answered success=False")
-        again = request_grip(node, gripper, not close)
+        ExaminedGrip(node, gripper, close).refuse("When the gripper answered success=False")
+        again = ExaminedGrip(node, gripper, not close)
         with suppress(WallWait):  # how it waits is another check's
             node.advance_until(again.has_gone_on, LONGEST_S, stride_s=COARSE_S)
         if len(again.tries) > 1:
@@ -315,17 +308,17 @@ def drive_arrives(nodes: Nodes) -> None:
     far = draws.whole("a goal too far away", 11, 11, 99)
     for bad in draws.shuffled("bad goals", (0, behind, far)):
         drive_server.require_rejection(node, bad)
-    goal, slack_s = start_drive(node, metres), drive_server.SLACK_S
-    drive_server.require_end(node, goal, f"A goal of {metres} m", "succeeded", metres + slack_s)
-    took_s = node.now_s - goal.sent_at_s
+    goal = drive_server.start_drive(node, metres)
+    goal.require_end("succeeded", metres + SLACK_S, TOLERANCE_S)
+    took_s = node.now_s - goal.sent.sent_at_s
     node.require_that(
-        took_s >= metres - slack_s,
-        f"A goal of {metres} m takes {metres} s, at 1 m/s.",
+        took_s >= metres - SLACK_S,
+        f"{goal.what} takes {metres} s, at 1 m/s.",
         f"It was over after {took_s:.1f} s.",
     )
-    drive_server.require_marks(node, goal, metres)
+    drive_server.require_marks(node, goal.sent, metres)
     drive_server.require_speed(node)
-    drive_server.require_stop(node, "succeeded")
+    drive_server.require_stop(node)
     drive_server.require_one_metre(node, "after a longer one")
     nodes.require_times(program_trials.WHOLE)
 
@@ -345,14 +338,14 @@ def drive_cancels(nodes: Nodes) -> None:
     Somebody steps in front of the robot: whoever cancels means now.
     """
     node = nodes.node(DRIVE_SERVER)
-    goal = start_drive(node, drive_server.LONGEST_M)
+    goal = drive_server.start_drive(node, drive_server.LONGEST_M)
     # Who looks for a cancel at each mark only has then most of a metre before the next look.
-    node.advance_until(lambda: any(f.sequence for f in goal.feedback), 1.0 + drive_server.SLACK_S)
+    node.advance_until(lambda: any(f.sequence for f in goal.sent.feedback), 1.0 + SLACK_S)
     node.advance(0.1)
-    cancel_drive(node, goal, "A canceled goal")
-    goal = start_drive(node, 1, "after a canceled one")
+    drive_server.cancel_drive(node, goal, "A canceled goal")
+    goal = drive_server.start_drive(node, 1, "after a canceled one")
     node.advance(0.3)
-    cancel_drive(node, goal, "A goal that is canceled before the first mark")
+    drive_server.cancel_drive(node, goal, "A goal that is canceled before the first mark")
     drive_server.require_one_metre(node, "after two canceled ones")
     nodes.require_no_errors("canceled")
     nodes.require_times(program_trials.CANCELED)
@@ -372,22 +365,19 @@ def drive_aborts(nodes: Nodes) -> None:
 
     When the jam comes loose, wheels that were not stopped start to turn again.
     """
-    node = nodes.node(DRIVE_SERVER)
-    goal = start_drive(node, drive_server.LONG_M)
+    node, abort_s = nodes.node(DRIVE_SERVER), drive_server.ABORT_S
+    goal = drive_server.start_drive(node, drive_server.LONG_M)
     node.advance(2.9)  # to most of the third metre: a node is seen to go on as it began
     jammed_s = node.now_s
-    node.send(drive_server.JAMMED, Bool(data=True))  # the wheels raise at the next command
-    limit_s = drive_server.COMMAND_S + drive_server.ABORT_S
-    drive_server.require_end(node, goal, "A goal whose wheels jam", "aborted", limit_s)
-    drive_server.require_stop(node, "been aborted")
-    drive_server.require_reason(node, "The goal")
+    node.send(JAMMED, Bool(data=True))  # the wheels raise at the next command
+    limit_s = drive_server.COMMAND_S + abort_s
+    drive_server.require_abort(node, goal, "A goal whose wheels jam", limit_s)
     drive_server.require_commands(node, jammed_s)
+    goal = drive_server.send_goal(node, 1, "while the wheels are jammed")
+    goal.require_accepted(drive_server.PROMPT_S)
     what = "A goal whose wheels are jammed from the start"
-    goal = start_drive(node, 1, "while the wheels are jammed", moves=False)
-    drive_server.require_end(node, goal, what, "aborted", drive_server.ABORT_S)
-    drive_server.require_reason(node, what)
-    drive_server.require_stop(node, "been aborted, jammed from the start")
-    node.send(drive_server.JAMMED, Bool(data=False))
+    drive_server.require_abort(node, goal, what, abort_s)
+    node.send(JAMMED, Bool(data=False))
     drive_server.require_one_metre(node, "after the jam, with free wheels,")
     nodes.require_no_errors("aborted")
     nodes.require_times(program_trials.ABORTED, program_trials.COMMANDS)
@@ -410,7 +400,7 @@ def gripper_stale(nodes: Nodes) -> None:
     """
     node = nodes.node(GRIPPER_CLIENT)
     with node.served_by(ServiceServer, GRIPPER) as gripper:
-        grip = request_grip(node, gripper, True)
+        grip = ExaminedGrip(node, gripper, True)
         node.advance(LATE_S)
         grip.require_patience()
         grip.tries[0].answer(success=False)
@@ -423,26 +413,26 @@ def gripper_stale(nodes: Nodes) -> None:
         grip.answer_again()
         grip.require_once("When the second try was answered, after a late answer to the first")
 
-        grip = request_grip(node, gripper, False)
+        grip = ExaminedGrip(node, gripper, False)
         grip.require_second_try()
         grip.tries[0].answer(success=False)
         grip.require_ignored("first try comes when the second one is under way")
         grip.answer_again()
 
-        before = request_grip(node, gripper, True)
+        before = ExaminedGrip(node, gripper, True)
         late = before.tries[0]
         before.answer_again()
-        grip = request_grip(node, gripper, True)
+        grip = ExaminedGrip(node, gripper, True)
         late.answer(success=False)
         grip.require_ignored("first try for the last request comes when the next one is under way")
         grip.tries[0].answer(success=True)
         when = "When a try was answered with success=True, after a late answer from before"
         grip.require_outcome(when, "done")
 
-        grip = request_grip(node, gripper, True)
+        grip = ExaminedGrip(node, gripper, True)
         grip.require_second_try()
         grip.tries[0].answer(success=True)
-        node.advance_until(lambda: grip.outcomes, DEADLINE_S, stride_s=COARSE_S)
+        node.advance_until(grip.is_over, DEADLINE_S, stride_s=COARSE_S)
         node.require_that(  # that anything is said at all is another check's
             grip.outcomes[:1] != ["done"],
             "An answer to the first try that comes during the second one is ignored, also when no "
@@ -471,8 +461,8 @@ def gripper_absent(nodes: Nodes) -> None:
     with node.served_by(ServiceServer, GRIPPER) as gripper:
         began = time.monotonic()
         node.advance(2.0)
-        require_heartbeat(node, "Before the first request", 0.0, time.monotonic() - began)
-        grip = request_grip(node, gripper, True)
+        require_beats(node, "Before the first request", 0.0, time.monotonic() - began)
+        grip = ExaminedGrip(node, gripper, True)
     with node.unserved(GRIPPER):
         grip.require_failure("When the gripper died in the middle of a call", node.now_s)
         grip = ExaminedGrip(node, None, True)
@@ -483,20 +473,21 @@ def gripper_absent(nodes: Nodes) -> None:
         grip.gripper = gripper
         when = f"When the gripper was not there, and came back {BACK_S:g} s after the request"
         node.require_that(
-            node.advance_until(lambda: grip.tries, DEADLINE_S - BACK_S),
+            node.advance_until(grip.has_begun, DEADLINE_S - BACK_S),
             f"{when}, it is called: the third try comes 3.5 s after the request or later.",
-            f"It was never called. {grip.describe_outcomes()}",
+            f"It was never called. {say_words(grip.outcomes)}",
         )
-        grip.require_data().tries[-1].answer(success=True)
+        grip.require_data()
+        grip.tries[-1].answer(success=True)
         grip.require_outcome(f"{when} and answered success=True", "done")
-        grip = request_grip(node, gripper, True)
+        grip = ExaminedGrip(node, gripper, True)
         grip.tries[0].answer(success=True)
         grip.require_outcome("When the gripper had come back and answered success=True", "done")
-        grip = request_grip(node, gripper, True)
+        grip = ExaminedGrip(node, gripper, True)
         grip.tries[0].answer(success=False)  # what it says then is another check's
         refused_s = node.now_s
         node.advance(1.0)
-        require_heartbeat(node, "After a refusal", refused_s)
+        require_beats(node, "After a refusal", refused_s)
         nodes.require_no_errors("absent")
     nodes.require_times(program_trials.BEAT)
 
@@ -589,10 +580,10 @@ def goals_lost(nodes: Nodes) -> None:
         goal = ExaminedJourney(node, navigator, metres)
     with node.unserved(NAVIGATE):
         when = "When the navigator died on the way"
-        goal.require_outcome(when, "lost", DIED_S)
+        goal.require_outcome(when, "lost", navigator_client.DIED_S)
         goal.require_once(when, "lost")
-        absent = Journey(node, None, metres)
-        require_outcome(node, absent, "When there was no navigator", "lost", LOST_S)
+        Journey(node, None, metres)
+        navigator_client.require_outcome(node, "When there was no navigator", "lost", LOST_S)
     with node.served_by(ActionServerEnd, NAVIGATE) as navigator:
         goal = ExaminedJourney(node, navigator, metres)
         navigator.end_goal(ServerGoalHandle.succeed)
@@ -604,7 +595,7 @@ def goals_lost(nodes: Nodes) -> None:
         navigator.end_goal(ServerGoalHandle.succeed)
         when = "When the goal was accepted late, but in time, and succeeded"
         goal.require_outcome(when, "arrived")
-        nodes.require_no_errors("lost")
+        nodes.require_no_errors("absent", "lost")
     nodes.require_times(program_trials.GOAL, program_trials.CANCEL)
 
 

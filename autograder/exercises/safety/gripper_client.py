@@ -1,4 +1,4 @@
-"""Part A, the gripper's client: one request for a grip, its tries, its outcome, the heartbeat."""
+"""Part A, the gripper's client: one request for a grip, its tries, and its outcome."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import SetBool
 
 from autograder.observe.clock_bound_node import ClockBoundNode
+from autograder.observe.heartbeats import require_heartbeat
 from autograder.observe.nouns import Service, Task, Topic
 from autograder.observe.observed_node import STRIDE_S
-from autograder.observe.phrases import capitalize_first, there_were
+from autograder.observe.phrases import capitalize_first, say_words, there_were
 from autograder.observe.plain_programs import Clocked
 from autograder.observe.services import Request, ServiceServer
-from autograder.observe.silences import longest_silence
 
 REQUEST = Topic("grip/request", Bool)
 OUTCOME = Topic("grip/outcome", String, value=lambda message: message.data)
@@ -19,43 +19,24 @@ HOLD = Topic("arm/hold", Empty)
 HEARTBEAT = Topic("grip/heartbeat", Empty)
 GRIPPER = Service("gripper/set", SetBool)
 GRIPPER_CLIENT = Task(
-    "GripperClient",
-    publishes=[OUTCOME, HOLD, HEARTBEAT],
-    subscribes=[REQUEST],
-    uses=[GRIPPER],
+    "GripperClient", publishes=[OUTCOME, HOLD, HEARTBEAT], subscribes=[REQUEST], uses=[GRIPPER],
     threads=4,
-)
+)  # fmt: skip
 
-PROMPT_S = 1.0
-"""Seconds for an outcome that is clear; a node may look for it by a timer."""
-LONGEST_S = 10.0
-"""Seconds from a request to its outcome."""
-ALLOWED_S = 0.2
-"""Seconds more or less that do no harm."""
-TOLERANCE_S = ALLOWED_S + STRIDE_S / 2
-"""Seconds that the task allows, and that the examiner's strides blur."""
-DEADLINE_S = LONGEST_S + TOLERANCE_S + STRIDE_S
-"""Seconds after which no outcome is due any more."""
-AFTER_S = 1.5
-"""Seconds in which a second outcome would show."""
-COARSE_S = 0.5
-"""Seconds between two looks where it does not matter when exactly something happens."""
-ANSWER_S, PAUSE_S = 1.0, 0.5
-"""Seconds after which a try has failed, from then to the second one at least, and by which the
-second pause is longer at least."""
-SHORTEST_S = 4.5 - 5 * ALLOWED_S - STRIDE_S
-"""Seconds of three tries and two pauses, each as short as may be."""
-HELD_S = 1.0
-"""Seconds of wall time for which the node's clock stands still in the first pause."""
-BEAT_S = 0.5
-"""Seconds between two heartbeats."""
-BLUR_S = 1.5 * STRIDE_S
-"""Seconds: a beat is known to a stride; and half a one, lest sums of floats decide."""
-ON_THE_WALL_CLOCK = " Does it beat on the wall clock? In simulated time that hardly moves."
-STOPPED = (
-    " It had beaten before: was it stopped, or is it in one callback group with what waits here?"
-)
+PROMPT_S = 1.0  # for an outcome that is clear; a node may look for it by a timer
+LONGEST_S = 10.0  # from a request to its outcome
+ALLOWED_S = 0.2  # more or less, which does no harm
+TOLERANCE_S = ALLOWED_S + STRIDE_S / 2  # what the task allows, and what the strides blur
+DEADLINE_S = LONGEST_S + TOLERANCE_S + STRIDE_S  # after which no outcome is due any more
+AFTER_S = 1.5  # in which a second outcome would show
+COARSE_S = 0.5  # between two looks where it does not matter when exactly something happens
+ANSWER_S = 1.0  # after which a try has failed
+PAUSE_S = 0.5  # from then to the second try, at least, and by which the next pause is longer
+SHORTEST_S = 4.5 - 5 * ALLOWED_S - STRIDE_S  # three tries and two pauses, as short as may be
+HELD_S = 1.0  # of wall time for which the node's clock stands still in the first pause
+BEAT_S = 0.5  # between two heartbeats
 GIVEN_UP = "After three tries without an answer"
+SECOND_TRY = "After a try without an answer there is a second one."
 
 
 class Grip:
@@ -86,30 +67,37 @@ class Grip:
         """What was published on grip/outcome so far."""
         return self._end.values(OUTCOME)
 
-    def has_gone_on(self) -> bool:
-        """Return whether there is more than one try, or an outcome."""
-        return len(self.tries) > 1 or bool(self.outcomes)
+    def has_begun(self) -> bool:
+        """Return whether the gripper has been called."""
+        return bool(self.tries)
+
+    def is_over(self) -> bool:
+        """Return whether there is an outcome."""
+        return bool(self.outcomes)
+
+    def has_gone_on(self, tries: int = 1) -> bool:
+        """Return whether there are more tries than these, or an outcome."""
+        return len(self.tries) > tries or self.is_over()
 
 
 class ExaminedGrip(Grip):
     """A request for a grip in a session, of which the task says what has to become."""
 
     def __init__(self, node: ClockBoundNode, gripper: ServiceServer | None, close: bool) -> None:
-        """Ask for it."""
+        """Ask for it, and require that the gripper is called, if there is one."""
         super().__init__(node, gripper, close)
         self._node, self._when = node, ""
+        if gripper is not None:
+            data = str(close).lower()
+            node.require_that(
+                node.advance_until(self.has_begun, PROMPT_S),
+                f"After grip/request {data}{self.follows}, gripper/set is called.",
+                f"Within {PROMPT_S:g} s the gripper was not called. {say_words(self.outcomes)}",
+            )
+            self.require_data()
 
-    def require_called(self) -> ExaminedGrip:
-        """Require that the gripper is called at once; return this."""
-        self._node.require_that(
-            self._node.advance_until(lambda: self.tries, PROMPT_S),
-            f"After grip/request {str(self.close).lower()}{self.follows}, gripper/set is called.",
-            f"Within {PROMPT_S:g} s the gripper was not called. {self.describe_outcomes()}",
-        )
-        return self.require_data()
-
-    def require_data(self) -> ExaminedGrip:
-        """Require that every try so far asks for what was requested; return this."""
+    def require_data(self) -> None:
+        """Require that every try so far asks for what was requested."""
         for number, attempt in enumerate(self.tries, 1):
             which = f" in try {number}" if number > 1 else ""
             self._node.require_that(
@@ -117,17 +105,11 @@ class ExaminedGrip(Grip):
                 f"The gripper is called with data={str(self.close).lower()}, as requested.",
                 f"It was called with data={str(attempt.message.data).lower()}{which}.",
             )
-        return self
 
     def require_outcome(self, when: str, word: str, limit_s: float = PROMPT_S) -> None:
         """Require one outcome, and a held arm unless it is good; ``when`` begins a sentence."""
         self._when = when
-        self._node.advance_until(lambda: self.outcomes, limit_s)
-        self._node.require_that(
-            self.outcomes == [word],
-            f"{when}, grip/outcome says “{word}”, once.",
-            self.describe_outcomes(f"Within {limit_s:.3g} s it"),
-        )
+        self._node.require_word(OUTCOME, word, limit_s, when)
         self._node.require_that(
             word == "done" or self._node.advance_until(lambda: self._end.values(HOLD), PROMPT_S),
             f"With “{word}” the arm is told to hold still, on arm/hold.",
@@ -140,54 +122,44 @@ class ExaminedGrip(Grip):
         self._node.require_that(
             len(self.outcomes) == 1,
             f"{when or self._when}, there is exactly one outcome.",
-            self.describe_outcomes(),
+            say_words(self.outcomes),
         )
-
-    def describe_outcomes(self, who: str = "It") -> str:
-        """Return which outcomes there were, a sentence; ``who`` begins one that says: none."""
-        words = ", then ".join(f"“{word}”" for word in self.outcomes)
-        return f"It said {words}." if words else f"{who} said nothing."
 
     def refuse(self, when: str) -> None:
         """Refuse the try that is under way, and require that it is the last."""
         self._node.forget(HOLD)  # what came with the request says nothing about the outcome
         tries = len(self.tries)
         self.tries[-1].answer(success=False)
-        self._node.advance_until(lambda: self.outcomes or len(self.tries) > tries, PROMPT_S)
-        self._require_no_more(tries, when)
+
+        def require_no_more() -> None:
+            self._node.require_that(
+                len(self.tries) <= tries,
+                f"{when}: a refusal is an answer, so the gripper is not asked again.",
+                f"The gripper was called {len(self.tries)} times.",
+            )
+
+        self._node.advance_until(lambda: self.has_gone_on(tries), PROMPT_S)
+        require_no_more()
         self.require_outcome(when, "refused")
         self.require_once()
-        self._require_no_more(tries, when)
-
-    def _require_no_more(self, tries: int, when: str) -> None:
-        self._node.require_that(
-            len(self.tries) <= tries,
-            f"{when}: a refusal is an answer, so the gripper is not asked again.",
-            f"The gripper was called {len(self.tries)} times.",
-        )
+        require_no_more()
 
     def require_patience(self) -> None:
         """Require that there is no outcome yet, while one try has had no answer."""
-        self._node.require_that(
-            not self.outcomes,
-            "After a try without an answer there is a second one.",
-            f"After one try it said “{''.join(self.outcomes[:1])}”.",
-        )
+        said = f"After one try it said “{''.join(self.outcomes[:1])}”."
+        self._node.require_that(not self.outcomes, SECOND_TRY, said)
 
-    def require_second_try(self) -> Request:
-        """Require that the gripper is tried once more, and return that try."""
+    def require_second_try(self) -> None:
+        """Require that the gripper is tried once more before there is an outcome."""
         self._node.advance_until(self.has_gone_on, LONGEST_S)
         self.require_patience()
-        self._node.require_that(
-            len(self.tries) > 1,
-            "After a try without an answer there is a second one.",
-            f"There was no second try in {LONGEST_S:g} s.",
-        )
-        return self.tries[1]
+        missing = f"There was no second try in {LONGEST_S:g} s."
+        self._node.require_that(len(self.tries) > 1, SECOND_TRY, missing)
 
     def answer_again(self) -> None:
         """Let the second try succeed, and require that it counts."""
-        self.require_second_try().answer(success=True)
+        self.require_second_try()
+        self.tries[1].answer(success=True)
         self.require_outcome("When the second try was answered with success=True", "done")
 
     def require_ignored(self, answer: str) -> None:
@@ -202,18 +174,23 @@ class ExaminedGrip(Grip):
     def require_failure(self, when: str, began_s: float) -> None:
         """Require that it fails, after three tries' time, and that the heart beats on."""
         self.require_outcome(when, "failed", DEADLINE_S)
-        lasted = self._node.now_s - began_s
+        lasted_s = self._node.now_s - began_s
         self._node.require_that(
-            lasted >= SHORTEST_S,
+            lasted_s >= SHORTEST_S,
             f"{when}, three tries take 3 s, and the pauses 1.5 s: it may come back.",
-            f"“failed” came after {lasted:.1f} s.",
+            f"“failed” came after {lasted_s:.1f} s.",
         )
-        require_heartbeat(self._node, when, began_s)
+        require_beats(self._node, when, began_s)
 
 
-def request_grip(node: ClockBoundNode, gripper: ServiceServer, close: bool) -> ExaminedGrip:
-    """Ask for a grip, and require that the gripper is called."""
-    return ExaminedGrip(node, gripper, close).require_called()
+def require_beats(
+    node: ClockBoundNode, when: str, since_s: float, watched_s: float | None = None
+) -> None:
+    """Require that the heart has beaten since a time: see `heartbeats.require_heartbeat`."""
+    require_heartbeat(
+        node, HEARTBEAT, BEAT_S,
+        allowed_s=ALLOWED_S, since_s=since_s, when=when, watched_s=watched_s,
+    )  # fmt: skip
 
 
 def carry_out(
@@ -223,7 +200,7 @@ def carry_out(
 
     ``aside`` is a sentence to add if the gripper was called again.
     """
-    grip = request_grip(node, gripper, close)
+    grip = ExaminedGrip(node, gripper, close)
     node.advance_until(lambda: False, delay_s)
     if not grip.outcomes:
         grip.tries[0].answer(success=True)
@@ -244,17 +221,13 @@ def give_up(
 
     ``stands_still``: time does so for a while when the first try has had its own.
     """
-    grip = request_grip(node, gripper, close)
+    grip = ExaminedGrip(node, gripper, close)
 
     def advance_to(second_s: float, tries: int, stride_s: float = STRIDE_S) -> None:
-        node.advance_until(
-            lambda: len(grip.tries) > tries or grip.outcomes,
-            grip.began_s + second_s - node.now_s,
-            stride_s=stride_s,
-        )
+        left_s = grip.began_s + second_s - node.now_s
+        node.advance_until(lambda: grip.has_gone_on(tries), left_s, stride_s=stride_s)
 
-    # In half strides: they blur how short the first pause is.
-    half_s = STRIDE_S / 2
+    half_s = STRIDE_S / 2  # strides blur how short the first pause is
     advance_to(node.now_s - grip.began_s + ANSWER_S + half_s, 1, half_s)
     if stands_still:
         what = f"{ANSWER_S:g} s after the first try the next one came, or an outcome"
@@ -266,9 +239,8 @@ def give_up(
     advance_to(DEADLINE_S, 2)
     if not grip.outcomes:
         node.forget(HOLD)  # what came with a try says nothing about the outcome
-    node.advance_until(lambda: grip.outcomes, grip.began_s + DEADLINE_S - node.now_s)
+    node.advance_until(grip.is_over, grip.began_s + DEADLINE_S - node.now_s)
     _require_three_tries(node, grip)
-    grip.require_outcome(GIVEN_UP, "failed")
     return grip
 
 
@@ -289,6 +261,7 @@ def _require_three_tries(node: ClockBoundNode, grip: ExaminedGrip) -> None:
         f"{capitalize_first(tries)} before the outcome “{grip.outcomes[0]}”.",
     )
     grip.require_data()
+    grip.require_outcome(GIVEN_UP, "failed")
     first_s, second_s = times_s[1] - times_s[0], times_s[2] - times_s[1]
     node.require_that(  # a try and a pause: two times, each of which may be shorter
         first_s >= ANSWER_S + PAUSE_S - 2 * ALLOWED_S - STRIDE_S / 4,
@@ -308,43 +281,4 @@ def _require_three_tries(node: ClockBoundNode, grip: ExaminedGrip) -> None:
         f"When the third try has had no answer for {ANSWER_S:g} s, the outcome is clear, and comes "
         "at once.",
         f"It came {ended_s - times_s[2]:.1f} s after the third try.",
-    )
-
-
-def require_heartbeat(
-    node: ClockBoundNode, when: str, since_s: float, watched_s: float | None = None
-) -> None:
-    """Require a heartbeat every 0.5 s since a time.
-
-    What counts is each silence between two beats, and not how many there were: a node that looks
-    by a timer may be late each time. Too many are told by their number: some may come soon after
-    one that was late.
-
-    Args:
-        node: the gripper's client.
-        when: that time in words, as the beginning of a sentence.
-        since_s: from when on, in s of the node's time.
-        watched_s: how long it was by the wall clock, if nothing else went on in the node.
-    """
-    lasted_s = node.now_s - since_s
-    times_s = [beat.at_s for beat in node.end.heard(HEARTBEAT) if beat.at_s > since_s]
-    silence_s, beats = longest_silence(times_s, since_s, node.now_s), len(times_s)
-    came = f"In {lasted_s:.1f} s {there_were(beats, 'heartbeat', 'heartbeats')}"
-    hint = ""
-    if beats <= lasted_s / BEAT_S / 2:
-        hint = STOPPED if watched_s is None else ON_THE_WALL_CLOCK
-        if watched_s is not None and beats > watched_s / BEAT_S + 1:
-            hint = ""  # by the wall clock there would be no more than these
-    node.require_that(
-        silence_s <= BEAT_S + ALLOWED_S + BLUR_S,
-        f"{when}, the heartbeat goes on at one every {BEAT_S:g} s: no silence is longer than "
-        f"{BEAT_S + ALLOWED_S:g} s.",
-        f"{came}; the longest silence lasted {silence_s:.1f} s.{hint}",
-    )
-    most = int((lasted_s + BLUR_S) / (BEAT_S - ALLOWED_S)) + 1
-    node.require_that(
-        beats <= most,
-        f"{when}, the heartbeat goes on at one every {BEAT_S:g} s: at most {most} in "
-        f"{lasted_s:.1f} s.",
-        f"{came}.",
     )

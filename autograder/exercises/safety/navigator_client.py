@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from itertools import pairwise
 
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Int32, String
@@ -13,6 +13,7 @@ from autograder.observe.actions import ActionServerEnd
 from autograder.observe.clock_bound_node import ClockBoundNode
 from autograder.observe.nouns import Action, Task, Topic
 from autograder.observe.observed_node import STRIDE_S
+from autograder.observe.phrases import say_words
 from autograder.observe.plain_programs import Clocked
 
 REQUEST = Topic("navigate/request", Int32)
@@ -20,38 +21,23 @@ OUTCOME = Topic("navigate/outcome", String, value=lambda message: message.data)
 SPEED = Topic("cmd_vel", Twist, value=is_motion)
 NAVIGATE = Action("navigate", Drive)
 NAVIGATION_CLIENT = Task(
-    "NavigationClient",
-    publishes=[OUTCOME, SPEED],
-    subscribes=[REQUEST],
-    uses=[NAVIGATE],
-    threads=4,
+    "NavigationClient", publishes=[OUTCOME, SPEED], subscribes=[REQUEST], uses=[NAVIGATE], threads=4
 )
 
-PROMPT_S = 1.0
-"""Seconds for an outcome that is clear; a node may look for it by a timer."""
-SILENCE_S = 2.0
-"""Seconds without feedback after which a drive is canceled."""
-ANSWER_S = 1.0
-"""Seconds that an answer may take."""
-SLOW_S = 0.7
-"""Seconds that an answer takes which is slow, but in time whatever the tolerance."""
-ALLOWED_S = 0.2
-"""Seconds more or less that do no harm."""
-TOLERANCE_S = ALLOWED_S + STRIDE_S
-"""Seconds that the task allows, and for a node that looks by a timer."""
-LOST_S = ANSWER_S + TOLERANCE_S + STRIDE_S
-"""Seconds within which an answer that does not come is given up."""
-DIED_S = SILENCE_S + ANSWER_S + 2 * ALLOWED_S + STRIDE_S
-"""Seconds within which a navigator that has died on the way is given up."""
-AFTER_S = 2.5
-"""Seconds in which a second outcome would show."""
-COARSE_S = 0.5
-"""Seconds between two looks where it does not matter when exactly something happens."""
-BREATH_S = 1.5
-"""Seconds between the feedbacks of a navigator that is slow, not dead."""
+PROMPT_S = 1.0  # for an outcome that is clear; a node may look for it by a timer
+SILENCE_S = 2.0  # without feedback after which a drive is canceled
+ANSWER_S = 1.0  # that an answer may take
+SLOW_S = 0.7  # that an answer takes which is slow, but in time whatever the tolerance
+ALLOWED_S = 0.2  # more or less, which does no harm
+TOLERANCE_S = ALLOWED_S + STRIDE_S  # what the task allows, and a node that looks by a timer
+LOST_S = ANSWER_S + TOLERANCE_S + STRIDE_S  # for an answer that does not come
+DIED_S = SILENCE_S + ANSWER_S + 2 * ALLOWED_S + STRIDE_S  # of a navigator that dies on the way
+AFTER_S = 2.5  # in which a second outcome would show
+COARSE_S = 0.5  # between two looks where it does not matter when exactly something happens
+BREATH_S = 1.5  # between the feedbacks of a navigator that is slow, not dead
+# Marks in the feedbacks of a slow drive, which takes longer than anyone would wait for the whole.
+# Once it stands still in between: the same feedback again is a sign of life, too.
 BREATHS = (1, 2, 3, 3, 4, 5, 6, 7)
-"""Marks in the feedbacks of a slow drive, which takes longer than anyone would wait for the whole.
-Once it stands still in between: the same feedback again is a sign of life, too."""
 
 
 class Journey:
@@ -77,6 +63,10 @@ class Journey:
     def outcomes(self) -> list[str]:
         """What was published on navigate/outcome so far."""
         return self._end.values(OUTCOME)
+
+    def is_over(self) -> bool:
+        """Return whether there is an outcome."""
+        return bool(self.outcomes)
 
 
 class ExaminedJourney(Journey):
@@ -113,8 +103,8 @@ class ExaminedJourney(Journey):
         self._node.forget(SPEED)
 
     def require_outcome(self, when: str, word: str, limit_s: float = PROMPT_S) -> None:
-        """Require one outcome, and a stop unless it is good; ``when`` begins a sentence."""
-        require_outcome(self._node, self, when, word, limit_s)
+        """Require one outcome: see the function `require_outcome`."""
+        require_outcome(self._node, when, word, limit_s)
 
     def require_once(self, when: str, word: str) -> None:
         """Require that the outcome stays the only one, past any timer of the goal's."""
@@ -128,21 +118,18 @@ class ExaminedJourney(Journey):
 
     def breathe(self) -> None:
         """Give feedback so often that the drive must be left alone."""
-        before = -1
-        for marks in (0, *BREATHS):
+        for before, marks in pairwise((-1, 0, *BREATHS)):
             if marks:
                 self.send_feedback(marks)
             self._node.advance(BREATH_S, stride_s=COARSE_S)
             same = " The last feedback had the same marks as the one before: it counts, too."
-            did = "It was canceled"
-            if not self.navigator.cancels_at_s:
-                did = f"It said “{''.join(self.outcomes[:1])}”"
+            canceled = bool(self.navigator.cancels_at_s)
             self._node.require_that(
-                not self.navigator.cancels_at_s and not self.outcomes,
+                not canceled and not self.outcomes,
                 f"A drive with feedback every {BREATH_S:g} s is left alone.",
-                f"{did}.{same if marks == before else ''}",
+                ("It was canceled." if canceled else say_words(self.outcomes))
+                + (same if marks == before else ""),
             )
-            before = marks
 
     def require_cancel(self, event: str = "its acceptance") -> None:
         """Wait in silence until the goal is canceled, neither too early nor too late.
@@ -155,11 +142,11 @@ class ExaminedJourney(Journey):
         expected = (
             f"The goal is canceled {SILENCE_S:g} s after {event}, with no feedback since then."
         )
-        said = f" It said “{self.outcomes[0]}”." if self.outcomes else ""
         self._node.require_that(
             cancels_at_s,
             expected,
-            f"{SILENCE_S + TOLERANCE_S:g} s after {event} no request to cancel had come.{said}",
+            f"{SILENCE_S + TOLERANCE_S:g} s after {event} no request to cancel had come. "
+            + say_words(self.outcomes),
         )
         waited_s = cancels_at_s[0] - since_s
         came = f"{waited_s:.1f} s after {event}"
@@ -181,24 +168,16 @@ class ExaminedJourney(Journey):
         self._await_acceptance()
 
 
-def require_outcome(
-    node: ClockBoundNode, journey: Journey, when: str, word: str, limit_s: float = PROMPT_S
-) -> None:
-    """Require one outcome of a journey, and a stop unless it is good."""
-    node.advance_until(lambda: journey.outcomes, limit_s)
-    words = ", then ".join(f"“{said}”" for said in journey.outcomes)
-    node.require_that(
-        journey.outcomes == [word],
-        f"{when}, navigate/outcome says “{word}”, once.",
-        f"It said {words}." if words else f"Within {limit_s:.3g} s it said nothing.",
-    )
+def require_outcome(node: ClockBoundNode, when: str, word: str, limit_s: float = PROMPT_S) -> None:
+    """Require one outcome, and a stop unless it is good; ``when`` begins a sentence."""
+    node.require_word(OUTCOME, word, limit_s, when)
     if word == "arrived":
         return
     node.advance_until(lambda: node.end.values(SPEED), PROMPT_S)
-    commands: list[Any] = node.end.values(SPEED)
-    last = "the last command was to drive" if commands else f"nothing came within {PROMPT_S:g} s"
+    moved = node.end.values(SPEED)
+    last = "the last command was to drive" if moved else f"nothing came within {PROMPT_S:g} s"
     node.require_that(
-        commands[-1:] == [False],
+        moved[-1:] == [False],
         f"With “{word}” the robot is stopped: a zero Twist on cmd_vel.",
         f"It said “{word}”, but on cmd_vel {last}.",
     )

@@ -12,110 +12,97 @@ from rclpy.action.server import ServerGoalHandle
 from std_msgs.msg import Bool
 
 from autograder.exercises.safety import drive_server, speed_limits
-from autograder.exercises.safety.drive_server import DRIVE, DRIVE_SERVER, motions, send_goal
+from autograder.exercises.safety.drive_server import DRIVE, DRIVE_SERVER, motions
 from autograder.exercises.safety.gripper_client import GRIPPER, GRIPPER_CLIENT, HEARTBEAT, Grip
 from autograder.exercises.safety.navigator_client import NAVIGATE, NAVIGATION_CLIENT, Journey
 from autograder.exercises.safety.speed_limits import SET_SPEED, SPEED_SERVER
 from autograder.observe.actions import ActionServerEnd, SentGoal
-from autograder.observe.plain_programs import COARSE_S, ObservedProgram
-from autograder.observe.program_trials import TIMED, Bounds, NodeTrials
-from autograder.observe.services import ServiceServer
-from autograder.observe.silences import longest_silence
+from autograder.observe.heartbeats import longest_silence
+from autograder.observe.plain_programs import ObservedProgram
+from autograder.observe.program_trials import TIMED, Bounds, NodeTrials, served
+from autograder.observe.services import Request, ServiceServer
 
-SLOW_S, LATE_S = 0.7, 1.5
-"""Seconds after which a try is answered, in time and too late."""
-BEATS = 2
-"""Heartbeats after the first, over which they are timed."""
-METRES = 3
-"""Of the drive that is timed: a second more or less is allowed a drive, whatever its length."""
+SLOW_S, LATE_S = 0.7, 1.5  # after which a try is answered, in time and too late
+BEATS = 2  # after the first, over which they are timed
+METRES = 3  # of the drive that is timed: a second more or less is allowed, whatever its length
 
 SLOW, LATE, PAUSE, BEAT = "slow answer", "late answer", "first pause", "heartbeat"
 STALL, GOAL, CANCEL = "silence", "goal without answer", "cancel without answer"
 WHOLE, COMMANDS, CANCELED, ABORTED = "drive", "commands", "canceled drive", "jammed drive"
 
 
-def _never() -> bool:
-    return False
-
-
-def _time_grips(program: ObservedProgram) -> None:
-    with program.served_by(ServiceServer, GRIPPER) as gripper:
-        program.forget(HEARTBEAT)
-        program.advance_until(lambda: len(program.end.heard(HEARTBEAT)) > BEATS, 1.5 * BEATS)
-        beats_s = [beat.at_s for beat in program.end.heard(HEARTBEAT)]
-        if len(beats_s) > 1:
-            program.times[BEAT] = (beats_s[-1] - beats_s[0]) / (len(beats_s) - 1)
-        grip = _answer_first_try(program, gripper, SLOW_S, 2.0)
-        program.times[SLOW] = len(grip.tries)
-        grip = _answer_first_try(program, gripper, LATE_S, 6.0)
-        program.times[LATE] = len(grip.tries)
-        program.times[PAUSE] = math.inf
-        if len(grip.tries) > 1:
-            program.times[PAUSE] = grip.tries[1].at_s - grip.tries[0].at_s
+def _time_grips(program: ObservedProgram, gripper: ServiceServer) -> None:
+    program.forget(HEARTBEAT)
+    program.advance_until(lambda: len(program.end.heard(HEARTBEAT)) > BEATS, 1.5 * BEATS)
+    beats_s = [beat.at_s for beat in program.end.heard(HEARTBEAT)]
+    if len(beats_s) > 1:
+        program.times[BEAT] = (beats_s[-1] - beats_s[0]) / (len(beats_s) - 1)
+    tries = _answer_first_try(program, gripper, SLOW_S, 2.0)
+    program.times[SLOW] = len(tries)
+    tries = _answer_first_try(program, gripper, LATE_S, 6.0)
+    program.times[LATE] = len(tries)
+    program.times[PAUSE] = tries[1].at_s - tries[0].at_s if len(tries) > 1 else math.inf
 
 
 def _answer_first_try(
     program: ObservedProgram, gripper: ServiceServer, after_s: float, most_s: float
-) -> Grip:
+) -> list[Request]:
     """Answer the first try of a grip after so many s, and the second one, if there is one."""
     grip = Grip(program, gripper, True)
-    program.advance_until(lambda: grip.tries, 1.0)
-    program.advance_until(_never, after_s)
+    program.advance_until(grip.has_begun, 1.0)
+    program.advance(after_s)
     grip.tries[0].answer(success=True)
     program.advance_until(grip.has_gone_on, most_s)
-    tried = grip.tries
-    if len(tried) > 1:
-        tried[1].answer(success=True)
-        program.advance_until(lambda: grip.outcomes, 2.0)
-    return grip
+    tries = grip.tries
+    if len(tries) > 1:
+        tries[1].answer(success=True)
+        program.advance_until(grip.is_over, 2.0)
+    return tries
 
 
 def _grip_without_gripper(program: ObservedProgram) -> None:
     grip = Grip(program, None, True)
-    program.advance_until(lambda: grip.outcomes, 8.0)
+    program.advance_until(grip.is_over, 8.0)
 
 
-def _grips_refused(program: ObservedProgram) -> None:
-    with program.served_by(ServiceServer, GRIPPER) as gripper:
-        for success in (True, False):
-            grip = Grip(program, gripper, success)
-            program.advance_until(lambda tried=grip: tried.tries, 1.0)  # type: ignore[misc]
-            grip.tries[0].answer(success=success)
-            program.advance_until(lambda said=grip: said.outcomes, 1.0)  # type: ignore[misc]
+def _grips_refused(program: ObservedProgram, gripper: ServiceServer) -> None:
+    for success in (True, False):
+        grip = Grip(program, gripper, success)
+        program.advance_until(grip.has_begun, 1.0)
+        grip.tries[0].answer(success=success)
+        program.advance_until(grip.is_over, 1.0)
 
 
-def _grip_unanswered(program: ObservedProgram) -> None:
-    with program.served_by(ServiceServer, GRIPPER) as gripper:
-        grip = Grip(program, gripper, True)
-        program.advance_until(lambda: len(grip.tries) > 1, 3.0)
-        grip.tries[1].fail()
-        program.advance_until(lambda: grip.outcomes, 6.0)
-        grip.tries[2].answer(success=True)
-        program.advance_until(_never, COARSE_S)
+def _grip_unanswered(program: ObservedProgram, gripper: ServiceServer) -> None:
+    grip = Grip(program, gripper, True)
+    program.advance_until(lambda: len(grip.tries) > 1, 3.0)
+    grip.tries[1].fail()
+    program.advance_until(grip.is_over, 6.0)
+    grip.tries[2].answer(success=True)
+    program.advance()
 
 
-def _grip_answered_late(program: ObservedProgram) -> None:
-    with program.served_by(ServiceServer, GRIPPER) as gripper:
-        grip = Grip(program, gripper, True)
-        program.advance_until(lambda: len(grip.tries) > 1, 3.0)
-        grip.tries[0].answer(success=True)
-        program.advance_until(_never, COARSE_S)
-        grip.tries[1].answer(success=True)
-        program.advance_until(lambda: grip.outcomes, 1.0)
+def _grip_answered_late(program: ObservedProgram, gripper: ServiceServer) -> None:
+    grip = Grip(program, gripper, True)
+    program.advance_until(lambda: len(grip.tries) > 1, 3.0)
+    for attempt in grip.tries:
+        attempt.answer(success=True)
+        program.advance()
 
 
 def _set_limits(program: ObservedProgram, *requests: speed_limits.Parameters) -> None:
     client = program.end.client_of(str(SET_SPEED), SET_SPEED.type)
     for parameters in requests:
-        answer = client.call_async(speed_limits.as_message(parameters))
+        messages = speed_limits.as_messages(parameters)
+        answer = client.call_async(SET_SPEED.type.Request(parameters=messages))
         program.advance_until(answer.done, 0.5)
 
 
 def _limits_that_are_bad(program: ObservedProgram) -> None:
     good = [("linear", 0.3), ("angular", 0.6)]
-    alone = [("linear", math.nan), ("angular", math.inf), ("linear", -0.5), ("angular", 7.0)]
-    alone += [("linear", "fast"), ("warp", 0.5)]  # type: ignore[list-item]
-    _set_limits(program, good, *[[parameter] for parameter in alone], [], good)
+    bad = [*good, ("linear", math.nan), ("angular", math.inf), ("linear", -0.5), ("angular", 7.0)]
+    _set_limits(program, *([limit] for limit in bad), [("linear", "fast")], [("warp", 0.5)], [])
+    _set_limits(program, good)
 
 
 def _jam(program: ObservedProgram, jammed: bool) -> None:
@@ -126,65 +113,72 @@ def _limits_for_jammed_wheels(program: ObservedProgram) -> None:
     _set_limits(program, [("linear", 0.3), ("angular", math.nan)])
     for jammed, value in ((True, 0.9), (False, 0.4)):
         _jam(program, jammed)
-        program.advance_until(_never, COARSE_S)
+        program.advance()
         _set_limits(program, [("linear", value)])
 
 
-def _time_losses(program: ObservedProgram) -> None:
-    with program.served_by(ActionServerEnd, NAVIGATE) as navigator:
-        asked_s = program.now_s
-        journey = Journey(program, navigator, 3, holds_cancel=True)
-        program.advance_until(lambda: navigator.cancels_at_s, 5.0)
-        program.times[STALL] = navigator.cancels_at_s[0] - asked_s
-        program.advance_until(lambda: journey.outcomes, 3.0)
-        program.times[CANCEL] = program.now_s - navigator.cancels_at_s[0]
-        navigator.decide()
-        program.advance_until(_never, 0.1)
-        navigator.end_goal(ServerGoalHandle.canceled)
-        program.advance_until(_never, 0.1)
-        asked_s = program.now_s
-        journey = Journey(program, navigator, 3, holds_goal=True)
-        program.advance_until(lambda: journey.outcomes, 3.0)
-        program.times[GOAL] = program.now_s - asked_s
-        navigator.decide()
-        program.advance_until(_never, 0.1)
+def _time_losses(program: ObservedProgram, navigator: ActionServerEnd) -> None:
+    asked_s = program.now_s
+    journey = Journey(program, navigator, 3, holds_cancel=True)
+    program.advance_until(lambda: navigator.cancels_at_s, 5.0)
+    program.times[STALL] = navigator.cancels_at_s[0] - asked_s
+    program.advance_until(journey.is_over, 3.0)
+    program.times[CANCEL] = program.now_s - navigator.cancels_at_s[0]
+    navigator.decide()
+    program.advance()
+    navigator.end_goal(ServerGoalHandle.canceled)
+    program.advance()
+    asked_s = program.now_s
+    _lose_goal(program, navigator)
+    program.times[GOAL] = program.now_s - asked_s
+    navigator.decide()
+    program.advance()
 
 
-def _goals_that_are_lost(program: ObservedProgram) -> None:
-    absent = Journey(program, None, 3)
-    program.advance_until(lambda: absent.outcomes, 3.0)
-    with program.served_by(ActionServerEnd, NAVIGATE) as navigator:
-        refused = Journey(program, navigator, 3, cancels=False)
-        program.advance_until(lambda: refused.outcomes, 5.0)
-        late = Journey(program, navigator, 3, holds_goal=True)
-        program.advance_until(lambda: late.outcomes, 2.5)
-        navigator.decide()
-        program.advance_until(_never, COARSE_S)
+def _lose_goal(program: ObservedProgram, navigator: ActionServerEnd) -> None:
+    journey = Journey(program, navigator, 3, holds_goal=True)
+    program.advance_until(journey.is_over, 3.0)
 
 
-def _goals_that_end(program: ObservedProgram) -> None:
-    with program.served_by(ActionServerEnd, NAVIGATE) as navigator:
-        for how in (ServerGoalHandle.succeed, ServerGoalHandle.abort):
-            journey = Journey(program, navigator, 3)
-            program.advance_until(lambda: navigator.goals, 1.0)
-            navigator.send_feedback(sequence=[1])
-            program.advance_until(_never, COARSE_S)
-            navigator.end_goal(how)
-            program.advance_until(lambda said=journey: said.outcomes, 1.0)  # type: ignore[misc]
-        rejected = Journey(program, navigator, 3, accepts=False)
-        program.advance_until(lambda: rejected.outcomes, 1.0)
+def _goal_without_navigator(program: ObservedProgram) -> None:
+    journey = Journey(program, None, 3)
+    program.advance_until(journey.is_over, 3.0)
 
 
-def _goal_that_stalls(program: ObservedProgram) -> None:
-    with program.served_by(ActionServerEnd, NAVIGATE) as navigator:
+def _goals_that_are_lost(program: ObservedProgram, navigator: ActionServerEnd) -> None:
+    journey = Journey(program, navigator, 3, cancels=False)
+    program.advance_until(journey.is_over, 5.0)
+    _lose_goal(program, navigator)
+    navigator.decide()
+    program.advance()
+
+
+def _goals_that_end(program: ObservedProgram, navigator: ActionServerEnd) -> None:
+    for how in (ServerGoalHandle.succeed, ServerGoalHandle.abort):
         journey = Journey(program, navigator, 3)
-        program.advance_until(lambda: navigator.cancels_at_s, 4.0)
-        navigator.end_goal(ServerGoalHandle.canceled)
-        program.advance_until(lambda: journey.outcomes, 1.0)
+        program.advance_until(lambda: navigator.goals, 1.0)
+        navigator.send_feedback(sequence=[1])
+        program.advance()
+        navigator.end_goal(how)
+        program.advance_until(journey.is_over, 1.0)
+    rejected = Journey(program, navigator, 3, accepts=False)
+    program.advance_until(rejected.is_over, 1.0)
+
+
+def _goal_that_stalls(program: ObservedProgram, navigator: ActionServerEnd) -> None:
+    journey = Journey(program, navigator, 3)
+    program.advance_until(lambda: navigator.cancels_at_s, 4.0)
+    navigator.end_goal(ServerGoalHandle.canceled)
+    program.advance_until(journey.is_over, 1.0)
+
+
+def _send_goal(program: ObservedProgram, metres: int) -> SentGoal:
+    program.forget(drive_server.COMMANDS)
+    return program.end.action_client(DRIVE).send(order=metres)
 
 
 def _start_drive(program: ObservedProgram, metres: int) -> SentGoal:
-    goal = send_goal(program, metres)
+    goal = _send_goal(program, metres)
     program.advance_until(lambda: any(motions(program)), 1.0)
     return goal
 
@@ -195,7 +189,7 @@ def _time_drives(program: ObservedProgram) -> None:
         program.advance_until(lambda: goal.end, most_s)
         program.times[name] = program.now_s - began_s
 
-    time_until_end(WHOLE, send_goal(program, METRES), 3.0 * METRES)
+    time_until_end(WHOLE, _send_goal(program, METRES), 3.0 * METRES)
     told_s = [command.at_s for command in program.end.heard(drive_server.COMMANDS)]
     program.times[COMMANDS] = longest_silence(told_s, told_s[0], program.now_s)
     goal = _start_drive(program, 2 * METRES)
@@ -205,11 +199,11 @@ def _time_drives(program: ObservedProgram) -> None:
     _jam(program, True)
     time_until_end(ABORTED, goal, 4.0)
     _jam(program, False)
-    program.advance_until(_never, 0.1)
+    program.advance()
 
 
 def _drives_that_are_canceled(program: ObservedProgram) -> None:
-    rejected = send_goal(program, 0)
+    rejected = _send_goal(program, 0)
     program.advance_until(lambda: rejected.accepted is not None, 0.5)
     goal = _start_drive(program, 5)
     program.end.action_client(DRIVE).cancel(goal)
@@ -221,8 +215,8 @@ def _drives_with_jammed_wheels(program: ObservedProgram) -> None:
     _jam(program, True)
     program.advance_until(lambda: goal.end, 2.0)
     _jam(program, False)
-    program.advance_until(_never, COARSE_S)
-    again = send_goal(program, 1)
+    program.advance()
+    again = _send_goal(program, 1)
     program.advance_until(lambda: again.end, 3.0)
 
 
@@ -230,8 +224,11 @@ TRIALS = (
     NodeTrials(
         GRIPPER_CLIENT,
         {
-            TIMED: _time_grips, "absent": _grip_without_gripper, "refused": _grips_refused,
-            "unanswered": _grip_unanswered, "stale": _grip_answered_late,
+            TIMED: served(_time_grips, ServiceServer, GRIPPER),
+            "absent": _grip_without_gripper,
+            "refused": served(_grips_refused, ServiceServer, GRIPPER),
+            "unanswered": served(_grip_unanswered, ServiceServer, GRIPPER),
+            "stale": served(_grip_answered_late, ServiceServer, GRIPPER),
         },
         {
             SLOW: Bounds(
@@ -257,8 +254,11 @@ TRIALS = (
     NodeTrials(
         NAVIGATION_CLIENT,
         {
-            TIMED: _time_losses, "lost": _goals_that_are_lost, "ended": _goals_that_end,
-            "stalled": _goal_that_stalls,
+            TIMED: served(_time_losses, ActionServerEnd, NAVIGATE),
+            "absent": _goal_without_navigator,
+            "lost": served(_goals_that_are_lost, ActionServerEnd, NAVIGATE),
+            "ended": served(_goals_that_end, ActionServerEnd, NAVIGATE),
+            "stalled": served(_goal_that_stalls, ActionServerEnd, NAVIGATE),
         },
         {
             STALL: Bounds(

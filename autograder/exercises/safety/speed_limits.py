@@ -24,10 +24,8 @@ SPEED_SERVER = Task(
     "SpeedServer", publishes=[LIMITS, COMMANDS], subscribes=[JAMMED], serves=[SET_SPEED], threads=4
 )
 
-ANSWER_S = 1.0
-"""Seconds for an answer; a service callback may await something."""
-SAME = 1e-6
-"""Limits that differ by less are equal."""
+ANSWER_S = 1.0  # for an answer; a service callback may await something
+SAME = 1e-6  # limits that differ by less are equal
 KINDS = {str: "a string", int: "an integer", bool: "a bool", list: "an array of doubles"}
 SPELLED = {"nan": "NaN", "inf": "infinity", "-inf": "minus infinity"}
 
@@ -72,18 +70,17 @@ def _describe(name: str, value: Any) -> str:
     return f"{name} = {text}" + (f", {kind}" if kind else "")
 
 
-def as_message(parameters: Parameters) -> SetParametersAtomically.Request:
-    """Return a request for some limits."""
-    messages = [Parameter(name, value=value).to_parameter_msg() for name, value in parameters]
-    return SetParametersAtomically.Request(parameters=messages)
+def as_messages(parameters: Parameters) -> list[Any]:
+    """Return the messages of some parameters."""
+    return [Parameter(name, value=value).to_parameter_msg() for name, value in parameters]
 
 
 def request_limits(node: ClockBoundNode, request: str, parameters: Parameters) -> Any:
     """Send a ``request``, which is in words the begin of a sentence; return its result."""
     node.forget(LIMITS, COMMANDS)
-    messages = as_message(parameters).parameters
-    expected = f"{request} is answered."
-    return node.call_within(SET_SPEED, ANSWER_S, expected=expected, parameters=messages).result
+    return node.call_within(
+        SET_SPEED, ANSWER_S, expected=f"{request} is answered.", parameters=as_messages(parameters)
+    ).result
 
 
 def require_set(node: ClockBoundNode, when: str, due: tuple[float, float], **limits: float) -> None:
