@@ -81,6 +81,10 @@ class ClockBoundNode(ObservedNode):
             self._server = None
             self._bench.session.stop(made)
 
+    def is_served(self, served: Service | Action) -> bool:
+        """Return whether the examiner plays a server that the node uses just now."""
+        return self._server is not None and self._server.served == served
+
     @contextmanager
     def unserved(self, served: Service | Action) -> Iterator[None]:
         """Require all waiting to run on the node's clock while nobody serves what it asks for.

@@ -10,9 +10,10 @@ ends their program, each node that a check asks about is tried by itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from autograder.examination.check_context import CheckContext
@@ -23,11 +24,9 @@ from autograder.observe.plain_programs import ObservedProgram
 from autograder.observe.stillness import Stillness
 from course.runtime.waiting import Deadline
 
-TIMED = "timed"
-"""The trial in which it matters how long something takes; there time passes in small strides."""
 FINE_S, FINEST_S = 0.1, 0.01
-"""Seconds in a stride there, as between two looks in a session; and where something has been out of
-bounds, as who waits ten times for 0.05 s may take ten strides: the step of a session's time."""
+"""Seconds in a stride where something is timed, as between two looks in a session; and where it has
+been out of bounds, as who waits ten times for 0.05 s may take ten strides: a session's step."""
 MOST_S = 60.0
 """Seconds that it may take to find out what ends programs, once it is known that something does."""
 NOT_FOUND_OUT = (
@@ -50,11 +49,14 @@ class Bounds(NamedTuple):
     """What was found, as a sentence, with a place for the number."""
 
 
+Trial = Callable[[ObservedProgram], None]
+
+
 def served(
     trial: Callable[[ObservedProgram, ServerT], None],
     server: Callable[[Any, Callable[[], float]], ServerT],
     what: Service | Action,
-) -> Callable[[ObservedProgram], None]:
+) -> Trial:
     """Return a trial during which the examiner plays a server: see `ObservedProgram.served_by`."""
 
     def run(program: ObservedProgram) -> None:
@@ -70,13 +72,29 @@ class NodeTrials:
 
     Attributes:
         task: what the node is connected to.
-        trials: by name; that of `TIMED` notes `ObservedProgram.times`.
-        times: the bounds of these.
+        timed: trials in which it matters how long something takes, by name; what they note in
+            `ObservedProgram.times` is judged by ``bounds``.
+        untimed: the others, which come after these.
+        bounds: of the times, by their names.
     """
 
     task: Task
-    trials: Mapping[str, Callable[[ObservedProgram], None]]
-    times: Mapping[str, Bounds] = field(default_factory=dict)
+    timed: Mapping[str, Trial] = field(default_factory=dict)
+    untimed: Mapping[str, Trial] = field(default_factory=dict)
+    bounds: Mapping[str, Bounds] = field(default_factory=dict)
+
+    @property
+    def names(self) -> list[str]:
+        """The names of all trials, in the order in which they come."""
+        return [*self.timed, *self.untimed]
+
+    def only(self, names: Collection[str]) -> NodeTrials:
+        """Return the same with these trials alone."""
+        return replace(
+            self,
+            timed={name: trial for name, trial in self.timed.items() if name in names},
+            untimed={name: trial for name, trial in self.untimed.items() if name in names},
+        )
 
 
 TrialTable = Sequence[NodeTrials]
@@ -85,8 +103,8 @@ TrialTable = Sequence[NodeTrials]
 class Times(NamedTuple):
     """How long things took; ``sure`` is whether nothing can have come later than it seemed."""
 
-    took: Mapping[str, float]
-    sure: bool
+    took: Mapping[str, float] = MappingProxyType({})
+    sure: bool = True
 
     def is_far_off(self, what: str, bounds: Bounds) -> bool:
         """Return whether a time is out of its bounds, or not known."""
@@ -98,7 +116,8 @@ class Found:
     """What programs have shown of a node: which trials end one, if known, and its times."""
 
     ends: dict[str, bool] = field(default_factory=dict)
-    times: Times | None = None
+    times: Times = field(default_factory=Times)
+    is_there: bool = True
 
 
 class Played(NamedTuple):
@@ -153,12 +172,11 @@ class ProgramTrials:
         if self._bench.programs is None:
             return
         for what in names:
-            bounds = self._table[node].times[what]
-            times = self._findings_of(node).times
-            if times is None:
+            bounds, found = self._table[node].bounds[what], self._findings_of(node)
+            if not found.is_there:
                 raise NotExaminable(NOT_FOUND_OUT)
-            if times.is_far_off(what, bounds):
-                self._require_in_bounds(bounds, what, self._take_again(node, times.sure))
+            if found.times.is_far_off(what, bounds):
+                self._require_in_bounds(bounds, what, self._take_again(node, found.times.sure))
 
     def _require_in_bounds(self, bounds: Bounds, what: str, times: Times) -> None:
         if not times.is_far_off(what, bounds):
@@ -176,22 +194,21 @@ class ProgramTrials:
 
     def _take_again(self, node: str, sure: bool) -> Times:
         if node not in self._finer:
-            trials = self._table[node]
-            timed = replace(trials, trials={TIMED: trials.trials[TIMED]})
+            timed = self._table[node].only(self._table[node].timed)
             # Each stride lasts long where nothing rests.
             played = self._play([timed], FINEST_S if sure else FINE_S)
             seen = played is not None and node in played.there
-            self._finer[node] = played.times if played and seen else Times({}, False)
+            self._finer[node] = played.times if played and seen else Times(sure=False)
         return self._finer[node]
 
     def _findings_of(self, node: str) -> Found:
         if self._all is None:
             self._all = self._play([*self._table.values()]) or Played(
-                ("", ""), frozenset(), Times({}, False)
+                ("", ""), frozenset(), Times(sure=False)
             )
             if self._all.ended is None:
                 for name in self._all.there:
-                    unharmed = dict.fromkeys(self._table[name].trials, False)
+                    unharmed = dict.fromkeys(self._table[name].names, False)
                     self._found[name] = Found(unharmed, self._all.times)
         if node not in self._found:
             self._found[node] = self._try_alone(self._table[node])
@@ -200,18 +217,15 @@ class ProgramTrials:
     def _try_alone(self, trials: NodeTrials) -> Found:
         """Find out which trials end a program of one node."""
         self._deadline = self._deadline or Deadline(MOST_S)
-        found, node, left = Found(), trials.task.node, [*trials.trials]
+        found, node, left = Found(is_there=False), trials.task.node, trials.names
         assert self._all is not None
         once, is_raising = {self._all.ended}, False
         while left and self._deadline.seconds_left:
-            played = self._play(
-                [replace(trials, trials={name: trials.trials[name] for name in left})],
-                waits_for_end=True,
-            )
+            played = self._play([trials.only(left)], waits_for_end=True)
             if played is None or node not in played.there:
                 break
-            if TIMED in left:
-                found.times = played.times
+            found.is_there, took = True, {**found.times.took, **played.times.took}
+            found.times = Times(took, found.times.sure and played.times.sure)
             ended = played.ended[1] if played.ended else ""
             unharmed = left[: left.index(ended)] if ended else left
             found.ends.update(dict.fromkeys(unharmed, False))
@@ -240,32 +254,26 @@ class ProgramTrials:
             if not program.up:
                 return None
             seen = ObservedProgram(program, self._still, tasks)
-            ended: tuple[str, str] | None = None
-            for node, name, trial in _list_trials(table):
-                ended = node, name
-                _try_once(seen, trial, stride_s if name == TIMED else 0.0)
-                if seen.has_ended() or (waits_for_end and seen.ends_soon()):
-                    break
-            else:
-                ended = ended if seen.ends_soon() else None
+            ended = _find_end(seen, table, stride_s, waits_for_end=waits_for_end)
             return Played(ended, seen.there, Times(seen.times, seen.rested))
 
 
-def _list_trials(
-    table: TrialTable,
-) -> list[tuple[str, str, Callable[[ObservedProgram], None]]]:
-    return [
-        (trials.task.node, name, trial) for trials in table for name, trial in trials.trials.items()
-    ]
+def _find_end(
+    program: ObservedProgram, table: TrialTable, stride_s: float, *, waits_for_end: bool
+) -> tuple[str, str] | None:
+    """Try nodes, and return the node and the trial in which their program ended, if it did."""
+    last = ("", "")
+    for trials in table:
+        for name, trial in {**trials.timed, **trials.untimed}.items():
+            last = trials.task.node, name
+            with program.timing(stride_s) if name in trials.timed else nullcontext():
+                _try_once(program, trial)
+            if program.has_ended() or (waits_for_end and program.ends_soon()):
+                return last
+    return last if program.ends_soon() else None
 
 
-def _try_once(
-    program: ObservedProgram, trial: Callable[[ObservedProgram], None], stride_s: float
-) -> None:
+def _try_once(program: ObservedProgram, trial: Trial) -> None:
     # A wrong node may leave the examiner's end where a trial cannot go on.
     with suppress(Exception):
-        if stride_s:
-            with program.timing(stride_s):
-                trial(program)
-        else:
-            trial(program)
+        trial(program)

@@ -9,12 +9,16 @@ from std_msgs.msg import Bool, String
 from test_msgs.action import Fibonacci as Drive
 
 from autograder.exercises.safety.speed_limits import is_motion
-from autograder.observe.actions import SentGoal
-from autograder.observe.clock_bound_node import ClockBoundNode
-from autograder.observe.heartbeats import longest_silence
-from autograder.observe.nouns import Action, Task, Topic
-from autograder.observe.observed_goal import ObservedGoal
-from autograder.observe.plain_programs import Clocked
+from autograder.observe import (
+    Action,
+    ClockBoundNode,
+    Clocked,
+    ObservedGoal,
+    SentGoal,
+    Task,
+    Topic,
+    longest_silence,
+)
 
 COMMANDS = Topic("cmd_vel", Twist)
 FAULTS = Topic("drive/fault", String, value=lambda message: message.data)

@@ -16,49 +16,33 @@ from rclpy.action.server import ServerGoalHandle
 from std_msgs.msg import Bool
 
 from autograder.examination.exam import Exam, Failed
-from autograder.exercises.safety import drive_server, navigator_client, program_trials, shutdown
+from autograder.exercises.safety import (
+    drive_server,
+    gripper_client,
+    navigator_client,
+    program_trials,
+    shutdown,
+    speed_limits,
+)
 from autograder.exercises.safety.drive_server import DRIVE_SERVER, SLACK_S, TOLERANCE_S
-from autograder.exercises.safety.gripper_client import (
-    COARSE_S,
-    DEADLINE_S,
-    GIVEN_UP,
-    GRIPPER,
-    GRIPPER_CLIENT,
-    LONGEST_S,
-    ExaminedGrip,
-    carry_out,
-    give_up,
-    require_beats,
-)
-from autograder.exercises.safety.navigator_client import (
-    LOST_S,
-    NAVIGATE,
-    NAVIGATION_CLIENT,
-    ExaminedJourney,
-    Journey,
-)
-from autograder.exercises.safety.speed_limits import (
-    JAMMED,
-    LIMITS,
-    SPEED_SERVER,
-    bad_requests,
-    describe_limits,
-    require_refused,
-    require_set,
-)
-from autograder.observe.actions import ActionServerEnd
-from autograder.observe.clock_bound_node import WallWait
+from autograder.exercises.safety.gripper_client import GRIPPER, GRIPPER_CLIENT, ExaminedGrip
+from autograder.exercises.safety.navigator_client import NAVIGATION_CLIENT, ExaminedJourney
+from autograder.exercises.safety.speed_limits import SPEED_SERVER, require_refused, require_set
+from autograder.observe import ActionServerEnd, Nodes, ServiceServer, WallWait, several_nodes
 from autograder.observe.phrases import say_words
-from autograder.observe.services import ServiceServer
-from autograder.observe.several_nodes import Nodes, several_nodes
 
-EXAM: Exam[Nodes] = Exam("safety", several_nodes(program_trials.TRIALS))
+READ_SERVICES = "Chapter 5, “Services: error handling”"
+EXAM: Exam[Nodes] = Exam("safety", several_nodes(program_trials.TRIALS), read=READ_SERVICES)
 
+COARSE_S = 0.5  # between two looks where it does not matter when exactly something happens
 SLOW_S, LATE_S = 0.7, 1.3  # after a try: in time, or late, whatever the tolerance
 APART_S = 0.5  # between requests; the second's answer takes so long that the first's 1 s is over
 BACK_S = 1.8  # after a request in which the gripper comes back: a third try is still to come
 LATER_S = 1.5  # in which a request that was refused might be made up for
-METRES, FAR = (3, 2, 7), (40, 20, 90)  # of drives: the usual ones, and bounds
+METRES, FAR = (
+    ("metres", 3, 2, 7),
+    ("metres of a long drive", 40, 20, 90),
+)  # and bounds
 IN_A_ROW = (
     " That was at the second request in a row that got no answer; at the first all was right."
 )
@@ -71,7 +55,6 @@ GOAL_LEFT = (
     "time-out called off?"
 )
 
-READ_SERVICES = "Chapter 5, “Services: error handling”"
 READ_GOALS = "Chapter 5, “Actions: goal, feedback, result”"
 READ_CANCELS = "Chapter 5, “Actions: cancellation”"
 READ_STATUS = "Chapter 5, “Actions: goal status”"
@@ -86,7 +69,6 @@ READ_GROUPS = "ROS 2 documentation, “Using callback groups”"
         "`future = self.gripper.call_async(SetBool.Request(data=request.data))`, "
         "`timer = once(self, 1.0, future.cancel)`, `answer = await future`: None is no answer.",
     ),
-    read=READ_SERVICES,
 )
 def gripper_answers(nodes: Nodes) -> None:
     """The gripper client reports a grip that the gripper carried out, also after 0.7 s.
@@ -96,8 +78,8 @@ def gripper_answers(nodes: Nodes) -> None:
     node, draws = nodes.node(GRIPPER_CLIENT), nodes.draws
     with node.served_by(ServiceServer, GRIPPER) as gripper:
         close = draws.flag("the grip that is carried out")
-        carry_out(node, gripper, close, 0.0)
-        carry_out(node, gripper, not close, SLOW_S).require_once()
+        gripper_client.carry_out(node, gripper, close, 0.0)
+        gripper_client.carry_out(node, gripper, not close, SLOW_S).require_once()
     nodes.require_times(program_trials.SLOW)
 
 
@@ -108,7 +90,6 @@ def gripper_answers(nodes: Nodes) -> None:
         "A refusal is an answer: leave the loop of tries, and command the arm to hold.",
         "On `success=False`: publish on arm/hold, then `refused` on grip/outcome, and return.",
     ),
-    read=READ_SERVICES,
 )
 def gripper_refuses(nodes: Nodes) -> None:
     """A grip that the gripper refuses is reported at once, and the arm holds still.
@@ -118,12 +99,14 @@ def gripper_refuses(nodes: Nodes) -> None:
     node, draws = nodes.node(GRIPPER_CLIENT), nodes.draws
     with node.served_by(ServiceServer, GRIPPER) as gripper:
         for grip in range(draws.whole("grips before a refusal", 0, 0, 2)):
-            carry_out(node, gripper, draws.flag(f"grip {grip} before a refusal"), 0.0)
+            gripper_client.carry_out(
+                node, gripper, draws.flag(f"grip {grip} before a refusal"), 0.0
+            )
         close = draws.flag("the grip that is refused")
         ExaminedGrip(node, gripper, close).refuse("When the gripper answered success=False")
         again = ExaminedGrip(node, gripper, not close)
         with suppress(WallWait):  # how it waits is another check's
-            node.advance_until(again.has_gone_on, LONGEST_S, stride_s=COARSE_S)
+            node.advance_until(again.has_gone_on, gripper_client.LONGEST_S, stride_s=COARSE_S)
         if len(again.tries) > 1:
             again.refuse(
                 "When the gripper answered not the first try, but the second with success=False"
@@ -138,7 +121,6 @@ def gripper_refuses(nodes: Nodes) -> None:
         "Loop over the pauses, such as 0.5 s and 1.0 s, on the node's clock; then give up.",
         "After the third try without an answer: publish on arm/hold, then `failed`.",
     ),
-    read=READ_SERVICES,
 )
 def gripper_retries(nodes: Nodes) -> None:
     """Without answers there are three tries with growing pauses, then a safe end.
@@ -149,16 +131,16 @@ def gripper_retries(nodes: Nodes) -> None:
     node = nodes.node(GRIPPER_CLIENT, fresh=True)
     with node.served_by(ServiceServer, GRIPPER) as gripper:
         close = nodes.draws.flag("the grip without an answer")
-        grip = give_up(node, gripper, close, stands_still=True)
+        grip = gripper_client.give_up(node, gripper, close, stands_still=True)
         grip.tries[2].answer(success=True)
-        grip.require_once(f"{GIVEN_UP}, and a late answer to the third")
+        grip.require_once(f"{gripper_client.GIVEN_UP}, and a late answer to the third")
         try:
-            give_up(node, gripper, not close)
+            gripper_client.give_up(node, gripper, not close)
         except Failed as failed:
             raise Failed(expected=failed.expected, actual=failed.actual + IN_A_ROW) from None
-        carry_out(node, gripper, True, 0.0)
+        gripper_client.carry_out(node, gripper, True, 0.0)
         node.advance(APART_S)
-        carry_out(node, gripper, False, SLOW_S, aside=GRIP_LEFT)
+        gripper_client.carry_out(node, gripper, False, SLOW_S, aside=GRIP_LEFT)
         nodes.require_no_errors("unanswered")
     nodes.require_times(program_trials.PAUSE)
 
@@ -169,7 +151,6 @@ def gripper_retries(nodes: Nodes) -> None:
         "A good request goes to `Wheels.set_limits` with both limits, and sets `successful`.",
         "Keep the limits in a dictionary; the one that is not named keeps its value.",
     ),
-    read=READ_SERVICES,
 )
 def speed_serves(nodes: Nodes) -> None:
     """A good request sets the speed limits and says so.
@@ -199,7 +180,6 @@ def speed_serves(nodes: Nodes) -> None:
         "Comparisons with NaN are all false, so test for what is right, not for what is wrong.",
         "`if not 0.0 <= value <= highest:` refuses NaN too; answer with `reason`, set nothing.",
     ),
-    read=READ_SERVICES,
 )
 def speed_refuses(nodes: Nodes) -> None:
     """Each bad request is answered with a reason, and changes nothing.
@@ -210,7 +190,7 @@ def speed_refuses(nodes: Nodes) -> None:
     node, draws = nodes.node(SPEED_SERVER), nodes.draws
     linear = draws.number("a linear limit after nonsense", 0.4, 0.05, 0.95)
     angular = draws.number("an angular limit after nonsense", 0.8, 0.05, 1.95)
-    requests = [*enumerate(bad_requests(draws))]
+    requests = [*enumerate(speed_limits.bad_requests(draws))]
     last, _ = (order := draws.shuffled("nonsense", requests))[-1]
     for number, parameters in order:
         require_refused(node, parameters)
@@ -234,25 +214,23 @@ def goals_end(nodes: Nodes) -> None:
     parcel in the corridor.
     """
     node, draws = nodes.node(NAVIGATION_CLIENT), nodes.draws
-    metres = draws.whole("metres of a drive", *METRES)
-    with node.served_by(ActionServerEnd, NAVIGATE) as navigator:
-        for end in draws.shuffled("ends of goals", ("succeeds", "is rejected", "is aborted")):
-            if end == "is rejected":
-                far = draws.whole("metres of a long drive", *FAR)
-                goal = ExaminedJourney(node, navigator, far, accepts=False, holds_goal=True)
-                goal.forget_stop()  # what came with the request is no answer to the rejection
-                navigator.decide()
-                goal.require_end("When the navigator rejected the goal", "rejected")
-                continue
-            goal = ExaminedJourney(node, navigator, metres - (end == "is aborted"))
-            goal.send_feedback(1)
-            goal.forget_stop()  # what came with the acceptance is no answer to the abort
-            if end == "succeeds":
-                navigator.end_goal(ServerGoalHandle.succeed)
-                goal.require_end("When the goal succeeded", "arrived")
-            else:
-                navigator.end_goal(ServerGoalHandle.abort)
-                goal.require_end("When the navigator aborted the goal", "aborted")
+    metres, far = draws.whole(*METRES), draws.whole(*FAR)
+    ends = (
+        ("When the goal succeeded", metres, ServerGoalHandle.succeed, "arrived"),
+        ("When the navigator rejected the goal", far, None, "rejected"),
+        ("When the navigator aborted the goal", metres - 1, ServerGoalHandle.abort, "aborted"),
+    )
+    with node.served_by(ActionServerEnd, navigator_client.NAVIGATE) as navigator:
+        for when, length, end, word in draws.shuffled("ends of goals", ends):
+            accepts = end is not None
+            goal = ExaminedJourney(node, navigator, length, accepts=accepts, holds_goal=not accepts)
+            if accepts:
+                goal.send_feedback(1)
+            goal.forget_stop()  # what came by now is no answer to what comes next
+            navigator.decide()
+            if end is not None:
+                navigator.end_goal(end)
+            goal.require_end(when, word)
         nodes.require_no_errors("ended")
 
 
@@ -271,19 +249,19 @@ def goals_stall(nodes: Nodes) -> None:
     A limit on the whole drive is too short for a long corridor and too long for a hung navigator.
     """
     node = nodes.node(NAVIGATION_CLIENT)
-    with node.served_by(ActionServerEnd, NAVIGATE) as navigator:
-        slow = ExaminedJourney(node, navigator, navigator_client.BREATHS[-1] + 1)
-        slow.breathe()
+    with node.served_by(ActionServerEnd, navigator_client.NAVIGATE) as navigator:
+        goal = ExaminedJourney(node, navigator, navigator_client.BREATHS[-1] + 1)
+        goal.breathe()
         navigator.end_goal(ServerGoalHandle.succeed)
-        slow.require_outcome("When a slow drive succeeded", "arrived")
-        stalled = ExaminedJourney(node, navigator, nodes.draws.whole("metres of a drive", *METRES))
+        goal.require_outcome("When a slow drive succeeded", "arrived")
+        goal = ExaminedJourney(node, navigator, nodes.draws.whole(*METRES))
         node.advance(1.0)
-        stalled.send_feedback(1)
-        stalled.require_cancel("the last feedback")
+        goal.send_feedback(1)
+        goal.require_cancel("the last feedback")
         when = "When feedback ceased for 2 s, and the cancel was accepted"
-        stalled.require_outcome(when, "stalled")
+        goal.require_outcome(when, "stalled")
         navigator.end_goal(ServerGoalHandle.canceled)
-        stalled.require_once(when, "stalled")
+        goal.require_once(when, "stalled")
         nodes.require_no_errors("stalled")
     nodes.require_times(program_trials.STALL)
 
@@ -369,7 +347,7 @@ def drive_aborts(nodes: Nodes) -> None:
     goal = drive_server.start_drive(node, drive_server.LONG_M)
     node.advance(2.9)  # to most of the third metre: a node is seen to go on as it began
     jammed_s = node.now_s
-    node.send(JAMMED, Bool(data=True))  # the wheels raise at the next command
+    node.send(speed_limits.JAMMED, Bool(data=True))  # the wheels raise at the next command
     limit_s = drive_server.COMMAND_S + abort_s
     drive_server.require_abort(node, goal, "A goal whose wheels jam", limit_s)
     drive_server.require_commands(node, jammed_s)
@@ -377,7 +355,7 @@ def drive_aborts(nodes: Nodes) -> None:
     goal.require_accepted(drive_server.PROMPT_S)
     what = "A goal whose wheels are jammed from the start"
     drive_server.require_abort(node, goal, what, abort_s)
-    node.send(JAMMED, Bool(data=False))
+    node.send(speed_limits.JAMMED, Bool(data=False))
     drive_server.require_one_metre(node, "after the jam, with free wheels,")
     nodes.require_no_errors("aborted")
     nodes.require_times(program_trials.ABORTED, program_trials.COMMANDS)
@@ -403,11 +381,11 @@ def gripper_stale(nodes: Nodes) -> None:
         grip = ExaminedGrip(node, gripper, True)
         node.advance(LATE_S)
         grip.require_patience()
-        grip.tries[0].answer(success=False)
         late_by = f"first try comes {LATE_S:g} s after it"
+        grip.tries[0].answer(success=False)
         grip.require_ignored(late_by)
         # Who looks at an answer only when the next try is due takes it for one then.
-        node.advance_until(grip.has_gone_on, LONGEST_S)
+        node.advance_until(grip.has_gone_on, gripper_client.LONGEST_S)
         if grip.outcomes[:1] == ["refused"]:
             grip.require_ignored(late_by)
         grip.answer_again()
@@ -432,7 +410,7 @@ def gripper_stale(nodes: Nodes) -> None:
         grip = ExaminedGrip(node, gripper, True)
         grip.require_second_try()
         grip.tries[0].answer(success=True)
-        node.advance_until(grip.is_over, DEADLINE_S, stride_s=COARSE_S)
+        node.advance_until(grip.is_over, gripper_client.DEADLINE_S, stride_s=COARSE_S)
         node.require_that(  # that anything is said at all is another check's
             grip.outcomes[:1] != ["done"],
             "An answer to the first try that comes during the second one is ignored, also when no "
@@ -461,7 +439,10 @@ def gripper_absent(nodes: Nodes) -> None:
     with node.served_by(ServiceServer, GRIPPER) as gripper:
         began = time.monotonic()
         node.advance(2.0)
-        require_beats(node, "Before the first request", 0.0, time.monotonic() - began)
+        watched_s = time.monotonic() - began
+        gripper_client.require_beats(
+            node, when="Before the first request", since_s=0.0, watched_s=watched_s
+        )
         grip = ExaminedGrip(node, gripper, True)
     with node.unserved(GRIPPER):
         grip.require_failure("When the gripper died in the middle of a call", node.now_s)
@@ -473,7 +454,7 @@ def gripper_absent(nodes: Nodes) -> None:
         grip.gripper = gripper
         when = f"When the gripper was not there, and came back {BACK_S:g} s after the request"
         node.require_that(
-            node.advance_until(grip.has_begun, DEADLINE_S - BACK_S),
+            node.advance_until(grip.has_begun, gripper_client.DEADLINE_S - BACK_S),
             f"{when}, it is called: the third try comes 3.5 s after the request or later.",
             f"It was never called. {say_words(grip.outcomes)}",
         )
@@ -487,7 +468,7 @@ def gripper_absent(nodes: Nodes) -> None:
         grip.tries[0].answer(success=False)  # what it says then is another check's
         refused_s = node.now_s
         node.advance(1.0)
-        require_beats(node, "After a refusal", refused_s)
+        gripper_client.require_beats(node, when="After a refusal", since_s=refused_s)
         nodes.require_no_errors("absent")
     nodes.require_times(program_trials.BEAT)
 
@@ -499,7 +480,6 @@ def gripper_absent(nodes: Nodes) -> None:
         "Work on a copy, and let it take the place of the limits after `set_limits` has returned.",
         "Copy `self.limits`, check all, `try: self.wheels.set_limits(**copy)`, and then store.",
     ),
-    read=READ_SERVICES,
 )
 def speed_atomic(nodes: Nodes) -> None:
     """A half-good request, or wheels that raise, leave the old limits as they were.
@@ -515,15 +495,16 @@ def speed_atomic(nodes: Nodes) -> None:
     for parameters in itertools.permutations([("linear", half), ("angular", math.nan)]):
         require_refused(node, parameters)
     require_set(node, "After a half-good request", (linear, angular), angular=angular)
-    node.send(JAMMED, Bool(data=True))
+    node.send(speed_limits.JAMMED, Bool(data=True))
     require_refused(node, [("linear", 0.9)], " with jammed wheels")
-    node.send(JAMMED, Bool(data=False))
+    node.send(speed_limits.JAMMED, Bool(data=False))
     node.advance(LATER_S, stride_s=COARSE_S)
-    reached = node.end.values(LIMITS)
+    reached = node.end.values(speed_limits.LIMITS)
     node.require_that(
         not reached,
         "A request that was refused is over: when the wheels work again, the old limits hold.",
-        f"Within {LATER_S:g} s after the jam, what reached the wheels: {describe_limits(reached)}.",
+        f"Within {LATER_S:g} s after the jam, what reached the wheels: "
+        f"{speed_limits.describe_limits(reached)}.",
     )
     require_set(node, "After the jam", (linear, later), angular=later)
     nodes.require_no_errors("atomic")
@@ -544,9 +525,8 @@ def goals_lost(nodes: Nodes) -> None:
     Just when the navigator does not obey or does not answer, nobody else stops the robot.
     """
     node, draws = nodes.node(NAVIGATION_CLIENT), nodes.draws
-    metres = draws.whole("metres of a drive", *METRES)
-    far = draws.whole("metres of a long drive", *FAR)
-    with node.served_by(ActionServerEnd, NAVIGATE) as navigator:
+    metres, far = draws.whole(*METRES), draws.whole(*FAR)
+    with node.served_by(ActionServerEnd, navigator_client.NAVIGATE) as navigator:
         goal = ExaminedJourney(
             node, navigator, far, cancels=False, holds_goal=True, holds_cancel=True
         )
@@ -562,7 +542,7 @@ def goals_lost(nodes: Nodes) -> None:
         goal = ExaminedJourney(node, navigator, metres, holds_goal=True)
         goal.forget_stop()  # what came with the request does not answer the silence
         when = "When the navigator did not answer the goal for 1 s"
-        goal.require_outcome(when, "lost", LOST_S)
+        goal.require_outcome(when, "lost", navigator_client.LOST_S)
         navigator.decide()
         if node.advance_until(lambda: navigator.goals, 1.0):
             goal.send_feedback(1)
@@ -572,19 +552,19 @@ def goals_lost(nodes: Nodes) -> None:
         goal = ExaminedJourney(node, navigator, metres + 1, holds_cancel=True)
         goal.require_cancel()
         when = "When the navigator did not answer the request to cancel for 1 s"
-        goal.require_outcome(when, "lost", LOST_S)
+        goal.require_outcome(when, "lost", navigator_client.LOST_S)
         navigator.decide()
         node.rest()
         navigator.end_goal(ServerGoalHandle.canceled)
         goal.require_once(f"{when}, then accepted it", "lost")
         goal = ExaminedJourney(node, navigator, metres)
-    with node.unserved(NAVIGATE):
+    with node.unserved(navigator_client.NAVIGATE):
         when = "When the navigator died on the way"
         goal.require_outcome(when, "lost", navigator_client.DIED_S)
         goal.require_once(when, "lost")
-        Journey(node, None, metres)
-        navigator_client.require_outcome(node, "When there was no navigator", "lost", LOST_S)
-    with node.served_by(ActionServerEnd, NAVIGATE) as navigator:
+        goal = ExaminedJourney(node, navigator, metres)
+        goal.require_outcome("When there was no navigator", "lost", navigator_client.LOST_S)
+    with node.served_by(ActionServerEnd, navigator_client.NAVIGATE) as navigator:
         goal = ExaminedJourney(node, navigator, metres)
         navigator.end_goal(ServerGoalHandle.succeed)
         when = "When the navigator had come back, and the goal succeeded"

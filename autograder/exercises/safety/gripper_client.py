@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import SetBool
 
-from autograder.observe.clock_bound_node import ClockBoundNode
-from autograder.observe.heartbeats import require_heartbeat
-from autograder.observe.nouns import Service, Task, Topic
-from autograder.observe.observed_node import STRIDE_S
+from autograder.observe import (
+    STRIDE_S,
+    ClockBoundNode,
+    Clocked,
+    Request,
+    Service,
+    ServiceServer,
+    Task,
+    Topic,
+    require_heartbeat,
+)
 from autograder.observe.phrases import capitalize_first, say_words, there_were
-from autograder.observe.plain_programs import Clocked
-from autograder.observe.services import Request, ServiceServer
 
 REQUEST = Topic("grip/request", Bool)
 OUTCOME = Topic("grip/outcome", String, value=lambda message: message.data)
@@ -36,6 +43,7 @@ SHORTEST_S = 4.5 - 5 * ALLOWED_S - STRIDE_S  # three tries and two pauses, as sh
 HELD_S = 1.0  # of wall time for which the node's clock stands still in the first pause
 BEAT_S = 0.5  # between two heartbeats
 GIVEN_UP = "After three tries without an answer"
+require_beats = partial(require_heartbeat, topic=HEARTBEAT, period_s=BEAT_S, allowed_s=ALLOWED_S)
 SECOND_TRY = "After a try without an answer there is a second one."
 
 
@@ -162,12 +170,12 @@ class ExaminedGrip(Grip):
         self.tries[1].answer(success=True)
         self.require_outcome("When the second try was answered with success=True", "done")
 
-    def require_ignored(self, answer: str) -> None:
-        """Require that an ``answer`` which has just been given does not count."""
+    def require_ignored(self, what: str) -> None:
+        """Require that an answer that has just been given does not count."""
         self._node.advance(2 * STRIDE_S)
         self._node.require_that(
             not self.outcomes,
-            f"A try has 1 s. The answer to the {answer}, and is ignored.",
+            f"A try has 1 s. The answer to the {what}, and is ignored.",
             f"It was taken for a present answer: it said “{''.join(self.outcomes[:1])}”.",
         )
 
@@ -180,17 +188,7 @@ class ExaminedGrip(Grip):
             f"{when}, three tries take 3 s, and the pauses 1.5 s: it may come back.",
             f"“failed” came after {lasted_s:.1f} s.",
         )
-        require_beats(self._node, when, began_s)
-
-
-def require_beats(
-    node: ClockBoundNode, when: str, since_s: float, watched_s: float | None = None
-) -> None:
-    """Require that the heart has beaten since a time: see `heartbeats.require_heartbeat`."""
-    require_heartbeat(
-        node, HEARTBEAT, BEAT_S,
-        allowed_s=ALLOWED_S, since_s=since_s, when=when, watched_s=watched_s,
-    )  # fmt: skip
+        require_beats(self._node, when=when, since_s=began_s)
 
 
 def carry_out(

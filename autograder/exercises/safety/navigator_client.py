@@ -9,12 +9,16 @@ from std_msgs.msg import Int32, String
 from test_msgs.action import Fibonacci as Drive
 
 from autograder.exercises.safety.speed_limits import is_motion
-from autograder.observe.actions import ActionServerEnd
-from autograder.observe.clock_bound_node import ClockBoundNode
-from autograder.observe.nouns import Action, Task, Topic
-from autograder.observe.observed_node import STRIDE_S
+from autograder.observe import (
+    STRIDE_S,
+    Action,
+    ActionServerEnd,
+    ClockBoundNode,
+    Clocked,
+    Task,
+    Topic,
+)
 from autograder.observe.phrases import say_words
-from autograder.observe.plain_programs import Clocked
 
 REQUEST = Topic("navigate/request", Int32)
 OUTCOME = Topic("navigate/outcome", String, value=lambda message: message.data)
@@ -75,9 +79,11 @@ class ExaminedJourney(Journey):
     def __init__(
         self, node: ClockBoundNode, navigator: ActionServerEnd, metres: int, **plan: bool
     ) -> None:
-        """Ask for it, and require that its goal is sent."""
+        """Ask for it, and require that its goal is sent, if the navigator is there."""
         super().__init__(node, navigator, metres, **plan)
         self._node, self.navigator = node, navigator
+        if not node.is_served(NAVIGATE):
+            return
         node.advance_until(lambda: navigator.requested, PROMPT_S)
         orders = [goal.order for goal in navigator.requested]
         got = f"a goal with order={orders[0]}" if orders else "no goal"
@@ -87,11 +93,7 @@ class ExaminedJourney(Journey):
             f"The request was published, and the navigator got {got}.",
         )
         if not plan.get("holds_goal"):
-            self._await_acceptance()
-
-    def _await_acceptance(self) -> None:
-        if not self._node.advance_until(lambda: self.navigator.goals, PROMPT_S):
-            raise RuntimeError("the examiner's navigator did not accept a goal")
+            node.advance_until(lambda: navigator.goals, PROMPT_S)
 
     def send_feedback(self, marks: int) -> None:
         """Tell how far the drive has come."""
@@ -103,8 +105,18 @@ class ExaminedJourney(Journey):
         self._node.forget(SPEED)
 
     def require_outcome(self, when: str, word: str, limit_s: float = PROMPT_S) -> None:
-        """Require one outcome: see the function `require_outcome`."""
-        require_outcome(self._node, when, word, limit_s)
+        """Require one outcome, and a stop unless it is good; ``when`` begins a sentence."""
+        self._node.require_word(OUTCOME, word, limit_s, when)
+        if word == "arrived":
+            return
+        self._node.advance_until(lambda: self._end.values(SPEED), PROMPT_S)
+        moved = self._end.values(SPEED)
+        last = "the last command was to drive" if moved else f"nothing came within {PROMPT_S:g} s"
+        self._node.require_that(
+            moved[-1:] == [False],
+            f"With “{word}” the robot is stopped: a zero Twist on cmd_vel.",
+            f"It said “{word}”, but on cmd_vel {last}.",
+        )
 
     def require_once(self, when: str, word: str) -> None:
         """Require that the outcome stays the only one, past any timer of the goal's."""
@@ -165,19 +177,4 @@ class ExaminedJourney(Journey):
             f"Before that it said “{''.join(self.outcomes[:1])}”.{aside}",
         )
         self.navigator.decide()
-        self._await_acceptance()
-
-
-def require_outcome(node: ClockBoundNode, when: str, word: str, limit_s: float = PROMPT_S) -> None:
-    """Require one outcome, and a stop unless it is good; ``when`` begins a sentence."""
-    node.require_word(OUTCOME, word, limit_s, when)
-    if word == "arrived":
-        return
-    node.advance_until(lambda: node.end.values(SPEED), PROMPT_S)
-    moved = node.end.values(SPEED)
-    last = "the last command was to drive" if moved else f"nothing came within {PROMPT_S:g} s"
-    node.require_that(
-        moved[-1:] == [False],
-        f"With “{word}” the robot is stopped: a zero Twist on cmd_vel.",
-        f"It said “{word}”, but on cmd_vel {last}.",
-    )
+        self._node.advance_until(lambda: self.navigator.goals, PROMPT_S)

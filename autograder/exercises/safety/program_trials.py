@@ -16,11 +16,17 @@ from autograder.exercises.safety.drive_server import DRIVE, DRIVE_SERVER, motion
 from autograder.exercises.safety.gripper_client import GRIPPER, GRIPPER_CLIENT, HEARTBEAT, Grip
 from autograder.exercises.safety.navigator_client import NAVIGATE, NAVIGATION_CLIENT, Journey
 from autograder.exercises.safety.speed_limits import SET_SPEED, SPEED_SERVER
-from autograder.observe.actions import ActionServerEnd, SentGoal
-from autograder.observe.heartbeats import longest_silence
-from autograder.observe.plain_programs import ObservedProgram
-from autograder.observe.program_trials import TIMED, Bounds, NodeTrials, served
-from autograder.observe.services import Request, ServiceServer
+from autograder.observe import (
+    ActionServerEnd,
+    Bounds,
+    NodeTrials,
+    ObservedProgram,
+    Request,
+    SentGoal,
+    ServiceServer,
+    longest_silence,
+    served,
+)
 
 SLOW_S, LATE_S = 0.7, 1.5  # after which a try is answered, in time and too late
 BEATS = 2  # after the first, over which they are timed
@@ -31,14 +37,16 @@ STALL, GOAL, CANCEL = "silence", "goal without answer", "cancel without answer"
 WHOLE, COMMANDS, CANCELED, ABORTED = "drive", "commands", "canceled drive", "jammed drive"
 
 
-def _time_grips(program: ObservedProgram, gripper: ServiceServer) -> None:
+def _grips_answered(program: ObservedProgram, gripper: ServiceServer) -> None:
     program.forget(HEARTBEAT)
     program.advance_until(lambda: len(program.end.heard(HEARTBEAT)) > BEATS, 1.5 * BEATS)
     beats_s = [beat.at_s for beat in program.end.heard(HEARTBEAT)]
     if len(beats_s) > 1:
         program.times[BEAT] = (beats_s[-1] - beats_s[0]) / (len(beats_s) - 1)
-    tries = _answer_first_try(program, gripper, SLOW_S, 2.0)
-    program.times[SLOW] = len(tries)
+    program.times[SLOW] = len(_answer_first_try(program, gripper, SLOW_S, 2.0))
+
+
+def _grips_answered_late(program: ObservedProgram, gripper: ServiceServer) -> None:
     tries = _answer_first_try(program, gripper, LATE_S, 6.0)
     program.times[LATE] = len(tries)
     program.times[PAUSE] = tries[1].at_s - tries[0].at_s if len(tries) > 1 else math.inf
@@ -61,8 +69,7 @@ def _answer_first_try(
 
 
 def _grip_without_gripper(program: ObservedProgram) -> None:
-    grip = Grip(program, None, True)
-    program.advance_until(grip.is_over, 8.0)
+    program.advance_until(Grip(program, None, True).is_over, 8.0)
 
 
 def _grips_refused(program: ObservedProgram, gripper: ServiceServer) -> None:
@@ -75,19 +82,11 @@ def _grips_refused(program: ObservedProgram, gripper: ServiceServer) -> None:
 
 def _grip_unanswered(program: ObservedProgram, gripper: ServiceServer) -> None:
     grip = Grip(program, gripper, True)
-    program.advance_until(lambda: len(grip.tries) > 1, 3.0)
+    program.advance_until(grip.has_gone_on, 3.0)
     grip.tries[1].fail()
     program.advance_until(grip.is_over, 6.0)
     grip.tries[2].answer(success=True)
     program.advance()
-
-
-def _grip_answered_late(program: ObservedProgram, gripper: ServiceServer) -> None:
-    grip = Grip(program, gripper, True)
-    program.advance_until(lambda: len(grip.tries) > 1, 3.0)
-    for attempt in grip.tries:
-        attempt.answer(success=True)
-        program.advance()
 
 
 def _set_limits(program: ObservedProgram, *requests: speed_limits.Parameters) -> None:
@@ -105,19 +104,19 @@ def _limits_that_are_bad(program: ObservedProgram) -> None:
     _set_limits(program, good)
 
 
-def _jam(program: ObservedProgram, jammed: bool) -> None:
-    program.end.publisher(drive_server.JAMMED).publish(Bool(data=jammed))
-
-
 def _limits_for_jammed_wheels(program: ObservedProgram) -> None:
     _set_limits(program, [("linear", 0.3), ("angular", math.nan)])
     for jammed, value in ((True, 0.9), (False, 0.4)):
         _jam(program, jammed)
-        program.advance()
         _set_limits(program, [("linear", value)])
 
 
-def _time_losses(program: ObservedProgram, navigator: ActionServerEnd) -> None:
+def _jam(program: ObservedProgram, jammed: bool) -> None:
+    program.end.publisher(drive_server.JAMMED).publish(Bool(data=jammed))
+    program.advance()
+
+
+def _goals_that_are_lost(program: ObservedProgram, navigator: ActionServerEnd) -> None:
     asked_s = program.now_s
     journey = Journey(program, navigator, 3, holds_cancel=True)
     program.advance_until(lambda: navigator.cancels_at_s, 5.0)
@@ -129,28 +128,16 @@ def _time_losses(program: ObservedProgram, navigator: ActionServerEnd) -> None:
     navigator.end_goal(ServerGoalHandle.canceled)
     program.advance()
     asked_s = program.now_s
-    _lose_goal(program, navigator)
+    journey = Journey(program, navigator, 3, holds_goal=True)
+    program.advance_until(journey.is_over, 3.0)
     program.times[GOAL] = program.now_s - asked_s
     navigator.decide()
     program.advance()
-
-
-def _lose_goal(program: ObservedProgram, navigator: ActionServerEnd) -> None:
-    journey = Journey(program, navigator, 3, holds_goal=True)
-    program.advance_until(journey.is_over, 3.0)
+    program.advance_until(Journey(program, navigator, 3, cancels=False).is_over, 5.0)
 
 
 def _goal_without_navigator(program: ObservedProgram) -> None:
-    journey = Journey(program, None, 3)
-    program.advance_until(journey.is_over, 3.0)
-
-
-def _goals_that_are_lost(program: ObservedProgram, navigator: ActionServerEnd) -> None:
-    journey = Journey(program, navigator, 3, cancels=False)
-    program.advance_until(journey.is_over, 5.0)
-    _lose_goal(program, navigator)
-    navigator.decide()
-    program.advance()
+    program.advance_until(Journey(program, None, 3).is_over, 3.0)
 
 
 def _goals_that_end(program: ObservedProgram, navigator: ActionServerEnd) -> None:
@@ -161,8 +148,7 @@ def _goals_that_end(program: ObservedProgram, navigator: ActionServerEnd) -> Non
         program.advance()
         navigator.end_goal(how)
         program.advance_until(journey.is_over, 1.0)
-    rejected = Journey(program, navigator, 3, accepts=False)
-    program.advance_until(rejected.is_over, 1.0)
+    program.advance_until(Journey(program, navigator, 3, accepts=False).is_over, 1.0)
 
 
 def _goal_that_stalls(program: ObservedProgram, navigator: ActionServerEnd) -> None:
@@ -172,65 +158,59 @@ def _goal_that_stalls(program: ObservedProgram, navigator: ActionServerEnd) -> N
     program.advance_until(journey.is_over, 1.0)
 
 
-def _send_goal(program: ObservedProgram, metres: int) -> SentGoal:
-    program.forget(drive_server.COMMANDS)
-    return program.end.action_client(DRIVE).send(order=metres)
-
-
 def _start_drive(program: ObservedProgram, metres: int) -> SentGoal:
-    goal = _send_goal(program, metres)
+    program.forget(drive_server.COMMANDS)
+    goal = program.end.action_client(DRIVE).send(order=metres)
     program.advance_until(lambda: any(motions(program)), 1.0)
     return goal
 
 
-def _time_drives(program: ObservedProgram) -> None:
-    def time_until_end(name: str, goal: SentGoal, most_s: float) -> None:
-        began_s = program.now_s
-        program.advance_until(lambda: goal.end, most_s)
-        program.times[name] = program.now_s - began_s
+def _time_until_end(program: ObservedProgram, goal: SentGoal, most_s: float) -> float:
+    began_s = program.now_s
+    program.advance_until(lambda: goal.end, most_s)
+    return program.now_s - began_s
 
-    time_until_end(WHOLE, _send_goal(program, METRES), 3.0 * METRES)
+
+def _drives_that_arrive(program: ObservedProgram) -> None:
+    asked_s = program.now_s
+    goal = _start_drive(program, METRES)
+    _time_until_end(program, goal, 3.0 * METRES)
+    program.times[WHOLE] = program.now_s - asked_s
     told_s = [command.at_s for command in program.end.heard(drive_server.COMMANDS)]
     program.times[COMMANDS] = longest_silence(told_s, told_s[0], program.now_s)
-    goal = _start_drive(program, 2 * METRES)
-    program.end.action_client(DRIVE).cancel(goal)
-    time_until_end(CANCELED, goal, 2.0)
-    goal = _start_drive(program, 2 * METRES)
-    _jam(program, True)
-    time_until_end(ABORTED, goal, 4.0)
-    _jam(program, False)
-    program.advance()
 
 
 def _drives_that_are_canceled(program: ObservedProgram) -> None:
-    rejected = _send_goal(program, 0)
-    program.advance_until(lambda: rejected.accepted is not None, 0.5)
-    goal = _start_drive(program, 5)
+    program.end.action_client(DRIVE).send(order=0)
+    program.advance()
+    goal = _start_drive(program, 2 * METRES)
     program.end.action_client(DRIVE).cancel(goal)
-    program.advance_until(lambda: goal.end, 1.0)
+    program.times[CANCELED] = _time_until_end(program, goal, 2.0)
 
 
 def _drives_with_jammed_wheels(program: ObservedProgram) -> None:
-    goal = _start_drive(program, 3)
+    goal = _start_drive(program, 2 * METRES)
+    jammed_s = program.now_s
     _jam(program, True)
-    program.advance_until(lambda: goal.end, 2.0)
+    _time_until_end(program, goal, 4.0)
+    program.times[ABORTED] = program.now_s - jammed_s
     _jam(program, False)
-    program.advance()
-    again = _send_goal(program, 1)
-    program.advance_until(lambda: again.end, 3.0)
+    _time_until_end(program, _start_drive(program, 1), 3.0)
 
 
 TRIALS = (
     NodeTrials(
         GRIPPER_CLIENT,
-        {
-            TIMED: served(_time_grips, ServiceServer, GRIPPER),
+        timed={
+            "answered": served(_grips_answered, ServiceServer, GRIPPER),
+            "stale": served(_grips_answered_late, ServiceServer, GRIPPER),
+        },
+        untimed={
             "absent": _grip_without_gripper,
             "refused": served(_grips_refused, ServiceServer, GRIPPER),
             "unanswered": served(_grip_unanswered, ServiceServer, GRIPPER),
-            "stale": served(_grip_answered_late, ServiceServer, GRIPPER),
         },
-        {
+        bounds={
             SLOW: Bounds(
                 f"An answer after {SLOW_S:g} s is in time: one try is enough.", 1, 1,
                 "the gripper was called {:.0f} times",
@@ -249,18 +229,17 @@ TRIALS = (
         },
     ),
     NodeTrials(
-        SPEED_SERVER, {"bad": _limits_that_are_bad, "atomic": _limits_for_jammed_wheels}
+        SPEED_SERVER, untimed={"bad": _limits_that_are_bad, "atomic": _limits_for_jammed_wheels}
     ),
     NodeTrials(
         NAVIGATION_CLIENT,
-        {
-            TIMED: served(_time_losses, ActionServerEnd, NAVIGATE),
+        timed={"lost": served(_goals_that_are_lost, ActionServerEnd, NAVIGATE)},
+        untimed={
             "absent": _goal_without_navigator,
-            "lost": served(_goals_that_are_lost, ActionServerEnd, NAVIGATE),
             "ended": served(_goals_that_end, ActionServerEnd, NAVIGATE),
             "stalled": served(_goal_that_stalls, ActionServerEnd, NAVIGATE),
         },
-        {
+        bounds={
             STALL: Bounds(
                 "The goal is canceled 2 s after its acceptance, with no feedback since then.",
                 1.5, 3.0, "the request to cancel came after {:.1f} s",
@@ -277,11 +256,11 @@ TRIALS = (
     ),
     NodeTrials(
         DRIVE_SERVER,
-        {
-            TIMED: _time_drives, "canceled": _drives_that_are_canceled,
+        timed={
+            "arrived": _drives_that_arrive, "canceled": _drives_that_are_canceled,
             "aborted": _drives_with_jammed_wheels,
         },
-        {
+        bounds={
             WHOLE: Bounds(
                 f"A goal of {METRES} m takes {METRES} s, at 1 m/s.", METRES - 1.1, METRES + 1.8,
                 "it took {:.1f} s",

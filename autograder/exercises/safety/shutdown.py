@@ -19,9 +19,7 @@ from autograder.exercises.safety.drive_server import (
     drives_afterwards,
     motions,
 )  # fmt: skip
-from autograder.observe.actions import SentGoal
-from autograder.observe.plain_programs import ObservedProgram, ProgramEnded
-from autograder.observe.several_nodes import Nodes
+from autograder.observe import Nodes, ObservedProgram, ProgramEnded, SentGoal
 
 # Seconds of wall time that shutdown() may take where it does not wait, 0.01 s as a rule; and in
 # which all sleep in a program, and nothing stops the wheels: something waits.
@@ -108,22 +106,21 @@ def require_stop_unasked(nodes: Nodes) -> None:
     with nodes.run_program(DRIVE_SERVER) as program:
         if program is None or not (goal := _start_drive(program)):
             return  # that it drives is another check's
-        late = _shut_down(program, "in a drive", lambda: not motions(program)[-1], goal)
+        late = [_shut_down(program, "in a drive", lambda: not motions(program)[-1], goal)]
         for is_there in (False, True):
             program.interrupt()  # it is ended, and then made anew
             program.wait(lambda there=is_there: program.is_complete() is there)  # type: ignore[misc]
         program.meet()
-        seen = program.is_complete()
         program.forget(drive_server.COMMANDS)
-        if seen:
-            late += _shut_down(program, "while no goal is under way", lambda: motions(program))
-    if late == 2:
+        if program.is_complete():
+            late.append(_shut_down(program, "while no goal is under way", lambda: motions(program)))
+    if late == [True, True]:
         raise Failed(
             expected=f"{UNASKED}, it stops the wheels at once.",
             actual="In a drive and while no goal is under way, the zero Twist on cmd_vel came more "
             f"than {AT_ONCE_S:g} s later.",
         )
-    if late or not seen:
+    if late != [False, False]:
         raise NotExaminable(
             "It could not be seen in a program of its own that shutdown() stops the wheels at "
             "once, in a drive and without one. After a hand-in a person looks at it."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import Twist
@@ -12,8 +13,7 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 
 from autograder.examination.draws import Draws
-from autograder.observe.clock_bound_node import ClockBoundNode
-from autograder.observe.nouns import Service, Task, Topic
+from autograder.observe import ClockBoundNode, Service, Task, Topic
 from autograder.observe.phrases import as_phrase, with_reason
 
 LIMITS = Topic("wheels/limits", Twist, value=lambda message: (message.linear.x, message.angular.z))
@@ -93,12 +93,8 @@ def require_set(node: ClockBoundNode, when: str, due: tuple[float, float], **lim
         f"It was answered successful=False, {with_reason(result.reason)}.",
     )
     reached = node.end.values(LIMITS)
-    fits = [
-        all(abs(seen - wish) < SAME for seen, wish in zip(limit, due, strict=True))
-        for limit in reached
-    ]
     node.require_that(
-        fits == [True],
+        len(reached) == 1 and all(map(partial(math.isclose, abs_tol=SAME), reached[0], due)),
         f"{request} hands both limits to the wheels, once: {describe_limits([due])}.",
         f"What reached the wheels: {describe_limits(reached)}.",
     )
