@@ -11,6 +11,8 @@ from autograder.observe.clock_bound_node import ClockBoundNode as ClockBoundNode
 from autograder.observe.clock_bound_node import WallWait as WallWait
 from autograder.observe.heartbeats import longest_silence as longest_silence
 from autograder.observe.heartbeats import require_heartbeat as require_heartbeat
+from autograder.observe.multi_node_rig import Nodes as Nodes
+from autograder.observe.multi_node_rig import several_nodes as several_nodes
 from autograder.observe.nouns import Action as Action
 from autograder.observe.nouns import Parameter as Parameter
 from autograder.observe.nouns import Service as Service
@@ -28,5 +30,3 @@ from autograder.observe.program_trials import NodeTrials as NodeTrials
 from autograder.observe.program_trials import served as served
 from autograder.observe.services import Request as Request
 from autograder.observe.services import ServiceServer as ServiceServer
-from autograder.observe.several_nodes import Nodes as Nodes
-from autograder.observe.several_nodes import several_nodes as several_nodes

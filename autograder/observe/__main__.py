@@ -14,6 +14,10 @@ from autograder.observe.span import Span
 DESCRIBED: tuple[Any, ...] = (
     observe.one_node, observe.Topic, observe.Service, observe.Action, observe.Parameter,
     observe.ObservedNode, Span, Change,
+    observe.several_nodes, observe.Nodes, observe.Task, observe.ClockBoundNode,
+    observe.ServiceServer, observe.Request, observe.ActionServerEnd,
+    observe.ObservedGoal, observe.SentGoal, observe.require_heartbeat, observe.longest_silence,
+    observe.ObservedProgram, observe.NodeTrials, observe.Bounds, observe.served,
 )  # fmt: skip
 
 

@@ -156,7 +156,7 @@ class ExaminerEnd(QuietNode):
             if not all(map(self.count_services, served.services))
         ]  # fmt: skip
         return lacking + [
-            f"no client of the {used.kind} {used}" for used in (*task.calls, *task.uses)
+            f"no client of {used}" for used in (*task.calls, *task.uses)
             if not all(map(self.count_clients, used.services))
         ]  # fmt: skip
 

@@ -476,7 +476,8 @@ class ObservedNode:
         Raises:
             Failed: one is.
         """
-        ends = (self._task.publishes, self._task.subscribes, self._task.serves, self._task.calls)
+        task = self._task
+        ends = (task.publishes, task.subscribes, task.serves, task.calls, task.uses)
         found = sum(map(len, ends))
         if not self.wait(lambda: len(self._missing()) == found):
             missing = self._missing()
@@ -486,7 +487,7 @@ class ObservedNode:
                     ("a publisher on", self._task.publishes),
                     ("a subscription to", self._task.subscribes),
                     ("the service", self._task.serves),
-                    ("a client of", self._task.calls),
+                    ("a client of", [*task.calls, *task.uses]),
                 )
                 for noun in nouns
                 if not any(phrase.endswith(str(noun)) for phrase in missing)

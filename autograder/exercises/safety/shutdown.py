@@ -165,11 +165,8 @@ def _shut_down(
         )
         drove_on = "Before the goal was aborted they were told to drive again."
         require(not any(moved[stopped:]), ONLY_STOPS, drove_on)
-        if goal is not None:
-            how = goal.end or "not over"
-            require(
-                how == "aborted", "the drive is aborted", f"{SETTLES_S:g} s later it was {how}."
-            )
+        how = "aborted" if goal is None else goal.end or "not over"
+        require(how == "aborted", "the drive is aborted", f"{SETTLES_S:g} s later it was {how}.")
         afterwards = f"A goal of {AFTERWARDS_M} m that came afterwards drove the robot."
         require(not drives_afterwards(program), ONLY_STOPS, afterwards)
     except ProgramEnded:
